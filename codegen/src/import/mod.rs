@@ -1,0 +1,1 @@
+//! Readers of file formats. Nothing outside this module knows them.

@@ -1,0 +1,5 @@
+//! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
+
+pub mod diag;
+pub mod import;
+pub mod model;

@@ -1,0 +1,252 @@
+//! The checked description of a mechanism: what importers make and everything after them reads.
+//!
+//! SI units, radians. No file format and no symbolic expression is known here.
+
+/// A number of the description: folded into the code, or an argument of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// Known when the code is generated.
+    Const(f64),
+    /// Index into [`Model::params`].
+    Param(usize),
+}
+
+impl Value {
+    /// Zero.
+    pub const ZERO: Value = Value::Const(0.0);
+    /// One.
+    pub const ONE: Value = Value::Const(1.0);
+
+    /// The constant, if it is one.
+    pub fn constant(self) -> Option<f64> {
+        match self {
+            Value::Const(x) => Some(x),
+            Value::Param(_) => None,
+        }
+    }
+}
+
+/// Orientation of a frame in another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Rotation {
+    /// `Rz(yaw) Ry(pitch) Rx(roll)` from `[roll, pitch, yaw]`, radians.
+    Rpy([Value; 3]),
+    /// About an axis (any length but zero) by an angle, radians.
+    AxisAngle {
+        /// Direction of the axis.
+        axis: [f64; 3],
+        /// Angle.
+        angle: Value,
+    },
+}
+
+impl Rotation {
+    /// No rotation.
+    pub const NONE: Rotation = Rotation::Rpy([Value::ZERO; 3]);
+}
+
+/// Pose of a frame in another: origin (m) and orientation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Origin in the axes of the frame it is placed in, m.
+    pub xyz: [Value; 3],
+    /// Orientation.
+    pub rotation: Rotation,
+}
+
+impl Placement {
+    /// The frame itself.
+    pub const IDENTITY: Placement = Placement { xyz: [Value::ZERO; 3], rotation: Rotation::NONE };
+}
+
+/// A run-time parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Param {
+    /// Name, unique among the parameters.
+    pub name: String,
+    /// Value used where none is given.
+    pub default: f64,
+}
+
+/// A rigid body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Name, unique among bodies and frames.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: Value,
+    /// Centre of mass in the body frame, m.
+    pub com: [Value; 3],
+    /// Inertia about the centre of mass `[xx, yy, zz, xy, xz, yz]`, kg m², in the axes `inertia_axes`.
+    pub inertia: [Value; 6],
+    /// Axes of `inertia`, relative to those of the body.
+    pub inertia_axes: Rotation,
+}
+
+/// What a joint lets its child do. Axes are in the child frame, any length but zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointKind {
+    /// One turn.
+    Pin {
+        /// Axis of rotation.
+        axis: [f64; 3],
+    },
+    /// One slide.
+    Slider {
+        /// Direction of sliding.
+        axis: [f64; 3],
+    },
+    /// A slide along and a turn about the same axis, independent; coordinates in that order.
+    Cylindrical {
+        /// The axis.
+        axis: [f64; 3],
+    },
+    /// A turn with a proportional slide.
+    Helical {
+        /// The axis.
+        axis: [f64; 3],
+        /// Metres per radian.
+        pitch: Value,
+    },
+    /// A turn about `axes[0]`, then about `axes[1]`, which the first turn carries.
+    Universal {
+        /// Both axes at zero coordinates.
+        axes: [[f64; 3]; 2],
+    },
+    /// Two slides across and a turn about the normal.
+    Planar {
+        /// Normal of the plane.
+        normal: [f64; 3],
+    },
+    /// Any rotation.
+    Spherical,
+    /// Any motion.
+    Floating,
+    /// None.
+    Fixed,
+}
+
+impl JointKind {
+    /// Number of coordinates.
+    pub fn nq(&self) -> usize {
+        match self {
+            JointKind::Fixed => 0,
+            JointKind::Pin { .. } | JointKind::Slider { .. } | JointKind::Helical { .. } => 1,
+            JointKind::Cylindrical { .. } | JointKind::Universal { .. } => 2,
+            JointKind::Planar { .. } => 3,
+            JointKind::Spherical => 4,
+            JointKind::Floating => 7,
+        }
+    }
+
+    /// Number of velocities.
+    pub fn nv(&self) -> usize {
+        match self {
+            JointKind::Spherical => 3,
+            JointKind::Floating => 6,
+            other => other.nq(),
+        }
+    }
+}
+
+/// Where a joint's coordinates come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// From the state.
+    Free,
+    /// From inputs: position, rate and acceleration (a rheonomic drive).
+    Prescribed,
+    /// `q = ratio q_leader + offset`, both joints of one freedom; `leader` is a joint index and may itself mimic.
+    Mimic {
+        /// Index of the leading joint.
+        leader: usize,
+        /// Factor.
+        ratio: Value,
+        /// Offset, rad or m.
+        offset: Value,
+    },
+}
+
+/// A joint and its passive elements; vectors hold one entry per freedom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name, unique among the joints.
+    pub name: String,
+    /// Kind and axes.
+    pub kind: JointKind,
+    /// Body index of the parent, `None` for the ground.
+    pub parent: Option<usize>,
+    /// Body index of the child.
+    pub child: usize,
+    /// Child frame in the parent frame at zero coordinates.
+    pub placement: Placement,
+    /// Source of the coordinates.
+    pub motion: Motion,
+    /// Viscous damping per freedom, N m s/rad or N s/m.
+    pub damping: Vec<Value>,
+    /// Spring stiffness per freedom.
+    pub stiffness: Vec<Value>,
+    /// Rest position per freedom of the springs.
+    pub rest: Vec<Value>,
+    /// Reflected rotor inertia per freedom.
+    pub armature: Vec<Value>,
+}
+
+/// A named frame on a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Name, unique among bodies and frames.
+    pub name: String,
+    /// Body index, `None` for the ground.
+    pub body: Option<usize>,
+    /// Pose in the body frame.
+    pub placement: Placement,
+}
+
+/// Axes in which an external wrench is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WrenchAxes {
+    /// Those of the body.
+    Body,
+    /// Those of the ground.
+    World,
+}
+
+/// An external wrench `[force; moment]` at the origin of a body frame, given with every call.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wrench {
+    /// Name, unique among the wrenches.
+    pub name: String,
+    /// Body index.
+    pub body: usize,
+    /// Axes.
+    pub axes: WrenchAxes,
+}
+
+/// Gravity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gravity {
+    /// Part of the model, m/s² in ground axes.
+    Constant([Value; 3]),
+    /// Given with every call.
+    Input,
+}
+
+/// A checked tree: `joints` is depth first, every body is the child of exactly one joint, parents come first, mimic chains end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Model {
+    /// Name, an identifier.
+    pub name: String,
+    /// Run-time parameters.
+    pub params: Vec<Param>,
+    /// Gravity.
+    pub gravity: Gravity,
+    /// Bodies, in file order.
+    pub bodies: Vec<Body>,
+    /// Joints, depth first from the ground.
+    pub joints: Vec<Joint>,
+    /// Named frames beside those of the bodies.
+    pub frames: Vec<Frame>,
+    /// External wrenches.
+    pub wrenches: Vec<Wrench>,
+}

@@ -1,0 +1,1 @@
+//! The `mbd_model!` macro.
