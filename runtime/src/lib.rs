@@ -1,2 +1,27 @@
-//! Runtime.
+//! Sweeps, interpreter and integrators of the multibody project.
+//!
+//! `no_std`, no allocation on the hot path. Generated code needs [`System`], [`integrate`] and [`trig`] only; the tree,
+//! its workspace and the interpreter (feature `alloc`) live in vectors that are sized once.
 #![no_std]
+
+#[cfg(feature = "alloc")]
+extern crate alloc;
+
+pub mod integrate;
+#[cfg(feature = "alloc")]
+pub mod interp;
+mod scalar;
+pub mod spatial;
+#[cfg(feature = "alloc")]
+pub mod sweep;
+pub mod system;
+#[cfg(feature = "alloc")]
+pub mod tree;
+pub mod trig;
+#[cfg(feature = "alloc")]
+pub mod workspace;
+
+#[cfg(feature = "alloc")]
+pub use interp::Interpreter;
+pub use scalar::Scalar;
+pub use system::{Real, System};

@@ -1,0 +1,185 @@
+//! The interpreter: the sweeps run directly on numbers, for any tree.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::spatial::Motion;
+use crate::sweep::{FrameState, Inputs, Sweeps};
+use crate::system::System;
+use crate::tree::{Kind, Source, Tree};
+use crate::workspace::Workspace;
+use crate::Scalar;
+
+/// What is given beside the state; public, to be set between calls.
+#[derive(Clone, Debug)]
+pub struct InputValues<S> {
+    /// Joint forces, one for each velocity, N m or N.
+    pub tau: Vec<S>,
+    /// Prescribed positions.
+    pub drive_q: Vec<S>,
+    /// Prescribed rates.
+    pub drive_v: Vec<S>,
+    /// Prescribed accelerations; needed for accelerations and reactions only.
+    pub drive_a: Vec<S>,
+    /// External wrenches `[force; moment]`.
+    pub wrenches: Vec<[S; 6]>,
+    /// Gravity in ground axes, m/s².
+    pub gravity: [S; 3],
+}
+
+impl<S: Scalar> InputValues<S> {
+    /// As the sweeps take it.
+    pub fn view(&self) -> Inputs<'_, S> {
+        Inputs {
+            tau: &self.tau,
+            drive_q: &self.drive_q,
+            drive_v: &self.drive_v,
+            drive_a: &self.drive_a,
+            wrenches: &self.wrenches,
+            gravity: self.gravity,
+        }
+    }
+}
+
+/// Runs the sweeps on numbers. Allocates when it is made, never afterwards.
+///
+/// All calls take slices in the order of the state; a slice of another length than [`Tree::dims`] says is a programming
+/// error and panics.
+#[derive(Clone, Debug)]
+pub struct Interpreter<S> {
+    /// Regrouped: everything but reactions.
+    tree: Tree<S>,
+    /// As described: reactions.
+    physical: Tree<S>,
+    work: Workspace<S>,
+    /// Inputs of the next call.
+    pub inputs: InputValues<S>,
+    v: Vec<S>,
+    quaternions: Vec<usize>,
+    neutral: Vec<S>,
+}
+
+impl<S: Scalar> Interpreter<S> {
+    /// An interpreter of a tree as it was described (not regrouped), with zero inputs and the given gravity.
+    pub fn new(physical: Tree<S>, gravity: [S; 3]) -> Self {
+        let tree = physical.regrouped();
+        let dims = tree.dims;
+        let o = S::zero();
+        let (mut quaternions, mut drive_q) = (Vec::new(), vec![o; dims.drive_q]);
+        let mut neutral = vec![o; dims.nq];
+        for node in &tree.nodes {
+            let offset = match node.kind {
+                Kind::Spherical => 0,
+                Kind::Floating => 3,
+                _ => continue,
+            };
+            match node.source {
+                Source::State { q, .. } => {
+                    quaternions.push(q + offset);
+                    neutral[q + offset + 3] = S::one();
+                }
+                Source::Drive { q, .. } => drive_q[q + offset + 3] = S::one(),
+            }
+        }
+        let inputs = InputValues {
+            tau: vec![o; dims.nv],
+            drive_q,
+            drive_v: vec![o; dims.drive_v],
+            drive_a: vec![o; dims.drive_v],
+            wrenches: vec![[o; 6]; dims.wrenches],
+            gravity,
+        };
+        Interpreter { work: Workspace::new(&tree), v: vec![o; dims.nv], tree, physical, inputs, quaternions, neutral }
+    }
+
+    /// The tree that is run.
+    pub fn tree(&self) -> &Tree<S> {
+        &self.tree
+    }
+
+    /// `(q, p) → (v, q̇, ṗ)`.
+    pub fn rates_into(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.rates(q, p, &self.inputs.view(), &mut self.work, v, qd, pd);
+    }
+
+    /// `(q, p) → v`.
+    pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.velocities(q, p, &self.inputs.view(), &mut self.work, v);
+    }
+
+    /// `(q, v) → p`.
+    pub fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.momenta(q, v, &self.inputs.view(), &mut self.work, p);
+    }
+
+    /// `(q, p) → (kinetic, potential)`, J.
+    pub fn energy(&mut self, q: &[S], p: &[S]) -> (S, S) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.energy(q, p, &self.inputs.view(), &mut self.work, &mut self.v)
+    }
+
+    /// `(q, v) → v̇`.
+    pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
+    }
+
+    /// `(q, v) → (v̇, reaction wrenches)`: `[force; moment]` transmitted by every joint to its child, in the child's
+    /// body frame, one for each entry of [`Tree::joint_nodes`].
+    pub fn reactions(&mut self, q: &[S], v: &[S], a: &mut [S], wrenches: &mut [[S; 6]]) {
+        let sweeps = Sweeps { tree: &self.physical, trace: &() };
+        sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
+        sweeps.reactions(&self.work, wrenches);
+    }
+
+    /// `q → M`, `nv × nv`, row by row.
+    pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.mass_matrix(q, &self.inputs.view(), &mut self.work, m);
+    }
+
+    /// `(q, v) →` pose and velocity of every frame of [`Tree::frames`].
+    pub fn frames(&mut self, q: &[S], v: &[S], out: &mut [FrameState<S>]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        let frames = self.tree.frames.iter().zip(out);
+        sweeps.frame_states(q, v, &self.inputs.view(), &mut self.work, frames);
+    }
+}
+
+impl<S: Scalar> FrameState<S> {
+    /// The ground itself.
+    pub fn ground() -> Self {
+        let (o, one) = (S::zero(), S::one());
+        FrameState { rotation: [[one, o, o], [o, one, o], [o, o, one]], position: [o; 3], velocity: Motion::zero() }
+    }
+}
+
+impl<S: Scalar> System for Interpreter<S> {
+    type Scalar = S;
+    type Coordinates = Vec<S>;
+    type Momenta = Vec<S>;
+
+    fn neutral(&self) -> Vec<S> {
+        self.neutral.clone()
+    }
+
+    fn rest(&self) -> Vec<S> {
+        vec![S::zero(); self.tree.dims.nv]
+    }
+
+    fn quaternions(&self) -> &[usize] {
+        &self.quaternions
+    }
+
+    fn rates(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.rates(q, p, &self.inputs.view(), &mut self.work, &mut self.v, qd, pd);
+    }
+
+    fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {
+        Sweeps { tree: &self.tree, trace: &() }.coordinate_rates(q, v, qd);
+    }
+}

@@ -1,0 +1,115 @@
+//! Rigid and articulated inertia.
+
+use super::{add3, cross, Force, Mat3, Motion, Vec3};
+use crate::Scalar;
+
+/// Place of entry `(i, j)` of a symmetric matrix stored as `[xx, xy, xz, yy, yz, zz]`.
+pub const SYM: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
+
+/// Inertia of a rigid body at a frame: mass (kg), first moment `m c` (kg m), inertia about the frame origin (kg m²) as
+/// `[xx, xy, xz, yy, yz, zz]`. Ten numbers in which the equations of motion are linear.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RigidInertia<S> {
+    /// Mass.
+    pub mass: S,
+    /// First moment.
+    pub moment: Vec3<S>,
+    /// Inertia about the frame origin.
+    pub inertia: [S; 6],
+}
+
+/// A symmetric 6×6 inertia `[[A, Hᵀ], [H, J]]`; `H` maps linear velocity to angular momentum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArticulatedInertia<S> {
+    /// Linear block.
+    pub a: [S; 6],
+    /// Coupling block, `h[angular][linear]`.
+    pub h: Mat3<S>,
+    /// Angular block.
+    pub j: [S; 6],
+}
+
+impl<S: Scalar> RigidInertia<S> {
+    /// No body.
+    pub fn zero() -> Self {
+        let o = S::zero();
+        RigidInertia { mass: o, moment: [o; 3], inertia: [o; 6] }
+    }
+
+    /// Sum of two bodies at one frame.
+    pub fn plus(&self, o: &Self) -> Self {
+        RigidInertia {
+            mass: self.mass + o.mass,
+            moment: add3(self.moment, o.moment),
+            inertia: core::array::from_fn(|k| self.inertia[k] + o.inertia[k]),
+        }
+    }
+
+    /// Momentum `M Ω`.
+    pub fn momentum(&self, w: &Motion<S>) -> Force<S> {
+        let (m, s, i) = (self.mass, self.moment, &self.inertia);
+        let spin: Vec3<S> =
+            core::array::from_fn(|k| i[SYM[k][0]] * w.ang[0] + i[SYM[k][1]] * w.ang[1] + i[SYM[k][2]] * w.ang[2]);
+        let drag = cross(w.ang, s);
+        Force { lin: core::array::from_fn(|k| m * w.lin[k] + drag[k]), ang: add3(cross(s, w.lin), spin) }
+    }
+
+    /// As a general 6×6 inertia.
+    pub fn articulated(&self) -> ArticulatedInertia<S> {
+        let (o, m, [x, y, z]) = (S::zero(), self.mass, self.moment);
+        ArticulatedInertia { a: [m, o, o, m, o, m], h: [[o, -z, y], [z, o, -x], [-y, x, o]], j: self.inertia }
+    }
+
+    /// The ten numbers back from a 6×6 inertia that is known to be rigid.
+    pub fn from_articulated(m: &ArticulatedInertia<S>) -> Self {
+        RigidInertia { mass: m.a[0], moment: [m.h[2][1], m.h[0][2], m.h[1][0]], inertia: m.j }
+    }
+}
+
+impl<S: Scalar> ArticulatedInertia<S> {
+    /// No inertia.
+    pub fn zero() -> Self {
+        let o = S::zero();
+        ArticulatedInertia { a: [o; 6], h: [[o; 3]; 3], j: [o; 6] }
+    }
+
+    /// Sum.
+    pub fn plus(&self, o: &Self) -> Self {
+        ArticulatedInertia {
+            a: core::array::from_fn(|k| self.a[k] + o.a[k]),
+            h: core::array::from_fn(|i| core::array::from_fn(|k| self.h[i][k] + o.h[i][k])),
+            j: core::array::from_fn(|k| self.j[k] + o.j[k]),
+        }
+    }
+
+    /// Entry `(i, k)` of the 6×6 matrix.
+    pub fn get(&self, i: usize, k: usize) -> S {
+        match (i < 3, k < 3) {
+            (true, true) => self.a[SYM[i][k]],
+            (false, false) => self.j[SYM[i - 3][k - 3]],
+            (false, true) => self.h[i - 3][k],
+            (true, false) => self.h[k - 3][i],
+        }
+    }
+
+    /// Entry `(i, k)` and its mirror image, to be changed.
+    pub fn get_mut(&mut self, i: usize, k: usize) -> &mut S {
+        match (i < 3, k < 3) {
+            (true, true) => &mut self.a[SYM[i][k]],
+            (false, false) => &mut self.j[SYM[i - 3][k - 3]],
+            (false, true) => &mut self.h[i - 3][k],
+            (true, false) => &mut self.h[k - 3][i],
+        }
+    }
+
+    /// Column `k`.
+    pub fn column(&self, k: usize) -> Force<S> {
+        Force { lin: core::array::from_fn(|i| self.get(i, k)), ang: core::array::from_fn(|i| self.get(i + 3, k)) }
+    }
+
+    /// `M Ω`.
+    pub fn times(&self, v: &Motion<S>) -> Force<S> {
+        let row = |i: usize| (1..6).fold(self.get(i, 0) * v.get(0), |sum, k| sum + self.get(i, k) * v.get(k));
+        Force { lin: core::array::from_fn(row), ang: core::array::from_fn(|i| row(i + 3)) }
+    }
+}

@@ -1,0 +1,15 @@
+//! Spatial algebra in six dimensions: `[linear; angular]`, in body axes, taken at the frame origin.
+//!
+//! Transforms stay factored into elementary steps (a turn about, a shift along one axis, or a full rotation): each is
+//! applied by itself, so the zeros of the operands survive, which a 6×6 matrix would lose.
+
+mod inertia;
+mod vector;
+mod xform;
+
+pub use inertia::{ArticulatedInertia, RigidInertia, SYM};
+pub use vector::{add3, cross, dot3, dot4, scale3, Force, Motion, Vec3};
+pub use xform::{quaternion_matrix, quaternion_rate, Axis, Step};
+
+/// A 3×3 matrix, row by row.
+pub type Mat3<S> = [[S; 3]; 3];

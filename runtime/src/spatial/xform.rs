@@ -1,0 +1,271 @@
+//! Elementary transforms and how each quantity passes through them.
+//!
+//! A placement is a list of steps from the parent frame to the child frame. Velocities go down the list
+//! ([`Step::motion`]), momenta, wrenches and inertia come back up it ([`Step::force`], [`Step::inertia`]).
+
+use super::{cross, ArticulatedInertia, Force, Mat3, Motion, Vec3, SYM};
+use crate::Scalar;
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// x.
+    X,
+    /// y.
+    Y,
+    /// z.
+    Z,
+}
+
+impl Axis {
+    /// Indices `(a, b, n)`, cyclic, `n` the axis itself.
+    #[inline]
+    pub fn cyclic(self) -> (usize, usize, usize) {
+        match self {
+            Axis::X => (1, 2, 0),
+            Axis::Y => (2, 0, 1),
+            Axis::Z => (0, 1, 2),
+        }
+    }
+}
+
+/// One elementary transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step<S> {
+    /// Rotation about an axis by the angle with cosine `c` and sine `s`.
+    Turn {
+        /// Axis.
+        axis: Axis,
+        /// Cosine.
+        c: S,
+        /// Sine.
+        s: S,
+    },
+    /// Displacement by `r` m along an axis.
+    Shift {
+        /// Axis.
+        axis: Axis,
+        /// Displacement.
+        r: S,
+    },
+    /// Rotation by a matrix that takes child components to parent components.
+    Rotate(Mat3<S>),
+}
+
+fn pair<S: Scalar>(c: S, s: S, x: S, y: S) -> (S, S) {
+    (c * x - s * y, s * x + c * y)
+}
+
+fn pair_back<S: Scalar>(c: S, s: S, x: S, y: S) -> (S, S) {
+    (c * x + s * y, c * y - s * x)
+}
+
+fn up3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
+    core::array::from_fn(|i| r[i][0] * x[0] + r[i][1] * x[1] + r[i][2] * x[2])
+}
+
+fn down3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
+    core::array::from_fn(|i| r[0][i] * x[0] + r[1][i] * x[1] + r[2][i] * x[2])
+}
+
+fn full<S: Scalar>(m: &[S; 6]) -> Mat3<S> {
+    core::array::from_fn(|i| core::array::from_fn(|k| m[SYM[i][k]]))
+}
+
+/// `R M Rᵀ` for a general matrix.
+fn congruence<S: Scalar>(r: &Mat3<S>, m: &Mat3<S>) -> Mat3<S> {
+    let rm: Mat3<S> = core::array::from_fn(|i| down3(m, r[i]));
+    core::array::from_fn(|i| core::array::from_fn(|k| rm[i][0] * r[k][0] + rm[i][1] * r[k][1] + rm[i][2] * r[k][2]))
+}
+
+/// Upper triangle of `R M Rᵀ` for a symmetric matrix: only six entries are formed.
+fn congruence_sym<S: Scalar>(r: &Mat3<S>, m: &[S; 6]) -> [S; 6] {
+    let m = full(m);
+    let rm: Mat3<S> = core::array::from_fn(|i| down3(&m, r[i]));
+    let at = |i: usize, k: usize| rm[i][0] * r[k][0] + rm[i][1] * r[k][1] + rm[i][2] * r[k][2];
+    [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
+}
+
+/// Rotation of a symmetric 2×2 block through `t = s (xx − yy) + 2 c xy`.
+fn turn_sym<S: Scalar>(c: S, s: S, m: &mut [S; 6], a: usize, b: usize, n: usize) {
+    let (aa, ab, bb) = (SYM[a][a], SYM[a][b], SYM[b][b]);
+    let t = s * (m[aa] - m[bb]) + (c + c) * m[ab];
+    let st = s * t;
+    let xy = c * t - m[ab];
+    m[aa] = m[aa] - st;
+    m[bb] = m[bb] + st;
+    m[ab] = xy;
+    (m[SYM[a][n]], m[SYM[b][n]]) = pair(c, s, m[SYM[a][n]], m[SYM[b][n]]);
+}
+
+/// Rotation of a general matrix about axis `n`, its 2×2 block through `t = s (xx − yy) + c (xy + yx)`.
+fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: usize) {
+    let t = s * (h[a][a] - h[b][b]) + c * (h[a][b] + h[b][a]);
+    let (st, ct) = (s * t, c * t);
+    let (xy, yx) = (ct - h[b][a], ct - h[a][b]);
+    h[a][a] = h[a][a] - st;
+    h[b][b] = h[b][b] + st;
+    h[a][b] = xy;
+    h[b][a] = yx;
+    (h[a][n], h[b][n]) = pair(c, s, h[a][n], h[b][n]);
+    (h[n][a], h[n][b]) = pair(c, s, h[n][a], h[n][b]);
+}
+
+impl<S: Scalar> Step<S> {
+    /// Components of a free vector of the parent in the child's axes.
+    pub fn vector(&self, x: Vec3<S>) -> Vec3<S> {
+        let mut x = x;
+        match self {
+            Step::Turn { axis, c, s } => {
+                let (a, b, _) = axis.cyclic();
+                (x[a], x[b]) = pair_back(*c, *s, x[a], x[b]);
+                x
+            }
+            Step::Shift { .. } => x,
+            Step::Rotate(r) => down3(r, x),
+        }
+    }
+
+    /// Components of a free vector of the child in the parent's axes.
+    pub fn vector_back(&self, x: Vec3<S>) -> Vec3<S> {
+        let mut x = x;
+        match self {
+            Step::Turn { axis, c, s } => {
+                let (a, b, _) = axis.cyclic();
+                (x[a], x[b]) = pair(*c, *s, x[a], x[b]);
+                x
+            }
+            Step::Shift { .. } => x,
+            Step::Rotate(r) => up3(r, x),
+        }
+    }
+
+    /// Velocity of the parent frame as seen at the child frame, in child axes: `X Ω`.
+    pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
+        match self {
+            Step::Shift { axis, r } => {
+                let (a, b, _) = axis.cyclic();
+                let mut m = *m;
+                m.lin[a] = m.lin[a] + *r * m.ang[b];
+                m.lin[b] = m.lin[b] - *r * m.ang[a];
+                m
+            }
+            _ => Motion { lin: self.vector(m.lin), ang: self.vector(m.ang) },
+        }
+    }
+
+    /// Momentum or wrench of the child at the parent frame: `Xᵀ P`.
+    pub fn force(&self, f: &Force<S>) -> Force<S> {
+        match self {
+            Step::Shift { axis, r } => {
+                let (a, b, _) = axis.cyclic();
+                let mut f = *f;
+                f.ang[a] = f.ang[a] - *r * f.lin[b];
+                f.ang[b] = f.ang[b] + *r * f.lin[a];
+                f
+            }
+            _ => Force { lin: self.vector_back(f.lin), ang: self.vector_back(f.ang) },
+        }
+    }
+
+    /// Wrench of the parent expressed at the child frame: the inverse of [`Step::force`].
+    pub fn force_back(&self, f: &Force<S>) -> Force<S> {
+        match self {
+            Step::Shift { axis, r } => Step::Shift { axis: *axis, r: -*r }.force(f),
+            _ => Force { lin: self.vector(f.lin), ang: self.vector(f.ang) },
+        }
+    }
+
+    /// First moment of mass `m` in the parent frame.
+    pub fn moment(&self, m: S, s: Vec3<S>) -> Vec3<S> {
+        match self {
+            Step::Shift { axis, r } => {
+                let (_, _, n) = axis.cyclic();
+                let mut s = s;
+                s[n] = s[n] + m * *r;
+                s
+            }
+            _ => self.vector_back(s),
+        }
+    }
+
+    /// Inertia of the child at the parent frame: `Xᵀ M X`.
+    pub fn inertia(&self, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
+        match self {
+            Step::Turn { axis, c, s } => {
+                let (a, b, n) = axis.cyclic();
+                let mut m = *m;
+                turn_sym(*c, *s, &mut m.a, a, b, n);
+                turn_general(*c, *s, &mut m.h, a, b, n);
+                turn_sym(*c, *s, &mut m.j, a, b, n);
+                m
+            }
+            Step::Shift { axis, r } => shift_inertia(*axis, *r, m),
+            Step::Rotate(r) => {
+                ArticulatedInertia { a: congruence_sym(r, &m.a), h: congruence(r, &m.h), j: congruence_sym(r, &m.j) }
+            }
+        }
+    }
+
+    /// Appends the step to the pose `(R, r)` of a frame.
+    pub fn pose(&self, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
+        match self {
+            Step::Turn { axis, c, s } => {
+                let (a, b, _) = axis.cyclic();
+                for row in rot.iter_mut() {
+                    (row[a], row[b]) = pair_back(*c, *s, row[a], row[b]);
+                }
+            }
+            Step::Shift { axis, r } => {
+                let (_, _, n) = axis.cyclic();
+                for (x, row) in pos.iter_mut().zip(rot.iter()) {
+                    *x = *x + *r * row[n];
+                }
+            }
+            Step::Rotate(m) => {
+                for row in rot.iter_mut() {
+                    *row = down3(m, *row);
+                }
+            }
+        }
+    }
+}
+
+/// `H'a* = Ha* − r A b*`, `H'b* = Hb* + r A a*`, then `J` from old and new `H`: no product is formed twice.
+fn shift_inertia<S: Scalar>(axis: Axis, r: S, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
+    let (a, b, n) = axis.cyclic();
+    let mut o = *m;
+    for k in 0..3 {
+        o.h[a][k] = m.h[a][k] - r * m.a[SYM[b][k]];
+        o.h[b][k] = m.h[b][k] + r * m.a[SYM[a][k]];
+    }
+    o.j[SYM[a][n]] = m.j[SYM[a][n]] - r * m.h[n][b];
+    o.j[SYM[b][n]] = m.j[SYM[b][n]] + r * m.h[n][a];
+    o.j[SYM[a][a]] = m.j[SYM[a][a]] - r * (m.h[a][b] + o.h[a][b]);
+    o.j[SYM[b][b]] = m.j[SYM[b][b]] + r * (m.h[b][a] + o.h[b][a]);
+    o.j[SYM[a][b]] = m.j[SYM[a][b]] + r * (m.h[a][a] - o.h[b][b]);
+    o
+}
+
+/// `R Rᵀ`-free rotation matrix of a unit quaternion `(x, y, z, w)`, child components to parent components (A.55).
+pub fn quaternion_matrix<S: Scalar>(q: [S; 4]) -> Mat3<S> {
+    let [x, y, z, w] = q;
+    let (x2, y2, z2) = (x + x, y + y, z + z);
+    let (xx, yy, zz) = (x * x2, y * y2, z * z2);
+    let (xy, xz, yz) = (x * y2, x * z2, y * z2);
+    let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+    let one = S::one();
+    [[one - (yy + zz), xy - wz, xz + wy], [xy + wz, one - (xx + zz), yz - wx], [xz - wy, yz + wx, one - (xx + yy)]]
+}
+
+/// Rate of a unit quaternion whose frame turns with `w` rad/s in its own axes (A.58).
+pub fn quaternion_rate<S: Scalar>(q: [S; 4], w: Vec3<S>) -> [S; 4] {
+    let half = S::constant(0.5);
+    let v = cross([q[0], q[1], q[2]], w);
+    [
+        half * (q[3] * w[0] + v[0]),
+        half * (q[3] * w[1] + v[1]),
+        half * (q[3] * w[2] + v[2]),
+        -(half * (q[0] * w[0] + q[1] * w[1] + q[2] * w[2])),
+    ]
+}

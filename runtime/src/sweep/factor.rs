@@ -1,0 +1,162 @@
+//! Articulated inertia, leaves to base: every freedom is eliminated by itself, a multi-freedom joint one column after
+//! the other, which is the `LDLᵀ` of its `Mj`.
+
+use super::{Quantity, Sweeps, Trace};
+use crate::spatial::{ArticulatedInertia, Force};
+use crate::tree::{Freedom, Source};
+use crate::workspace::{Factor, Pivot, Poses};
+use crate::Scalar;
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// `M*`, `U`, `Mj`, `M'` of every node (4.48, 4.44).
+    pub fn factor(&self, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
+        let n = self.tree.nodes.len();
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            f.m[i] = node.inertia.articulated();
+        }
+        f.columns.fill(Force::zero());
+        f.gram.fill(S::zero());
+        for i in (0..n).rev() {
+            let node = &self.tree.nodes[i];
+            self.trace.at(Some(i), Quantity::Pivot);
+            let mut m = f.m[i]; // M*_i (4.48)
+            for (k, &g) in node.solve_before.iter().enumerate() {
+                self.solve_shared(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
+            }
+            for k in 0..node.kind.nv() {
+                self.eliminate(i, k, first[i] + k, &mut m, f);
+            }
+            for (k, &g) in node.solve_after.iter().enumerate() {
+                self.solve_shared(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
+            }
+            f.m[i] = m; // M'_i (4.44)
+            let Some(parent) = node.parent else { continue };
+            self.trace.at(Some(i), Quantity::Inertia);
+            let carried = self.steps(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+            f.m[parent] = f.m[parent].plus(&carried);
+            for &g in &node.open {
+                let column = self.force_out(poses, i, &f.columns[g * n + i]);
+                f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
+            }
+        }
+        let ground = &self.tree.solve_at_ground;
+        for (k, &g) in ground.iter().enumerate() {
+            self.trace.at(None, Quantity::Pivot);
+            let mut nothing = ArticulatedInertia::zero();
+            self.solve_shared(g, None, ground[k + 1..].iter().copied(), &mut nothing, f);
+        }
+    }
+
+    /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of a shared coordinate.
+    fn eliminate(&self, i: usize, k: usize, freedom: usize, m: &mut ArticulatedInertia<S>, f: &mut Factor<S>) {
+        let node = &self.tree.nodes[i];
+        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        let e = node.kind.axis(k);
+        let armature = node.passive[k].armature;
+        let u = column(&e, m); // U = M* E
+        for h in Self::open_after(node, 0) {
+            f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]);
+        }
+        if let Some(g) = node.shared {
+            let a = node.ratio;
+            let old = f.cross[freedom * ng + g];
+            let column = f.columns[g * n + i].plus(&u.times(a));
+            let rotor = a * a * armature;
+            f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
+            for h in Self::open_after(node, 0).filter(|&h| h != g) {
+                let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
+                f.gram[g * ng + h] = x;
+                f.gram[h * ng + g] = x;
+            }
+            f.columns[g * n + i] = column;
+            return;
+        }
+        if let Source::Drive { .. } = node.source {
+            f.pivots[freedom] = Pivot { u, k: Force::zero(), rho: S::zero(), armature };
+            return;
+        }
+        let pivot = reduce(&e, u, armature, m);
+        for h in Self::open_after(node, 0) {
+            let c = f.cross[freedom * ng + h];
+            f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
+            for h2 in Self::open_after(node, 0) {
+                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
+            }
+        }
+        f.pivots[freedom] = pivot;
+    }
+
+    /// Eliminates shared coordinate `g` at node `i` (`None`: the ground), `open` being those that stay open.
+    fn solve_shared(
+        &self,
+        g: usize,
+        i: Option<usize>,
+        open: impl Iterator<Item = usize> + Clone,
+        m: &mut ArticulatedInertia<S>,
+        f: &mut Factor<S>,
+    ) {
+        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        let u = i.map_or(Force::zero(), |i| f.columns[g * n + i]);
+        let rho = S::one() / f.gram[g * ng + g];
+        let k = u.times(rho);
+        for a in 0..6 {
+            for b in a..6 {
+                *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
+            }
+        }
+        for h in open.clone() {
+            f.shared_cross[g * ng + h] = f.gram[g * ng + h];
+        }
+        for h in open.clone() {
+            let c = f.shared_cross[g * ng + h];
+            if let Some(i) = i {
+                f.columns[h * n + i] = f.columns[h * n + i].minus(&k.times(c));
+            }
+            for h2 in open.clone() {
+                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (rho * f.shared_cross[g * ng + h2]);
+            }
+        }
+        f.shared[g] = Pivot { u, k, rho, armature: S::zero() };
+    }
+}
+
+/// `U = M* E`.
+fn column<S: Scalar>(e: &Freedom<S>, m: &ArticulatedInertia<S>) -> Force<S> {
+    match e {
+        Freedom::Unit(k) => m.column(*k),
+        Freedom::Screw(h) => m.column(5).plus(&m.column(2).times(*h)),
+    }
+}
+
+/// `M' = M* − U Mj⁻¹ Uᵀ` (4.44). The row along `E` is known: `EᵀM' = armature · kᵀ`, zero without a rotor.
+fn reduce<S: Scalar>(e: &Freedom<S>, u: Force<S>, armature: S, m: &mut ArticulatedInertia<S>) -> Pivot<S> {
+    let rho = S::one() / (e.dot(&u) + armature); // Mj⁻¹
+    let mut k = u.times(rho);
+    let known = match e {
+        Freedom::Unit(z) => *z,
+        Freedom::Screw(_) => 5,
+    };
+    let along = S::one() - armature * rho; // E · k
+    *k.get_mut(known) = match e {
+        Freedom::Unit(_) => along,
+        Freedom::Screw(h) => along - *h * k.lin[2],
+    };
+    for a in 0..6 {
+        for b in a..6 {
+            if a != known && b != known {
+                *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
+            }
+        }
+    }
+    for b in (0..6).filter(|&b| b != known) {
+        *m.get_mut(known, b) = match e {
+            Freedom::Unit(_) => armature * k.get(b),
+            Freedom::Screw(h) => armature * k.get(b) - *h * m.get(2, b),
+        };
+    }
+    *m.get_mut(known, known) = match e {
+        Freedom::Unit(_) => armature * k.get(known),
+        Freedom::Screw(h) => armature * k.get(known) - *h * m.get(2, known),
+    };
+    Pivot { u, k, rho, armature }
+}

@@ -1,0 +1,95 @@
+//! Gravity by first moments, external wrenches, springs.
+
+use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::{add3, cross, dot3, Force};
+use crate::tree::WrenchAxes;
+use crate::workspace::Workspace;
+use crate::Scalar;
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Everything [`Sweeps::momentum_rates`] needs of gravity and wrenches.
+    pub(super) fn loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
+        self.gravity_moments(w);
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            self.trace.at(Some(i), Quantity::Load);
+            let g = node.parent.map_or(u.gravity, |p| w.loads.gravity[p]);
+            w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
+        }
+        self.wrench_loads(u, w);
+        if self.tree.wrenches.is_empty() {
+            return;
+        }
+        w.loads.total.copy_from_slice(&w.loads.own);
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.trace.at(Some(i), Quantity::Load);
+            if let Some(p) = self.tree.nodes[i].parent {
+                let out = self.force_out(&w.poses, i, &w.loads.total[i]);
+                w.loads.total[p] = w.loads.total[p].plus(&out); // T*_i (4.22)
+            }
+        }
+    }
+
+    /// First moment and mass of every subtree: `s_i = m c + Σ (R s_c + m_c r)`.
+    pub(super) fn gravity_moments(&self, w: &mut Workspace<S>) {
+        w.loads.ground_moment = self.tree.ground_moment;
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            w.loads.moment[i] = node.inertia.moment;
+            w.loads.mass[i] = node.inertia.mass;
+        }
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.trace.at(Some(i), Quantity::Load);
+            let mass = w.loads.mass[i];
+            let out = self.steps(&w.poses, i).rev().fold(w.loads.moment[i], |s, step| step.moment(mass, s));
+            match self.tree.nodes[i].parent {
+                Some(p) => {
+                    w.loads.moment[p] = add3(w.loads.moment[p], out);
+                    w.loads.mass[p] = w.loads.mass[p] + mass;
+                }
+                None => w.loads.ground_moment = add3(w.loads.ground_moment, out),
+            }
+        }
+    }
+
+    /// External wrenches at the nodes they act on.
+    pub(super) fn wrench_loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
+        if self.tree.wrenches.is_empty() {
+            return;
+        }
+        w.loads.own.fill(Force::zero());
+        for (wrench, given) in self.tree.wrenches.iter().zip(u.wrenches) {
+            let Some(node) = wrench.frame.node else { continue };
+            self.trace.at(Some(node), Quantity::Load);
+            let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
+            if wrench.axes == WrenchAxes::Ground {
+                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).chain(&wrench.frame.place);
+                for step in path {
+                    f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
+                }
+            }
+            let f = wrench.frame.place.iter().rev().fold(f, |f, step| step.force(&f));
+            w.loads.own[node] = w.loads.own[node].plus(&f);
+        }
+    }
+
+    /// `V = −g · s` and the springs.
+    pub(super) fn potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
+        self.trace.at(None, Quantity::Energy);
+        let mut potential = -dot3(u.gravity, w.loads.ground_moment);
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            self.trace.at(Some(i), Quantity::Energy);
+            if node.kind.has_rates() {
+                let passive = &node.passive[0];
+                let stretch = w.poses.coordinate[i] - passive.rest;
+                potential = potential + S::constant(0.5) * passive.stiffness * stretch * stretch;
+            }
+        }
+        potential
+    }
+
+    /// Gravity's wrench on the subtree of node `i`, in its frame: `(m g, s × g)`.
+    pub(super) fn weight(&self, w: &Workspace<S>, i: usize) -> Force<S> {
+        let g = w.loads.gravity[i];
+        let m = w.loads.mass[i];
+        Force { lin: [m * g[0], m * g[1], m * g[2]], ang: cross(w.loads.moment[i], g) }
+    }
+}

@@ -1,0 +1,182 @@
+//! The sweeps, each written once, over any [`Scalar`].
+//!
+//! Letters and equation numbers are those of J. Naudet, *Forward Dynamics of Multibody Systems: A Recursive Hamiltonian
+//! Approach* (2005). Joints drop what their structure makes zero (`M'E = 0`, `EᵀD' = p` are built in, not computed).
+//!
+//! A coordinate shared by several joints (a mimic) keeps its column `F = M* E` open while the sweep goes on inward, and
+//! is eliminated where all its joints have met: exact, and still one pass.
+
+mod articulate;
+mod factor;
+mod kinematics;
+mod loads;
+mod matrix;
+mod momentum;
+mod rates;
+mod solve;
+
+pub use kinematics::FrameState;
+
+use crate::spatial::{Force, Motion, Step};
+use crate::tree::{Node, Tree};
+use crate::workspace::Workspace;
+use crate::Scalar;
+
+/// What a sweep is about to compute; a symbolic run labels its nodes with it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Quantity {
+    /// Sines, cosines, rotation matrices.
+    Pose,
+    /// `M*`, `M'`.
+    Inertia,
+    /// `U`, `Mj`, `k`.
+    Pivot,
+    /// `D`, `D'`.
+    Remainder,
+    /// `Ω̂`, `Ω`.
+    Velocity,
+    /// `q̇` or `ν`.
+    Rate,
+    /// `Ω̇`, `q̈`.
+    Acceleration,
+    /// `P`, `P*`.
+    Momentum,
+    /// `ṗ`.
+    MomentumRate,
+    /// Gravity and wrenches.
+    Load,
+    /// Energies.
+    Energy,
+    /// Mass matrix.
+    MassMatrix,
+    /// Placements of frames.
+    Placement,
+    /// Reaction wrenches.
+    Reaction,
+}
+
+/// Is told where the sweep stands. `()` listens to nothing.
+pub trait Trace {
+    /// The next operations belong to this node (`None`: the ground) and quantity.
+    fn at(&self, _node: Option<usize>, _what: Quantity) {}
+}
+
+impl Trace for () {}
+
+/// What is given with every call beside the state.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a, S> {
+    /// Joint forces `τ`, one for each velocity; empty where none act.
+    pub tau: &'a [S],
+    /// Prescribed positions.
+    pub drive_q: &'a [S],
+    /// Prescribed rates.
+    pub drive_v: &'a [S],
+    /// Prescribed accelerations.
+    pub drive_a: &'a [S],
+    /// External wrenches `[force; moment]`.
+    pub wrenches: &'a [[S; 6]],
+    /// Gravity in ground axes, m/s².
+    pub gravity: [S; 3],
+}
+
+/// The sweeps over one tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweeps<'a, S, T = ()> {
+    /// The mechanism.
+    pub tree: &'a Tree<S>,
+    /// Listener.
+    pub trace: &'a T,
+}
+
+impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
+    /// `X Ω` from the parent frame to node `i`.
+    fn motion_in(&self, w: &crate::workspace::Poses<S>, i: usize, m: &Motion<S>) -> Motion<S> {
+        self.steps(w, i).fold(*m, |m, step| step.motion(&m))
+    }
+
+    /// `Xᵀ P` from node `i` to its parent frame.
+    fn force_out(&self, w: &crate::workspace::Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
+        self.steps(w, i).rev().fold(*f, |f, step| step.force(&f))
+    }
+
+    /// Steps from the parent frame to node `i`.
+    fn steps<'b>(
+        &'b self,
+        w: &'b crate::workspace::Poses<S>,
+        i: usize,
+    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+        self.tree.nodes[i].place.iter().chain(w.joint[i].get())
+    }
+
+    /// Shared coordinates still open after position `k` of `solve_before`.
+    fn open_before(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
+        node.solve_before[k..].iter().chain(&node.solve_after).chain(&node.open).copied()
+    }
+
+    /// Shared coordinates still open after position `k` of `solve_after`.
+    fn open_after(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
+        node.solve_after[k..].iter().chain(&node.open).copied()
+    }
+
+    /// Momenta from velocities, `p = M(q) v`, without forming `M`. `p` has one entry for each velocity.
+    pub fn momenta(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, p: &mut [S]) {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        self.velocity_kinematics(v, u.drive_v, w);
+        self.momentum_sweep(w, p);
+    }
+
+    /// Velocities from momenta.
+    pub fn velocities(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        self.factor(&w.poses, &w.first, &mut w.factor);
+        self.solve_velocities(p, u, w);
+        self.collect_rates(&w.velocity, &w.first, v);
+    }
+
+    /// Rates of the state: velocities `v`, coordinate rates `q̇`, momentum rates `ṗ`.
+    pub fn rates(
+        &self,
+        q: &[S],
+        p: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        v: &mut [S],
+        qd: &mut [S],
+        pd: &mut [S],
+    ) {
+        self.velocities(q, p, u, w, v);
+        self.coordinate_rates(q, v, qd);
+        self.loads(u, w);
+        self.momentum_rates(u, w, pd);
+    }
+
+    /// Kinetic and potential energy, J. The potential is zero with every mass at the height of the ground's origin.
+    pub fn energy(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) -> (S, S) {
+        self.velocities(q, p, u, w, v);
+        let kinetic = self.kinetic(p, w);
+        self.gravity_moments(w);
+        (kinetic, self.potential(u, w))
+    }
+
+    /// Accelerations from velocities: `(q, v, τ) → v̇`.
+    pub fn accelerations(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S]) {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        self.factor(&w.poses, &w.first, &mut w.factor);
+        self.velocity_kinematics(v, u.drive_v, w);
+        self.wrench_loads(u, w);
+        self.solve_accelerations(u, w);
+        self.collect_rates(&w.acceleration, &w.first, a);
+    }
+
+    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, after
+    /// [`Sweeps::accelerations`] on a tree that was not regrouped (4.66).
+    pub fn reactions(&self, w: &Workspace<S>, out: &mut [[S; 6]]) {
+        for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
+            self.trace.at(Some(i), Quantity::Reaction);
+            let f = self.transmitted(&w.factor, &w.acceleration, i);
+            let f = self.tree.frames[k].place.iter().fold(f, |f, step| step.force_back(&f));
+            *out = core::array::from_fn(|c| f.get(c));
+        }
+    }
+}

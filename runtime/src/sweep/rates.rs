@@ -1,0 +1,121 @@
+//! Momentum rates `ṗ` (4.36) and accelerations (4.7).
+
+use super::solve::Load;
+use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::{ArticulatedInertia, Force, Motion};
+use crate::tree::{Freedom, Kind, Node, Source};
+use crate::workspace::Workspace;
+use crate::Scalar;
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// `ṗ_i = E_iᵀ (T*_i − Ω_i × P*_i) + τ_i` (4.36), after the velocity solution and the loads. No momentum sweep: `P*`
+    /// is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of it is needed.
+    pub(super) fn momentum_rates(&self, u: &Inputs<S>, w: &Workspace<S>, pd: &mut [S]) {
+        pd.fill(S::zero());
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            let Source::State { v, .. } = node.source else { continue };
+            self.trace.at(Some(i), Quantity::MomentumRate);
+            let d = self.remainder_with_open(&w.factor, &w.velocity, i);
+            let (m, hat) = (&w.factor.m[i], &w.velocity.hat[i]);
+            let gyro = match node.kind {
+                Kind::Pin => gyro_turn(m, hat, &d),
+                Kind::Slider => gyro_slide(m, hat, &d),
+                Kind::Helical { pitch } => gyro_turn(m, hat, &d) + pitch * gyro_slide(m, hat, &d),
+                Kind::Planar | Kind::Spherical | Kind::Floating => {
+                    let force = w.velocity.omega[i].cross_force(&m.times(hat).plus(&d));
+                    for k in 0..node.kind.nv() {
+                        let axis = node.kind.axis(k);
+                        let sum = self.applied(w, i, &axis) - axis.dot(&force);
+                        pd[v + k] = sum + self.passive(node, w, i, k);
+                    }
+                    continue;
+                }
+            };
+            let sum = self.applied(w, i, &node.kind.axis(0)) - gyro;
+            pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+        }
+        for (pd, tau) in pd.iter_mut().zip(u.tau) {
+            *pd = *pd + *tau;
+        }
+    }
+
+    /// `Eᵀ T*`: gravity and external wrenches.
+    fn applied(&self, w: &Workspace<S>, i: usize, axis: &Freedom<S>) -> S {
+        let weight = axis.dot(&self.weight(w, i));
+        if self.tree.wrenches.is_empty() {
+            return weight;
+        }
+        weight + axis.dot(&w.loads.total[i])
+    }
+
+    /// Damping and spring on freedom `k` of node `i`.
+    fn passive(&self, node: &Node<S>, w: &Workspace<S>, i: usize, k: usize) -> S {
+        let passive = &node.passive[k];
+        let damper = -(passive.damping * w.velocity.rate[w.first[i] + k]);
+        if !node.kind.has_rates() {
+            return damper;
+        }
+        damper - passive.stiffness * (w.poses.coordinate[i] - passive.rest)
+    }
+
+    /// Accelerations, after the velocity kinematics and the wrenches on the bodies: the same linear problem with joint
+    /// forces on the right, `Ω × P − T` on the bodies, `Ω × E v` imposed, and a ground that accelerates against gravity.
+    pub(super) fn solve_accelerations(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
+        let nv = self.tree.dims.nv;
+        w.generalized[..nv].fill(S::zero());
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            self.trace.at(Some(i), Quantity::Load);
+            let omega = w.velocity.omega[i];
+            let mut seed = omega.cross_force(&node.inertia.momentum(&omega));
+            if !self.tree.wrenches.is_empty() {
+                seed = seed.minus(&w.loads.own[i]);
+            }
+            w.force[i] = seed;
+            let mut joint = Motion::zero();
+            for k in 0..node.kind.nv() {
+                joint = joint.plus(&node.kind.axis(k).motion(w.velocity.rate[w.first[i] + k]));
+                if let Source::State { v, .. } = node.source {
+                    w.generalized[v + k] = w.generalized[v + k] + node.ratio * self.passive(node, w, i, k);
+                }
+            }
+            w.imposed[i] = omega.cross_motion(&joint);
+        }
+        for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
+            *f = *f + *tau;
+        }
+        let [x, y, z] = u.gravity;
+        let load = Load {
+            p: &w.generalized,
+            drive: u.drive_a,
+            seeds: Some(&w.force),
+            imposed: Some(&w.imposed),
+            ground: Motion { lin: [-x, -y, -z], ang: [S::zero(); 3] },
+            what: Quantity::Acceleration,
+        };
+        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
+    }
+}
+
+/// `z`-moment of `Ω × (M'Ω̂ + D')` with the products that cancel left out; `ω_z` does not enter, so `Ω̂` serves for `Ω`.
+/// The differences `Axx − Ayy` and the like are those the rotation of `M'` forms.
+fn gyro_turn<S: Scalar>(m: &ArticulatedInertia<S>, w: &Motion<S>, d: &Force<S>) -> S {
+    let ([vx, vy, vz], [wx, wy, wz]) = (w.lin, w.ang);
+    let (a, h, j) = (&m.a, &m.h, &m.j);
+    let (da, dh, dj) = (a[0] - a[3], h[0][0] - h[1][1], j[0] - j[3]);
+    let s = h[0][1] + h[1][0];
+    let ly = a[1] * vx - da * vy + s * wx - dh * wy + a[4] * vz + h[2][1] * wz + d.lin[1];
+    let lx = a[1] * vy + s * wy + dh * wx + a[2] * vz + h[2][0] * wz + d.lin[0];
+    let ay = j[1] * wx - dj * wy + h[1][2] * vz + j[4] * wz + d.ang[1];
+    let ax = j[1] * wy + h[0][2] * vz + j[2] * wz + d.ang[0];
+    vx * ly - vy * lx + wx * ay - wy * ax
+}
+
+/// `z`-force of `Ω × (M'Ω̂ + D')`; `v_z` does not enter.
+fn gyro_slide<S: Scalar>(m: &ArticulatedInertia<S>, w: &Motion<S>, d: &Force<S>) -> S {
+    let ([vx, vy, vz], [wx, wy, wz]) = (w.lin, w.ang);
+    let (a, h) = (&m.a, &m.h);
+    let dh = h[0][0] - h[1][1];
+    let ly = a[1] * vx + a[3] * vy + a[4] * vz + h[0][1] * wx - dh * wy + h[2][1] * wz + d.lin[1];
+    let lx = a[0] * vx + a[1] * vy + a[2] * vz + h[1][0] * wy + h[2][0] * wz + d.lin[0];
+    wx * ly - wy * lx
+}

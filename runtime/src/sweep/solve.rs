@@ -1,0 +1,245 @@
+//! The linear problem behind both levels: momenta to velocities, forces to accelerations.
+//!
+//! With `M'`, `U`, `Mj` known, right-hand sides travel back (`D`, 4.49, 4.45) and motions forth (4.40). On the velocity
+//! level the right-hand side is `p` and nothing else; on the acceleration level it is the joint force, every body starts
+//! with `D = Ω × P − T`, and `Ω × E v` is imposed on every node.
+
+use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::{Force, Motion};
+use crate::tree::{Freedom, Source};
+use crate::workspace::{Factor, Poses, Solution, Workspace};
+use crate::Scalar;
+
+/// A right-hand side.
+pub(super) struct Load<'a, S> {
+    /// For each velocity index: `p` or joint force.
+    pub p: &'a [S],
+    /// For each prescribed freedom: rate or acceleration.
+    pub drive: &'a [S],
+    /// `D` of every body by itself.
+    pub seeds: Option<&'a [Force<S>]>,
+    /// Motion imposed on every node beside its freedoms, `Ω_t`.
+    pub imposed: Option<&'a [Motion<S>]>,
+    /// Motion of the ground.
+    pub ground: Motion<S>,
+    /// What the motion is, for the listener.
+    pub what: Quantity,
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Solves for rates (or accelerations).
+    pub(super) fn solve(
+        &self,
+        poses: &Poses<S>,
+        first: &[usize],
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+    ) {
+        self.remainders(poses, first, f, load, sol);
+        self.motions(poses, first, f, load, sol);
+    }
+
+    /// `D`, `D'` and `(p − d) / Mj`, leaves to base.
+    fn remainders(&self, poses: &Poses<S>, first: &[usize], f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+        match load.seeds {
+            Some(seeds) => sol.d.copy_from_slice(seeds),
+            None => sol.d.fill(Force::zero()),
+        }
+        // `shared_rate` holds the momentum remainder of open coordinates until the forward sweep overwrites it.
+        sol.shared_rate.fill(S::zero());
+        for i in (0..self.tree.nodes.len()).rev() {
+            let node = &self.tree.nodes[i];
+            self.trace.at(Some(i), Quantity::Remainder);
+            let mut d = sol.d[i]; // D_i (4.49)
+            for (k, &g) in node.solve_before.iter().enumerate() {
+                let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
+                d = d.plus(&f.shared[g].u.times(e));
+            }
+            for k in 0..node.kind.nv() {
+                self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
+            }
+            for (k, &g) in node.solve_after.iter().enumerate() {
+                let e = self.shared_remainder(g, f, load, sol, Self::open_after(node, k + 1));
+                d = d.plus(&f.shared[g].u.times(e));
+            }
+            sol.d[i] = d; // D'_i (4.45)
+            if let Some(imposed) = load.imposed {
+                let through = f.m[i].times(&imposed[i]);
+                let n = self.tree.nodes.len();
+                for &h in &node.open {
+                    sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&imposed[i]);
+                }
+                d = d.plus(&through);
+            }
+            if let Some(parent) = node.parent {
+                let carried = self.force_out(poses, i, &d);
+                sol.d[parent] = sol.d[parent].plus(&carried);
+            }
+        }
+        let ground = &self.tree.solve_at_ground;
+        for (k, &g) in ground.iter().enumerate() {
+            self.shared_remainder(g, f, load, sol, ground[k + 1..].iter().copied());
+        }
+    }
+
+    /// Own freedom `k` of node `i` in the backward sweep.
+    fn remainder(
+        &self,
+        i: usize,
+        k: usize,
+        freedom: usize,
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+        d: &mut Force<S>,
+    ) {
+        let node = &self.tree.nodes[i];
+        let ng = self.tree.shared.len();
+        let axis = node.kind.axis(k);
+        let pivot = &f.pivots[freedom];
+        if let Some(g) = node.shared {
+            sol.shared_rate[g] = sol.shared_rate[g] + node.ratio * axis.dot(d);
+            return;
+        }
+        let e = match node.source {
+            Source::State { v, .. } => {
+                let p = load.p[v + k];
+                let e = (p - axis.dot(d)) * pivot.rho;
+                reduce(&axis, d, &pivot.u, e, p - pivot.armature * e);
+                e
+            }
+            Source::Drive { v, .. } => {
+                let rate = node.ratio * load.drive[v + k];
+                *d = d.plus(&pivot.u.times(rate));
+                rate
+            }
+        };
+        for h in Self::open_after(node, 0) {
+            sol.shared_rate[h] = sol.shared_rate[h] + f.cross[freedom * ng + h] * e;
+        }
+        sol.e[freedom] = e;
+    }
+
+    /// A shared coordinate in the backward sweep; gives its `(p − d) / Mj`.
+    fn shared_remainder(
+        &self,
+        g: usize,
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+        open: impl Iterator<Item = usize>,
+    ) -> S {
+        let ng = self.tree.shared.len();
+        let e = (load.p[self.tree.shared[g]] - sol.shared_rate[g]) * f.shared[g].rho;
+        for h in open {
+            sol.shared_rate[h] = sol.shared_rate[h] + f.shared_cross[g * ng + h] * e;
+        }
+        sol.shared_e[g] = e;
+        e
+    }
+
+    /// `Ω̂`, rates, `Ω`, base to leaves.
+    fn motions(&self, poses: &Poses<S>, first: &[usize], f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+        let ng = self.tree.shared.len();
+        let ground = &self.tree.solve_at_ground;
+        for (k, &g) in ground.iter().enumerate().rev() {
+            self.trace.at(None, load.what);
+            self.shared_motion(g, f, &Motion::zero(), ground[k + 1..].iter().copied(), sol);
+        }
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            self.trace.at(Some(i), load.what);
+            let outer = node.parent.map_or(load.ground, |p| sol.omega[p]);
+            let mut hat = self.motion_in(poses, i, &outer);
+            if let Some(imposed) = load.imposed {
+                hat = hat.plus(&imposed[i]);
+            }
+            sol.hat[i] = hat; // Ω̂_i
+            for (k, &g) in node.solve_after.iter().enumerate().rev() {
+                self.shared_motion(g, f, &hat, Self::open_after(node, k + 1), sol);
+            }
+            let mut omega = hat;
+            for k in (0..node.kind.nv()).rev() {
+                let freedom = first[i] + k;
+                let rate = match (node.shared, node.source) {
+                    (Some(g), _) => node.ratio * sol.shared_rate[g],
+                    (None, Source::Drive { .. }) => sol.e[freedom],
+                    (None, Source::State { .. }) => {
+                        let pivot = &f.pivots[freedom];
+                        let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
+                        Self::open_after(node, 0)
+                            .fold(rate, |rate, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h])
+                    }
+                };
+                sol.rate[freedom] = rate;
+                node.kind.axis(k).add_to(&mut omega, rate);
+            }
+            for (k, &g) in node.solve_before.iter().enumerate().rev() {
+                self.shared_motion(g, f, &omega, Self::open_before(node, k + 1), sol);
+            }
+            sol.omega[i] = omega; // Ω_i
+        }
+    }
+
+    fn shared_motion(
+        &self,
+        g: usize,
+        f: &Factor<S>,
+        omega: &Motion<S>,
+        open: impl Iterator<Item = usize>,
+        sol: &mut Solution<S>,
+    ) {
+        let ng = self.tree.shared.len();
+        let pivot = &f.shared[g];
+        let rate = sol.shared_e[g] - pivot.k.dot(omega);
+        sol.shared_rate[g] =
+            open.fold(rate, |rate, h| rate - pivot.rho * f.shared_cross[g * ng + h] * sol.shared_rate[h]);
+    }
+
+    /// Velocity level: `p → Ω, v`.
+    pub(super) fn solve_velocities(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+        let load =
+            Load { p, drive: u.drive_v, seeds: None, imposed: None, ground: Motion::zero(), what: Quantity::Velocity };
+        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+    }
+
+    /// Wrench (or momentum) that node `i` receives from its parent, in its own frame: `M'Ω̂ + D'` (4.43).
+    pub(super) fn transmitted(&self, f: &Factor<S>, sol: &Solution<S>, i: usize) -> Force<S> {
+        f.m[i].times(&sol.hat[i]).plus(&self.remainder_with_open(f, sol, i))
+    }
+
+    /// `D'` and what open coordinates add to it.
+    pub(super) fn remainder_with_open(&self, f: &Factor<S>, sol: &Solution<S>, i: usize) -> Force<S> {
+        let n = self.tree.nodes.len();
+        let open = self.tree.nodes[i].open.iter();
+        open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.shared_rate[g])))
+    }
+
+    /// Rates of the state's velocities out of the nodes.
+    pub(super) fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            if let (Source::State { v: at, .. }, None) = (node.source, node.shared) {
+                let nv = node.kind.nv();
+                v[at..at + nv].copy_from_slice(&sol.rate[first[i]..first[i] + nv]);
+            }
+        }
+        for (g, &at) in self.tree.shared.iter().enumerate() {
+            v[at] = sol.shared_rate[g];
+        }
+    }
+}
+
+/// `D' = D + U e` (4.45), the component along `E` being known: `EᵀD' = p − armature · e`.
+fn reduce<S: Scalar>(axis: &Freedom<S>, d: &mut Force<S>, u: &Force<S>, e: S, along: S) {
+    let known = match axis {
+        Freedom::Unit(k) => *k,
+        Freedom::Screw(_) => 5,
+    };
+    for k in (0..6).filter(|&k| k != known) {
+        *d.get_mut(k) = d.get(k) + u.get(k) * e;
+    }
+    *d.get_mut(known) = match axis {
+        Freedom::Unit(_) => along,
+        Freedom::Screw(h) => along - *h * d.lin[2],
+    };
+}

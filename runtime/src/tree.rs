@@ -1,0 +1,315 @@
+//! The mechanism as the sweeps see it: a tree of nodes whose constants are scalars of any kind.
+//!
+//! A node is one joint and the rigid body behind it. Joints whose motion splits into independent turns and slides
+//! (universal, cylindrical) are two nodes with a massless body between; all others keep a constant motion subspace `E`
+//! in the node frame, and turn about or slide along its z axis.
+
+use alloc::vec::Vec;
+
+use crate::spatial::{Force, Motion, RigidInertia, Step, Vec3};
+use crate::Scalar;
+
+/// What a node's joint can do, seen in the node frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind<S> {
+    /// Turn about z.
+    Pin,
+    /// Slide along z.
+    Slider,
+    /// Turn about z with a slide of `pitch` m per radian.
+    Helical {
+        /// Metres per radian.
+        pitch: S,
+    },
+    /// Slides along x and y of the outer axes, then a turn about z; velocities in the axes of the node.
+    Planar,
+    /// Any rotation, by a unit quaternion; velocities in the axes of the node.
+    Spherical,
+    /// A position and a unit quaternion; velocities in the axes of the node.
+    Floating,
+}
+
+impl<S: Scalar> Kind<S> {
+    /// Coordinates the node reads.
+    pub fn nq(&self) -> usize {
+        match self {
+            Kind::Pin | Kind::Slider | Kind::Helical { .. } => 1,
+            Kind::Planar => 3,
+            Kind::Spherical => 4,
+            Kind::Floating => 7,
+        }
+    }
+
+    /// Freedoms.
+    pub fn nv(&self) -> usize {
+        match self {
+            Kind::Spherical => 3,
+            Kind::Floating => 6,
+            other => other.nq(),
+        }
+    }
+
+    /// Column `k` of the joint matrix `E`.
+    pub fn axis(&self, k: usize) -> Freedom<S> {
+        match self {
+            Kind::Pin => Freedom::Unit(5),
+            Kind::Slider => Freedom::Unit(2),
+            Kind::Helical { pitch } => Freedom::Screw(*pitch),
+            Kind::Planar => Freedom::Unit([0, 1, 5][k]),
+            Kind::Spherical => Freedom::Unit(3 + k),
+            Kind::Floating => Freedom::Unit(k),
+        }
+    }
+
+    /// Whether a linear spring on coordinate `k` acts on velocity `k` (rate equals coordinate rate).
+    pub fn has_rates(&self) -> bool {
+        matches!(self, Kind::Pin | Kind::Slider | Kind::Helical { .. })
+    }
+}
+
+/// One column of `E`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Freedom<S> {
+    /// Unit vector `k`: 0–2 linear, 3–5 angular.
+    Unit(usize),
+    /// `[pitch z; z]`.
+    Screw(S),
+}
+
+impl<S: Scalar> Freedom<S> {
+    /// `E · F`.
+    pub fn dot(&self, f: &Force<S>) -> S {
+        match self {
+            Freedom::Unit(k) => f.get(*k),
+            Freedom::Screw(h) => f.ang[2] + *h * f.lin[2],
+        }
+    }
+
+    /// `E · Ω`, for products that are linear in a row.
+    pub fn motion(&self, rate: S) -> Motion<S> {
+        let mut m = Motion::zero();
+        match self {
+            Freedom::Unit(k) => *m.get_mut(*k) = rate,
+            Freedom::Screw(h) => {
+                m.ang[2] = rate;
+                m.lin[2] = *h * rate;
+            }
+        }
+        m
+    }
+
+    /// Adds `E rate` to a motion.
+    pub fn add_to(&self, m: &mut Motion<S>, rate: S) {
+        match self {
+            Freedom::Unit(k) => *m.get_mut(*k) = m.get(*k) + rate,
+            Freedom::Screw(h) => {
+                m.ang[2] = m.ang[2] + rate;
+                m.lin[2] = m.lin[2] + *h * rate;
+            }
+        }
+    }
+}
+
+/// Where a node's coordinates and velocities come from; indices of the first ones.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Coordinates and velocities of the state.
+    State {
+        /// Into `q`.
+        q: usize,
+        /// Into `v`, `p`, `τ`.
+        v: usize,
+    },
+    /// Prescribed positions, rates and accelerations (a rheonomic drive).
+    Drive {
+        /// Into the positions.
+        q: usize,
+        /// Into the rates and accelerations.
+        v: usize,
+    },
+}
+
+/// Passive elements of one freedom.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passive<S> {
+    /// Viscous damping, N m s/rad or N s/m.
+    pub damping: S,
+    /// Spring stiffness, N m/rad or N/m.
+    pub stiffness: S,
+    /// Rest position of the spring.
+    pub rest: S,
+    /// Reflected rotor inertia, kg m² or kg.
+    pub armature: S,
+}
+
+/// A joint and the rigid body behind it.
+#[derive(Clone, Debug)]
+pub struct Node<S> {
+    /// Parent node, `None` for the ground. Parents come before children.
+    pub parent: Option<usize>,
+    /// Constant steps from the parent frame to the joint.
+    pub place: Vec<Step<S>>,
+    /// Joint.
+    pub kind: Kind<S>,
+    /// Coordinates.
+    pub source: Source,
+    /// `coordinate = ratio · source + offset`, one-freedom nodes only.
+    pub ratio: S,
+    /// Constant added to the coordinate of the source (a mimic's offset).
+    pub offset: S,
+    /// Constant turn from the coordinate to the angle of the node frame.
+    pub phase: S,
+    /// Further turn by this many right angles, exact.
+    pub quarter: u8,
+    /// Constant slide added along the joint axis, m.
+    pub slide: S,
+    /// Inertia of the bodies that move with the node, in its frame.
+    pub inertia: RigidInertia<S>,
+    /// Passive elements, one for each freedom.
+    pub passive: Vec<Passive<S>>,
+    /// Coordinate shared by several nodes: index into [`Tree::shared`].
+    pub shared: Option<usize>,
+    /// Shared coordinates with members in the subtree of this node that are not solved below it.
+    pub open: Vec<usize>,
+    /// Those solved at this node, before its own freedoms (its subtrees hold all members).
+    pub solve_before: Vec<usize>,
+    /// Those solved at this node, after its own freedom, which is a member.
+    pub solve_after: Vec<usize>,
+}
+
+/// A frame of interest, constant on a node or on the ground.
+#[derive(Clone, Debug)]
+pub struct TreeFrame<S> {
+    /// Node, `None` for the ground.
+    pub node: Option<usize>,
+    /// Steps from the node frame.
+    pub place: Vec<Step<S>>,
+}
+
+/// Axes of an external wrench.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WrenchAxes {
+    /// Those of the frame it acts at.
+    Frame,
+    /// Those of the ground.
+    Ground,
+}
+
+/// An external wrench that is given with every call, acting at the origin of a frame.
+#[derive(Clone, Debug)]
+pub struct TreeWrench<S> {
+    /// Where it acts.
+    pub frame: TreeFrame<S>,
+    /// Axes of its components.
+    pub axes: WrenchAxes,
+    /// Nodes from the root to the one it acts on.
+    pub path: Vec<usize>,
+}
+
+/// A mechanism. `S` is the scalar of its constants and of everything computed from them.
+#[derive(Clone, Debug)]
+pub struct Tree<S> {
+    /// Nodes, parents first.
+    pub nodes: Vec<Node<S>>,
+    /// Number of coordinates, velocities, prescribed positions, prescribed rates.
+    pub dims: Dims,
+    /// Velocity index of each coordinate shared by several nodes.
+    pub shared: Vec<usize>,
+    /// Shared coordinates whose members meet only at the ground.
+    pub solve_at_ground: Vec<usize>,
+    /// First moment of bodies that regrouping has moved to the ground, kg m.
+    pub ground_moment: Vec3<S>,
+    /// External wrenches.
+    pub wrenches: Vec<TreeWrench<S>>,
+    /// Frames of interest: first that of every joint's child body, in joint order, then the others.
+    pub frames: Vec<TreeFrame<S>>,
+    /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
+    pub joint_nodes: Vec<usize>,
+}
+
+/// Dimensions of a mechanism.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Dims {
+    /// Coordinates.
+    pub nq: usize,
+    /// Velocities, momenta, joint forces.
+    pub nv: usize,
+    /// Prescribed positions.
+    pub drive_q: usize,
+    /// Prescribed rates and accelerations.
+    pub drive_v: usize,
+    /// External wrenches.
+    pub wrenches: usize,
+}
+
+impl<S: Scalar> Tree<S> {
+    /// The same mechanism with fewer non-zero inertial parameters: what a joint cannot tell from inertia of its parent
+    /// is moved there, from the tips inward (Khalil and Kleinfinger's base parameters). Past a pin goes all that is
+    /// symmetric about its axis `{m, m c_z, (J_yy, J_yy, 0)}`, past a slider the rotational inertia, past a spherical
+    /// joint the mass. Motion, momenta and energies are unchanged; wrenches inside the joints are not, so reactions
+    /// must come from the original.
+    pub fn regrouped(&self) -> Tree<S> {
+        let mut tree = self.clone();
+        for i in (0..tree.nodes.len()).rev() {
+            let moved = match tree.nodes[i].kind {
+                Kind::Pin => regroup_pin(&mut tree.nodes[i].inertia),
+                Kind::Slider => {
+                    let mut moved = RigidInertia::zero();
+                    core::mem::swap(&mut moved.inertia, &mut tree.nodes[i].inertia.inertia);
+                    moved
+                }
+                Kind::Spherical => {
+                    let mut moved = RigidInertia::zero();
+                    core::mem::swap(&mut moved.mass, &mut tree.nodes[i].inertia.mass);
+                    moved
+                }
+                Kind::Helical { .. } | Kind::Planar | Kind::Floating => continue,
+            };
+            // Invariant under the joint's own motion, so only the constant steps count. The slide of a pin shifts it.
+            let z = crate::spatial::Axis::Z;
+            let mut m = moved.articulated();
+            match tree.nodes[i].kind {
+                Kind::Pin => m = Step::Shift { axis: z, r: tree.nodes[i].slide }.inertia(&m),
+                Kind::Slider => m = phase_step(&tree.nodes[i]).inertia(&m),
+                _ => {}
+            }
+            for step in tree.nodes[i].place.iter().rev() {
+                m = step.inertia(&m);
+            }
+            let at_parent = RigidInertia::from_articulated(&m);
+            match tree.nodes[i].parent {
+                Some(p) => tree.nodes[p].inertia = tree.nodes[p].inertia.plus(&at_parent),
+                None => tree.ground_moment = crate::spatial::add3(tree.ground_moment, at_parent.moment),
+            }
+        }
+        tree
+    }
+}
+
+/// The constant turn of a slider about its axis.
+fn phase_step<S: Scalar>(node: &Node<S>) -> Step<S> {
+    let (s, c) = quarter_turn(node.phase.sin_cos(), node.quarter);
+    Step::Turn { axis: crate::spatial::Axis::Z, c, s }
+}
+
+/// Sine and cosine after `quarter` more right angles, exact.
+pub(crate) fn quarter_turn<S: Scalar>((s, c): (S, S), quarter: u8) -> (S, S) {
+    match quarter % 4 {
+        0 => (s, c),
+        1 => (c, -s),
+        2 => (-s, -c),
+        _ => (-c, s),
+    }
+}
+
+fn regroup_pin<S: Scalar>(body: &mut RigidInertia<S>) -> RigidInertia<S> {
+    let o = S::zero();
+    let mut moved = RigidInertia::zero();
+    core::mem::swap(&mut moved.mass, &mut body.mass);
+    core::mem::swap(&mut moved.moment[2], &mut body.moment[2]);
+    let yy = body.inertia[3];
+    moved.inertia = [yy, o, o, yy, o, o];
+    body.inertia[0] = body.inertia[0] - yy;
+    body.inertia[3] = o;
+    moved
+}

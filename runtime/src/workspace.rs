@@ -1,0 +1,197 @@
+//! Everything a sweep computes, one slot for each node or freedom, with its symbol in `algorithm` notation.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, Step, Vec3};
+use crate::tree::Tree;
+use crate::Scalar;
+
+/// Results of the articulation: variable steps of every joint.
+#[derive(Clone, Debug)]
+pub struct Poses<S> {
+    /// Steps from the constant placement to the node frame.
+    pub joint: Vec<JointSteps<S>>,
+    /// Joint coordinate of one-freedom nodes: `ratio · source + offset`.
+    pub coordinate: Vec<S>,
+}
+
+/// At most four steps, kept in place.
+#[derive(Clone, Copy, Debug)]
+pub struct JointSteps<S> {
+    steps: [Step<S>; 4],
+    len: usize,
+}
+
+impl<S: Scalar> JointSteps<S> {
+    /// No steps.
+    pub fn new() -> Self {
+        JointSteps { steps: [Step::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0 }
+    }
+
+    /// Replaces the steps; those beyond four are dropped.
+    pub fn set(&mut self, steps: &[Step<S>]) {
+        self.len = steps.len().min(4);
+        self.steps[..self.len].copy_from_slice(&steps[..self.len]);
+    }
+
+    /// The steps, parent to child.
+    pub fn get(&self) -> &[Step<S>] {
+        &self.steps[..self.len]
+    }
+}
+
+impl<S: Scalar> Default for JointSteps<S> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// One eliminated freedom.
+#[derive(Clone, Copy, Debug)]
+pub struct Pivot<S> {
+    /// `U = M* E`.
+    pub u: Force<S>,
+    /// `k = U / Mj`; its component along `E` is `1 − armature / Mj`.
+    pub k: Force<S>,
+    /// `1 / Mj`.
+    pub rho: S,
+    /// Momentum of the freedom's rotor per unit rate.
+    pub armature: S,
+}
+
+/// The articulated inertia with every freedom eliminated: depends on the configuration alone.
+#[derive(Clone, Debug)]
+pub struct Factor<S> {
+    /// `M'_i`, after the node's own freedoms.
+    pub m: Vec<ArticulatedInertia<S>>,
+    /// Pivots of the nodes' own freedoms, in node order.
+    pub pivots: Vec<Pivot<S>>,
+    /// Pivots of shared coordinates.
+    pub shared: Vec<Pivot<S>>,
+    /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
+    pub columns: Vec<Force<S>>,
+    /// Inertia between shared coordinates, while they are open.
+    pub gram: Vec<S>,
+    /// `E · F_h` of every freedom with every open coordinate, at `freedom · shared + h`.
+    pub cross: Vec<S>,
+    /// The same for shared coordinates with one another.
+    pub shared_cross: Vec<S>,
+}
+
+/// Rates (or accelerations) and what leads to them.
+#[derive(Clone, Debug)]
+pub struct Solution<S> {
+    /// `D'_i`.
+    pub d: Vec<Force<S>>,
+    /// `(p − d) / Mj` of every freedom; the prescribed rate where there is one.
+    pub e: Vec<S>,
+    /// The same for shared coordinates.
+    pub shared_e: Vec<S>,
+    /// Rate of every freedom of every node.
+    pub rate: Vec<S>,
+    /// Rate of every shared coordinate.
+    pub shared_rate: Vec<S>,
+    /// `Ω̂_i`: motion of the node frame before its own freedoms.
+    pub hat: Vec<Motion<S>>,
+    /// `Ω_i`.
+    pub omega: Vec<Motion<S>>,
+}
+
+/// Gravity and external wrenches on subtrees.
+#[derive(Clone, Debug)]
+pub struct Loads<S> {
+    /// First moment of the subtree in the node frame.
+    pub moment: Vec<Vec3<S>>,
+    /// Mass of the subtree.
+    pub mass: Vec<S>,
+    /// Gravity in node axes.
+    pub gravity: Vec<Vec3<S>>,
+    /// Wrench on the node itself, in its frame.
+    pub own: Vec<Force<S>>,
+    /// `T*_i`, external wrenches on the subtree.
+    pub total: Vec<Force<S>>,
+    /// First moment of everything, in the ground frame.
+    pub ground_moment: Vec3<S>,
+}
+
+/// All of it.
+#[derive(Clone, Debug)]
+pub struct Workspace<S> {
+    /// First freedom of every node, and their number at the end.
+    pub first: Vec<usize>,
+    /// Articulation.
+    pub poses: Poses<S>,
+    /// Eliminated inertia.
+    pub factor: Factor<S>,
+    /// Velocity level.
+    pub velocity: Solution<S>,
+    /// Acceleration level.
+    pub acceleration: Solution<S>,
+    /// Gravity and wrenches.
+    pub loads: Loads<S>,
+    /// Body momenta, accumulated momenta or seeds, one for each node.
+    pub force: Vec<Force<S>>,
+    /// Joint forces, one for each velocity.
+    pub generalized: Vec<S>,
+    /// Imposed accelerations, one for each node.
+    pub imposed: Vec<Motion<S>>,
+    /// Pose of every node in the ground.
+    pub rotation: Vec<Mat3<S>>,
+    /// Origin of every node in the ground, m.
+    pub position: Vec<Vec3<S>>,
+}
+
+impl<S: Scalar> Workspace<S> {
+    /// Room for a tree: the only allocation there is.
+    pub fn new(tree: &Tree<S>) -> Self {
+        let n = tree.nodes.len();
+        let g = tree.shared.len();
+        let mut first = Vec::with_capacity(n + 1);
+        let mut f = 0;
+        for node in &tree.nodes {
+            first.push(f);
+            f += node.kind.nv();
+        }
+        first.push(f);
+        let o = S::zero();
+        let pivot = Pivot { u: Force::zero(), k: Force::zero(), rho: o, armature: o };
+        let solution = Solution {
+            d: vec![Force::zero(); n],
+            e: vec![o; f],
+            shared_e: vec![o; g],
+            rate: vec![o; f],
+            shared_rate: vec![o; g],
+            hat: vec![Motion::zero(); n],
+            omega: vec![Motion::zero(); n],
+        };
+        Workspace {
+            first,
+            poses: Poses { joint: vec![JointSteps::new(); n], coordinate: vec![o; n] },
+            factor: Factor {
+                m: vec![ArticulatedInertia::zero(); n],
+                pivots: vec![pivot; f],
+                shared: vec![pivot; g],
+                columns: vec![Force::zero(); g * n],
+                gram: vec![o; g * g],
+                cross: vec![o; f * g],
+                shared_cross: vec![o; g * g],
+            },
+            velocity: solution.clone(),
+            acceleration: solution,
+            loads: Loads {
+                moment: vec![[o; 3]; n],
+                mass: vec![o; n],
+                gravity: vec![[o; 3]; n],
+                own: vec![Force::zero(); n],
+                total: vec![Force::zero(); n],
+                ground_moment: [o; 3],
+            },
+            force: vec![Force::zero(); n],
+            generalized: vec![o; tree.dims.nv],
+            imposed: vec![Motion::zero(); n],
+            rotation: vec![[[o; 3]; 3]; n],
+            position: vec![[o; 3]; n],
+        }
+    }
+}
