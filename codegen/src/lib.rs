@@ -3,3 +3,4 @@
 pub mod diag;
 pub mod import;
 pub mod model;
+pub mod plan;

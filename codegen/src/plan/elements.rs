@@ -1,0 +1,86 @@
+//! Splits joints into elementary ones and merges what fixed joints hold together.
+
+use super::placement::{direction, placement};
+use super::{NodeKind, PlanOptions, PoseStep};
+use crate::model::{JointKind, Model};
+
+/// An elementary joint. Its *element frame* is the child body's frame, or for the first half of a joint of two halves
+/// that frame at zero coordinates of the second.
+#[derive(Clone, Debug)]
+pub struct Element {
+    /// Element that carries it.
+    pub parent: Option<usize>,
+    /// Element frame in the parent's element frame, at zero coordinates.
+    pub pose: Vec<PoseStep>,
+    /// Kind.
+    pub kind: NodeKind,
+    /// Unit axis in the element frame, for joints that have one.
+    pub axis: Option<[f64; 3]>,
+    /// Model joint and first freedom in it.
+    pub joint: (usize, usize),
+    /// Whether the element frame carries the joint's child body.
+    pub last: bool,
+}
+
+/// A body or frame: element that carries it (`None`: ground) and pose in the element frame.
+pub type Carried = (Option<usize>, Vec<PoseStep>);
+
+/// The elementary joints of a model.
+#[derive(Clone, Debug)]
+pub struct Elements {
+    /// Joints, parents first.
+    pub list: Vec<Element>,
+    /// For every body of the model.
+    pub bodies: Vec<Carried>,
+    /// For every frame of the model.
+    pub frames: Vec<Carried>,
+    /// Rotation of each body's inertia axes in its body frame.
+    pub inertia_axes: Vec<Vec<PoseStep>>,
+}
+
+/// Elementary joints, merged bodies, snapped angles.
+pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) -> Elements {
+    let snap = options.snap;
+    let mut list: Vec<Element> = Vec::new();
+    let mut bodies: Vec<Carried> = vec![(None, Vec::new()); model.bodies.len()];
+    for (k, joint) in model.joints.iter().enumerate() {
+        let mut worst = 0.0_f64;
+        let mut note = |off: f64| worst = worst.max(off);
+        let (carrier, mut pose) = joint.parent.map_or((None, Vec::new()), |b| bodies[b].clone());
+        pose.extend(placement(&joint.placement, snap, &mut note));
+        let halves: Vec<(NodeKind, Option<[f64; 3]>)> = match joint.kind {
+            JointKind::Fixed => Vec::new(),
+            JointKind::Pin { axis } => vec![(NodeKind::Pin, Some(axis))],
+            JointKind::Slider { axis } => vec![(NodeKind::Slider, Some(axis))],
+            JointKind::Cylindrical { axis } => vec![(NodeKind::Slider, Some(axis)), (NodeKind::Pin, Some(axis))],
+            JointKind::Helical { axis, pitch } => vec![(NodeKind::Helical(pitch), Some(axis))],
+            JointKind::Universal { axes } => vec![(NodeKind::Pin, Some(axes[0])), (NodeKind::Pin, Some(axes[1]))],
+            JointKind::Planar { normal } => vec![(NodeKind::Planar, Some(normal))],
+            JointKind::Spherical => vec![(NodeKind::Spherical, None)],
+            JointKind::Floating => vec![(NodeKind::Floating, None)],
+        };
+        let mut at: Carried = (carrier, pose);
+        let count = halves.len();
+        for (half, (kind, axis)) in halves.into_iter().enumerate() {
+            let axis = axis.map(|a| direction(a, snap, &mut note));
+            let (parent, pose) = std::mem::replace(&mut at, (Some(list.len()), Vec::new()));
+            list.push(Element { parent, pose, kind, axis, joint: (k, half), last: half + 1 == count });
+        }
+        bodies[joint.child] = at;
+        if worst > 0.0 {
+            notices.push(format!(
+                "joint `{}`: an angle {worst:.1e} rad off a right angle is taken as exact",
+                joint.name
+            ));
+        }
+    }
+    let mut quiet = |_: f64| {};
+    let frames = model.frames.iter().map(|frame| {
+        let (carrier, mut pose) = frame.body.map_or((None, Vec::new()), |b| bodies[b].clone());
+        pose.extend(placement(&frame.placement, snap, &mut quiet));
+        (carrier, pose)
+    });
+    let frames = frames.collect();
+    let axes = model.bodies.iter().map(|b| super::placement::rotation(&b.inertia_axes, snap, &mut |_| {}));
+    Elements { inertia_axes: axes.collect(), list, bodies, frames }
+}

@@ -1,0 +1,273 @@
+//! Choice of the node frames.
+//!
+//! A pin's frame may be turned about and slid along its axis. Both are used up so that the way to the (largest) next
+//! joint is a screw along x alone, `X(α, a)`, in the manner of Denavit, Hartenberg and Khalil: constants vanish, and
+//! what is left of the turn goes into the joint angle.
+
+use mbd_runtime::spatial::Vec3;
+use mbd_runtime::tree::Source;
+
+use super::elements::Elements;
+use super::instantiate::body_inertia;
+use super::placement::constant;
+use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
+use super::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
+use crate::model::{Model, Motion, Value};
+
+/// Nodes with their frames chosen.
+pub struct Framed {
+    /// Nodes.
+    pub nodes: Vec<PlanNode>,
+    /// Named frames.
+    pub frames: Vec<PlanFrame>,
+    /// Last node of each moving joint.
+    pub joint_nodes: Vec<usize>,
+}
+
+/// Chooses frames and expresses every body in them.
+pub fn choose(model: &Model, elements: &Elements, slots: &[Slot]) -> Framed {
+    let weights = weights(elements);
+    let mut nodes: Vec<PlanNode> = Vec::new();
+    // Element frame in the node frame.
+    let mut inside: Vec<Rigid> = Vec::new();
+    for (k, element) in elements.list.iter().enumerate() {
+        let align = element.axis.map_or(Rigid::IDENTITY, Rigid::align_z);
+        let mut pose: Vec<PoseStep> = element.parent.map_or(Vec::new(), |p| all_steps(&inside[p]));
+        pose.extend(&element.pose);
+        pose.push(PoseStep::Rotate(align.rot));
+        let way = factored(&pose);
+        let primary = (0..elements.list.len()).filter(|&c| elements.list[c].parent == Some(k)).max_by(|&a, &b| {
+            // The first of equals.
+            weights[a].cmp(&weights[b]).then(b.cmp(&a))
+        });
+        let line = primary.and_then(|c| line_of(elements, c, &align));
+        let turns = matches!(element.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
+        let ((c, s), h) = if turns { freedom(&way, primary.is_some(), line) } else { ((1.0, 0.0), 0.0) };
+        inside.push(Rigid::screw_z(c, s, h).inverse().then(&align.inverse()));
+        nodes.push(node(model, elements, slots, k, way, (c, s), h));
+    }
+    add_inertias(model, elements, &inside, &mut nodes);
+    let joint_nodes: Vec<usize> = (0..nodes.len()).filter(|&k| elements.list[k].last).collect();
+    let frames = named_frames(model, elements, &inside, &joint_nodes);
+    Framed { nodes, frames, joint_nodes }
+}
+
+/// Number of elements in every subtree.
+fn weights(elements: &Elements) -> Vec<usize> {
+    let mut weights = vec![1; elements.list.len()];
+    for k in (0..weights.len()).rev() {
+        if let Some(p) = elements.list[k].parent {
+            weights[p] += weights[k];
+        }
+    }
+    weights
+}
+
+/// Way to the axis of an element: constants factored into screws, parameters left as they stand.
+fn factored(pose: &[PoseStep]) -> Screws {
+    if let Some(t) = constant(pose) {
+        return screws(&t);
+    }
+    // Constant stretches between parameters are factored each by itself.
+    let mut steps = Vec::new();
+    let mut stretch: Vec<PoseStep> = Vec::new();
+    for step in pose {
+        if constant(&[*step]).is_some() {
+            stretch.push(*step);
+            continue;
+        }
+        steps.extend(constant(&stretch).iter().flat_map(all_steps));
+        stretch.clear();
+        steps.push(*step);
+    }
+    let rest = constant(&stretch).map_or(screws(&Rigid::IDENTITY), |t| screws(&t));
+    steps.extend(rest.steps);
+    Screws { steps, turn: rest.turn, slide: rest.slide }
+}
+
+/// Point on, and direction of, the axis of element `c` in the aligned frame of its parent.
+fn line_of(elements: &Elements, c: usize, align: &Rigid) -> Option<(Vec3<f64>, Option<Vec3<f64>>)> {
+    let child = &elements.list[c];
+    let pose = align.inverse().then(&constant(&child.pose)?);
+    Some((pose.pos, child.axis.map(|a| pose.turn(a))))
+}
+
+type Turn = (f64, f64);
+
+/// Turn about and slide along the own axis that make the way to the next one simple.
+fn freedom(way: &Screws, has_child: bool, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn, f64) {
+    let (c, s) = way.turn;
+    let undo = ((c, -s), -way.slide);
+    let Some((point, axis)) = line else {
+        return if has_child { ((1.0, 0.0), 0.0) } else { undo };
+    };
+    let size = point.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let unit = |x: f64, y: f64| -> Turn {
+        let n = x.hypot(y);
+        let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
+        let (x, y) = (snap(x), snap(y));
+        // Either sense of the normal will do: the one nearer to where the frame stands.
+        if x < 0.0 || (x == 0.0 && y < 0.0) {
+            (-x, -y)
+        } else {
+            (x, y)
+        }
+    };
+    let Some([ux, uy, uz]) = axis else {
+        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        return (if off { unit(point[0], point[1]) } else { undo.0 }, point[2]);
+    };
+    let sine = ux.hypot(uy);
+    if sine < ROUND_OFF {
+        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        return (if off { unit(point[0], point[1]) } else { undo.0 }, undo.1);
+    }
+    let along = point[0] * ux + point[1] * uy + point[2] * uz;
+    let h = (point[2] - along * uz) / (1.0 - uz * uz);
+    if h.abs() > 20.0 * size {
+        return ((1.0, 0.0), 0.0); // nearly parallel: the common normal is too far away to be of use
+    }
+    (unit(-uy, ux), if h.abs() <= ROUND_OFF * size { 0.0 } else { h })
+}
+
+fn node(
+    model: &Model,
+    elements: &Elements,
+    slots: &[Slot],
+    k: usize,
+    way: Screws,
+    (c, s): Turn,
+    h: f64,
+) -> PlanNode {
+    let element = &elements.list[k];
+    let (joint, first) = element.joint;
+    let description = &model.joints[joint];
+    let name = match element.last {
+        true => model.bodies[description.child].name.clone(),
+        false => description.name.clone(),
+    };
+    let (source, follow) = source(model, slots, joint, first);
+    let mut place = way.steps;
+    let (phase, quarter, slide) = match element.kind {
+        NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_) => {
+            let (c0, s0) = way.turn;
+            let angle = (s0 * c + c0 * s).atan2(c0 * c - s0 * s);
+            let quarters = (angle / std::f64::consts::FRAC_PI_2).round();
+            let rest = angle - quarters * std::f64::consts::FRAC_PI_2;
+            let slide = way.slide + h;
+            let size = way.slide.abs().max(h.abs());
+            let slide = if slide.abs() <= ROUND_OFF * size { 0.0 } else { slide };
+            match rest.abs() < ROUND_OFF {
+                true => (0.0, (quarters as i64).rem_euclid(4) as u8, slide),
+                false => (angle, 0, slide),
+            }
+        }
+        _ => {
+            let last = Rigid::screw_z(way.turn.0, way.turn.1, way.slide);
+            place.extend(all_steps(&last));
+            (0.0, 0, 0.0)
+        }
+    };
+    PlanNode {
+        name,
+        parent: element.parent,
+        place,
+        kind: element.kind,
+        joint: element.joint,
+        source,
+        follow,
+        phase,
+        quarter,
+        slide,
+        inertia: [0.0; 10],
+        variable: Vec::new(),
+        shared: None,
+        open: Vec::new(),
+        solve_before: Vec::new(),
+        solve_after: Vec::new(),
+    }
+}
+
+/// Coordinates of a joint's freedom; a mimic's are those of the joint it follows in the end.
+fn source(model: &Model, slots: &[Slot], joint: usize, first: usize) -> (Source, Vec<(Value, Value)>) {
+    let mut follow = Vec::new();
+    let mut at = joint;
+    while let Motion::Mimic { leader, ratio, offset } = model.joints[at].motion {
+        follow.insert(0, (ratio, offset));
+        at = leader;
+    }
+    let slot = slots.iter().find(|s| s.joint == at).and_then(|s| s.at);
+    let source = match slot {
+        Some(Source::State { q, v }) => Source::State { q: q + first, v: v + first },
+        Some(Source::Drive { q, v }) => Source::Drive { q: q + first, v: v + first },
+        None => unreachable!("a checked model's mimic chains end at a joint with coordinates"),
+    };
+    (source, follow)
+}
+
+/// Inertia of every body at its node.
+fn add_inertias(model: &Model, elements: &Elements, inside: &[Rigid], nodes: &mut [PlanNode]) {
+    for (b, body) in model.bodies.iter().enumerate() {
+        let (Some(k), pose) = &elements.bodies[b] else { continue };
+        let mut steps = all_steps_exact(&inside[*k]);
+        steps.extend(pose);
+        let numbers = body.com.iter().chain(&body.inertia).chain([&body.mass]);
+        let constants = numbers.map(|v| v.constant()).collect::<Option<Vec<f64>>>();
+        match (constants, constant(&steps), constant(&elements.inertia_axes[b])) {
+            (Some(x), Some(pose), Some(axes)) => {
+                let inertia: [f64; 6] = std::array::from_fn(|i| x[3 + i]);
+                let body = body_inertia(x[9], [x[0], x[1], x[2]], inertia, &axes.rot, &pose.rot, pose.pos);
+                let sum = &mut nodes[*k].inertia;
+                sum[0] += body.mass;
+                for (i, x) in body.moment.iter().chain(&body.inertia).enumerate() {
+                    sum[1 + i] += x;
+                }
+            }
+            _ => nodes[*k].variable.push((b, steps)),
+        }
+    }
+    for node in nodes {
+        clean_inertia(&mut node.inertia);
+    }
+}
+
+/// Zeros that rotations have smeared into round-off come back.
+fn clean_inertia(x: &mut [f64; 10]) {
+    for range in [1..4, 4..10] {
+        let size = x[range.clone()].iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for x in &mut x[range] {
+            if x.abs() < ROUND_OFF * size {
+                *x = 0.0;
+            }
+        }
+    }
+}
+
+fn all_steps_exact(t: &Rigid) -> Vec<PoseStep> {
+    use mbd_runtime::spatial::Axis;
+    let shifts = [Axis::X, Axis::Y, Axis::Z].into_iter().zip(t.pos);
+    let mut steps: Vec<PoseStep> =
+        shifts.filter(|(_, r)| *r != 0.0).map(|(axis, r)| PoseStep::Shift { axis, r: Value::Const(r) }).collect();
+    if t.rot != Rigid::IDENTITY.rot {
+        steps.push(PoseStep::Rotate(t.rot));
+    }
+    steps
+}
+
+/// Frames of the joints' children first, then all other bodies, then the model's frames.
+fn named_frames(model: &Model, elements: &Elements, inside: &[Rigid], joint_nodes: &[usize]) -> Vec<PlanFrame> {
+    let frame = |name: &str, (node, pose): &(Option<usize>, Vec<PoseStep>)| {
+        let mut steps = node.map_or(Vec::new(), |k| all_steps_exact(&inside[k]));
+        steps.extend(pose);
+        if let Some(t) = constant(&steps) {
+            steps = all_steps_exact(&t);
+        }
+        PlanFrame { name: name.to_string(), node: *node, pose: steps }
+    };
+    let children: Vec<usize> =
+        joint_nodes.iter().map(|&k| model.joints[elements.list[k].joint.0].child).collect();
+    let others = (0..model.bodies.len()).filter(|b| !children.contains(b));
+    let bodies = children.iter().copied().chain(others).map(|b| frame(&model.bodies[b].name, &elements.bodies[b]));
+    let named = model.frames.iter().zip(&elements.frames).map(|(f, carried)| frame(&f.name, carried));
+    bodies.chain(named).collect()
+}

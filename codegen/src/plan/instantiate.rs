@@ -1,0 +1,148 @@
+//! From the plan to a tree of any scalar: numbers, symbols, duals. The fork is one type parameter.
+
+use mbd_runtime::spatial::{add3, Mat3, RigidInertia, Step, Vec3, SYM};
+use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+use mbd_runtime::Scalar;
+
+use super::{NodeKind, Plan, PlanNode, PoseStep};
+use crate::model::Value;
+
+/// A number of the model as a scalar.
+pub(super) fn value<S: Scalar>(v: Value, params: &[S]) -> S {
+    match v {
+        Value::Const(x) => S::constant(x),
+        Value::Param(k) => params[k],
+    }
+}
+
+fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<Step<S>> {
+    pose.iter()
+        .map(|step| match *step {
+            PoseStep::Turn { axis, c, s } => Step::Turn { axis, c: S::constant(c), s: S::constant(s) },
+            PoseStep::TurnBy { axis, angle } => {
+                let (s, c) = value(angle, params).sin_cos();
+                Step::Turn { axis, c, s }
+            }
+            PoseStep::Shift { axis, r } => Step::Shift { axis, r: value(r, params) },
+            PoseStep::Rotate(m) => Step::Rotate(m.map(|row| row.map(S::constant))),
+        })
+        .collect()
+}
+
+/// Inertia of a body at a frame in which it stands at `(rot, pos)`: mass, centre of mass, inertia about it
+/// `[xx, yy, zz, xy, xz, yz]` in axes turned by `axes` from those of the body.
+pub(super) fn body_inertia<S: Scalar>(
+    mass: S,
+    com: Vec3<S>,
+    inertia: [S; 6],
+    axes: &Mat3<S>,
+    rot: &Mat3<S>,
+    pos: Vec3<S>,
+) -> RigidInertia<S> {
+    let [xx, yy, zz, xy, xz, yz] = inertia;
+    let about_com = [xx, xy, xz, yy, yz, zz];
+    let turned = |m: [S; 6], r: &Mat3<S>| {
+        let body = RigidInertia { mass: S::zero(), moment: [S::zero(); 3], inertia: m };
+        Step::Rotate(*r).inertia(&body.articulated()).j
+    };
+    let j = turned(turned(about_com, axes), rot);
+    let c = add3(Step::Rotate(*rot).vector_back(com), pos);
+    let square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
+    let mut at_frame = j;
+    for a in 0..3 {
+        for b in a..3 {
+            let shift = if a == b { square - c[a] * c[b] } else { -(c[a] * c[b]) };
+            at_frame[SYM[a][b]] = j[SYM[a][b]] + mass * shift;
+        }
+    }
+    RigidInertia { mass, moment: c.map(|x| mass * x), inertia: at_frame }
+}
+
+impl Plan {
+    /// The tree with given parameters, not regrouped. `params` has one entry for each run-time parameter.
+    pub fn tree<S: Scalar>(&self, params: &[S]) -> Tree<S> {
+        let frames: Vec<TreeFrame<S>> =
+            self.frames.iter().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) }).collect();
+        let wrenches = self.wrenches.iter().map(|&(frame, axes)| {
+            let mut path: Vec<usize> =
+                std::iter::successors(frames[frame].node, |&i| self.nodes[i].parent).collect();
+            path.reverse();
+            TreeWrench { frame: frames[frame].clone(), axes, path }
+        });
+        Tree {
+            nodes: self.nodes.iter().map(|n| self.node(n, params)).collect(),
+            dims: self.dims,
+            shared: self.shared.clone(),
+            solve_at_ground: self.solve_at_ground.clone(),
+            ground_moment: [S::zero(); 3],
+            wrenches: wrenches.collect(),
+            joint_nodes: self.joint_nodes.clone(),
+            frames,
+        }
+    }
+
+    fn node<S: Scalar>(&self, node: &PlanNode, params: &[S]) -> Node<S> {
+        let kind = match node.kind {
+            NodeKind::Pin => Kind::Pin,
+            NodeKind::Slider => Kind::Slider,
+            NodeKind::Helical(pitch) => Kind::Helical { pitch: value(pitch, params) },
+            NodeKind::Planar => Kind::Planar,
+            NodeKind::Spherical => Kind::Spherical,
+            NodeKind::Floating => Kind::Floating,
+        };
+        let (mut ratio, mut offset) = (S::one(), S::zero());
+        for &(r, o) in &node.follow {
+            let r = value(r, params);
+            ratio = r * ratio;
+            offset = r * offset + value(o, params);
+        }
+        let joint = &self.model.joints[node.joint.0];
+        let at = |list: &[Value], k: usize| value(list.get(node.joint.1 + k).copied().unwrap_or(Value::ZERO), params);
+        let passive = (0..kind.nv()).map(|k| Passive {
+            damping: at(&joint.damping, k),
+            stiffness: at(&joint.stiffness, k),
+            rest: at(&joint.rest, k),
+            armature: at(&joint.armature, k),
+        });
+        Node {
+            parent: node.parent,
+            place: steps(&node.place, params),
+            passive: passive.collect(),
+            kind,
+            source: node.source,
+            ratio,
+            offset,
+            phase: S::constant(node.phase),
+            quarter: node.quarter,
+            slide: S::constant(node.slide),
+            inertia: self.inertia(node, params),
+            shared: node.shared,
+            open: node.open.clone(),
+            solve_before: node.solve_before.clone(),
+            solve_after: node.solve_after.clone(),
+        }
+    }
+
+    fn inertia<S: Scalar>(&self, node: &PlanNode, params: &[S]) -> RigidInertia<S> {
+        let x = node.inertia.map(S::constant);
+        let fixed = RigidInertia {
+            mass: x[0],
+            moment: [x[1], x[2], x[3]],
+            inertia: [x[4], x[5], x[6], x[7], x[8], x[9]],
+        };
+        let (o, one) = (S::zero(), S::one());
+        let identity = [[one, o, o], [o, one, o], [o, o, one]];
+        node.variable.iter().fold(fixed, |sum, (b, pose)| {
+            let body = &self.model.bodies[*b];
+            let of = |v: Value| value(v, params);
+            let (mut rot, mut pos, mut axes, mut nowhere) = (identity, [o; 3], identity, [o; 3]);
+            for step in steps(pose, params) {
+                step.pose(&mut rot, &mut pos);
+            }
+            for step in steps(&super::placement::rotation(&body.inertia_axes, 0.0, &mut |_| {}), params) {
+                step.pose(&mut axes, &mut nowhere);
+            }
+            sum.plus(&body_inertia(of(body.mass), body.com.map(of), body.inertia.map(of), &axes, &rot, pos))
+        })
+    }
+}

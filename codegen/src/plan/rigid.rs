@@ -1,0 +1,161 @@
+//! Constant poses and their factoring into elementary steps.
+
+use mbd_runtime::spatial::{Axis, Mat3, Vec3};
+
+use super::PoseStep;
+use crate::model::Value;
+
+/// Below this, relative to one, a sine, cosine or ratio of lengths is round-off.
+pub const ROUND_OFF: f64 = 1e-14;
+
+/// Pose of a frame in another: child components to parent components, origin in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rigid {
+    /// Rotation.
+    pub rot: Mat3<f64>,
+    /// Origin.
+    pub pos: Vec3<f64>,
+}
+
+impl Rigid {
+    /// The frame itself.
+    pub const IDENTITY: Rigid = Rigid { rot: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], pos: [0.0; 3] };
+
+    /// `self ∘ other`.
+    pub fn then(&self, other: &Rigid) -> Rigid {
+        let mut out = *self;
+        for (i, row) in self.rot.iter().enumerate() {
+            out.pos[i] = self.pos[i] + row[0] * other.pos[0] + row[1] * other.pos[1] + row[2] * other.pos[2];
+            for k in 0..3 {
+                out.rot[i][k] = row[0] * other.rot[0][k] + row[1] * other.rot[1][k] + row[2] * other.rot[2][k];
+            }
+        }
+        out
+    }
+
+    /// The opposite pose.
+    pub fn inverse(&self) -> Rigid {
+        let rot: Mat3<f64> = std::array::from_fn(|i| std::array::from_fn(|k| self.rot[k][i]));
+        let p = self.pos;
+        Rigid { rot, pos: std::array::from_fn(|i| -(rot[i][0] * p[0] + rot[i][1] * p[1] + rot[i][2] * p[2])) }
+    }
+
+    /// A vector of the child in parent components.
+    pub fn turn(&self, x: Vec3<f64>) -> Vec3<f64> {
+        self.rot.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
+    }
+
+    /// About z by the angle with the given cosine and sine, and along z.
+    pub fn screw_z(c: f64, s: f64, r: f64) -> Rigid {
+        Rigid { rot: [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], pos: [0.0, 0.0, r] }
+    }
+
+    /// The smallest rotation that takes z to the unit vector `a`.
+    pub fn align_z(a: Vec3<f64>) -> Rigid {
+        let [x, y, z] = a;
+        if z < -1.0 + 1e-9 {
+            // About x by half a turn, then whatever is left.
+            let rest = Rigid::align_z([x, -y, -z]).rot;
+            let half = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+            return Rigid { rot: half, pos: [0.0; 3] }.then(&Rigid { rot: rest, pos: [0.0; 3] });
+        }
+        let k = 1.0 / (1.0 + z);
+        let rot = [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]];
+        Rigid { rot, pos: [0.0; 3] }
+    }
+}
+
+/// `Z(γ, b) X(α, a) Z(θ, d)`: a pose as three screws, the last left to the joint it leads to.
+#[derive(Clone, Debug)]
+pub struct Screws {
+    /// Steps up to the last screw.
+    pub steps: Vec<PoseStep>,
+    /// `θ` as cosine and sine.
+    pub turn: (f64, f64),
+    /// `d`.
+    pub slide: f64,
+}
+
+/// Round-off to exact zeros and right angles; the pair stays on the unit circle.
+fn clean_turn(c: f64, s: f64) -> (f64, f64) {
+    let n = c.hypot(s);
+    let (c, s) = (c / n, s / n);
+    if s.abs() < ROUND_OFF {
+        (c.signum(), 0.0)
+    } else if c.abs() < ROUND_OFF {
+        (0.0, s.signum())
+    } else {
+        (c, s)
+    }
+}
+
+fn clean(x: f64, scale: f64) -> f64 {
+    if x.abs() <= ROUND_OFF * scale {
+        0.0
+    } else {
+        x
+    }
+}
+
+fn turn_step(steps: &mut Vec<PoseStep>, axis: Axis, (c, s): (f64, f64)) {
+    if (c, s) != (1.0, 0.0) {
+        steps.push(PoseStep::Turn { axis, c, s });
+    }
+}
+
+fn shift_step(steps: &mut Vec<PoseStep>, axis: Axis, r: f64) {
+    if r != 0.0 {
+        steps.push(PoseStep::Shift { axis, r: Value::Const(r) });
+    }
+}
+
+/// Factors a pose into screws. Axes that nearly coincide in direction have their common normal far away: then the
+/// displacement is made first and the screws only turn.
+pub fn screws(t: &Rigid) -> Screws {
+    let (rot, pos) = (&t.rot, t.pos);
+    let size = pos.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let sin_alpha = rot[0][2].hypot(rot[1][2]);
+    let mut steps = Vec::new();
+    if sin_alpha < ROUND_OFF {
+        // Parallel axes: the first screw only points x at the other axis.
+        let (x, y) = (clean(pos[0], size), clean(pos[1], size));
+        let gamma = if y == 0.0 { (1.0, 0.0) } else { clean_turn(x, y) };
+        let a = gamma.0 * x + gamma.1 * y;
+        let up = rot[2][2].signum();
+        turn_step(&mut steps, Axis::Z, gamma);
+        shift_step(&mut steps, Axis::X, a);
+        turn_step(&mut steps, Axis::X, (up, 0.0));
+        // R = Rz(γ) Rx(0 or π) Rz(θ)
+        let (c, s) = (rot[0][0], rot[1][0]);
+        let turn = clean_turn(gamma.0 * c + gamma.1 * s, up * (gamma.0 * s - gamma.1 * c));
+        return Screws { steps, turn, slide: up * clean(pos[2], size) };
+    }
+    let sign = if rot[1][2] > 0.0 { -1.0 } else { 1.0 };
+    let gamma = clean_turn(-rot[1][2] * sign, rot[0][2] * sign);
+    let alpha = clean_turn(rot[2][2], sign * sin_alpha);
+    let turn = clean_turn(rot[2][1] * sign, rot[2][0] * sign);
+    let across = [gamma.0 * pos[0] + gamma.1 * pos[1], gamma.0 * pos[1] - gamma.1 * pos[0]];
+    let d = -across[1] / alpha.1;
+    let b = pos[2] - alpha.0 * d;
+    if b.abs().max(d.abs()) > 20.0 * size {
+        for (axis, r) in [Axis::X, Axis::Y, Axis::Z].into_iter().zip(pos) {
+            shift_step(&mut steps, axis, clean(r, size));
+        }
+        turn_step(&mut steps, Axis::Z, gamma);
+        turn_step(&mut steps, Axis::X, alpha);
+        return Screws { steps, turn, slide: 0.0 };
+    }
+    shift_step(&mut steps, Axis::Z, clean(b, size));
+    turn_step(&mut steps, Axis::Z, gamma);
+    shift_step(&mut steps, Axis::X, clean(across[0], size));
+    turn_step(&mut steps, Axis::X, alpha);
+    Screws { steps, turn, slide: clean(d, size) }
+}
+
+/// A constant pose as steps, nothing left over.
+pub fn all_steps(t: &Rigid) -> Vec<PoseStep> {
+    let Screws { mut steps, turn, slide } = screws(t);
+    shift_step(&mut steps, Axis::Z, slide);
+    turn_step(&mut steps, Axis::Z, turn);
+    steps
+}

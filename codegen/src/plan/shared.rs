@@ -1,0 +1,50 @@
+//! Coordinates shared by several joints: where their columns are open, and where they are solved.
+
+use mbd_runtime::tree::Source;
+
+use super::Plan;
+use crate::model::Motion;
+
+/// Marks the nodes of every coordinate that more than one node follows.
+pub fn share(plan: &mut Plan) {
+    for v in 0..plan.dims.nv {
+        let members: Vec<usize> = (0..plan.nodes.len())
+            .filter(|&i| matches!(plan.nodes[i].source, Source::State { v: at, .. } if at == v))
+            .collect();
+        let mimics = members.iter().any(|&i| {
+            let joint = plan.nodes[i].joint.0;
+            matches!(plan.model.joints[joint].motion, Motion::Mimic { .. })
+        });
+        if !mimics {
+            continue;
+        }
+        let g = plan.shared.len();
+        plan.shared.push(v);
+        for &i in &members {
+            plan.nodes[i].shared = Some(g);
+        }
+        open(plan, g, &members);
+    }
+}
+
+/// Ancestors of node `i`, itself first, then outward to the ground.
+fn ancestors(plan: &Plan, i: usize) -> Vec<usize> {
+    std::iter::successors(Some(i), |&i| plan.nodes[i].parent).collect()
+}
+
+fn open(plan: &mut Plan, g: usize, members: &[usize]) {
+    let paths: Vec<Vec<usize>> = members.iter().map(|&i| ancestors(plan, i)).collect();
+    let meeting = paths[0].iter().copied().find(|a| paths.iter().all(|path| path.contains(a)));
+    for path in &paths {
+        for &i in path.iter().take_while(|&&i| Some(i) != meeting) {
+            if !plan.nodes[i].open.contains(&g) {
+                plan.nodes[i].open.push(g);
+            }
+        }
+    }
+    match meeting {
+        Some(i) if members.contains(&i) => plan.nodes[i].solve_after.push(g),
+        Some(i) => plan.nodes[i].solve_before.push(g),
+        None => plan.solve_at_ground.push(g),
+    }
+}
