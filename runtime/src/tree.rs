@@ -61,9 +61,12 @@ impl<S: Scalar> Kind<S> {
         }
     }
 
-    /// Whether a linear spring on coordinate `k` acts on velocity `k` (rate equals coordinate rate).
-    pub fn has_rates(&self) -> bool {
-        matches!(self, Kind::Pin | Kind::Slider | Kind::Helical { .. })
+    /// Coordinates a linear spring can act on.
+    pub fn springs(&self) -> usize {
+        match self {
+            Kind::Spherical | Kind::Floating => 0,
+            other => other.nq(),
+        }
     }
 }
 

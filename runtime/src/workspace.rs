@@ -12,8 +12,15 @@ use crate::Scalar;
 pub struct Poses<S> {
     /// Steps from the constant placement to the node frame.
     pub joint: Vec<JointSteps<S>>,
-    /// Joint coordinate of one-freedom nodes: `ratio · source + offset`.
-    pub coordinate: Vec<S>,
+    /// Joint coordinates of nodes a spring can act on, three slots each: `ratio · source + offset`.
+    pub coordinates: Vec<[S; 3]>,
+}
+
+impl<S: Scalar> Poses<S> {
+    /// Joint coordinate `k` of node `i`.
+    pub fn coordinate(&self, i: usize, k: usize) -> S {
+        self.coordinates[i][k]
+    }
 }
 
 /// At most four steps, kept in place.
@@ -167,7 +174,7 @@ impl<S: Scalar> Workspace<S> {
         };
         Workspace {
             first,
-            poses: Poses { joint: vec![JointSteps::new(); n], coordinate: vec![o; n] },
+            poses: Poses { joint: vec![JointSteps::new(); n], coordinates: vec![[o; 3]; n] },
             factor: Factor {
                 m: vec![ArticulatedInertia::zero(); n],
                 pivots: vec![pivot; f],

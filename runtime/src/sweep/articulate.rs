@@ -21,7 +21,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             };
             let shift = |axis: Axis, r: S| Step::Shift { axis, r };
             let x = node.ratio * q[0] + node.offset;
-            w.coordinate[i] = x;
+            w.coordinates[i][0] = x;
+            if let Kind::Planar = node.kind {
+                w.coordinates[i].copy_from_slice(&q[..3]);
+            }
             match node.kind {
                 Kind::Pin => w.joint[i].set(&[shift(Axis::Z, node.slide), turn(x)]),
                 Kind::Slider => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),

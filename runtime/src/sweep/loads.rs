@@ -77,9 +77,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let mut potential = -dot3(u.gravity, w.loads.ground_moment);
         for (i, node) in self.tree.nodes.iter().enumerate() {
             self.trace.at(Some(i), Quantity::Energy);
-            if node.kind.has_rates() {
-                let passive = &node.passive[0];
-                let stretch = w.poses.coordinate[i] - passive.rest;
+            for k in 0..node.kind.springs() {
+                let passive = &node.passive[k];
+                let stretch = w.poses.coordinate(i, k) - passive.rest;
                 potential = potential + S::constant(0.5) * passive.stiffness * stretch * stretch;
             }
         }

@@ -52,10 +52,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn passive(&self, node: &Node<S>, w: &Workspace<S>, i: usize, k: usize) -> S {
         let passive = &node.passive[k];
         let damper = -(passive.damping * w.velocity.rate[w.first[i] + k]);
-        if !node.kind.has_rates() {
-            return damper;
+        let pull = |k: usize| node.passive[k].stiffness * (w.poses.coordinate(i, k) - node.passive[k].rest);
+        match node.kind {
+            Kind::Spherical | Kind::Floating => damper,
+            // The springs of a planar joint act in the outer axes.
+            Kind::Planar if k < 2 => damper - w.poses.joint[i].get()[2].vector([pull(0), pull(1), S::zero()])[k],
+            _ => damper - pull(k),
         }
-        damper - passive.stiffness * (w.poses.coordinate[i] - passive.rest)
     }
 
     /// Accelerations, after the velocity kinematics and the wrenches on the bodies: the same linear problem with joint
