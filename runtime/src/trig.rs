@@ -39,7 +39,7 @@ fn chunk32(at: u32) -> u32 {
 /// The 64 bits of [`TWO_OVER_PI`] from bit `at` on.
 #[inline]
 fn chunk64(at: u32) -> u64 {
-    (u64::from(chunk32(at)) << 32) | u64::from(chunk32(at + 32))
+    (u64::from(chunk32(at)) << 32) | u64::from(chunk32(at.wrapping_add(32)))
 }
 
 /// One float type's functions. Written once: only constants, polynomials and the integer types differ.
