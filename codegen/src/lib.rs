@@ -1,6 +1,11 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
 pub mod diag;
+pub mod emit;
+pub mod generate;
 pub mod import;
 pub mod model;
 pub mod plan;
+pub mod symbolic;
+
+pub use generate::{generate, Generated, Group, Options, Precision};

@@ -68,10 +68,8 @@ pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) 
         }
         bodies[joint.child] = at;
         if worst > 0.0 {
-            notices.push(format!(
-                "joint `{}`: an angle {worst:.1e} rad off a right angle is taken as exact",
-                joint.name
-            ));
+            notices
+                .push(format!("joint `{}`: an angle {worst:.1e} rad off a right angle is taken as exact", joint.name));
         }
     }
     let mut quiet = |_: f64| {};

@@ -130,15 +130,7 @@ fn freedom(way: &Screws, has_child: bool, line: Option<(Vec3<f64>, Option<Vec3<f
     (unit(-uy, ux), if h.abs() <= ROUND_OFF * size { 0.0 } else { h })
 }
 
-fn node(
-    model: &Model,
-    elements: &Elements,
-    slots: &[Slot],
-    k: usize,
-    way: Screws,
-    (c, s): Turn,
-    h: f64,
-) -> PlanNode {
+fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screws, (c, s): Turn, h: f64) -> PlanNode {
     let element = &elements.list[k];
     let (joint, first) = element.joint;
     let description = &model.joints[joint];
@@ -264,8 +256,7 @@ fn named_frames(model: &Model, elements: &Elements, inside: &[Rigid], joint_node
         }
         PlanFrame { name: name.to_string(), node: *node, pose: steps }
     };
-    let children: Vec<usize> =
-        joint_nodes.iter().map(|&k| model.joints[elements.list[k].joint.0].child).collect();
+    let children: Vec<usize> = joint_nodes.iter().map(|&k| model.joints[elements.list[k].joint.0].child).collect();
     let others = (0..model.bodies.len()).filter(|b| !children.contains(b));
     let bodies = children.iter().copied().chain(others).map(|b| frame(&model.bodies[b].name, &elements.bodies[b]));
     let named = model.frames.iter().zip(&elements.frames).map(|(f, carried)| frame(&f.name, carried));

@@ -64,8 +64,7 @@ impl Plan {
         let frames: Vec<TreeFrame<S>> =
             self.frames.iter().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) }).collect();
         let wrenches = self.wrenches.iter().map(|&(frame, axes)| {
-            let mut path: Vec<usize> =
-                std::iter::successors(frames[frame].node, |&i| self.nodes[i].parent).collect();
+            let mut path: Vec<usize> = std::iter::successors(frames[frame].node, |&i| self.nodes[i].parent).collect();
             path.reverse();
             TreeWrench { frame: frames[frame].clone(), axes, path }
         });
@@ -125,11 +124,8 @@ impl Plan {
 
     fn inertia<S: Scalar>(&self, node: &PlanNode, params: &[S]) -> RigidInertia<S> {
         let x = node.inertia.map(S::constant);
-        let fixed = RigidInertia {
-            mass: x[0],
-            moment: [x[1], x[2], x[3]],
-            inertia: [x[4], x[5], x[6], x[7], x[8], x[9]],
-        };
+        let fixed =
+            RigidInertia { mass: x[0], moment: [x[1], x[2], x[3]], inertia: [x[4], x[5], x[6], x[7], x[8], x[9]] };
         let (o, one) = (S::zero(), S::one());
         let identity = [[one, o, o], [o, one, o], [o, o, one]];
         node.variable.iter().fold(fixed, |sum, (b, pose)| {

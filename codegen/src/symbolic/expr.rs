@@ -1,0 +1,298 @@
+//! The graph and its handles.
+
+use std::cell::{Cell, RefCell};
+use std::collections::HashMap;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use mbd_runtime::sweep::{Quantity, Trace};
+use mbd_runtime::Scalar;
+
+/// An operand: the bits of a constant, or a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Operand {
+    /// A constant, by its bits; never negative.
+    Const(u64),
+    /// A node.
+    Node(u32),
+}
+
+/// One operation. Negative signs live on the edges: see [`Expr`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Op {
+    /// Input `k`.
+    Input(u32),
+    /// `a + b`.
+    Add(Operand, Operand),
+    /// `a − b`.
+    Sub(Operand, Operand),
+    /// `a · b`.
+    Mul(Operand, Operand),
+    /// `a / b`.
+    Div(Operand, Operand),
+    /// Square root.
+    Sqrt(u32),
+    /// Sine.
+    Sin(u32),
+    /// Cosine.
+    Cos(u32),
+}
+
+impl Op {
+    /// The operands, where there are any.
+    pub fn operands(&self) -> impl Iterator<Item = Operand> {
+        let (a, b) = match *self {
+            Op::Input(_) => (None, None),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => (Some(a), Some(b)),
+            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => (Some(Operand::Node(a)), None),
+        };
+        a.into_iter().chain(b)
+    }
+}
+
+/// Where a node came from: tree node (`None`: ground) and quantity.
+pub type Label = (Option<usize>, Quantity);
+
+#[derive(Debug, Default)]
+struct Inner {
+    ops: Vec<Op>,
+    labels: Vec<Label>,
+    // Looked up, never iterated: order is that of `ops`.
+    memo: HashMap<Op, u32>,
+}
+
+/// A graph of operations, each standing once, in the order of first use.
+#[derive(Debug)]
+pub struct Graph {
+    inner: RefCell<Inner>,
+    label: Cell<Label>,
+}
+
+impl Default for Graph {
+    fn default() -> Self {
+        Graph { inner: RefCell::default(), label: Cell::new((None, Quantity::Pose)) }
+    }
+}
+
+impl Trace for Graph {
+    fn at(&self, node: Option<usize>, what: Quantity) {
+        self.label.set((node, what));
+    }
+}
+
+impl Graph {
+    /// Input `k`.
+    pub fn input(&self, k: usize) -> Expr<'_> {
+        self.node(Op::Input(k as u32), false)
+    }
+
+    /// Number of operations created so far, inputs included.
+    pub fn len(&self) -> usize {
+        self.inner.borrow().ops.len()
+    }
+
+    /// Whether nothing has been created.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Operation and origin of a node.
+    pub fn get(&self, id: u32) -> (Op, Label) {
+        let inner = self.inner.borrow();
+        (inner.ops[id as usize], inner.labels[id as usize])
+    }
+
+    fn node(&self, op: Op, neg: bool) -> Expr<'_> {
+        let mut inner = self.inner.borrow_mut();
+        let next = inner.ops.len() as u32;
+        let id = *inner.memo.entry(op).or_insert(next);
+        if id == next {
+            inner.ops.push(op);
+            inner.labels.push(self.label.get());
+        }
+        Expr::Node { graph: self, id, neg }
+    }
+}
+
+/// A symbolic scalar: a constant, or a signed node of a graph. `Copy`, 16 bytes.
+#[derive(Clone, Copy, Debug)]
+pub enum Expr<'g> {
+    /// A constant; belongs to no graph.
+    Const(f64),
+    /// A node or its negative.
+    Node {
+        /// The graph.
+        graph: &'g Graph,
+        /// The node.
+        id: u32,
+        /// Whether the value is the node's negative.
+        neg: bool,
+    },
+}
+
+impl<'g> Expr<'g> {
+    /// Splits into operand and sign.
+    fn split(self) -> (Operand, bool) {
+        match self {
+            Expr::Const(x) => (Operand::Const(x.abs().to_bits()), x < 0.0),
+            Expr::Node { id, neg, .. } => (Operand::Node(id), neg),
+        }
+    }
+
+    fn graph(self, other: Self) -> Option<&'g Graph> {
+        match (self, other) {
+            (Expr::Node { graph, .. }, _) | (_, Expr::Node { graph, .. }) => Some(graph),
+            _ => None,
+        }
+    }
+
+    fn is(self, x: f64) -> bool {
+        matches!(self, Expr::Const(c) if c == x)
+    }
+
+    fn unary(self, f: impl Fn(f64) -> f64, op: impl Fn(u32) -> Op) -> (Self, bool) {
+        match self {
+            Expr::Const(x) => (Expr::Const(f(x)), false),
+            Expr::Node { graph, id, neg } => (graph.node(op(id), false), neg),
+        }
+    }
+}
+
+impl Add for Expr<'_> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        let Some(graph) = self.graph(other) else {
+            let (Expr::Const(x), Expr::Const(y)) = (self, other) else { unreachable!("constants have no graph") };
+            return Expr::Const(x + y);
+        };
+        if self.is(0.0) {
+            return other;
+        }
+        if other.is(0.0) {
+            return self;
+        }
+        let ((mut a, mut a_neg), (mut b, mut b_neg)) = (self.split(), other.split());
+        if a == b && a_neg != b_neg {
+            return Expr::Const(0.0);
+        }
+        // Nodes in order of age, a constant last; the first operand's sign goes outside.
+        let first = |x: Operand| (matches!(x, Operand::Const(_)), x);
+        if first(b) < first(a) {
+            std::mem::swap(&mut a, &mut b);
+            std::mem::swap(&mut a_neg, &mut b_neg);
+        }
+        let op = if a_neg == b_neg { Op::Add(a, b) } else { Op::Sub(a, b) };
+        graph.node(op, a_neg)
+    }
+}
+
+impl Neg for Expr<'_> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        match self {
+            Expr::Const(x) if x == 0.0 => self,
+            Expr::Const(x) => Expr::Const(-x),
+            Expr::Node { graph, id, neg } => Expr::Node { graph, id, neg: !neg },
+        }
+    }
+}
+
+impl Sub for Expr<'_> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Mul for Expr<'_> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let Some(graph) = self.graph(other) else {
+            let (Expr::Const(x), Expr::Const(y)) = (self, other) else { unreachable!("constants have no graph") };
+            return Expr::Const(x * y);
+        };
+        for (x, y) in [(self, other), (other, self)] {
+            if x.is(0.0) {
+                return Expr::Const(0.0);
+            } else if x.is(1.0) {
+                return y;
+            } else if x.is(-1.0) {
+                return -y;
+            }
+        }
+        let ((a, a_neg), (b, b_neg)) = (self.split(), other.split());
+        graph.node(if b < a { Op::Mul(b, a) } else { Op::Mul(a, b) }, a_neg != b_neg)
+    }
+}
+
+impl Div for Expr<'_> {
+    type Output = Self;
+    fn div(self, other: Self) -> Self {
+        let Some(graph) = self.graph(other) else {
+            let (Expr::Const(x), Expr::Const(y)) = (self, other) else { unreachable!("constants have no graph") };
+            return Expr::Const(x / y);
+        };
+        if self.is(0.0) || other.is(1.0) {
+            return self;
+        }
+        let ((a, a_neg), (b, b_neg)) = (self.split(), other.split());
+        graph.node(Op::Div(a, b), a_neg != b_neg)
+    }
+}
+
+impl Scalar for Expr<'_> {
+    fn constant(x: f64) -> Self {
+        Expr::Const(x)
+    }
+
+    fn sin_cos(self) -> (Self, Self) {
+        let trig = |x: f64| Scalar::sin_cos(x);
+        let (s, neg) = self.unary(|x| trig(x).0, Op::Sin);
+        let (c, _) = self.unary(|x| trig(x).1, Op::Cos);
+        (if neg { -s } else { s }, c)
+    }
+
+    fn sqrt(self) -> Self {
+        match self {
+            Expr::Const(x) => Expr::Const(Scalar::sqrt(x)),
+            Expr::Node { neg: true, .. } => unreachable!("no sweep takes the root of a negative value"),
+            Expr::Node { graph, id, neg: false } => graph.node(Op::Sqrt(id), false),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn is_small() {
+        assert_eq!(std::mem::size_of::<Expr>(), 16);
+    }
+
+    #[test]
+    fn exact_rules() {
+        let g = Graph::default();
+        let (x, y) = (g.input(0), g.input(1));
+        let same = |a: Expr, b: Expr| assert_eq!(a.split(), b.split());
+        let c = Expr::Const;
+        same(x + c(0.0), x);
+        same(c(0.0) + x, x);
+        same(x * c(1.0), x);
+        same(x * c(-1.0), -x);
+        same(x * c(0.0), c(0.0));
+        same(x - x, c(0.0));
+        same(x + y, y + x);
+        same(x * y, y * x);
+        same(y - x, -(x - y));
+        same(-x - y, -(x + y));
+        same(x * -y, -(x * y));
+        same(x / -y, -(x / y));
+        same(x - c(2.0), -(c(2.0) - x));
+        same(c(2.0) * c(3.0), c(6.0));
+        same((-x).sin_cos().0, -(x.sin_cos().0));
+        same((-x).sin_cos().1, x.sin_cos().1);
+        // What is not exact stays as it is written.
+        let (Expr::Node { id, .. }, true) = ((x + c(1.0)) + c(2.0), true) else { panic!() };
+        assert!(matches!(g.get(id).0, Op::Add(Operand::Node(_), Operand::Const(_))));
+    }
+}

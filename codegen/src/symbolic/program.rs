@@ -1,0 +1,158 @@
+//! Live operations of a graph, in order, and what they cost.
+
+use super::{Expr, Graph, Label, Op, Operand};
+
+/// A signed result: a constant or a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// A constant.
+    Const(f64),
+    /// A node or its negative.
+    Node(u32, bool),
+}
+
+/// Operations by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Additions and subtractions.
+    pub additions: usize,
+    /// Multiplications.
+    pub multiplications: usize,
+    /// Divisions.
+    pub divisions: usize,
+    /// Square roots.
+    pub roots: usize,
+    /// Pairs of a sine and a cosine of one angle.
+    pub sincos: usize,
+}
+
+impl Counts {
+    /// Additions, multiplications and divisions: the number to compare.
+    pub fn total(&self) -> usize {
+        self.additions + self.multiplications + self.divisions
+    }
+
+    /// Sum.
+    pub fn plus(self, o: Counts) -> Counts {
+        Counts {
+            additions: self.additions + o.additions,
+            multiplications: self.multiplications + o.multiplications,
+            divisions: self.divisions + o.divisions,
+            roots: self.roots + o.roots,
+            sincos: self.sincos + o.sincos,
+        }
+    }
+
+    fn add(&mut self, op: &Op, sine_of_pair: bool) {
+        match op {
+            Op::Input(_) => {}
+            Op::Add(..) | Op::Sub(..) => self.additions += 1,
+            Op::Mul(..) => self.multiplications += 1,
+            Op::Div(..) => self.divisions += 1,
+            Op::Sqrt(_) => self.roots += 1,
+            Op::Sin(_) | Op::Cos(_) => self.sincos += usize::from(!sine_of_pair),
+        }
+    }
+}
+
+/// A straight-line program: what the outputs need, nothing else, operands before their use.
+#[derive(Clone, Debug)]
+pub struct Program {
+    /// Live nodes in order: node id, operation, origin.
+    pub steps: Vec<(u32, Op, Label)>,
+    /// Results, in the order they were asked for.
+    pub outputs: Vec<Output>,
+}
+
+impl Program {
+    /// The program of some outputs; everything they do not need is left out.
+    pub fn new(graph: &Graph, outputs: &[Expr]) -> Program {
+        let outputs: Vec<Output> = outputs
+            .iter()
+            .map(|e| match *e {
+                Expr::Const(x) => Output::Const(x),
+                Expr::Node { id, neg, .. } => Output::Node(id, neg),
+            })
+            .collect();
+        let mut live = vec![false; graph.len()];
+        for output in &outputs {
+            if let Output::Node(id, _) = output {
+                live[*id as usize] = true;
+            }
+        }
+        // Operands are older than the node that uses them: one pass backward marks everything.
+        for id in (0..live.len()).rev() {
+            if live[id] {
+                mark(graph, id, &mut live);
+            }
+        }
+        let steps = (0..live.len() as u32).filter(|&id| live[id as usize]).map(|id| {
+            let (op, label) = graph.get(id);
+            (id, op, label)
+        });
+        let mut program = Program { steps: steps.collect(), outputs };
+        program.turn_negated_differences();
+        program
+    }
+
+    /// Operations that are executed.
+    pub fn counts(&self) -> Counts {
+        self.counts_where(|_| true)
+    }
+
+    /// Operations whose origin satisfies a condition; a pair of sine and cosine counts where its first half stands.
+    pub fn counts_where(&self, condition: impl Fn(&Label) -> bool) -> Counts {
+        let mut counts = Counts::default();
+        let mut angles = std::collections::BTreeSet::new();
+        for (_, op, label) in &self.steps {
+            let second = match op {
+                Op::Sin(a) | Op::Cos(a) => !angles.insert(*a),
+                _ => false,
+            };
+            if condition(label) {
+                counts.add(op, second);
+            }
+        }
+        counts
+    }
+
+    /// `−(a − b)` that is only ever an output becomes `b − a`.
+    fn turn_negated_differences(&mut self) {
+        let mut inner = std::collections::BTreeSet::new();
+        for (_, op, _) in &self.steps {
+            inner.extend(op.operands());
+        }
+        let mut signs = std::collections::BTreeMap::new();
+        for output in &self.outputs {
+            if let Output::Node(id, neg) = output {
+                signs.entry(*id).and_modify(|all| *all &= *neg).or_insert(*neg);
+            }
+        }
+        for (id, op, _) in &mut self.steps {
+            if let Op::Sub(a, b) = *op {
+                if signs.get(id) == Some(&true) && !inner.contains(&Operand::Node(*id)) {
+                    *op = Op::Sub(b, a);
+                } else {
+                    signs.remove(id);
+                }
+            } else {
+                signs.remove(id);
+            }
+        }
+        for output in &mut self.outputs {
+            if let Output::Node(id, neg) = output {
+                if signs.get(id) == Some(&true) {
+                    *neg = false;
+                }
+            }
+        }
+    }
+}
+
+fn mark(graph: &Graph, id: usize, live: &mut [bool]) {
+    for operand in graph.get(id as u32).0.operands() {
+        if let Operand::Node(k) = operand {
+            live[k as usize] = true;
+        }
+    }
+}
