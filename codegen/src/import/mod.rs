@@ -1,1 +1,4 @@
 //! Readers of file formats. Nothing outside this module knows them.
+
+pub mod raw;
+pub mod source;
