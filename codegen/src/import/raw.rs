@@ -230,6 +230,9 @@ pub struct RawModel {
     pub wrenches: Vec<RawWrench>,
     /// A body or joint had to be left out and was reported: unknown names and loose bodies are then no news.
     pub incomplete: bool,
+    /// The file was written for other programs: what nature forbids but the equations survive is then a warning, and the model's
+    /// name is made usable.
+    pub lenient: bool,
 }
 
 impl RawModel {
@@ -244,6 +247,7 @@ impl RawModel {
             frames: Vec::new(),
             wrenches: Vec::new(),
             incomplete: false,
+            lenient: false,
         }
     }
 }
