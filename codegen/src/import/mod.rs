@@ -2,3 +2,5 @@
 
 pub mod raw;
 pub mod source;
+pub mod toml;
+pub mod words;

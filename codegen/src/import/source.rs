@@ -106,6 +106,11 @@ impl<'a> Findings<'a> {
         self.add(Severity::Notice, span, message, "");
     }
 
+    /// Line of the start of a span, from 1.
+    pub fn line(&self, span: Span) -> usize {
+        self.map.position(span.start).0
+    }
+
     /// Whether there is an error among them.
     pub fn has_errors(&self) -> bool {
         self.list.iter().any(|d| d.severity == Severity::Error)
