@@ -116,7 +116,7 @@ fn joint_kind(raw: &RawJoint, kind: JointType, what: &str, numbers: &mut Numbers
 }
 
 /// Within a microradian of parallel: the two rates could not be told apart.
-fn parallel(a: [f64; 3], b: [f64; 3]) -> bool {
+pub(super) fn parallel(a: [f64; 3], b: [f64; 3]) -> bool {
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     norm(cross) <= 1e-6 * norm(a) * norm(b)
 }

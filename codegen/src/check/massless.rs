@@ -74,6 +74,9 @@ fn weak_freedom(model: &Model, k: usize, heavy: bool, moving: bool, inertia: Opt
         return loose.contains(&true).then(|| format!("{body}{all} {verb} neither mass nor inertia"));
     }
     let inertia = inertia.filter(|_| !moving)?;
+    if matches!(joint.kind, JointKind::Universal { axes: [a, b] } if super::joints::parallel(a, b)) {
+        return None; // reported as that
+    }
     let columns = freedoms(&joint.kind, model);
     let armature: Vec<f64> = joint.armature.iter().map(|a| at_default(*a, model)).collect();
     let resists = resistance(&inertia, &columns, &armature);

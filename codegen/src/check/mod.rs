@@ -107,6 +107,10 @@ fn wrenches(raw: &RawModel, names: &Names, findings: &mut Findings) -> Vec<Wrenc
 
 /// A mechanism without freedom is no error, but seldom meant.
 fn moving(model: &Model, findings: &mut Findings) {
+    // What is missing may be among what could not be read.
+    if findings.has_errors() {
+        return;
+    }
     if model.bodies.is_empty() {
         findings.error(Span::FILE, "the model has no bodies", "add at least one body and the joint that carries it");
     } else if model.joints.iter().all(|j| j.kind.nv() == 0) {

@@ -87,12 +87,14 @@ impl<'r> Names<'r> {
         names
     }
 
-    /// Whether a body is the one its name stands for (a second one of that name is reported).
+    /// Whether a body is the one its name stands for (a second one of that name is reported, and one called like the ground).
     pub(super) fn is_first(&self, body: usize) -> bool {
-        self.bodies.get(self.raw.bodies[body].name.value.as_str()) == Some(&body)
+        let name = self.raw.bodies[body].name.value.as_str();
+        name != GROUND && self.bodies.get(name) == Some(&body)
     }
 
-    /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` and `what` as in ``joint `elbow`: parent ..``.
+    /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` (empty, or with a space behind) and `what` as in
+    /// ``joint `elbow`: parent `upper_am` is not a body``.
     pub(super) fn body(
         &self,
         name: &Spanned<String>,
@@ -106,13 +108,14 @@ impl<'r> Names<'r> {
         let found = self.bodies.get(name.value.as_str()).copied();
         // A body that had to be left out may be the one that is missed.
         if found.is_none() && !self.raw.incomplete {
-            let all = || self.raw.bodies.iter().map(|b| b.name.value.as_str());
-            let help = did_you_mean(&name.value, all().chain([GROUND]), || match self.raw.bodies.len() {
+            let firsts = (0..self.raw.bodies.len()).filter(|&b| self.is_first(b));
+            let all: Vec<&str> = firsts.map(|b| self.raw.bodies[b].name.value.as_str()).collect();
+            let help = did_you_mean(&name.value, all.iter().copied().chain([GROUND]), || match all.len() {
                 0 => "the model has no bodies yet: add one".into(),
-                1 => format!("the only body is {}", list(all())),
-                _ => format!("the bodies are {}", list(all())),
+                1 => format!("the only body is {}", list(all.iter().copied())),
+                _ => format!("the bodies are {}", list(all.iter().copied())),
             });
-            findings.error(name.span, format!("{what}: {role} {} is not a body", quote(&name.value)), help);
+            findings.error(name.span, format!("{what}: {role}{} is not a body", quote(&name.value)), help);
         }
         found.map(Some)
     }
