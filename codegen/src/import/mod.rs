@@ -3,6 +3,7 @@
 pub mod raw;
 pub mod source;
 pub mod toml;
+pub mod urdf;
 pub mod words;
 
 use self::source::{Findings, Span};
@@ -39,8 +40,8 @@ pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, 
     let extension = std::path::Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match extension.as_deref() {
         Some("toml") => toml::read_with(file, text, options),
-        Some("urdf") => read_urdf(file, text, options),
-        Some("xml") if text.contains("<robot") => read_urdf(file, text, options),
+        Some("urdf") => urdf::read(file, text, options),
+        Some("xml") if text.contains("<robot") => urdf::read(file, text, options),
         Some("xml") => refuse(file, text, "no `<robot>` in this file", "of XML formats only URDF can be read"),
         Some("xacro") => {
             refuse(file, text, "xacro files have to be expanded first", "run `xacro model.xacro > model.urdf`")
@@ -51,11 +52,6 @@ pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, 
 }
 
 const KNOWN: &str = "models are read from `.toml` and `.urdf` files";
-
-/// To be replaced by `urdf::read(file, text, options)` where that reader is there.
-fn read_urdf(file: &str, text: &str, _options: &ImportOptions) -> (Option<Model>, Diagnostics) {
-    refuse(file, text, "URDF cannot be read yet", "describe the model in TOML")
-}
 
 fn refuse(file: &str, text: &str, message: &str, help: &str) -> (Option<Model>, Diagnostics) {
     let mut findings = Findings::new(file, text);
