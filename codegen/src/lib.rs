@@ -1,5 +1,6 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
+pub mod check;
 pub mod diag;
 pub mod emit;
 pub mod generate;

@@ -1,0 +1,309 @@
+//! Joints: axes, passive elements, source of motion.
+
+use super::names::{norm, Names};
+use super::numbers::{Numbers, Quantity};
+use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawModel, RawMotion};
+use crate::import::source::{Findings, Span, Spanned};
+use crate::import::words::{list, quote};
+use crate::model::{Joint, JointKind, Motion, Value};
+
+/// A type as it is written.
+fn type_name(kind: JointType) -> &'static str {
+    match kind {
+        JointType::Pin => "pin",
+        JointType::Slider => "slider",
+        JointType::Cylindrical => "cylindrical",
+        JointType::Helical => "helical",
+        JointType::Universal => "universal",
+        JointType::Planar => "planar",
+        JointType::Spherical => "spherical",
+        JointType::Floating => "floating",
+        JointType::Fixed => "fixed",
+    }
+}
+
+/// What each coordinate measures; empty where coordinates have no axes of their own.
+fn coordinates(kind: JointType) -> &'static [Quantity] {
+    use Quantity::{Angle, Length};
+    match kind {
+        JointType::Pin | JointType::Helical => &[Angle],
+        JointType::Slider => &[Length],
+        JointType::Cylindrical => &[Length, Angle],
+        JointType::Universal => &[Angle, Angle],
+        JointType::Planar => &[Length, Length, Angle],
+        JointType::Spherical | JointType::Floating | JointType::Fixed => &[],
+    }
+}
+
+/// A joint with everything but its indices, which are filled in when the tree is known.
+pub(super) fn joint(raw: &RawJoint, numbers: &mut Numbers) -> Joint {
+    let what = format!("joint {}", quote(&raw.name.value));
+    let placement = numbers.placement(&raw.placement, &what);
+    let kind = raw.kind.as_ref().map(|k| k.value);
+    let motion = motion(raw, kind, &what, numbers);
+    let joint_kind = match kind {
+        Some(kind) => {
+            superfluous(raw, kind, &what, numbers.findings);
+            joint_kind(raw, kind, &what, numbers)
+        }
+        None => JointKind::Fixed,
+    };
+    let mut joint = Joint {
+        name: raw.name.value.clone(),
+        kind: joint_kind,
+        parent: None,
+        child: 0,
+        placement,
+        motion,
+        damping: Vec::new(),
+        stiffness: Vec::new(),
+        rest: Vec::new(),
+        armature: Vec::new(),
+    };
+    // How many freedoms an unknown type has is unknown.
+    let Some(kind) = kind else { return joint };
+    let plain = vec![Quantity::Plain; joint_kind.nv()];
+    let rest = coordinates(kind);
+    joint.damping = freedoms(&raw.damping, &plain, "damping", kind, &what, numbers);
+    joint.stiffness = freedoms(&raw.stiffness, &plain, "stiffness", kind, &what, numbers);
+    joint.rest = freedoms(&raw.rest, if rest.is_empty() { &plain } else { rest }, "rest", kind, &what, numbers);
+    joint.armature = freedoms(&raw.armature, &plain, "armature", kind, &what, numbers);
+    signs(raw, &joint, &what, numbers);
+    joint
+}
+
+fn joint_kind(raw: &RawJoint, kind: JointType, what: &str, numbers: &mut Numbers) -> JointKind {
+    let mut direction = |axis: &Option<Spanned<[f64; 3]>>, key: &str, default: [f64; 3]| match axis {
+        Some(axis) => numbers.direction(axis, &format!("{what}: `{key}`")).unwrap_or(default),
+        None => default,
+    };
+    let z = [0.0, 0.0, 1.0];
+    match kind {
+        JointType::Pin => JointKind::Pin { axis: direction(&raw.axis, "axis", z) },
+        JointType::Slider => JointKind::Slider { axis: direction(&raw.axis, "axis", z) },
+        JointType::Cylindrical => JointKind::Cylindrical { axis: direction(&raw.axis, "axis", z) },
+        JointType::Planar => JointKind::Planar { normal: direction(&raw.axis, "axis", z) },
+        JointType::Spherical => JointKind::Spherical,
+        JointType::Floating => JointKind::Floating,
+        JointType::Fixed => JointKind::Fixed,
+        JointType::Helical => {
+            let axis = direction(&raw.axis, "axis", z);
+            if raw.pitch.is_none() {
+                let message = format!("{what}: a helical joint needs a `pitch`");
+                let help = "add `pitch = ..`, metres along the axis per radian (lead per turn / 2 pi)";
+                numbers.findings.error(raw.name.span, message, help);
+            }
+            let pitch = numbers.or_zero(&raw.pitch, Quantity::Pitch, &format!("{what}: `pitch`"));
+            if let (Some(p), Some(0.0)) = (&raw.pitch, pitch.constant()) {
+                numbers.findings.warning(
+                    p.span,
+                    format!("{what}: a helical joint of pitch 0 is a pin"),
+                    "make it a `pin`",
+                );
+            }
+            JointKind::Helical { axis, pitch }
+        }
+        JointType::Universal => {
+            let axes = [direction(&raw.axis, "axis", [1.0, 0.0, 0.0]), direction(&raw.axis2, "axis2", [0.0, 1.0, 0.0])];
+            let span = raw.axis2.as_ref().or(raw.axis.as_ref()).map_or(raw.name.span, |a| a.span);
+            if parallel(axes[0], axes[1]) {
+                let help = "the second axis has to cross the first: by default they are x and y";
+                numbers.findings.error(span, format!("{what}: the two axes of a universal joint are parallel"), help);
+            }
+            JointKind::Universal { axes }
+        }
+    }
+}
+
+/// Within a microradian of parallel: the two rates could not be told apart.
+pub(super) fn parallel(a: [f64; 3], b: [f64; 3]) -> bool {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    norm(cross) <= 1e-6 * norm(a) * norm(b)
+}
+
+/// Entries that mean nothing on a joint of this type.
+fn superfluous(raw: &RawJoint, kind: JointType, what: &str, findings: &mut Findings) {
+    let at = |f: &Option<RawFreedoms>| f.as_ref().map(span_of);
+    let has_axis = !matches!(kind, JointType::Spherical | JointType::Floating | JointType::Fixed);
+    let has_spring = !coordinates(kind).is_empty();
+    let moves = kind != JointType::Fixed;
+    let entries = [
+        ("axis", raw.axis.as_ref().map(|a| a.span), has_axis),
+        ("axis2", raw.axis2.as_ref().map(|a| a.span), kind == JointType::Universal),
+        ("pitch", raw.pitch.as_ref().map(|p| p.span), kind == JointType::Helical),
+        ("damping", at(&raw.damping), moves),
+        ("stiffness", at(&raw.stiffness), has_spring),
+        ("rest", at(&raw.rest), has_spring),
+        ("armature", at(&raw.armature), moves),
+    ];
+    for (key, span, allowed) in entries {
+        if let (Some(span), false) = (span, allowed) {
+            let help = match key {
+                "stiffness" | "rest" if moves => {
+                    "there is no linear spring on its coordinates: remove it, or give its torque from outside"
+                }
+                "axis2" => "remove it, or make the joint `universal`",
+                "pitch" => "remove it, or make the joint `helical`",
+                _ => "remove it, or change the type of the joint",
+            };
+            findings.error(span, format!("{what}: a {} joint has no `{key}`", type_name(kind)), help);
+        }
+    }
+}
+
+fn span_of(f: &RawFreedoms) -> Span {
+    match f {
+        RawFreedoms::All(x) => x.span,
+        RawFreedoms::Each(list) => list.span,
+    }
+}
+
+/// One value per freedom, zeros where nothing is given or nothing belongs.
+fn freedoms(
+    raw: &Option<RawFreedoms>,
+    quantities: &[Quantity],
+    key: &str,
+    kind: JointType,
+    what: &str,
+    numbers: &mut Numbers,
+) -> Vec<Value> {
+    let n = quantities.len();
+    let named = format!("{what}: `{key}`");
+    match raw {
+        None => vec![Value::ZERO; n],
+        Some(RawFreedoms::All(x)) => {
+            // An angle among the coordinates makes the number one.
+            let quantity = quantities.iter().copied().find(|q| *q == Quantity::Angle).or(quantities.first().copied());
+            vec![numbers.value(x, quantity.unwrap_or(Quantity::Plain), &named); n]
+        }
+        Some(RawFreedoms::Each(list)) => {
+            let quantity = |k: usize| quantities.get(k).copied().unwrap_or(Quantity::Plain);
+            let mut values: Vec<Value> =
+                list.value.iter().enumerate().map(|(k, x)| numbers.value(x, quantity(k), &named)).collect();
+            if values.len() != n {
+                // A joint without freedoms is told so already.
+                if n > 0 {
+                    let message =
+                        format!("{named} has {} numbers, and a {} joint has {}", values.len(), type_name(kind), of(n));
+                    let help =
+                        if n == 1 { "write one number".into() } else { format!("write {n} numbers, or one for all") };
+                    numbers.findings.error(list.span, message, help);
+                }
+                values.resize(n, Value::ZERO);
+            }
+            values
+        }
+    }
+}
+
+fn of(n: usize) -> String {
+    format!("{n} freedom{}", if n == 1 { "" } else { "s" })
+}
+
+/// Signs and idle springs.
+fn signs(raw: &RawJoint, joint: &Joint, what: &str, numbers: &mut Numbers) {
+    let negative = |values: &[Value]| values.iter().any(|v| v.constant().is_some_and(|x| x < 0.0));
+    if let (Some(f), true) = (&raw.damping, negative(&joint.damping)) {
+        let message = format!("{what}: negative damping feeds energy into the motion");
+        numbers.findings.warning(span_of(f), message, "damping that brakes is positive");
+    }
+    if let (Some(f), true) = (&raw.stiffness, negative(&joint.stiffness)) {
+        let message = format!("{what}: a spring of negative stiffness pushes away from its rest position");
+        numbers.findings.warning(span_of(f), message, "stiffness that pulls back is positive");
+    }
+    if let (Some(f), true) = (&raw.armature, negative(&joint.armature)) {
+        let message = format!("{what}: armature is an inertia and cannot be negative");
+        numbers.findings.error(span_of(f), message, "write the rotor inertia times the square of the gear ratio");
+    }
+    if let (Some(f), None) = (&raw.rest, &raw.stiffness) {
+        let message = format!("{what}: `rest` has no effect without `stiffness`");
+        numbers.findings.warning(span_of(f), message, "add `stiffness`, or remove `rest`");
+    }
+}
+
+fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Numbers) -> Motion {
+    if let RawMotion::Prescribed(span) = raw.motion {
+        if kind == Some(JointType::Fixed) {
+            let message = format!("{what}: a fixed joint has no motion to prescribe");
+            numbers.findings.error(span, message, "remove `motion`, or change the type of the joint");
+        }
+        if raw.mimic.is_some() {
+            let message = format!("{what}: motion is prescribed and follows another joint at the same time");
+            numbers.findings.error(span, message, "remove `motion` or `mimic`");
+        }
+    }
+    let Some(mimic) = &raw.mimic else {
+        return match raw.motion {
+            RawMotion::Free => Motion::Free,
+            RawMotion::Prescribed(_) => Motion::Prescribed,
+        };
+    };
+    if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
+        let message = format!("{what}: a {} joint cannot mimic another", type_name(kind));
+        let help = "only joints of one freedom can: `pin`, `slider` and `helical`";
+        numbers.findings.error(mimic.span, message, help);
+    }
+    let ratio = mimic.ratio.as_ref().map(|r| numbers.value(r, Quantity::Plain, &format!("{what}: `ratio`")));
+    if let (Some(0.0), Some(r)) = (ratio.and_then(Value::constant), &mimic.ratio) {
+        let message = format!("{what}: with a ratio of 0 it never moves");
+        numbers.findings.warning(r.span, message, "make it a `fixed` joint, or correct the ratio");
+    }
+    let quantity = kind.map_or(&[] as &[_], coordinates).first().copied().unwrap_or(Quantity::Plain);
+    let offset = numbers.or_zero(&mimic.offset, quantity, &format!("{what}: `offset`"));
+    Motion::Mimic { leader: 0, ratio: ratio.unwrap_or(Value::ONE), offset }
+}
+
+/// File index of the leader of each joint that mimics one. Reports leaders that cannot lead and rings.
+pub(super) fn leaders(raw: &RawModel, names: &Names, findings: &mut Findings) -> Vec<Option<usize>> {
+    let mut leaders = Vec::new();
+    for j in &raw.joints {
+        let what = format!("joint {}", quote(&j.name.value));
+        let leader = j.mimic.as_ref().and_then(|m| {
+            let leader = names.joint(&m.leader, &what, findings)?;
+            let kind = raw.joints[leader].kind.as_ref().map(|k| k.value);
+            if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
+                let message = format!("{what}: leader {} is a {} joint", quote(&m.leader.value), type_name(kind));
+                let help = "only joints of one freedom can lead: `pin`, `slider` and `helical`";
+                findings.error(m.leader.span, message, help);
+            }
+            Some(leader)
+        });
+        leaders.push(leader);
+    }
+    rings(raw, &leaders, findings);
+    leaders
+}
+
+/// Reports each ring of leaders once.
+fn rings(raw: &RawModel, leaders: &[Option<usize>], findings: &mut Findings) {
+    // 0: not visited; k: visited by the walk that started at joint k - 1.
+    let mut walk = vec![0; leaders.len()];
+    for start in 0..leaders.len() {
+        let mut at = start;
+        while walk[at] == 0 {
+            walk[at] = start + 1;
+            let Some(next) = leaders[at] else { break };
+            at = next;
+            if walk[at] != start + 1 {
+                continue;
+            }
+            let mut ring = vec![at];
+            let mut next = leaders[at];
+            while let Some(j) = next.filter(|&j| j != at) {
+                ring.push(j);
+                next = leaders[j];
+            }
+            ring.sort_unstable();
+            let first = &raw.joints[ring[0]];
+            let span = first.mimic.as_ref().map_or(first.name.span, |m| m.leader.span);
+            let message = match ring.len() {
+                1 => format!("joint {} mimics itself", quote(&first.name.value)),
+                _ => format!(
+                    "joints {} mimic one another in a circle",
+                    list(ring.iter().map(|&j| raw.joints[j].name.value.as_str()))
+                ),
+            };
+            findings.error(span, message, "name a joint that moves by itself as the leader");
+        }
+    }
+}

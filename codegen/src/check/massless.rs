@@ -1,0 +1,266 @@
+//! Freedoms that nothing resists: they make the mass matrix singular.
+
+use super::symmetric::full;
+use crate::import::raw::RawModel;
+use crate::import::source::Findings;
+use crate::import::words::quote;
+use crate::model::{Body, JointKind, Model, Motion, Placement, Rotation, Value};
+
+type Mat3 = [[f64; 3]; 3];
+
+/// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2 leaves 1e-11.
+const NOTHING: f64 = 1e-10;
+
+/// Mass, first moment and inertia about the origin, in the axes of one frame.
+#[derive(Clone, Copy, Default)]
+struct Inertia {
+    mass: f64,
+    first: [f64; 3],
+    about_origin: Mat3,
+}
+
+/// Reports free joints that carry nothing heavy, and leaves that do not resist one of their freedoms. `order` gives the file index of each joint.
+pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &mut Findings) {
+    let n = model.joints.len();
+    let mut carrier = vec![0; model.bodies.len()];
+    for (k, joint) in model.joints.iter().enumerate() {
+        carrier[joint.child] = k;
+    }
+    let mut leads = vec![false; n];
+    for joint in &model.joints {
+        if let Motion::Mimic { leader, .. } = joint.motion {
+            leads[leader] = true;
+        }
+    }
+    // What rides on each joint, from the leaves inwards: is anything heavy, is anything moving, and (while nothing moves) its inertia.
+    let mut heavy: Vec<bool> = model.joints.iter().map(|j| is_heavy(&model.bodies[j.child])).collect();
+    let mut moving = vec![false; n];
+    let mut reported = vec![false; n];
+    let mut inertia: Vec<Option<Inertia>> = model.joints.iter().map(|j| own(&model.bodies[j.child], model)).collect();
+    for k in (0..n).rev() {
+        let joint = &model.joints[k];
+        let nv = joint.kind.nv();
+        let judged = nv > 0 && joint.motion == Motion::Free && !leads[k];
+        if judged && !reported[k] {
+            if let Some(problem) = weak_freedom(model, k, heavy[k], moving[k], inertia[k]) {
+                let source = &raw.joints[order[k]];
+                let body = quote(&model.bodies[joint.child].name);
+                let message = format!("joint {}: {problem}, so the mass matrix is singular", quote(&joint.name));
+                let help = format!("give {body} mass and inertia, give the joint an `armature`, or make it `fixed`");
+                findings.error(source.name.span, message, help);
+                reported[k] = true;
+            }
+        }
+        let Some(parent) = joint.parent.map(|b| carrier[b]) else { continue };
+        heavy[parent] |= heavy[k];
+        moving[parent] |= moving[k] || nv > 0;
+        // One report per massless branch is enough.
+        reported[parent] |= reported[k] && !heavy[k];
+        inertia[parent] = match (inertia[parent], inertia[k]) {
+            (Some(a), Some(b)) => Some(sum(a, moved(b, &joint.placement, model))),
+            _ => None,
+        };
+    }
+}
+
+/// Says which freedom of joint `k` nothing resists, if there is one.
+fn weak_freedom(model: &Model, k: usize, heavy: bool, moving: bool, inertia: Option<Inertia>) -> Option<String> {
+    let joint = &model.joints[k];
+    let body = quote(&model.bodies[joint.child].name);
+    let loose: Vec<bool> = joint.armature.iter().map(|a| a.constant() == Some(0.0)).collect();
+    if !heavy {
+        let all = if moving { " and all it carries" } else { "" };
+        let verb = if moving { "have" } else { "has" };
+        return loose.contains(&true).then(|| format!("{body}{all} {verb} neither mass nor inertia"));
+    }
+    let inertia = inertia.filter(|_| !moving)?;
+    if matches!(joint.kind, JointKind::Universal { axes: [a, b] } if super::joints::parallel(a, b)) {
+        return None; // reported as that
+    }
+    let columns = freedoms(&joint.kind, model);
+    let armature: Vec<f64> = joint.armature.iter().map(|a| at_default(*a, model)).collect();
+    let resists = resistance(&inertia, &columns, &armature);
+    let scale = |turns: bool| if turns { trace(&inertia.about_origin) } else { inertia.mass };
+    let weak = (0..columns.len()).find(|&i| {
+        let turns = columns[i].1 != [0.0; 3];
+        loose[i] && resists[i] <= NOTHING * scale(turns)
+    })?;
+    let way = if columns[weak].1 != [0.0; 3] { "turning" } else { "sliding" };
+    Some(format!("{body} has no inertia against {way}{}", about(&joint.kind, weak)))
+}
+
+fn about(kind: &JointKind, freedom: usize) -> &'static str {
+    match (kind, freedom) {
+        (JointKind::Spherical, k) => [" about x", " about y", " about z"][k.min(2)],
+        (JointKind::Floating, k) if k >= 3 => [" about x", " about y", " about z"][(k - 3).min(2)],
+        (JointKind::Universal { .. }, 0) => " about the first axis",
+        (JointKind::Universal { .. }, _) => " about the second axis",
+        (JointKind::Planar { .. }, _) => " about the normal",
+        (JointKind::Pin { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => " about the axis",
+        _ => "",
+    }
+}
+
+/// A body counts as heavy if any part of its inertia is a parameter or not zero.
+fn is_heavy(body: &Body) -> bool {
+    body.mass != Value::ZERO || body.inertia.iter().any(|x| *x != Value::ZERO)
+}
+
+fn at_default(value: Value, model: &Model) -> f64 {
+    match value {
+        Value::Const(x) => x,
+        Value::Param(k) => model.params[k].default,
+    }
+}
+
+/// Inertia of a body in its own frame; `None` if a parameter has a say in it.
+fn own(body: &Body, model: &Model) -> Option<Inertia> {
+    let mass = body.mass.constant()?;
+    let mut com = [0.0; 3];
+    for (slot, x) in com.iter_mut().zip(body.com) {
+        *slot = x.constant()?;
+    }
+    let mut entries = [0.0; 6];
+    for (slot, x) in entries.iter_mut().zip(body.inertia) {
+        *slot = x.constant()?;
+    }
+    let r = matrix(&body.inertia_axes, model);
+    let about_com = multiply(&multiply(&r, &full(entries)), &transpose(&r));
+    Some(Inertia { mass, first: com.map(|x| mass * x), about_origin: add(about_com, steiner(mass, com, com)) })
+}
+
+/// The inertia seen from the parent frame, at zero coordinates (used for fixed joints only).
+fn moved(i: Inertia, placement: &Placement, model: &Model) -> Inertia {
+    let r = matrix(&placement.rotation, model);
+    let d = placement.xyz.map(|x| at_default(x, model));
+    let first = apply(&r, i.first);
+    let turned = multiply(&multiply(&r, &i.about_origin), &transpose(&r));
+    // About d + x: I + (d, h) + (h, d) + m (d, d).
+    let mixed = add(steiner(1.0, d, first), steiner(1.0, first, d));
+    let about_origin = add(add(turned, mixed), steiner(i.mass, d, d));
+    Inertia { mass: i.mass, first: [0, 1, 2].map(|k| first[k] + i.mass * d[k]), about_origin }
+}
+
+fn sum(a: Inertia, b: Inertia) -> Inertia {
+    Inertia {
+        mass: a.mass + b.mass,
+        first: [0, 1, 2].map(|k| a.first[k] + b.first[k]),
+        about_origin: add(a.about_origin, b.about_origin),
+    }
+}
+
+/// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates.
+fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
+    const NONE: [f64; 3] = [0.0; 3];
+    const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    match kind {
+        JointKind::Pin { axis } => vec![(NONE, unit(*axis))],
+        JointKind::Slider { axis } => vec![(unit(*axis), NONE)],
+        JointKind::Cylindrical { axis } => vec![(unit(*axis), NONE), (NONE, unit(*axis))],
+        JointKind::Helical { axis, pitch } => {
+            let a = unit(*axis);
+            vec![(a.map(|x| x * at_default(*pitch, model)), a)]
+        }
+        JointKind::Universal { axes } => axes.map(|a| (NONE, unit(a))).to_vec(),
+        JointKind::Planar { normal } => {
+            // Any two directions across the normal: the mass is the same along all.
+            let n = unit(*normal);
+            let k = (0..3).min_by(|i, j| n[*i].abs().total_cmp(&n[*j].abs())).unwrap_or(0);
+            let a = unit(cross(n, AXES[k]));
+            vec![(a, NONE), (cross(n, a), NONE), (NONE, n)]
+        }
+        JointKind::Spherical => AXES.map(|a| (NONE, a)).to_vec(),
+        JointKind::Floating => AXES.map(|a| (a, NONE)).into_iter().chain(AXES.map(|a| (NONE, a))).collect(),
+        JointKind::Fixed => Vec::new(),
+    }
+}
+
+/// What resists each freedom when the ones before it may follow freely: the pivots of the joint's own block of the mass matrix.
+fn resistance(i: &Inertia, columns: &[([f64; 3], [f64; 3])], armature: &[f64]) -> Vec<f64> {
+    let momentum = |(v, w): ([f64; 3], [f64; 3])| {
+        let a = cross(w, i.first);
+        let p = [0, 1, 2].map(|k| i.mass * v[k] + a[k]);
+        let (b, c) = (cross(i.first, v), apply(&i.about_origin, w));
+        (p, [0, 1, 2].map(|k| b[k] + c[k]))
+    };
+    let n = columns.len();
+    let mut m = vec![vec![0.0; n]; n];
+    for a in 0..n {
+        let (p, l) = momentum(columns[a]);
+        for b in 0..n {
+            m[a][b] = dot(columns[b].0, p) + dot(columns[b].1, l);
+        }
+        m[a][a] += armature[a];
+    }
+    let mut pivots = vec![0.0; n];
+    for k in 0..n {
+        pivots[k] = m[k][k];
+        if pivots[k] <= 0.0 {
+            continue;
+        }
+        for r in k + 1..n {
+            let f = m[r][k] / pivots[k];
+            for c in k..n {
+                m[r][c] -= f * m[k][c];
+            }
+        }
+    }
+    pivots
+}
+
+fn matrix(rotation: &Rotation, model: &Model) -> Mat3 {
+    let about = |axis: [f64; 3], angle: f64| {
+        let (s, c) = angle.sin_cos();
+        let [x, y, z] = axis;
+        let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
+        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
+        [0, 1, 2].map(|i| [0, 1, 2].map(|j| c * one(i, j) + s * skew[i][j] + (1.0 - c) * axis[i] * axis[j]))
+    };
+    match rotation {
+        Rotation::AxisAngle { axis, angle } => about(unit(*axis), at_default(*angle, model)),
+        Rotation::Rpy(rpy) => {
+            let [roll, pitch, yaw] = rpy.map(|x| at_default(x, model));
+            let zy = multiply(&about([0.0, 0.0, 1.0], yaw), &about([0.0, 1.0, 0.0], pitch));
+            multiply(&zy, &about([1.0, 0.0, 0.0], roll))
+        }
+    }
+}
+
+/// `m (a·b 1 - b aᵀ)`, symmetric in sum with its counterpart.
+fn steiner(m: f64, a: [f64; 3], b: [f64; 3]) -> Mat3 {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m * (if i == j { dot(a, b) } else { 0.0 } - b[i] * a[j])))
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let n = super::names::norm(v);
+    v.map(|x| x / n)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn apply(m: &Mat3, v: [f64; 3]) -> [f64; 3] {
+    m.map(|row| dot(row, v))
+}
+
+fn transpose(m: &Mat3) -> Mat3 {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
+}
+
+fn multiply(a: &Mat3, b: &Mat3) -> Mat3 {
+    let t = transpose(b);
+    a.map(|row| t.map(|column| dot(row, column)))
+}
+
+fn add(a: Mat3, b: Mat3) -> Mat3 {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][j] + b[i][j]))
+}
+
+fn trace(m: &Mat3) -> f64 {
+    m[0][0] + m[1][1] + m[2][2]
+}

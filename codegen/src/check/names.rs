@@ -1,0 +1,176 @@
+//! Names: usable, unique, and unique still as identifiers.
+
+use std::collections::HashMap;
+
+use crate::import::raw::RawModel;
+use crate::import::source::{Findings, Spanned};
+use crate::import::words::{did_you_mean, list, quote};
+
+/// Name of the fixed world.
+const GROUND: &str = "ground";
+
+/// Words that cannot be identifiers in any edition of Rust up to 2024.
+const KEYWORDS: &[&str] = &[
+    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else",
+    "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod",
+    "move", "mut", "override", "priv", "pub", "ref", "return", "Self", "self", "static", "struct", "super", "trait",
+    "true", "try", "type", "typeof", "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
+];
+
+/// The identifier a name becomes in generated code: anything but ASCII letters and digits turns into `_`, a leading digit gets a `_` in
+/// front, a keyword one behind. The checks make sure that no two names of a kind meet, in whatever case.
+pub fn identifier(name: &str) -> String {
+    let mut out: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
+    if out.is_empty() || out.starts_with(|c: char| c.is_ascii_digit()) {
+        out.insert(0, '_');
+    }
+    if KEYWORDS.contains(&out.as_str()) || out == "_" {
+        out.push('_');
+    }
+    out
+}
+
+/// Euclidean length, without overflow on the way.
+pub(super) fn norm(v: [f64; 3]) -> f64 {
+    v[0].hypot(v[1]).hypot(v[2])
+}
+
+/// Name of the model: as stated, or from the file.
+pub(super) fn model_name(raw: &RawModel, file: &str, findings: &mut Findings) -> String {
+    let Some(name) = &raw.name else {
+        let stem = std::path::Path::new(file).file_stem().map_or(String::new(), |s| s.to_string_lossy().into_owned());
+        return if usable(&stem) { identifier(&stem) } else { "model".into() };
+    };
+    let fixed = if usable(&name.value) { identifier(&name.value) } else { "model".into() };
+    if fixed != name.value {
+        if raw.lenient {
+            findings.notice(
+                name.span,
+                format!("model {} is called {} in generated code", quote(&name.value), quote(&fixed)),
+            );
+        } else {
+            let message = format!("the model cannot be called {}", quote(&name.value));
+            let help = format!("use letters, digits and `_`, and no Rust keyword: {}", quote(&fixed));
+            findings.error(name.span, message, help);
+        }
+    }
+    fixed
+}
+
+fn usable(name: &str) -> bool {
+    name.chars().any(|c| c.is_ascii_alphanumeric())
+}
+
+/// Where the bodies are.
+pub(super) struct Names<'r> {
+    raw: &'r RawModel,
+    bodies: HashMap<&'r str, usize>,
+    joints: HashMap<&'r str, usize>,
+}
+
+impl<'r> Names<'r> {
+    /// Indexes all names and reports those that cannot stay.
+    pub(super) fn collect(raw: &'r RawModel, findings: &mut Findings) -> Self {
+        let bodies = raw.bodies.iter().map(|b| ("body", &b.name));
+        let frames = raw.frames.iter().map(|f| ("frame", &f.name));
+        unique(bodies.chain(frames), findings);
+        unique(raw.joints.iter().map(|j| ("joint", &j.name)), findings);
+        unique(raw.params.iter().map(|p| ("parameter", &p.name)), findings);
+        unique(raw.wrenches.iter().map(|w| ("wrench", w.name.as_ref().unwrap_or(&w.body))), findings);
+        let mut names = Names { raw, bodies: HashMap::new(), joints: HashMap::new() };
+        for (k, b) in raw.bodies.iter().enumerate() {
+            names.bodies.entry(&b.name.value).or_insert(k);
+        }
+        for (k, j) in raw.joints.iter().enumerate() {
+            names.joints.entry(&j.name.value).or_insert(k);
+        }
+        names
+    }
+
+    /// Whether a body is the one its name stands for (a second one of that name is reported, and one called like the ground).
+    pub(super) fn is_first(&self, body: usize) -> bool {
+        let name = self.raw.bodies[body].name.value.as_str();
+        name != GROUND && self.bodies.get(name) == Some(&body)
+    }
+
+    /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` (empty, or with a space behind) and `what` as in
+    /// ``joint `elbow`: parent `upper_am` is not a body``.
+    pub(super) fn body(
+        &self,
+        name: &Spanned<String>,
+        role: &str,
+        what: &str,
+        findings: &mut Findings,
+    ) -> Option<Option<usize>> {
+        if name.value == GROUND {
+            return Some(None);
+        }
+        let found = self.bodies.get(name.value.as_str()).copied();
+        // A body that had to be left out may be the one that is missed.
+        if found.is_none() && !self.raw.incomplete {
+            let firsts = (0..self.raw.bodies.len()).filter(|&b| self.is_first(b));
+            let all: Vec<&str> = firsts.map(|b| self.raw.bodies[b].name.value.as_str()).collect();
+            let help = did_you_mean(&name.value, all.iter().copied().chain([GROUND]), || match all.len() {
+                0 => "the model has no bodies yet: add one".into(),
+                1 => format!("the only body is {}", list(all.iter().copied())),
+                _ => format!("the bodies are {}", list(all.iter().copied())),
+            });
+            findings.error(name.span, format!("{what}: {role}{} is not a body", quote(&name.value)), help);
+        }
+        found.map(Some)
+    }
+
+    /// The joint called so.
+    pub(super) fn joint(&self, name: &Spanned<String>, what: &str, findings: &mut Findings) -> Option<usize> {
+        let found = self.joints.get(name.value.as_str()).copied();
+        if found.is_none() && !self.raw.incomplete {
+            let all = || self.raw.joints.iter().map(|j| j.name.value.as_str());
+            let help = did_you_mean(&name.value, all(), || format!("the joints are {}", list(all())));
+            findings.error(name.span, format!("{what}: leader {} is not a joint", quote(&name.value)), help);
+        }
+        found
+    }
+}
+
+/// Reports names of one family that are unusable, taken, or become the identifier of another.
+fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findings: &mut Findings) {
+    let mut exact: HashMap<&str, (&str, usize)> = HashMap::new();
+    let mut folded: HashMap<String, &str> = HashMap::new();
+    for (kind, name) in names {
+        let shown = quote(&name.value);
+        if name.value == GROUND && (kind == "body" || kind == "frame") {
+            let message = format!("a {kind} cannot be called `{GROUND}`, which is the fixed world");
+            findings.error(
+                name.span,
+                message,
+                "give it another name; to hang something on the fixed world use `ground` as its parent",
+            );
+            continue;
+        }
+        if !usable(&name.value) {
+            let message = format!("a {kind} cannot be called {shown}");
+            findings.error(name.span, message, "give it a name with at least one letter or digit (ASCII)");
+            continue;
+        }
+        let line = findings.line(name.span);
+        if let Some((other, at)) = exact.insert(&name.value, (kind, line)) {
+            let help = match (kind, other) {
+                ("wrench", _) => "give each wrench on the same body a `name` of its own",
+                ("frame", "body") => "every body is a frame of its own name already: choose another name",
+                _ => "rename one of them",
+            };
+            let message = match kind == other {
+                true => format!("{kind} {shown} is defined twice, first in line {at}"),
+                false => format!("{kind} {shown} has the name of the {other} in line {at}"),
+            };
+            findings.error(name.span, message, help);
+        } else if let Some(other) = folded.insert(identifier(&name.value).to_ascii_lowercase(), &name.value) {
+            let message = format!("{kind} {shown} and {} become the same identifier in generated code", quote(other));
+            findings.error(
+                name.span,
+                message,
+                "rename one of them: only ASCII letters and digits tell names apart, and case does not",
+            );
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! What a reader hands to the checks: the model with names instead of indices and the place of everything.
+//!
+//! A reader fills this in and reports what its format forbids (unknown keys, wrong types, numbers that are not finite); everything about
+//! the mechanism itself (names, tree, physics) is judged by [`crate::check::check`], the same for all formats. What a reader has
+//! reported already stands here as [`RawValue::Invalid`] or `None`, so that nothing is reported twice.
+
+use super::source::{Span, Spanned};
+use crate::model::WrenchAxes;
+
+/// A number of the description.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawValue {
+    /// A finite constant, SI units, radians.
+    Const(f64),
+    /// A parameter, by name.
+    Param(String),
+    /// Not a number; already reported.
+    Invalid,
+}
+
+/// A number and its place.
+pub type RawNumber = Spanned<RawValue>;
+
+/// Three numbers and the place of the whole.
+pub type RawVec3 = Spanned<[RawNumber; 3]>;
+
+/// An orientation.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawRotation {
+    /// `[roll, pitch, yaw]`, radians.
+    Rpy(RawVec3),
+    /// About an axis by an angle, radians; the axis is `None` where it was reported already.
+    AxisAngle {
+        /// Direction.
+        axis: Option<Spanned<[f64; 3]>>,
+        /// Angle, rad.
+        angle: RawNumber,
+    },
+}
+
+/// A pose; `None` stands for zero.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawPlacement {
+    /// Origin, m.
+    pub xyz: Option<RawVec3>,
+    /// Orientation.
+    pub rotation: Option<RawRotation>,
+}
+
+/// A run-time parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawParam {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Default; a constant.
+    pub default: RawNumber,
+}
+
+/// A rigid body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawBody {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Mass, kg; 0 where `None`.
+    pub mass: Option<RawNumber>,
+    /// Centre of mass in the body frame, m.
+    pub com: Option<RawVec3>,
+    /// About the centre of mass, `[xx, yy, zz, xy, xz, yz]`, kg m².
+    pub inertia: Option<Spanned<[RawNumber; 6]>>,
+    /// Axes of `inertia` relative to those of the body.
+    pub inertia_axes: Option<RawRotation>,
+}
+
+/// Kind of a joint, without its axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointType {
+    /// One turn.
+    Pin,
+    /// One slide.
+    Slider,
+    /// A slide and a turn about one axis.
+    Cylindrical,
+    /// A screw.
+    Helical,
+    /// Two turns.
+    Universal,
+    /// Two slides and a turn.
+    Planar,
+    /// Any rotation.
+    Spherical,
+    /// Any motion.
+    Floating,
+    /// None.
+    Fixed,
+}
+
+/// One number for every freedom, or one per freedom.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawFreedoms {
+    /// The same for all.
+    All(RawNumber),
+    /// One per freedom, in the order of the velocities.
+    Each(Spanned<Vec<RawNumber>>),
+}
+
+/// Where the coordinates come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawMotion {
+    /// From the state.
+    Free,
+    /// From inputs.
+    Prescribed(Span),
+}
+
+/// `q = ratio q_leader + offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawMimic {
+    /// The whole entry.
+    pub span: Span,
+    /// Name of the leading joint.
+    pub leader: Spanned<String>,
+    /// Factor; 1 where `None`.
+    pub ratio: Option<RawNumber>,
+    /// Offset, rad or m; 0 where `None`.
+    pub offset: Option<RawNumber>,
+}
+
+/// A joint. Entries the type has no use for are reported by the checks; a reader whose format always writes them leaves them out.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawJoint {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Kind; `None` where it was reported already.
+    pub kind: Option<Spanned<JointType>>,
+    /// Parent body; `None` for the ground. The name `ground` means the ground too.
+    pub parent: Option<Spanned<String>>,
+    /// Child body; `None` where it was reported already.
+    pub child: Option<Spanned<String>>,
+    /// Child frame in the parent frame at zero coordinates.
+    pub placement: RawPlacement,
+    /// Axis in the child frame; z, or x for a universal joint, where `None`.
+    pub axis: Option<Spanned<[f64; 3]>>,
+    /// Second axis of a universal joint; y where `None`.
+    pub axis2: Option<Spanned<[f64; 3]>>,
+    /// Pitch of a helical joint, m/rad.
+    pub pitch: Option<RawNumber>,
+    /// Viscous damping.
+    pub damping: Option<RawFreedoms>,
+    /// Spring stiffness.
+    pub stiffness: Option<RawFreedoms>,
+    /// Rest position of the springs.
+    pub rest: Option<RawFreedoms>,
+    /// Reflected rotor inertia.
+    pub armature: Option<RawFreedoms>,
+    /// Source of the coordinates.
+    pub motion: RawMotion,
+    /// Coupling to another joint.
+    pub mimic: Option<RawMimic>,
+}
+
+impl RawJoint {
+    /// A free joint with nothing but a name, a kind and a child, on the ground.
+    pub fn new(name: Spanned<String>, kind: Option<Spanned<JointType>>, child: Option<Spanned<String>>) -> Self {
+        RawJoint {
+            name,
+            kind,
+            parent: None,
+            child,
+            placement: RawPlacement::default(),
+            axis: None,
+            axis2: None,
+            pitch: None,
+            damping: None,
+            stiffness: None,
+            rest: None,
+            armature: None,
+            motion: RawMotion::Free,
+            mimic: None,
+        }
+    }
+}
+
+/// A named frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawFrame {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Body, or `ground`.
+    pub body: Spanned<String>,
+    /// Pose in the body frame.
+    pub placement: RawPlacement,
+}
+
+/// An external wrench.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawWrench {
+    /// Name; that of the body where `None`.
+    pub name: Option<Spanned<String>>,
+    /// Body.
+    pub body: Spanned<String>,
+    /// Axes.
+    pub axes: WrenchAxes,
+}
+
+/// Gravity.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawGravity {
+    /// Part of the model, m/s² in ground axes.
+    Constant(RawVec3),
+    /// Given with every call.
+    Input,
+}
+
+/// A model as read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawModel {
+    /// Name as written; `None`: made from the file name.
+    pub name: Option<Spanned<String>>,
+    /// Parameters, in file order.
+    pub params: Vec<RawParam>,
+    /// Gravity; `[0, 0, -9.81]` where `None`.
+    pub gravity: Option<RawGravity>,
+    /// Bodies, in file order.
+    pub bodies: Vec<RawBody>,
+    /// Joints, in file order.
+    pub joints: Vec<RawJoint>,
+    /// Frames, in file order.
+    pub frames: Vec<RawFrame>,
+    /// Wrenches, in file order.
+    pub wrenches: Vec<RawWrench>,
+    /// A body or joint had to be left out and was reported: unknown names and loose bodies are then no news.
+    pub incomplete: bool,
+    /// The file was written for other programs: what nature forbids but the equations survive is then a warning, and the model's
+    /// name is made usable.
+    pub lenient: bool,
+}
+
+impl RawModel {
+    /// Nothing yet.
+    pub fn empty() -> Self {
+        RawModel {
+            name: None,
+            params: Vec::new(),
+            gravity: None,
+            bodies: Vec::new(),
+            joints: Vec::new(),
+            frames: Vec::new(),
+            wrenches: Vec::new(),
+            incomplete: false,
+            lenient: false,
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Places in a source text and the collector of findings that every reader and the checks write to.
+
+use crate::diag::{Diagnostic, Diagnostics, Severity};
+
+/// Byte range in the source text; `0..0` stands for the file as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Span {
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+impl Span {
+    /// The file as a whole: shown without line and column.
+    pub const FILE: Span = Span { start: 0, end: 0 };
+
+    /// From a byte range.
+    pub fn new(start: usize, end: usize) -> Self {
+        Span { start, end }
+    }
+}
+
+impl From<std::ops::Range<usize>> for Span {
+    fn from(r: std::ops::Range<usize>) -> Self {
+        Span { start: r.start, end: r.end }
+    }
+}
+
+/// A value and where it stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spanned<T> {
+    /// The value.
+    pub value: T,
+    /// Its place.
+    pub span: Span,
+}
+
+impl<T> Spanned<T> {
+    /// A value with its place.
+    pub fn new(value: T, span: impl Into<Span>) -> Self {
+        Spanned { value, span: span.into() }
+    }
+}
+
+/// Turns byte offsets into lines and columns.
+#[derive(Clone, Debug)]
+pub struct SourceMap<'a> {
+    text: &'a str,
+    /// Byte offset of the first byte of each line.
+    lines: Vec<usize>,
+}
+
+impl<'a> SourceMap<'a> {
+    /// Notes where the lines of `text` start.
+    pub fn new(text: &'a str) -> Self {
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(k, _)| k + 1)).collect();
+        SourceMap { text, lines }
+    }
+
+    /// Line and column (in characters), both from 1. Offsets past the end or inside a character are moved back to where there is something.
+    pub fn position(&self, offset: usize) -> (usize, usize) {
+        let mut offset = offset.min(self.text.len());
+        while !self.text.is_char_boundary(offset) {
+            offset -= 1;
+        }
+        let line = self.lines.partition_point(|&start| start <= offset);
+        let start = self.lines[line - 1];
+        (line, self.text[start..offset].chars().count() + 1)
+    }
+}
+
+/// Collects the findings about one file.
+#[derive(Clone, Debug)]
+pub struct Findings<'a> {
+    file: &'a str,
+    map: SourceMap<'a>,
+    list: Vec<Diagnostic>,
+}
+
+impl<'a> Findings<'a> {
+    /// None yet; `file` as the caller named it.
+    pub fn new(file: &'a str, text: &'a str) -> Self {
+        Findings { file, map: SourceMap::new(text), list: Vec::new() }
+    }
+
+    /// Adds a finding.
+    pub fn add(&mut self, severity: Severity, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
+        let file = self.file.to_string();
+        self.list.push(Diagnostic { severity, file, line, column, message: message.into(), help: help.into() });
+    }
+
+    /// Adds an error: nothing can be made of the file.
+    pub fn error(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        self.add(Severity::Error, span, message, help);
+    }
+
+    /// Adds a warning: something is ignored or suspicious.
+    pub fn warning(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        self.add(Severity::Warning, span, message, help);
+    }
+
+    /// Adds a notice: something was changed on the way.
+    pub fn notice(&mut self, span: Span, message: impl Into<String>) {
+        self.add(Severity::Notice, span, message, "");
+    }
+
+    /// Line of the start of a span, from 1.
+    pub fn line(&self, span: Span) -> usize {
+        self.map.position(span.start).0
+    }
+
+    /// Whether there is an error among them.
+    pub fn has_errors(&self) -> bool {
+        self.list.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// All findings, in the order of the file.
+    pub fn finish(mut self) -> Diagnostics {
+        self.list.sort_by_key(|d| (d.line, d.column));
+        Diagnostics(self.list)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_count_characters() {
+        let text = "a\nöä = 1\n";
+        let map = SourceMap::new(text);
+        assert_eq!(map.position(0), (1, 1));
+        assert_eq!(map.position(1), (1, 2));
+        assert_eq!(map.position(2), (2, 1));
+        assert_eq!(map.position(3), (2, 1)); // inside ö
+        assert_eq!(map.position(6), (2, 3));
+        assert_eq!(map.position(text.len()), (3, 1));
+        assert_eq!(map.position(1000), (3, 1));
+    }
+
+    #[test]
+    fn findings_come_in_file_order() {
+        let mut f = Findings::new("m.toml", "a\nb\n");
+        f.warning(Span::new(2, 3), "second", "do this");
+        f.error(Span::new(0, 1), "first", "do that");
+        f.notice(Span::FILE, "whole");
+        assert!(f.has_errors());
+        let shown = f.finish().to_string();
+        assert_eq!(
+            shown,
+            "m.toml: notice: whole\nm.toml:1:1: error: first\n  help: do that\nm.toml:2:1: warning: second\n  help: do this"
+        );
+    }
+}

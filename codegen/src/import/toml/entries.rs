@@ -1,0 +1,239 @@
+//! `[[body]]`, `[[joint]]`, `[[frame]]` and `[[wrench]]`.
+
+use super::super::raw::{
+    JointType, RawBody, RawFrame, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation,
+    RawValue, RawWrench,
+};
+use super::super::source::{Findings, Spanned};
+use super::super::words::{did_you_mean, quote};
+use super::numbers::{self, Unit};
+use super::table::Table;
+use crate::model::WrenchAxes;
+use ::toml::de::DeValue;
+
+const BODY: &[&str] = &["name", "mass", "com", "inertia", "inertia_rpy"];
+const JOINT: &[&str] = &[
+    "name",
+    "type",
+    "parent",
+    "child",
+    "xyz",
+    "rpy",
+    "rotate",
+    "axis",
+    "axis2",
+    "pitch",
+    "damping",
+    "stiffness",
+    "rest",
+    "armature",
+    "motion",
+    "mimic",
+];
+const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
+const WRENCH: &[&str] = &["name", "body", "frame"];
+const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
+
+pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+    table.reject_unknown(BODY, "a body", findings);
+    let name = table.required_text("name", findings);
+    let mass = table.number("mass", Unit::Plain, findings);
+    let com = table.vec3("com", Unit::Plain, findings);
+    let inertia = inertia(&table, findings);
+    let inertia_axes = table.vec3("inertia_rpy", Unit::Angle, findings).map(RawRotation::Rpy);
+    match name {
+        Some(name) => raw.bodies.push(RawBody { name, mass, com, inertia, inertia_axes }),
+        None => raw.incomplete = true,
+    }
+}
+
+/// `[xx, yy, zz]` or `{ xx, yy, zz, xy, xz, yz }`.
+fn inertia(table: &Table, findings: &mut Findings) -> Option<Spanned<[RawNumber; 6]>> {
+    let (span, value) = table.get("inertia")?;
+    let what = format!("{}`inertia`", table.prefix());
+    let zero = || Spanned::new(RawValue::Const(0.0), span);
+    let invalid = || Spanned::new([0; 6].map(|_| Spanned::new(RawValue::Invalid, span)), span);
+    match value {
+        DeValue::Array(items) if items.len() != 3 => {
+            findings.error(
+                span,
+                format!("{what} needs 3 moments and has {} numbers", items.len()),
+                "write `[xx, yy, zz]`, or `{ xx = .., yy = .., zz = .., xy = .., xz = .., yz = .. }`",
+            );
+            Some(invalid())
+        }
+        DeValue::Table(t) if !t.contains_key("param") && !t.contains_key("deg") => {
+            let inner = Table::new(t, span, what);
+            inner.reject_unknown(&INERTIA, "an inertia", findings);
+            let mut missing = false;
+            for key in &INERTIA[..3] {
+                if !inner.has(key) {
+                    inner.missing(key, &format!("`{key} = ..`, the moment about that axis in kg m²"), findings);
+                    missing = true;
+                }
+            }
+            let all = INERTIA.map(|key| inner.number(key, Unit::Plain, findings).unwrap_or_else(zero));
+            Some(if missing { invalid() } else { Spanned::new(all, span) })
+        }
+        _ => {
+            let [xx, yy, zz] = table.vec3("inertia", Unit::Plain, findings)?.value;
+            Some(Spanned::new([xx, yy, zz, zero(), zero(), zero()], span))
+        }
+    }
+}
+
+fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
+    let xyz = table.vec3("xyz", Unit::Plain, findings);
+    if table.has("rpy") && table.has("rotate") {
+        let message = format!("{}`rpy` and `rotate` together", table.prefix());
+        findings.error(table.key_span("rotate"), message, "keep one of them");
+    }
+    let rpy = table.vec3("rpy", Unit::Angle, findings).map(RawRotation::Rpy);
+    let rotate = table.table("rotate", findings).map(|inner| {
+        inner.reject_unknown(&["axis", "angle"], "a rotation", findings);
+        for (key, example) in [("axis", "`axis = [0, 0, 1]`"), ("angle", "`angle = { deg = 90 }`")] {
+            if !inner.has(key) {
+                inner.missing(key, example, findings);
+            }
+        }
+        let axis = inner.direction("axis", findings);
+        let angle = inner.number("angle", Unit::Angle, findings);
+        RawRotation::AxisAngle { axis, angle: angle.unwrap_or(Spanned::new(RawValue::Invalid, inner.span)) }
+    });
+    RawPlacement { xyz, rotation: rpy.or(rotate) }
+}
+
+const TYPES: [(&str, JointType); 9] = [
+    ("pin", JointType::Pin),
+    ("slider", JointType::Slider),
+    ("cylindrical", JointType::Cylindrical),
+    ("helical", JointType::Helical),
+    ("universal", JointType::Universal),
+    ("planar", JointType::Planar),
+    ("spherical", JointType::Spherical),
+    ("floating", JointType::Floating),
+    ("fixed", JointType::Fixed),
+];
+
+/// What the types are called elsewhere.
+const ALIASES: [(&str, &str); 16] = [
+    ("hinge", "pin"),
+    ("revolute", "pin"),
+    ("continuous", "pin"),
+    ("rotary", "pin"),
+    ("rotational", "pin"),
+    ("prismatic", "slider"),
+    ("slide", "slider"),
+    ("linear", "slider"),
+    ("ball", "spherical"),
+    ("free", "floating"),
+    ("6dof", "floating"),
+    ("weld", "fixed"),
+    ("rigid", "fixed"),
+    ("screw", "helical"),
+    ("cardan", "universal"),
+    ("hooke", "universal"),
+];
+
+fn joint_type(table: &Table, findings: &mut Findings) -> Option<Spanned<JointType>> {
+    let names = || TYPES.iter().map(|(name, _)| *name);
+    if !table.has("type") {
+        let all: Vec<String> = names().map(quote).collect();
+        table.missing("type", &format!("`type = \"pin\"`, or one of {}", all[1..].join(", ")), findings);
+    }
+    let text = table.text("type", findings)?;
+    if let Some((_, kind)) = TYPES.iter().find(|(name, _)| *name == text.value) {
+        return Some(Spanned::new(*kind, text.span));
+    }
+    let lower = text.value.to_lowercase();
+    let help = match ALIASES.iter().find(|(alias, _)| *alias == lower) {
+        Some((_, name)) => format!("it is called `{name}` here"),
+        None => did_you_mean(&text.value, names(), || {
+            format!("the types are {}", names().map(quote).collect::<Vec<_>>().join(", "))
+        }),
+    };
+    findings.error(text.span, format!("{}unknown type {}", table.prefix(), quote(&text.value)), help);
+    None
+}
+
+/// Unit of each coordinate, for degrees in `rest`.
+fn units(kind: Option<JointType>) -> &'static [Unit] {
+    use Unit::{Angle, Plain};
+    match kind {
+        Some(JointType::Slider) => &[Plain],
+        Some(JointType::Cylindrical) => &[Plain, Angle],
+        Some(JointType::Planar) => &[Plain, Plain, Angle],
+        // An unknown type is one finding; its units are not another.
+        _ => &[Angle],
+    }
+}
+
+pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+    table.reject_unknown(JOINT, "a joint", findings);
+    let Some(name) = table.required_text("name", findings) else {
+        raw.incomplete = true;
+        return;
+    };
+    let kind = joint_type(&table, findings);
+    let child = table.required_text("child", findings);
+    // Without its joint a body would look loose.
+    raw.incomplete |= child.is_none();
+    let units = units(kind.as_ref().map(|k| k.value));
+    let mut freedoms = |key: &str, units: &[Unit]| {
+        table.raw(key).and_then(|v| numbers::freedoms(v, units, &format!("{}`{key}`", table.prefix()), findings))
+    };
+    let damping = freedoms("damping", &[Unit::Plain]);
+    let stiffness = freedoms("stiffness", &[Unit::Plain]);
+    let rest = freedoms("rest", units);
+    let armature = freedoms("armature", &[Unit::Plain]);
+    let motion = match table.choice("motion", &["free", "prescribed"], findings) {
+        Some(choice) if choice.value == 1 => RawMotion::Prescribed(choice.span),
+        _ => RawMotion::Free,
+    };
+    let joint = RawJoint {
+        parent: table.text("parent", findings),
+        placement: placement(&table, findings),
+        axis: table.direction("axis", findings),
+        axis2: table.direction("axis2", findings),
+        pitch: table.number("pitch", Unit::Plain, findings),
+        damping,
+        stiffness,
+        rest,
+        armature,
+        motion,
+        mimic: mimic(&table, units, findings),
+        ..RawJoint::new(name, kind, child)
+    };
+    raw.joints.push(joint);
+}
+
+fn mimic(table: &Table, units: &[Unit], findings: &mut Findings) -> Option<RawMimic> {
+    let inner = table.table("mimic", findings)?;
+    inner.reject_unknown(&["joint", "ratio", "offset"], "a mimic", findings);
+    let leader = inner.required_text("joint", findings);
+    let ratio = inner.number("ratio", Unit::Plain, findings);
+    let offset = inner.number("offset", units[0], findings);
+    Some(RawMimic { span: inner.span, leader: leader?, ratio, offset })
+}
+
+pub(super) fn frame(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+    table.reject_unknown(FRAME, "a frame", findings);
+    let name = table.required_text("name", findings);
+    let body = table.required_text("body", findings);
+    let placement = placement(&table, findings);
+    if let (Some(name), Some(body)) = (name, body) {
+        raw.frames.push(RawFrame { name, body, placement });
+    }
+}
+
+pub(super) fn wrench(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+    table.reject_unknown(WRENCH, "a wrench", findings);
+    let axes = match table.choice("frame", &["body", "world"], findings) {
+        Some(choice) if choice.value == 1 => WrenchAxes::World,
+        _ => WrenchAxes::Body,
+    };
+    let name = table.text("name", findings);
+    if let Some(body) = table.required_text("body", findings) {
+        raw.wrenches.push(RawWrench { name, body, axes });
+    }
+}

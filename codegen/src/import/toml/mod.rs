@@ -1,0 +1,129 @@
+//! The TOML model format (docs/model-format.md). Here: the document and its top level.
+
+mod entries;
+mod numbers;
+mod table;
+
+use ::toml::de::{DeTable, DeValue, Error};
+
+use self::table::Table;
+use super::raw::{RawGravity, RawModel, RawParam, RawValue};
+use super::source::{Findings, Span, Spanned};
+use super::words::quote;
+use super::{Base, ImportOptions};
+use crate::check::check;
+use crate::diag::Diagnostics;
+use crate::model::Model;
+
+const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench"];
+
+/// Reads and checks a model. `file` is named in the findings and gives the model its name if the text does not.
+/// All findings of the text come back at once, in its order; a model only if none of them is an error.
+pub fn read(file: &str, text: &str) -> (Option<Model>, Diagnostics) {
+    read_with(file, text, &ImportOptions::default())
+}
+
+/// [`read`] with options: the base has to be the default, gravity replaces that of the file.
+pub fn read_with(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
+    let mut findings = Findings::new(file, text);
+    if options.base != Base::default() {
+        let help = "leave the option out; in the file the joints to `ground` say how the model is attached";
+        findings.error(Span::FILE, "a TOML model states its own base", help);
+    }
+    let model = read_raw(text, &mut findings).and_then(|mut raw| {
+        if let Some(g) = options.gravity {
+            raw.gravity = Some(override_gravity(g, &mut findings));
+        }
+        check(&raw, file, &mut findings)
+    });
+    (model, findings.finish())
+}
+
+fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
+    if g.iter().any(|x| !x.is_finite()) {
+        findings.error(Span::FILE, "the option for gravity is not finite", "give three finite numbers in m/s²");
+    }
+    RawGravity::Constant(Spanned::new(g.map(|x| Spanned::new(RawValue::Const(x), Span::FILE)), Span::FILE))
+}
+
+/// Reads without checking the mechanism; `None` where the text is no TOML.
+pub fn read_raw(text: &str, findings: &mut Findings) -> Option<RawModel> {
+    let document = match DeTable::parse(text) {
+        Ok(document) => document,
+        Err(error) => {
+            syntax_error(text, &error, findings);
+            return None;
+        }
+    };
+    let top = Table::new(document.get_ref(), Span::FILE, String::new());
+    let mut raw = RawModel::empty();
+    top.reject_unknown(KEYS, "a model", findings);
+    raw.name = top.text("name", findings);
+    raw.gravity = top.get("gravity").and_then(|(span, value)| gravity(&top, span, value, findings));
+    if let Some(table) = top.table("params", findings) {
+        params(&table, &mut raw, findings);
+    }
+    for table in top.tables("body", findings) {
+        entries::body(table, &mut raw, findings);
+    }
+    for table in top.tables("joint", findings) {
+        entries::joint(table, &mut raw, findings);
+    }
+    for table in top.tables("frame", findings) {
+        entries::frame(table, &mut raw, findings);
+    }
+    for table in top.tables("wrench", findings) {
+        entries::wrench(table, &mut raw, findings);
+    }
+    Some(raw)
+}
+
+fn gravity(top: &Table, span: Span, value: &DeValue, findings: &mut Findings) -> Option<RawGravity> {
+    match value {
+        DeValue::String(s) if s == "input" => Some(RawGravity::Input),
+        DeValue::String(s) => {
+            let message = format!("`gravity` cannot be {}", quote(s));
+            findings.error(
+                span,
+                message,
+                "write `gravity = [0, 0, -9.81]`, or `gravity = \"input\"` to give it with every call",
+            );
+            None
+        }
+        _ => top.vec3("gravity", numbers::Unit::Plain, findings).map(RawGravity::Constant),
+    }
+}
+
+fn params(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
+    // The map is sorted by name; parameters keep the order of the file.
+    let mut entries: Vec<_> = table.entries().collect();
+    entries.sort_by_key(|(name, _)| name.span.start);
+    for (name, value) in entries {
+        let what = format!("parameter {}", quote(&name.value));
+        let default = numbers::default_value(value, &what, findings);
+        raw.params.push(RawParam { name: Spanned::new(name.value.to_string(), name.span), default });
+    }
+}
+
+/// One finding from an error of the TOML parser.
+fn syntax_error(text: &str, error: &Error, findings: &mut Findings) {
+    let span = error.span().unwrap_or(0..0);
+    // An error at the very first byte is one with a place, too.
+    let place = Span::new(span.start, span.end.max(1));
+    let culprit = quote(text.get(span).unwrap_or("").lines().next().unwrap_or(""));
+    let (message, help) = match error.message() {
+        m if m.starts_with("duplicate key") => (
+            format!("key {culprit} is given twice"),
+            "keep one; the lists of bodies, joints, frames and wrenches have double brackets, like `[[body]]`",
+        ),
+        m if m.starts_with("string values must be quoted") => (
+            format!("{culprit} is neither a number nor quoted text"),
+            "put text in double quotes; numbers stand without unit",
+        ),
+        m => (
+            format!("not valid TOML: {m}"),
+            "entries are `key = value`, one on a line; text stands in double quotes, lists in `[ ]`, tables in `{ }`",
+        ),
+    };
+    findings.error(place, message, help);
+}

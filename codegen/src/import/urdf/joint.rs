@@ -1,0 +1,162 @@
+//! `joint`: what lets a link move against its parent.
+
+use super::link::read_origin;
+use super::xml::{place, Reader};
+use crate::diag::Severity;
+use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawMimic, RawNumber, RawValue};
+use crate::import::source::{Span, Spanned};
+use crate::import::words::{did_you_mean, quote};
+use roxmltree::Node;
+
+/// Kinds by their names in a file. `spherical` and `ball` are no part of URDF, but some simulators know them.
+const KINDS: [(&str, JointType); 8] = [
+    ("revolute", JointType::Pin),
+    ("continuous", JointType::Pin),
+    ("prismatic", JointType::Slider),
+    ("planar", JointType::Planar),
+    ("floating", JointType::Floating),
+    ("spherical", JointType::Spherical),
+    ("ball", JointType::Spherical),
+    ("fixed", JointType::Fixed),
+];
+
+/// What may stand in a `joint` and has nothing to do with its free motion.
+const IGNORED: [(&str, &str); 3] = [
+    ("limit", "`limit` is not used: joints move without stops, torques without bounds"),
+    ("safety_controller", "`safety_controller` is not used"),
+    ("calibration", "`calibration` is not used"),
+];
+
+/// Reads a `joint`. Without a name, a parent or a child it is reported and left out.
+pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawJoint> {
+    reader.attributes(node, &["name", "type"]);
+    let name = reader.required(node, "name", "");
+    let whose = name.as_ref().map_or(String::new(), |n| format!("joint {}: ", quote(n.value)));
+    let kind = read_kind(reader, node, &whose);
+    let used = ["origin", "parent", "child", "axis", "dynamics", "mimic"];
+    let [origin, parent, child, axis, dynamics, mimic] = reader.single_children(node, used, &IGNORED);
+    let parent = read_end(reader, node, parent, "parent", &whose);
+    let child = read_end(reader, node, child, "child", &whose);
+    let placement = origin.map(|o| read_origin(reader, o, &whose)).unwrap_or_default();
+    let axis = read_axis(reader, node, axis, kind.as_ref().map(|k| k.value), &whose);
+    let damping = dynamics.and_then(|d| read_dynamics(reader, d, kind.as_ref().map(|k| k.value), &whose));
+    let mimic = mimic.and_then(|m| read_mimic(reader, m, kind.as_ref().map(|k| k.value), &whose));
+    let name = name?;
+    let mut joint = RawJoint::new(Spanned::new(name.value.to_string(), name.span), kind, Some(child?));
+    joint.parent = Some(parent?);
+    joint.placement = placement;
+    joint.axis = axis;
+    joint.damping = damping;
+    joint.mimic = mimic;
+    Some(joint)
+}
+
+fn read_kind(reader: &mut Reader, node: Node, whose: &str) -> Option<Spanned<JointType>> {
+    let names = KINDS.map(|(name, _)| name);
+    let help = || format!("the types are {}", names.map(quote).join(", "));
+    let Some(text) = reader.attribute(node, "type") else {
+        reader.findings.error(place(node), format!("{whose}no `type`"), help());
+        return None;
+    };
+    if let Some((_, kind)) = KINDS.iter().find(|(name, _)| *name == text.value) {
+        return Some(Spanned::new(*kind, text.span));
+    }
+    let message = format!("{whose}unknown type {}", quote(text.value));
+    reader.findings.error(text.span, message, did_you_mean(text.value, names, help));
+    None
+}
+
+/// `<parent link="..."/>` or `<child link="..."/>`.
+fn read_end(reader: &mut Reader, joint: Node, end: Option<Node>, which: &str, whose: &str) -> Option<Spanned<String>> {
+    let Some(end) = end else {
+        let help = format!("write `<{which} link=\"...\"/>`");
+        reader.findings.error(place(joint), format!("{whose}no `{which}`"), help);
+        return None;
+    };
+    reader.leaf(end, &["link"]);
+    let text = reader.required(end, "link", whose)?;
+    Some(Spanned::new(text.value.to_string(), text.span))
+}
+
+/// The axis, for the kinds that have one. URDF's own default is x.
+fn read_axis(
+    reader: &mut Reader,
+    joint: Node,
+    axis: Option<Node>,
+    kind: Option<JointType>,
+    whose: &str,
+) -> Option<Spanned<[f64; 3]>> {
+    let wanted = !matches!(kind, Some(JointType::Fixed | JointType::Floating | JointType::Spherical));
+    let Some(node) = axis else {
+        if wanted && kind.is_some() {
+            reader.tally.notice(place(joint), "a joint without `axis` turns about or slides along its x axis");
+        }
+        return wanted.then(|| Spanned::new([1.0, 0.0, 0.0], place(joint)));
+    };
+    reader.leaf(node, &["xyz"]);
+    if !wanted {
+        reader.tally.notice(place(node), "`axis` of a fixed, floating or spherical joint has no meaning");
+        return None;
+    }
+    reader.required(node, "xyz", whose)?;
+    let numbers = reader.vec3(node, "xyz", whose)?;
+    let mut values = [0.0; 3];
+    for (value, number) in values.iter_mut().zip(&numbers.value) {
+        let RawValue::Const(x) = number.value else { return None };
+        *value = x;
+    }
+    Some(Spanned::new(values, numbers.span))
+}
+
+/// Viscous damping; dry friction is reported.
+fn read_dynamics(reader: &mut Reader, node: Node, kind: Option<JointType>, whose: &str) -> Option<RawFreedoms> {
+    reader.leaf(node, &["damping", "friction"]);
+    let damping = reader.number(node, "damping", whose);
+    let friction = reader.number(node, "friction", whose);
+    if kind == Some(JointType::Fixed) {
+        reader.tally.notice(place(node), "`dynamics` of a fixed joint has no meaning");
+        return None;
+    }
+    if let Some(friction) = friction.filter(is_not_zero) {
+        let message = "dry friction (`friction`) is not modelled";
+        let help = "add it as a joint torque of your own, or set it to 0";
+        reader.tally.add(Severity::Warning, "friction", friction.span, message, help);
+    }
+    let damping = damping?;
+    if matches!(kind, Some(JointType::Planar | JointType::Floating)) {
+        if is_not_zero(&damping) {
+            let message = format!("{whose}one `damping` for slides and turns together is not used");
+            reader.findings.warning(
+                damping.span,
+                message,
+                "add it as joint forces and torques of your own, or set it to 0",
+            );
+        }
+        return None;
+    }
+    is_not_zero(&damping).then_some(RawFreedoms::All(damping))
+}
+
+fn is_not_zero(number: &RawNumber) -> bool {
+    matches!(number.value, RawValue::Const(x) if x != 0.0)
+}
+
+fn read_mimic(reader: &mut Reader, node: Node, kind: Option<JointType>, whose: &str) -> Option<RawMimic> {
+    reader.leaf(node, &["joint", "multiplier", "offset"]);
+    let leader = reader.required(node, "joint", whose);
+    let ratio = reader.number(node, "multiplier", whose);
+    let offset = reader.number(node, "offset", whose);
+    // Robots with some joints frozen for a task keep the `mimic` of those.
+    if kind == Some(JointType::Fixed) {
+        reader.tally.notice(place(node), "`mimic` of a fixed joint has no meaning");
+        return None;
+    }
+    let leader = leader?;
+    let range = node.range();
+    Some(RawMimic {
+        span: Span::new(range.start, range.end),
+        leader: Spanned::new(leader.value.to_string(), leader.span),
+        ratio,
+        offset,
+    })
+}

@@ -1,0 +1,171 @@
+//! The URDF reader: `robot` files of links and joints, as robot makers publish them.
+//!
+//! Every element and attribute is used, named in a finding, or an error. What has nothing to do with the free motion (shapes, limits,
+//! extensions of simulators) is counted, one notice per kind; what is unknown is a warning. Macros, entities and other formats are errors.
+
+mod joint;
+mod link;
+mod unused;
+mod xml;
+
+#[cfg(test)]
+mod tests;
+
+use super::raw::{JointType, RawBody, RawGravity, RawJoint, RawModel, RawValue};
+use super::source::{Findings, Span, Spanned};
+use super::words::{list, quote};
+use super::{Base, ImportOptions};
+use crate::check::check;
+use crate::diag::Diagnostics;
+use crate::model::Model;
+use roxmltree::{Document, Node};
+use std::collections::HashSet;
+use unused::Tally;
+use xml::{place, shown, syntax_error, Reader};
+
+/// What may stand in a `robot` and has nothing to do with its motion.
+const IGNORED: [(&str, &str); 6] = [
+    ("material", link::SHAPES),
+    ("gazebo", "`gazebo` is not used, even where it speaks of physics"),
+    ("transmission", "`transmission` is not used: motors and gears have no inertia"),
+    ("ros2_control", "`ros2_control` is not used"),
+    ("sensor", "`sensor` is not used"),
+    ("group", "`group` is not used"),
+];
+
+/// Reads a model from `text`; `file` is how messages call it, and its stem the name of a model that has none.
+///
+/// The root link hangs on the ground by the joint `root_joint`, of the kind `options.base` asks for. Links stay bodies and fixed joints
+/// stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes `ground_link`.
+///
+/// # Errors
+/// No model where a finding is an error; all findings of the file are returned together.
+pub fn read(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
+    let mut findings = Findings::new(file, text);
+    let document = match Document::parse(text) {
+        Ok(document) => document,
+        Err(error) => {
+            let (span, message, help) = syntax_error(&error, text);
+            findings.error(span, message, help);
+            return (None, findings.finish());
+        }
+    };
+    let mut reader = Reader { findings, tally: Tally::default() };
+    let raw = read_robot(&mut reader, document.root_element(), options);
+    let Reader { mut findings, tally } = reader;
+    tally.report(&mut findings);
+    let model = raw.and_then(|raw| check(&raw, file, &mut findings));
+    let model = model.filter(|_| !findings.has_errors());
+    (model, findings.finish())
+}
+
+fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Option<RawModel> {
+    if node.tag_name().name() != "robot" {
+        let help = match node.tag_name().name() {
+            "sdf" | "mujoco" | "MujocoInput" => "convert it to URDF: no other XML format is read",
+            _ => "a URDF file is one `robot` element",
+        };
+        reader.findings.error(place(node), format!("{} is not a robot", quote(shown(node))), help);
+        return None;
+    }
+    let mut raw = RawModel::empty();
+    raw.lenient = true;
+    reader.attributes(node, &["name", "version"]);
+    raw.name = match reader.attribute(node, "name") {
+        Some(name) if !name.value.trim().is_empty() => Some(Spanned::new(name.value.to_string(), name.span)),
+        _ => {
+            reader.tally.notice(place(node), "`robot` has no name; the model is called after the file");
+            None
+        }
+    };
+    for child in reader.children(node, &["link", "joint"], &IGNORED) {
+        if child.tag_name().name() == "link" {
+            push_or_note(&mut raw.bodies, link::read(reader, child), &mut raw.incomplete);
+        } else {
+            push_or_note(&mut raw.joints, joint::read(reader, child), &mut raw.incomplete);
+        }
+    }
+    if raw.bodies.is_empty() && !raw.incomplete {
+        reader.findings.error(place(node), "a robot without links", "give at least one `link`");
+        return None;
+    }
+    rename_ground(reader, &mut raw);
+    add_base(reader, &mut raw, options.base);
+    raw.gravity = options.gravity.map(|g| {
+        let number = |x| Spanned::new(RawValue::Const(x), Span::FILE);
+        RawGravity::Constant(Spanned::new(g.map(number), Span::FILE))
+    });
+    Some(raw)
+}
+
+fn push_or_note<T>(list: &mut Vec<T>, item: Option<T>, incomplete: &mut bool) {
+    match item {
+        Some(item) => list.push(item),
+        None => *incomplete = true,
+    }
+}
+
+/// Gives a link called `ground` another name, and the joints that speak of it.
+fn rename_ground(reader: &mut Reader, raw: &mut RawModel) {
+    let taken: HashSet<&str> = raw.bodies.iter().map(|b| b.name.value.as_str()).collect();
+    if !taken.contains("ground") {
+        return;
+    }
+    let new = free_name("ground_link", &taken);
+    let ends = raw.joints.iter_mut().flat_map(|j| j.parent.iter_mut().chain(&mut j.child));
+    for end in ends.filter(|end| end.value == "ground") {
+        end.value.clone_from(&new);
+    }
+    for body in raw.bodies.iter_mut().filter(|b| b.name.value == "ground") {
+        let message = format!("link `ground` is called `{new}` here, since `ground` means the fixed world");
+        reader.findings.notice(body.name.span, message);
+        body.name.value.clone_from(&new);
+    }
+}
+
+/// `wanted`, with as many `_` behind it as make it new.
+fn free_name(wanted: &str, taken: &HashSet<&str>) -> String {
+    let mut name = wanted.to_string();
+    while taken.contains(name.as_str()) {
+        name.push('_');
+    }
+    name
+}
+
+/// Hangs the root link on the ground, by the joint that Pinocchio calls `root_joint`.
+fn add_base(reader: &mut Reader, raw: &mut RawModel, base: Base) {
+    let names: HashSet<&str> = raw.bodies.iter().map(|b| b.name.value.as_str()).collect();
+    let children: HashSet<&str> = raw.joints.iter().filter_map(|j| Some(j.child.as_ref()?.value.as_str())).collect();
+    // A joint with an unknown child has been or will be reported; the link it meant is then no root.
+    let whole = !raw.incomplete && children.iter().all(|child| names.contains(child));
+    let mut seen = HashSet::new();
+    let roots: Vec<&RawBody> = (raw.bodies.iter())
+        .filter(|b| !children.contains(b.name.value.as_str()) && seen.insert(b.name.value.as_str()))
+        .collect();
+    if let ([_, second, ..], true) = (roots.as_slice(), whole) {
+        let message = format!(
+            "{} root links ({}); a robot has one",
+            roots.len(),
+            list(roots.iter().map(|r| r.name.value.as_str()))
+        );
+        let help = "every link but one has to be the `child` of a joint: add the missing joints, or remove links that are not used";
+        reader.findings.error(second.name.span, message, help);
+    }
+    let taken: HashSet<&str> = raw.joints.iter().map(|j| j.name.value.as_str()).collect();
+    let name = free_name("root_joint", &taken);
+    let kind = match base {
+        Base::Fixed => JointType::Fixed,
+        Base::Floating => JointType::Floating,
+        Base::Planar => JointType::Planar,
+    };
+    let mut joints = Vec::with_capacity(raw.joints.len() + roots.len());
+    for (k, root) in roots.iter().enumerate() {
+        let span = root.name.span;
+        // Only the first is the base; the others, an error already, hang there so that the rest of the checks can be made.
+        let (name, kind) =
+            if k == 0 { (name.clone(), kind) } else { (free_name(&format!("{name}_{k}"), &taken), JointType::Fixed) };
+        joints.push(RawJoint::new(Spanned::new(name, span), Some(Spanned::new(kind, span)), Some(root.name.clone())));
+    }
+    joints.append(&mut raw.joints);
+    raw.joints = joints;
+}

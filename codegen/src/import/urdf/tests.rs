@@ -1,0 +1,218 @@
+use super::read;
+use crate::diag::{Diagnostics, Severity};
+use crate::import::{Base, ImportOptions};
+use crate::model::{Gravity, JointKind, Model, Motion, Rotation, Value};
+use std::fmt::Write;
+
+const SOLID: &str =
+    r#"<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"#;
+
+fn import(text: &str, base: Base) -> (Option<Model>, Diagnostics) {
+    read("robot.urdf", text, &ImportOptions { base, ..ImportOptions::default() })
+}
+
+/// The model of a file without errors, and its findings as text.
+fn model(text: &str, base: Base) -> (Model, String) {
+    let (model, findings) = import(text, base);
+    (model.unwrap_or_else(|| panic!("{findings}")), findings.to_string())
+}
+
+fn consts<const N: usize>(values: [Value; N]) -> [f64; N] {
+    values.map(|v| v.constant().expect("URDF has no parameters"))
+}
+
+fn link(name: &str) -> String {
+    format!(r#"<link name="{name}">{SOLID}</link>"#)
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str, rest: &str) -> String {
+    let ends = format!(r#"<parent link="{parent}"/><child link="{child}"/>"#);
+    format!(r#"<joint name="{name}" type="{kind}">{ends}{rest}</joint>"#)
+}
+
+#[test]
+fn every_number_arrives_in_its_place() {
+    let text = r#"<robot name="arm" version="1.0">
+      <link name="base"/>
+      <link name="upper"><inertial>
+        <origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><mass value="1.5e0"/>
+        <inertia ixx="11" ixy="0.4" ixz="0.5" iyy="12" iyz="0.6" izz="13"/>
+      </inertial></link>
+      <link name="slide"><inertial>
+        <mass value="2"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>
+      </inertial></link>
+      <joint name="shoulder" type="revolute">
+        <parent link="base"/><child link="upper"/><origin xyz=" 4 5	6 " rpy="0.4 0.5 0.6"/><axis xyz="0 3 4"/>
+        <dynamics damping="0.7"/>
+      </joint>
+      <joint name="rail" type="prismatic">
+        <parent link="upper"/><child link="slide"/><axis xyz="0 0 -1"/>
+        <mimic joint="shoulder" multiplier="-2" offset="0.25"/>
+      </joint>
+    </robot>"#;
+    let (m, findings) = model(text, Base::Fixed);
+    assert_eq!(findings, "");
+    assert_eq!(m.name, "arm");
+    assert_eq!(m.gravity, Gravity::Constant([Value::ZERO, Value::ZERO, Value::Const(-9.81)]));
+    let upper = &m.bodies[1];
+    assert_eq!((upper.name.as_str(), upper.mass), ("upper", Value::Const(1.5)));
+    assert_eq!(consts(upper.com), [1.0, 2.0, 3.0]);
+    assert_eq!(consts(upper.inertia), [11.0, 12.0, 13.0, 0.4, 0.5, 0.6]);
+    assert_eq!(upper.inertia_axes, Rotation::Rpy([0.1, 0.2, 0.3].map(Value::Const)));
+    let shoulder = &m.joints[1];
+    assert_eq!((shoulder.parent, shoulder.child), (Some(0), 1));
+    assert_eq!(consts(shoulder.placement.xyz), [4.0, 5.0, 6.0]);
+    assert_eq!(shoulder.placement.rotation, Rotation::Rpy([0.4, 0.5, 0.6].map(Value::Const)));
+    assert_eq!(shoulder.kind, JointKind::Pin { axis: [0.0, 3.0, 4.0] });
+    assert_eq!(shoulder.damping, [Value::Const(0.7)]);
+    let rail = &m.joints[2];
+    assert_eq!(rail.kind, JointKind::Slider { axis: [0.0, 0.0, -1.0] });
+    assert_eq!(rail.motion, Motion::Mimic { leader: 1, ratio: Value::Const(-2.0), offset: Value::Const(0.25) });
+}
+
+#[test]
+fn what_is_left_out_takes_the_default_of_urdf() {
+    let joints =
+        joint("a", "continuous", "base", "one", "<mimic joint='b'/>") + &joint("b", "revolute", "base", "two", "");
+    let text = format!("<robot name='r'><link name='base'/>{}{}{joints}</robot>", link("one"), link("two"));
+    let (m, findings) = model(&text, Base::Fixed);
+    // The default axis is x, not the z of this project's own format; it is told once.
+    assert_eq!(m.joints[1].kind, JointKind::Pin { axis: [1.0, 0.0, 0.0] });
+    assert_eq!(m.joints[1].motion, Motion::Mimic { leader: 2, ratio: Value::ONE, offset: Value::ZERO });
+    assert_eq!(consts(m.joints[1].placement.xyz), [0.0; 3]);
+    assert_eq!(m.bodies[0].mass, Value::ZERO);
+    assert!(findings.contains("turns about or slides along its x axis (2 times, first here)"), "{findings}");
+}
+
+#[test]
+fn every_joint_type() {
+    let x = [1.0, 0.0, 0.0];
+    let kinds = [
+        ("revolute", JointKind::Pin { axis: x }),
+        ("continuous", JointKind::Pin { axis: x }),
+        ("prismatic", JointKind::Slider { axis: x }),
+        ("planar", JointKind::Planar { normal: x }),
+        ("floating", JointKind::Floating),
+        ("spherical", JointKind::Spherical),
+        ("ball", JointKind::Spherical),
+        ("fixed", JointKind::Fixed),
+    ];
+    for (name, kind) in kinds {
+        let text = format!("<robot name='r'>{}{}{}</robot>", link("a"), link("b"), joint("j", name, "a", "b", ""));
+        let (m, _) = model(&text, Base::Fixed);
+        assert_eq!(m.joints[1].kind, kind, "{name}");
+    }
+}
+
+#[test]
+fn the_base_is_what_was_asked_for() {
+    let text = format!(
+        "<robot name='r'>{}{}{}</robot>",
+        link("tip"),
+        link("trunk"),
+        joint("j", "revolute", "trunk", "tip", "")
+    );
+    for (base, kind) in [
+        (Base::Fixed, JointKind::Fixed),
+        (Base::Floating, JointKind::Floating),
+        (Base::Planar, JointKind::Planar { normal: [0.0, 0.0, 1.0] }),
+    ] {
+        let (m, _) = model(&text, base);
+        let root = &m.joints[0];
+        assert_eq!((root.name.as_str(), root.kind, root.parent, root.child), ("root_joint", kind, None, 1));
+        assert_eq!(m.joints.len(), 2);
+    }
+    let (m, _) = model(&text.replace("\"j\"", "\"root_joint\""), Base::Floating);
+    assert_eq!([m.joints[0].name.as_str(), m.joints[1].name.as_str()], ["root_joint_", "root_joint"]);
+}
+
+#[test]
+fn joints_come_depth_first_with_children_in_file_order() {
+    let mut text = "<robot name='tree'>".to_string();
+    for (name, parent) in [("e", "c"), ("c", "a"), ("b", "a"), ("d", "b"), ("f", "c")] {
+        text += &(link(name) + &joint(&format!("to_{name}"), "revolute", parent, name, "<axis xyz='0 0 1'/>"));
+    }
+    let (m, findings) = model(&(text + &link("a") + "</robot>"), Base::Fixed);
+    assert_eq!(findings, "");
+    let names: Vec<_> = m.joints.iter().map(|j| j.name.as_str()).collect();
+    assert_eq!(names, ["root_joint", "to_c", "to_e", "to_f", "to_b", "to_d"]);
+    let bodies: Vec<_> = m.bodies.iter().map(|b| b.name.as_str()).collect();
+    assert_eq!(bodies, ["e", "c", "b", "d", "f", "a"]);
+}
+
+#[test]
+fn a_link_called_ground_is_renamed_and_stays_connected() {
+    let parts = link("world") + &link("ground") + &link("ground_link") + &link("tip");
+    let joints = joint("a", "fixed", "world", "ground", "")
+        + &joint("b", "revolute", "ground", "ground_link", "")
+        + &joint("c", "revolute", "ground_link", "tip", "");
+    let (m, findings) = model(&format!("<robot name='r'>{parts}{joints}</robot>"), Base::Fixed);
+    assert_eq!(m.bodies[1].name, "ground_link_");
+    assert_eq!((m.joints[1].child, m.joints[2].parent, m.joints[2].child), (1, Some(1), 2));
+    assert!(findings.contains("link `ground` is called `ground_link_` here"), "{findings}");
+}
+
+#[test]
+fn gravity_comes_from_the_options() {
+    let text = format!("<robot name='r'>{}</robot>", link("a"));
+    let options = ImportOptions { gravity: Some([0.0, -1.62, 0.0]), base: Base::Floating };
+    let (m, _) = read("r.urdf", &text, &options);
+    assert_eq!(m.map(|m| m.gravity), Some(Gravity::Constant([0.0, -1.62, 0.0].map(Value::Const))));
+}
+
+#[test]
+fn a_namespace_of_the_whole_file_changes_nothing() {
+    let text = format!("<robot name='r' xmlns='http://www.ros.org'>{}</robot>", link("a"));
+    let (m, findings) = model(&text, Base::Floating);
+    assert_eq!((m.bodies.len(), findings.as_str()), (1, ""));
+}
+
+#[test]
+fn invalid_numbers_are_reported_once() {
+    let text = format!(
+        "<robot name='r'>{}</robot>",
+        link("a").replace("<mass value=\"1\"/>", "<mass value=''/>").replace("ixx=\"1\"", "ixx='x'")
+    );
+    let (m, findings) = import(&text, Base::Floating);
+    assert!(m.is_none());
+    assert_eq!(findings.0.iter().filter(|d| d.severity == Severity::Error).count(), 2, "{findings}");
+}
+
+#[test]
+fn depth_is_no_danger() {
+    // Elements in elements: the parser and this reader go through them without recursion.
+    let deep = "<a>".repeat(200_000) + &"</a>".repeat(200_000);
+    let (m, findings) = import(&format!("<robot name='r'>{}{deep}</robot>", link("x")), Base::Floating);
+    assert!(m.is_some(), "{findings}");
+    let (m, _) = import(&"<robot>".repeat(200_000), Base::Floating);
+    assert!(m.is_none());
+    // Links on links.
+    let mut text = format!("<robot name='chain'>{}", link("l0"));
+    for k in 1..5_000 {
+        let (parent, child) = (format!("l{}", k - 1), format!("l{k}"));
+        text += &(link(&child) + &joint(&format!("j{k}"), "revolute", &parent, &child, "<axis xyz='0 0 1'/>"));
+    }
+    let (m, _) = model(&(text + "</robot>"), Base::Fixed);
+    assert_eq!(m.joints.len(), 5_000);
+}
+
+/// Files cut off and changed at every place: some error or other, but never a panic.
+#[test]
+fn no_bytes_make_it_panic() {
+    let text = include_str!("../../../tests/broken/urdf/unused.urdf");
+    let spoilt = ["<", ">", "\"", "&", "&#0;", "ä", "-", "x", " ", "<a:b", "${", "]]>", "9e999"];
+    let mut models = 0;
+    for k in (0..text.len()).filter(|&k| text.is_char_boundary(k)) {
+        let _ = import(&text[..k], Base::Fixed);
+        let word = spoilt[k % spoilt.len()];
+        let next = text[k..].chars().next().map_or(k, |c| k + c.len_utf8());
+        let changed = format!("{}{word}{}", &text[..k], &text[next..]);
+        models += usize::from(import(&changed, Base::Planar).0.is_some());
+    }
+    assert!(models > 100, "the changes should be small enough that some leave a model: {models}");
+    // Names longer than the parser keeps lengths for.
+    let mut long = String::from("<robot name='r'><link name='a'><inertial><mass ");
+    write!(long, "{0}='1' value{1}={1}'ä'/></inertial></link></robot>", "ä".repeat(40_000), " ".repeat(300)).unwrap();
+    let (m, findings) = import(&long, Base::Floating);
+    assert!(m.is_none() && findings.0.len() >= 3, "{findings}");
+}
