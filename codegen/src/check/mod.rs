@@ -83,7 +83,7 @@ fn gravity(raw: &RawModel, numbers: &mut Numbers) -> Gravity {
 fn frames(raw: &RawModel, names: &Names, numbers: &mut Numbers) -> Vec<Frame> {
     let one = |f: &crate::import::raw::RawFrame| {
         let what = format!("frame {}", quote(&f.name.value));
-        let body = names.body(&f.body, "body", &what, numbers.findings).unwrap_or(None);
+        let body = names.body(&f.body, "", &what, numbers.findings).unwrap_or(None);
         Frame { name: f.name.value.clone(), body, placement: numbers.placement(&f.placement, &what) }
     };
     raw.frames.iter().map(one).collect()
@@ -93,7 +93,7 @@ fn wrenches(raw: &RawModel, names: &Names, findings: &mut Findings) -> Vec<Wrenc
     let mut out = Vec::new();
     for w in &raw.wrenches {
         let name = w.name.as_ref().unwrap_or(&w.body).value.clone();
-        match names.body(&w.body, "body", &format!("wrench {}", quote(&name)), findings) {
+        match names.body(&w.body, "", &format!("wrench {}", quote(&name)), findings) {
             Some(Some(body)) => out.push(Wrench { name, body, axes: w.axes }),
             Some(None) => {
                 let message = format!("wrench {} acts on the ground, which does not move", quote(&name));

@@ -76,7 +76,7 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
                     return Value::Param(k);
                 }
                 let help = did_you_mean(name, self.params.iter().map(|p| p.name.value.as_str()), || {
-                    format!("declare it with its default: `{name} = 0.0` under `[params]`")
+                    format!("declare it with its default under `[params]`: {}", quote(&format!("{name} = 0.0")))
                 });
                 self.findings.error(number.span, format!("{what}: {} is not a parameter", quote(name)), help);
                 Value::Const(f64::NAN)
@@ -146,7 +146,7 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
         for (p, _) in self.params.iter().zip(&self.used).filter(|(_, used)| !**used) {
             let name = &p.name.value;
             let message = format!("parameter {} is not used", quote(name));
-            let help = format!("remove it, or use it: `mass = {{ param = \"{name}\" }}`");
+            let help = format!("remove it, or use it: {}", quote(&format!("mass = {{ param = \"{name}\" }}")));
             self.findings.warning(p.name.span, message, help);
         }
     }

@@ -21,9 +21,9 @@ pub(super) fn links(raw: &RawModel, names: &Names, findings: &mut Findings) -> V
         let what = format!("joint {}", quote(&j.name.value));
         let parent = match &j.parent {
             None => Some(None),
-            Some(name) => names.body(name, "parent", &what, findings),
+            Some(name) => names.body(name, "parent ", &what, findings),
         };
-        let child = j.child.as_ref().and_then(|name| match names.body(name, "child", &what, findings) {
+        let child = j.child.as_ref().and_then(|name| match names.body(name, "child ", &what, findings) {
             Some(None) => {
                 let help = "the ground carries and is not carried: make it the parent";
                 findings.error(name.span, format!("{what}: the ground cannot be the child"), help);
@@ -87,7 +87,8 @@ fn carriers(raw: &RawModel, names: &Names, links: &[Link], findings: &mut Findin
         if carrier[b].is_none() && !raw.incomplete && names.is_first(b) {
             let name = &body.name.value;
             let help = format!(
-                "add a joint with `child = \"{name}\"`; a body that moves freely has a `floating` joint to `ground`"
+                "add a joint with {} as its child; a body that moves freely has a `floating` joint to `ground`",
+                quote(name)
             );
             findings.error(body.name.span, format!("body {} is not the child of any joint", quote(name)), help);
         }

@@ -46,11 +46,20 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         }
         let d = distance(&word, &other);
         // A word with nothing in common is no suggestion, however short.
-        if d <= limit && d < word.len().max(other.len()) && best.is_none_or(|(b, _)| d < b) {
-            best = Some((d, candidate));
+        let plausible = d <= limit && d < word.len().max(other.len());
+        // Swapped letters are likelier than others.
+        let rank = (d, sorted(&word) != sorted(&other));
+        if plausible && best.is_none_or(|(b, _)| rank < b) {
+            best = Some((rank, candidate));
         }
     }
     best.map(|(_, c)| c)
+}
+
+fn sorted(word: &[char]) -> Vec<char> {
+    let mut letters = word.to_vec();
+    letters.sort_unstable();
+    letters
 }
 
 /// The closest candidate as help, or else `otherwise`.
@@ -92,6 +101,7 @@ mod tests {
         assert_eq!(closest("mas", ["mass", "name"]), Some("mass"));
         assert_eq!(closest("Mass", ["mass"]), Some("mass"));
         assert_eq!(closest("naem", ["name"]), Some("name"));
+        assert_eq!(closest("yx", ["xx", "xy"]), Some("xy"));
         assert_eq!(closest("x", ["y"]), None);
         assert_eq!(closest("colour", ["mass", "com", "name"]), None);
         assert_eq!(closest(&"a".repeat(100), ["a"]), None);

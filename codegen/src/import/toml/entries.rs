@@ -35,9 +35,11 @@ const WRENCH: &[&str] = &["name", "body", "frame"];
 const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
 pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
-    table.reject_unknown(BODY, "a body", findings);
+    let all_known = table.reject_unknown(BODY, "a body", findings);
     let name = table.required_text("name", findings);
-    let mass = table.number("mass", Unit::Plain, findings);
+    // A misspelt mass is not a missing one.
+    let unread = (!all_known).then(|| Spanned::new(RawValue::Invalid, table.span));
+    let mass = table.number("mass", Unit::Plain, findings).or(unread);
     let com = table.vec3("com", Unit::Plain, findings);
     let inertia = inertia(&table, findings);
     let inertia_axes = table.vec3("inertia_rpy", Unit::Angle, findings).map(RawRotation::Rpy);
@@ -170,14 +172,11 @@ fn units(kind: Option<JointType>) -> &'static [Unit] {
 
 pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(JOINT, "a joint", findings);
-    let Some(name) = table.required_text("name", findings) else {
-        raw.incomplete = true;
-        return;
-    };
+    let name = table.required_text("name", findings);
     let kind = joint_type(&table, findings);
     let child = table.required_text("child", findings);
     // Without its joint a body would look loose.
-    raw.incomplete |= child.is_none();
+    raw.incomplete |= child.is_none() || name.is_none();
     let units = units(kind.as_ref().map(|k| k.value));
     let mut freedoms = |key: &str, units: &[Unit]| {
         table.raw(key).and_then(|v| numbers::freedoms(v, units, &format!("{}`{key}`", table.prefix()), findings))
@@ -202,9 +201,11 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         armature,
         motion,
         mimic: mimic(&table, units, findings),
-        ..RawJoint::new(name, kind, child)
+        ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
-    raw.joints.push(joint);
+    if name.is_some() {
+        raw.joints.push(joint);
+    }
 }
 
 fn mimic(table: &Table, units: &[Unit], findings: &mut Findings) -> Option<RawMimic> {

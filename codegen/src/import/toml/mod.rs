@@ -111,7 +111,13 @@ fn syntax_error(text: &str, error: &Error, findings: &mut Findings) {
     // An error at the very first byte is one with a place, too.
     let place = Span::new(span.start, span.end.max(1));
     let culprit = quote(text.get(span).unwrap_or("").lines().next().unwrap_or(""));
+    let comma = text.get(..place.start).is_some_and(|before| before.ends_with(|c: char| c.is_ascii_digit()))
+        && text.get(place.start..).is_some_and(|rest| rest.starts_with(','));
     let (message, help) = match error.message() {
+        _ if text.trim_start_matches(['\u{feff}', ' ', '\n', '\r', '\t']).starts_with('<') => {
+            ("this is XML, not TOML".into(), "if it is a robot description, name the file `.urdf`")
+        }
+        _ if comma => ("a comma inside a number".into(), "write the decimals after a point, as in `1.5`"),
         m if m.starts_with("duplicate key") => (
             format!("key {culprit} is given twice"),
             "keep one; the lists of bodies, joints, frames and wrenches have double brackets, like `[[body]]`",

@@ -59,8 +59,9 @@ impl<'t> Table<'t> {
         self.table.get_key_value(key).map_or(self.span, |(k, _)| k.span().into())
     }
 
-    /// Reports every key that is not in `keys`; `kind` as in "a joint".
-    pub(super) fn reject_unknown(&self, keys: &[&str], kind: &str, findings: &mut Findings) {
+    /// Reports every key that is not in `keys` and says whether there was none; `kind` as in "a joint".
+    pub(super) fn reject_unknown(&self, keys: &[&str], kind: &str, findings: &mut Findings) -> bool {
+        let mut all_known = true;
         for (key, _) in self.entries() {
             if !keys.contains(&key.value.as_ref()) {
                 let message = format!("{}unknown key {}", self.prefix(), quote(key.value));
@@ -68,8 +69,10 @@ impl<'t> Table<'t> {
                     format!("the keys of {kind} are {}", keys.iter().map(|k| quote(k)).collect::<Vec<_>>().join(", "))
                 });
                 findings.error(key.span, message, help);
+                all_known = false;
             }
         }
+        all_known
     }
 
     /// Reports a missing key.
