@@ -5,6 +5,7 @@ pub mod diag;
 pub mod emit;
 pub mod generate;
 pub mod import;
+pub mod layout;
 pub mod model;
 pub mod plan;
 pub mod symbolic;

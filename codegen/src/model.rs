@@ -180,6 +180,8 @@ pub struct Joint {
     pub child: usize,
     /// Child frame in the parent frame at zero coordinates.
     pub placement: Placement,
+    /// A pin without limits that other programs may store as cosine and sine; changes nothing here.
+    pub unbounded: bool,
     /// Source of the coordinates.
     pub motion: Motion,
     /// Viscous damping per freedom, N m s/rad or N s/m.

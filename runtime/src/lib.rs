@@ -10,6 +10,8 @@ extern crate alloc;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;
+#[cfg(feature = "alloc")]
+pub mod layout;
 mod scalar;
 pub mod spatial;
 #[cfg(feature = "alloc")]

@@ -160,7 +160,7 @@ def state(system, rng):
     for name in system.reported:
         ident = system.links[name]
         place, speed = data.oMf[ident], pin.getFrameVelocity(model, data, ident, pin.ReferenceFrame.LOCAL)
-        links.append({"R": place.rotation.flatten(), "r": place.translation, "v": speed.vector})
+        links.append({"R": place.rotation.flatten(), "r": place.translation.copy(), "v": speed.vector.copy()})
     out = {"q": pick(system.free, q, "q"), "v": u[f], "tau": tau}
     if system.wrenches:
         out["wrenches"] = wrenches

@@ -54,6 +54,7 @@ pub(super) fn joint(raw: &RawJoint, numbers: &mut Numbers) -> Joint {
         parent: None,
         child: 0,
         placement,
+        unbounded: raw.unbounded,
         motion,
         damping: Vec::new(),
         stiffness: Vec::new(),

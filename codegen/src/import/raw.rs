@@ -152,6 +152,8 @@ pub struct RawJoint {
     pub rest: Option<RawFreedoms>,
     /// Reflected rotor inertia.
     pub armature: Option<RawFreedoms>,
+    /// A pin without limits that other programs may store as cosine and sine.
+    pub unbounded: bool,
     /// Source of the coordinates.
     pub motion: RawMotion,
     /// Coupling to another joint.
@@ -174,6 +176,7 @@ impl RawJoint {
             stiffness: None,
             rest: None,
             armature: None,
+            unbounded: false,
             motion: RawMotion::Free,
             mimic: None,
         }

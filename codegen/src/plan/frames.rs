@@ -123,8 +123,8 @@ fn freedom(way: &Screws, has_child: bool, line: Option<(Vec3<f64>, Option<Vec3<f
         return (if off { unit(point[0], point[1]) } else { undo.0 }, undo.1);
     }
     let along = point[0] * ux + point[1] * uy + point[2] * uz;
-    let h = (point[2] - along * uz) / (1.0 - uz * uz);
-    if h.abs() > 20.0 * size {
+    let h = (point[2] - along * uz) / (sine * sine);
+    if sine < 1e-6 || h.abs() > 20.0 * size {
         return ((1.0, 0.0), 0.0); // nearly parallel: the common normal is too far away to be of use
     }
     (unit(-uy, ux), if h.abs() <= ROUND_OFF * size { 0.0 } else { h })

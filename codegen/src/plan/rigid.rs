@@ -137,7 +137,7 @@ pub fn screws(t: &Rigid) -> Screws {
     let across = [gamma.0 * pos[0] + gamma.1 * pos[1], gamma.0 * pos[1] - gamma.1 * pos[0]];
     let d = -across[1] / alpha.1;
     let b = pos[2] - alpha.0 * d;
-    if b.abs().max(d.abs()) > 20.0 * size {
+    if sin_alpha < 1e-6 || b.abs().max(d.abs()) > 20.0 * size {
         for (axis, r) in [Axis::X, Axis::Y, Axis::Z].into_iter().zip(pos) {
             shift_step(&mut steps, axis, clean(r, size));
         }

@@ -42,7 +42,9 @@ pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawJoint> {
     let damping = dynamics.and_then(|d| read_dynamics(reader, d, kind.as_ref().map(|k| k.value), &whose));
     let mimic = mimic.and_then(|m| read_mimic(reader, m, kind.as_ref().map(|k| k.value), &whose));
     let name = name?;
+    let unbounded = node.attribute("type") == Some("continuous");
     let mut joint = RawJoint::new(Spanned::new(name.value.to_string(), name.span), kind, Some(child?));
+    joint.unbounded = unbounded;
     joint.parent = Some(parent?);
     joint.placement = placement;
     joint.axis = axis;

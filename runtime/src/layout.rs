@@ -1,0 +1,173 @@
+//! States in the order and form of other programs.
+//!
+//! Velocities, momenta and joint forces are permuted; coordinates are also rewritten where a program stores a rotation
+//! in another way. Both layouts describe the same frames, so nothing else changes.
+
+use alloc::vec::Vec;
+
+use crate::spatial::{quaternion_matrix, Step};
+use crate::system::Real;
+
+/// How another program stores the coordinates of one joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As here, this many coordinates and velocities.
+    Same {
+        /// Coordinates and velocities.
+        n: usize,
+    },
+    /// An angle as cosine and sine (Pinocchio, unbounded revolute joints).
+    CosSin,
+    /// x, y, cosine, sine (Pinocchio, planar joints).
+    PlanarCosSin,
+    /// Unit quaternion x, y, z, w, as here.
+    Quaternion,
+    /// Unit quaternion w, x, y, z (MuJoCo).
+    QuaternionWxyz,
+    /// Position, quaternion x, y, z, w, velocities in body axes, as here (Pinocchio).
+    Floating,
+    /// Position, quaternion w, x, y, z, linear velocity in outer axes, angular in body axes (MuJoCo).
+    FloatingWorld,
+}
+
+impl Form {
+    /// Number of coordinates here and there, and of velocities.
+    pub fn sizes(self) -> (usize, usize, usize) {
+        match self {
+            Form::Same { n } => (n, n, n),
+            Form::CosSin => (1, 2, 1),
+            Form::PlanarCosSin => (3, 4, 3),
+            Form::Quaternion | Form::QuaternionWxyz => (4, 4, 3),
+            Form::Floating | Form::FloatingWorld => (7, 7, 6),
+        }
+    }
+}
+
+/// One joint's place here and there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Form there.
+    pub form: Form,
+    /// First coordinate here and there.
+    pub q: (usize, usize),
+    /// First velocity here and there.
+    pub v: (usize, usize),
+}
+
+/// A correspondence of states. Slices must have the lengths of both sides; missing entries are left alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Joints.
+    pub parts: Vec<Part>,
+}
+
+fn copy<S: Copy>(from: &[S], at: usize, to: &mut [S], place: usize, n: usize) {
+    if let (Some(from), Some(to)) = (from.get(at..at + n), to.get_mut(place..place + n)) {
+        to.copy_from_slice(from);
+    }
+}
+
+impl Layout {
+    /// Number of coordinates and velocities there.
+    pub fn sizes(&self) -> (usize, usize) {
+        let sizes = self.parts.iter().map(|p| p.form.sizes());
+        sizes.fold((0, 0), |(q, v), (_, nq, nv)| (q + nq, v + nv))
+    }
+
+    /// Coordinates from there to here. An angle comes back in (−π, π].
+    pub fn q_from(&self, there: &[f64], here: &mut [f64]) {
+        for part in &self.parts {
+            let (at, to) = (part.q.1, part.q.0);
+            let (n, _, _) = part.form.sizes();
+            match part.form {
+                Form::Same { .. } | Form::Quaternion | Form::Floating => copy(there, at, here, to, n),
+                Form::CosSin => here[to] = libm::atan2(there[at + 1], there[at]),
+                Form::PlanarCosSin => {
+                    copy(there, at, here, to, 2);
+                    here[to + 2] = libm::atan2(there[at + 3], there[at + 2]);
+                }
+                Form::QuaternionWxyz => {
+                    copy(there, at + 1, here, to, 3);
+                    here[to + 3] = there[at];
+                }
+                Form::FloatingWorld => {
+                    copy(there, at, here, to, 3);
+                    copy(there, at + 4, here, to + 3, 3);
+                    here[to + 6] = there[at + 3];
+                }
+            }
+        }
+    }
+
+    /// Coordinates from here to there.
+    pub fn q_to(&self, here: &[f64], there: &mut [f64]) {
+        for part in &self.parts {
+            let (at, to) = part.q;
+            let (n, _, _) = part.form.sizes();
+            match part.form {
+                Form::Same { .. } | Form::Quaternion | Form::Floating => copy(here, at, there, to, n),
+                Form::CosSin => (there[to + 1], there[to]) = crate::trig::sincos_f64(here[at]),
+                Form::PlanarCosSin => {
+                    copy(here, at, there, to, 2);
+                    (there[to + 3], there[to + 2]) = crate::trig::sincos_f64(here[at + 2]);
+                }
+                Form::QuaternionWxyz => {
+                    copy(here, at, there, to + 1, 3);
+                    there[to] = here[at + 3];
+                }
+                Form::FloatingWorld => {
+                    copy(here, at, there, to, 3);
+                    copy(here, at + 3, there, to + 4, 3);
+                    there[to + 3] = here[at + 6];
+                }
+            }
+        }
+    }
+
+    /// Coordinate rates from here to there; `q` are the coordinates here.
+    pub fn qd_to(&self, q: &[f64], here: &[f64], there: &mut [f64]) {
+        self.q_to(here, there);
+        for part in &self.parts {
+            let (at, to) = part.q;
+            let shift = match part.form {
+                Form::CosSin => 0,
+                Form::PlanarCosSin => 2,
+                _ => continue,
+            };
+            let (s, c) = crate::trig::sincos_f64(q[at + shift]);
+            let rate = here[at + shift];
+            there[to + shift] = -s * rate;
+            there[to + shift + 1] = c * rate;
+        }
+    }
+
+    /// Velocities, momenta or joint forces from there to here; `q` are the coordinates here.
+    pub fn v_from(&self, q: &[f64], there: &[f64], here: &mut [f64]) {
+        for part in &self.parts {
+            let (_, _, n) = part.form.sizes();
+            copy(there, part.v.1, here, part.v.0, n);
+            if part.form == Form::FloatingWorld {
+                turn(q, part, &mut here[part.v.0..], Step::vector);
+            }
+        }
+    }
+
+    /// Velocities, momenta or joint forces from here to there; `q` are the coordinates here.
+    pub fn v_to(&self, q: &[f64], here: &[f64], there: &mut [f64]) {
+        for part in &self.parts {
+            let (_, _, n) = part.form.sizes();
+            copy(here, part.v.0, there, part.v.1, n);
+            if part.form == Form::FloatingWorld {
+                turn(q, part, &mut there[part.v.1..], Step::vector_back);
+            }
+        }
+    }
+}
+
+/// Turns the first three numbers between body and outer axes of a floating joint.
+fn turn<S: Real>(q: &[S], part: &Part, x: &mut [S], by: impl Fn(&Step<S>, [S; 3]) -> [S; 3]) {
+    let at = part.q.0 + 3;
+    let step = Step::Rotate(quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]));
+    let turned = by(&step, [x[0], x[1], x[2]]);
+    x[..3].copy_from_slice(&turned);
+}
