@@ -12,6 +12,7 @@ pub mod integrate;
 pub mod interp;
 #[cfg(feature = "alloc")]
 pub mod layout;
+pub mod notation;
 mod scalar;
 pub mod spatial;
 #[cfg(feature = "alloc")]

@@ -42,7 +42,11 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot]) -> Framed {
         });
         let line = primary.and_then(|c| line_of(elements, c, &align));
         let turns = matches!(element.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
-        let ((c, s), h) = if turns { freedom(&way, primary.is_some(), line) } else { ((1.0, 0.0), 0.0) };
+        let ((c, s), h) = match (turns, primary) {
+            (false, _) => ((1.0, 0.0), 0.0),
+            (true, None) => tip(&way, element.kind, centre(model, elements, k, &align)),
+            (true, Some(_)) => freedom(&way, line),
+        };
         inside.push(Rigid::screw_z(c, s, h).inverse().then(&align.inverse()));
         nodes.push(node(model, elements, slots, k, way, (c, s), h));
     }
@@ -94,25 +98,61 @@ fn line_of(elements: &Elements, c: usize, align: &Rigid) -> Option<(Vec3<f64>, O
 
 type Turn = (f64, f64);
 
+/// First moment of the bodies of an element in its aligned frame, if it is constant.
+fn centre(model: &Model, elements: &Elements, k: usize, align: &Rigid) -> Option<Vec3<f64>> {
+    let mut sum = [0.0; 3];
+    for (b, body) in model.bodies.iter().enumerate().filter(|(b, _)| elements.bodies[*b].0 == Some(k)) {
+        let pose = align.inverse().then(&constant(&elements.bodies[b].1)?);
+        let (mass, com) = (body.mass.constant()?, [body.com[0], body.com[1], body.com[2]]);
+        let com = [com[0].constant()?, com[1].constant()?, com[2].constant()?];
+        let at = pose.turn(com);
+        for (sum, (at, pos)) in sum.iter_mut().zip(at.iter().zip(pose.pos)) {
+            *sum += mass * (at + pos);
+        }
+    }
+    Some(sum)
+}
+
+/// At a tip, the turn either makes the joint angle the frame's own, or turns x to the mass centre: one zero more in the
+/// first moment is worth the addition to the angle.
+fn tip(way: &Screws, kind: NodeKind, centre: Option<Vec3<f64>>) -> (Turn, f64) {
+    let (c, s) = way.turn;
+    let undo = (c, -s);
+    let turn = match centre {
+        Some([x, y, _]) if kind == NodeKind::Pin && x.hypot(y) > 0.0 => {
+            let ahead = unit(x, y);
+            // Against the parent's axes: already zero there?
+            let y = c * y + s * x;
+            let aligned = y.abs() <= ROUND_OFF * x.hypot(y);
+            if aligned {
+                undo
+            } else {
+                ahead
+            }
+        }
+        _ => undo,
+    };
+    (turn, -way.slide)
+}
+
+/// A direction across the axis; either sense will do, so the one nearer to where the frame stands.
+fn unit(x: f64, y: f64) -> Turn {
+    let n = x.hypot(y);
+    let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
+    let (x, y) = (snap(x), snap(y));
+    if x < 0.0 || (x == 0.0 && y < 0.0) {
+        (-x, -y)
+    } else {
+        (x, y)
+    }
+}
+
 /// Turn about and slide along the own axis that make the way to the next one simple.
-fn freedom(way: &Screws, has_child: bool, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn, f64) {
+fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn, f64) {
     let (c, s) = way.turn;
     let undo = ((c, -s), -way.slide);
-    let Some((point, axis)) = line else {
-        return if has_child { ((1.0, 0.0), 0.0) } else { undo };
-    };
+    let Some((point, axis)) = line else { return ((1.0, 0.0), 0.0) };
     let size = point.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    let unit = |x: f64, y: f64| -> Turn {
-        let n = x.hypot(y);
-        let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
-        let (x, y) = (snap(x), snap(y));
-        // Either sense of the normal will do: the one nearer to where the frame stands.
-        if x < 0.0 || (x == 0.0 && y < 0.0) {
-            (-x, -y)
-        } else {
-            (x, y)
-        }
-    };
     let Some([ux, uy, uz]) = axis else {
         let off = point[0].hypot(point[1]) > ROUND_OFF * size;
         return (if off { unit(point[0], point[1]) } else { undo.0 }, point[2]);

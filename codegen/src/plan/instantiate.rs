@@ -2,7 +2,7 @@
 
 use mbd_runtime::spatial::{add3, Mat3, RigidInertia, Step, Vec3, SYM};
 use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
-use mbd_runtime::Scalar;
+use mbd_runtime::{Interpreter, Scalar};
 
 use super::{NodeKind, Plan, PlanNode, PoseStep};
 use crate::model::Value;
@@ -59,6 +59,11 @@ pub(super) fn body_inertia<S: Scalar>(
 }
 
 impl Plan {
+    /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
+    pub fn interpreter(&self, params: &[f64]) -> Interpreter<f64> {
+        Interpreter::new(self.tree(params), self.gravity(params))
+    }
+
     /// The tree with given parameters, not regrouped. `params` has one entry for each run-time parameter.
     pub fn tree<S: Scalar>(&self, params: &[S]) -> Tree<S> {
         let frames: Vec<TreeFrame<S>> =

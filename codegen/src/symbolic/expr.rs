@@ -189,7 +189,7 @@ impl Neg for Expr<'_> {
     type Output = Self;
     fn neg(self) -> Self {
         match self {
-            Expr::Const(x) if x == 0.0 => self,
+            Expr::Const(0.0) => self,
             Expr::Const(x) => Expr::Const(-x),
             Expr::Node { graph, id, neg } => Expr::Node { graph, id, neg: !neg },
         }
