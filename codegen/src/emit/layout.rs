@@ -32,9 +32,9 @@ impl Function {
     /// Inlining hint: small kernels melt into the caller's loop.
     pub fn inline(&self, statements: usize) -> &'static str {
         if statements <= 300 {
-            "#[inline]"
+            "    #[inline]\n"
         } else {
-            "#[rustfmt::skip]"
+            ""
         }
     }
 }
@@ -279,6 +279,22 @@ fn places(name: &str, n: usize) -> Vec<String> {
     (0..n).map(|k| format!("{name}[{k}]")).collect()
 }
 
+/// `impl Default`.
+pub fn default(out: &mut String, options: &Options) {
+    let name = &options.type_name;
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl ::core::default::Default for {name} {{
+    fn default() -> Self {{
+        Self::new()
+    }}
+}}
+"
+    );
+}
+
 /// Signature of a group's function.
 pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
     let t = options.precision.name();
@@ -383,13 +399,6 @@ pub fn system(out: &mut String, plan: &Plan, options: &Options) {
     let _ = write!(
         out,
         "
-#[rustfmt::skip]
-impl ::core::default::Default for {name} {{
-    fn default() -> Self {{
-        Self::new()
-    }}
-}}
-
 #[rustfmt::skip]
 impl {rt}::System for {name} {{
     type Scalar = {t};

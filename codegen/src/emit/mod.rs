@@ -32,6 +32,7 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
         function(&mut out, plan, options, map, "coordinate_rates", &layout::coordinate_rates_signature(plan, options));
     }
     let _ = writeln!(out, "}}");
+    layout::default(&mut out, options);
     if rates {
         layout::system(&mut out, plan, options);
     }

@@ -57,7 +57,7 @@ impl<'a> Body<'a> {
         if statements.len() <= self.options.chunk {
             let _ = writeln!(
                 out,
-                "    {}\n    pub fn {name}(&self, {}){} {{",
+                "{}    pub fn {name}(&self, {}){} {{",
                 function.inline(statements.len()),
                 function.arguments,
                 function.returns
