@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::spatial::Motion;
 use crate::sweep::{FrameState, Inputs, Sweeps};
-use crate::system::System;
+use crate::system::{Real, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -146,6 +146,50 @@ impl<S: Scalar> Interpreter<S> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
         sweeps.frame_states(q, v, &self.inputs.view(), &mut self.work, frames);
+    }
+}
+
+/// A mass matrix without full rank: some freedom moves no inertia.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RankLoss {
+    /// Velocity index of the freedom.
+    pub velocity: usize,
+    /// Inertia it moves, all other freedoms outboard of it being free: zero, negative or not a number.
+    pub inertia: f64,
+}
+
+impl core::fmt::Display for RankLoss {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let RankLoss { velocity, inertia } = self;
+        write!(f, "the mass matrix is singular: velocity {velocity} moves an inertia of {inertia:e}")
+    }
+}
+
+impl core::error::Error for RankLoss {}
+
+impl<S: Real> Interpreter<S> {
+    /// Whether every freedom moves a positive inertia at the coordinates `q`. The sweeps themselves do not look: where
+    /// this fails, velocities and accelerations are infinite or not numbers.
+    ///
+    /// # Errors
+    /// [`RankLoss`] for the first freedom, outboard first, without inertia.
+    pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.articulate(q, &self.inputs.drive_q, &mut self.work.poses);
+        sweeps.factor(&self.work.poses, &self.work.first, &mut self.work.factor);
+        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.shared) {
+            (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
+            _ => None,
+        });
+        let own = own.flat_map(|(v, freedoms)| freedoms.enumerate().map(move |(k, f)| (v + k, f)));
+        let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));
+        let shared = self.tree.shared.iter().zip(&self.work.factor.shared).map(|(&v, pivot)| (v, pivot.rho));
+        for (velocity, rho) in own.chain(shared) {
+            if !(rho.is_finite() && rho > S::zero()) {
+                return Err(RankLoss { velocity, inertia: 1.0 / rho.to_f64() });
+            }
+        }
+        Ok(())
     }
 }
 

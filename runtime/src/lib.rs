@@ -25,6 +25,6 @@ pub mod trig;
 pub mod workspace;
 
 #[cfg(feature = "alloc")]
-pub use interp::Interpreter;
+pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
 pub use system::{Real, System};
