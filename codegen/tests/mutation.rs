@@ -22,9 +22,22 @@ fn survive(file: &str, seeds: &[String], rounds: u64) {
     assert!(with_model > rounds / 50, "only {with_model} of {rounds} mutated files were models");
 }
 
+/// From the broken models and the good ones of one format.
+fn seeds(extension: &str) -> Vec<String> {
+    let file = format!("m.{extension}");
+    let folders = [concat!(env!("CARGO_MANIFEST_DIR"), "/tests"), concat!(env!("CARGO_MANIFEST_DIR"), "/../models")];
+    let mut seeds = mutate::corpus(&folders, extension);
+    // Large files take long and say little more.
+    seeds.retain(|s| s.len() < 20_000);
+    mutate::balanced(seeds, |text| load(&file, text, &ImportOptions::default()).0.is_some())
+}
+
 #[test]
 fn mutated_toml_never_panics() {
-    let seeds = mutate::corpus(&[concat!(env!("CARGO_MANIFEST_DIR"), "/tests")], "toml");
-    let seeds = mutate::balanced(seeds, |text| load("m.toml", text, &ImportOptions::default()).0.is_some());
-    survive("m.toml", &seeds, 20_000);
+    survive("m.toml", &seeds("toml"), 20_000);
+}
+
+#[test]
+fn mutated_urdf_never_panics() {
+    survive("m.urdf", &seeds("urdf"), 20_000);
 }

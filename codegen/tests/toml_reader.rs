@@ -219,3 +219,18 @@ fn long_chains_are_no_trouble() {
     let ring = text.replace("parent = 'ground'", &format!("parent = 'b{}'", n - 1));
     assert_eq!(messages(&ring).len(), 1);
 }
+
+/// The models this project ships are clean, all of them.
+#[test]
+fn shipped_models_are_clean() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../models");
+    let files = std::fs::read_dir(folder).expect("the folder of models").map(|e| e.expect("an entry").path());
+    let mut count = 0;
+    for path in files.filter(|p| p.extension().is_some_and(|e| e == "toml")) {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        let (model, findings) = read(&name, &std::fs::read_to_string(&path).expect("UTF-8"));
+        assert!(model.is_some() && findings.0.is_empty(), "{findings}");
+        count += 1;
+    }
+    assert!(count >= 5, "{count} models");
+}
