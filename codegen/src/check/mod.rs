@@ -8,8 +8,6 @@ mod numbers;
 mod symmetric;
 mod tree;
 
-pub use names::identifier;
-
 use self::names::Names;
 use self::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawGravity, RawModel, RawValue};

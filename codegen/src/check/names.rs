@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::emit::names::identifier;
 use crate::import::raw::RawModel;
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::{did_you_mean, list, quote};
@@ -17,9 +18,9 @@ const KEYWORDS: &[&str] = &[
     "true", "try", "type", "typeof", "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
 
-/// The identifier a name becomes in generated code: anything but ASCII letters and digits turns into `_`, a leading digit gets a `_` in
-/// front, a keyword one behind. The checks make sure that no two names of a kind meet, in whatever case.
-pub fn identifier(name: &str) -> String {
+/// A name of a model as a Rust identifier, its case kept: anything but ASCII letters and digits turns into `_`, a leading digit gets a `_`
+/// in front, a keyword one behind.
+fn rust_name(name: &str) -> String {
     let mut out: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if out.is_empty() || out.starts_with(|c: char| c.is_ascii_digit()) {
         out.insert(0, '_');
@@ -39,9 +40,9 @@ pub(super) fn norm(v: [f64; 3]) -> f64 {
 pub(super) fn model_name(raw: &RawModel, file: &str, findings: &mut Findings) -> String {
     let Some(name) = &raw.name else {
         let stem = std::path::Path::new(file).file_stem().map_or(String::new(), |s| s.to_string_lossy().into_owned());
-        return if usable(&stem) { identifier(&stem) } else { "model".into() };
+        return if usable(&stem) { rust_name(&stem) } else { "model".into() };
     };
-    let fixed = if usable(&name.value) { identifier(&name.value) } else { "model".into() };
+    let fixed = if usable(&name.value) { rust_name(&name.value) } else { "model".into() };
     if fixed != name.value {
         if raw.lenient {
             findings.notice(
@@ -57,8 +58,11 @@ pub(super) fn model_name(raw: &RawModel, file: &str, findings: &mut Findings) ->
     fixed
 }
 
+/// Names stand in comments of the generated code, too: nothing that ends a line or turns the direction of writing.
 fn usable(name: &str) -> bool {
-    name.chars().any(|c| c.is_ascii_alphanumeric())
+    let hidden =
+        |c: char| c.is_control() || ('\u{2028}'..='\u{202e}').contains(&c) || ('\u{2066}'..='\u{2069}').contains(&c);
+    name.chars().any(|c| c.is_ascii_alphanumeric()) && !name.contains(hidden)
 }
 
 /// Where the bodies are.
@@ -149,7 +153,11 @@ fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findi
         }
         if !usable(&name.value) {
             let message = format!("a {kind} cannot be called {shown}");
-            findings.error(name.span, message, "give it a name with at least one letter or digit (ASCII)");
+            findings.error(
+                name.span,
+                message,
+                "give it a name with at least one ASCII letter or digit, and no control characters",
+            );
             continue;
         }
         let line = findings.line(name.span);
@@ -164,7 +172,7 @@ fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findi
                 false => format!("{kind} {shown} has the name of the {other} in line {at}"),
             };
             findings.error(name.span, message, help);
-        } else if let Some(other) = folded.insert(identifier(&name.value).to_ascii_lowercase(), &name.value) {
+        } else if let Some(other) = folded.insert(identifier(&name.value), &name.value) {
             let message = format!("{kind} {shown} and {} become the same identifier in generated code", quote(other));
             findings.error(
                 name.span,

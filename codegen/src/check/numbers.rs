@@ -27,7 +27,7 @@ impl Quantity {
     fn suspicion(self, x: f64) -> Option<(String, String)> {
         let x = x.abs();
         // A little over a turn is a turn written with few digits.
-        if self == Quantity::Angle && x > 6.2832 {
+        if self == Quantity::Angle && x > 1.00001 * std::f64::consts::TAU {
             let help = format!("angles are in radians; in a TOML model {x} degrees are written `{{ deg = {x} }}`");
             Some((format!("{x} is more than a full turn"), help))
         } else if self == Quantity::Length && x > 100.0 {

@@ -1,7 +1,7 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
 mod layout;
-mod names;
+pub(crate) mod names;
 mod statements;
 
 use std::fmt::Write;

@@ -88,7 +88,14 @@ impl<'a> Findings<'a> {
     pub fn add(&mut self, severity: Severity, span: Span, message: impl Into<String>, help: impl Into<String>) {
         let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
         let file = self.file.to_string();
-        self.list.push(Diagnostic { severity, file, line, column, message: message.into(), help: help.into() });
+        self.list.push(Diagnostic {
+            severity,
+            file,
+            line,
+            column,
+            message: one_line(message.into()),
+            help: one_line(help.into()),
+        });
     }
 
     /// Adds an error: nothing can be made of the file.
@@ -123,6 +130,15 @@ impl<'a> Findings<'a> {
     }
 }
 
+/// Control characters escaped: a finding is one line, whatever stands in the file.
+fn one_line(text: String) -> String {
+    if !text.contains(char::is_control) {
+        return text;
+    }
+    let escape = |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(escape).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,12 +161,12 @@ mod tests {
         let mut f = Findings::new("m.toml", "a\nb\n");
         f.warning(Span::new(2, 3), "second", "do this");
         f.error(Span::new(0, 1), "first", "do that");
-        f.notice(Span::FILE, "whole");
+        f.notice(Span::FILE, "whole\n");
         assert!(f.has_errors());
         let shown = f.finish().to_string();
         assert_eq!(
             shown,
-            "m.toml: notice: whole\nm.toml:1:1: error: first\n  help: do that\nm.toml:2:1: warning: second\n  help: do this"
+            "m.toml: notice: whole\\n\nm.toml:1:1: error: first\n  help: do that\nm.toml:2:1: warning: second\n  help: do this"
         );
     }
 }

@@ -99,7 +99,7 @@ fn params(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
     let mut entries: Vec<_> = table.entries().collect();
     entries.sort_by_key(|(name, _)| name.span.start);
     for (name, value) in entries {
-        let what = format!("parameter {}", quote(&name.value));
+        let what = format!("parameter {}", quote(name.value));
         let default = numbers::default_value(value, &what, findings);
         raw.params.push(RawParam { name: Spanned::new(name.value.to_string(), name.span), default });
     }
