@@ -58,12 +58,14 @@ pub(super) fn inertias(raw: &RawModel, bodies: &[Body], numbers: &mut Numbers) {
         let entries = body.inertia.map(|v| numbers.at_default(v));
         let Some(moments) = eigenvalues(entries) else { continue };
         let by_default = body.inertia.iter().any(|v| v.constant().is_none());
-        inertia(&body.name, entries, moments, by_default, raw.lenient, at.span, numbers);
+        let mass = numbers.at_default(body.mass);
+        inertia(&body.name, mass, entries, moments, by_default, raw.lenient, at.span, numbers);
     }
 }
 
 fn inertia(
     name: &str,
+    mass: f64,
     entries: [f64; 6],
     moments: [f64; 3],
     by_default: bool,
@@ -77,7 +79,10 @@ fn inertia(
     let suffix = if by_default { ", with the defaults of its parameters" } else { "" };
     // What a parameter may still change is no error.
     let error = if by_default { Severity::Warning } else { Severity::Error };
-    if small < -ROUNDING * scale {
+    // Below what a body of a millimetre has, and far below, the entries are some program's rounding errors.
+    if small < -ROUNDING * scale.max(mass * 1e-6) {
+        // In files of others, what a body of a centimetre has does not keep the robot from moving.
+        let error = if lenient && -small < mass * 1e-4 { Severity::Warning } else { error };
         let (message, help) = if entries[..3].iter().any(|x| *x < 0.0) {
             (
                 format!("inertia of {} has a negative moment{suffix}", quote(name)),

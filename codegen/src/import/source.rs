@@ -58,13 +58,18 @@ impl<'a> SourceMap<'a> {
         SourceMap { text, lines }
     }
 
+    /// Line of an offset, from 1.
+    pub fn line(&self, offset: usize) -> usize {
+        self.lines.partition_point(|&start| start <= offset.min(self.text.len()))
+    }
+
     /// Line and column (in characters), both from 1. Offsets past the end or inside a character are moved back to where there is something.
     pub fn position(&self, offset: usize) -> (usize, usize) {
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
             offset -= 1;
         }
-        let line = self.lines.partition_point(|&start| start <= offset);
+        let line = self.line(offset);
         let start = self.lines[line - 1];
         (line, self.text[start..offset].chars().count() + 1)
     }
@@ -115,7 +120,7 @@ impl<'a> Findings<'a> {
 
     /// Line of the start of a span, from 1.
     pub fn line(&self, span: Span) -> usize {
-        self.map.position(span.start).0
+        self.map.line(span.start)
     }
 
     /// Whether there is an error among them.
