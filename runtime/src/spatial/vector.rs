@@ -43,35 +43,45 @@ pub struct Force<S> {
     pub ang: Vec3<S>,
 }
 
+/// What motions and forces share: components and sums. They stay two types: one never takes the place of the other.
+macro_rules! six_components {
+    ($name:ident) => {
+        impl<S: Scalar> $name<S> {
+            /// All components zero.
+            pub fn zero() -> Self {
+                $name { lin: [S::zero(); 3], ang: [S::zero(); 3] }
+            }
+
+            /// Component `k`: 0–2 linear, 3–5 angular.
+            pub fn get(&self, k: usize) -> S {
+                if k < 3 {
+                    self.lin[k]
+                } else {
+                    self.ang[k - 3]
+                }
+            }
+
+            /// Component `k`, to be changed.
+            pub fn get_mut(&mut self, k: usize) -> &mut S {
+                if k < 3 {
+                    &mut self.lin[k]
+                } else {
+                    &mut self.ang[k - 3]
+                }
+            }
+
+            /// Sum.
+            pub fn plus(&self, o: &Self) -> Self {
+                $name { lin: add3(self.lin, o.lin), ang: add3(self.ang, o.ang) }
+            }
+        }
+    };
+}
+
+six_components!(Motion);
+six_components!(Force);
+
 impl<S: Scalar> Motion<S> {
-    /// No motion.
-    pub fn zero() -> Self {
-        Motion { lin: [S::zero(); 3], ang: [S::zero(); 3] }
-    }
-
-    /// Component `k`: 0–2 linear, 3–5 angular.
-    pub fn get(&self, k: usize) -> S {
-        if k < 3 {
-            self.lin[k]
-        } else {
-            self.ang[k - 3]
-        }
-    }
-
-    /// Component `k`, to be changed.
-    pub fn get_mut(&mut self, k: usize) -> &mut S {
-        if k < 3 {
-            &mut self.lin[k]
-        } else {
-            &mut self.ang[k - 3]
-        }
-    }
-
-    /// Sum.
-    pub fn plus(&self, o: &Self) -> Self {
-        Motion { lin: add3(self.lin, o.lin), ang: add3(self.ang, o.ang) }
-    }
-
     /// `Ω × V`: rate of the components of a motion `V` carried by a frame that moves with `Ω` (D.21).
     pub fn cross_motion(&self, o: &Self) -> Self {
         Motion { lin: add3(cross(self.ang, o.lin), cross(self.lin, o.ang)), ang: cross(self.ang, o.ang) }
@@ -84,34 +94,6 @@ impl<S: Scalar> Motion<S> {
 }
 
 impl<S: Scalar> Force<S> {
-    /// No wrench.
-    pub fn zero() -> Self {
-        Force { lin: [S::zero(); 3], ang: [S::zero(); 3] }
-    }
-
-    /// Component `k`: 0–2 linear, 3–5 angular.
-    pub fn get(&self, k: usize) -> S {
-        if k < 3 {
-            self.lin[k]
-        } else {
-            self.ang[k - 3]
-        }
-    }
-
-    /// Component `k`, to be changed.
-    pub fn get_mut(&mut self, k: usize) -> &mut S {
-        if k < 3 {
-            &mut self.lin[k]
-        } else {
-            &mut self.ang[k - 3]
-        }
-    }
-
-    /// Sum.
-    pub fn plus(&self, o: &Self) -> Self {
-        Force { lin: add3(self.lin, o.lin), ang: add3(self.ang, o.ang) }
-    }
-
     /// Difference.
     pub fn minus(&self, o: &Self) -> Self {
         self.plus(&o.times(-S::one()))
