@@ -1,0 +1,117 @@
+//! Placements, axes and passive elements.
+
+use mbd_codegen::model::{JointKind, Placement, Rotation, Value};
+
+use super::model::Builder;
+
+const QUARTERS: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, std::f64::consts::PI];
+
+/// Sine of the angle between two directions.
+pub fn sine(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let norm = |v: [f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    norm(cross) / (norm(a) * norm(b))
+}
+
+impl Builder<'_> {
+    /// Any vector of about the given size, or one along an axis.
+    pub fn vector(&mut self, size: f64) -> [f64; 3] {
+        if self.rng.chance(self.knobs.skew) {
+            return std::array::from_fn(|_| self.rng.around(size));
+        }
+        let mut v = [0.0; 3];
+        if self.rng.chance(0.85) {
+            v[self.rng.below(3)] = self.rng.around(size);
+        }
+        v
+    }
+
+    /// A direction, not always of unit length.
+    pub fn direction(&mut self) -> [f64; 3] {
+        if !self.rng.chance(self.knobs.skew) {
+            let mut v = [0.0; 3];
+            v[self.rng.below(3)] = self.rng.pick(&[1.0, 1.0, -1.0, 2.0]);
+            return v;
+        }
+        loop {
+            let v: [f64; 3] = std::array::from_fn(|_| self.rng.around(1.0));
+            if v.iter().map(|x| x * x).sum::<f64>() > 0.04 {
+                return v;
+            }
+        }
+    }
+
+    /// An angle of a placement; on aligned ones a multiple of 90°, once in a while written with few digits.
+    fn angle(&mut self, general: bool) -> Value {
+        if general {
+            let x = self.rng.around(3.1);
+            return self.value(x);
+        }
+        match self.rng.below(20) {
+            0..=9 => Value::ZERO,
+            10 => Value::Const(1.570_796_3),
+            11 => self.value(QUARTERS[0]),
+            _ => Value::Const(self.rng.pick(&QUARTERS)),
+        }
+    }
+
+    /// Orientation, in one of the ways to write it.
+    pub fn rotation(&mut self) -> Rotation {
+        let general = self.rng.chance(self.knobs.skew);
+        if self.rng.chance(0.25) {
+            let axis = self.direction();
+            return Rotation::AxisAngle { axis, angle: self.angle(general) };
+        }
+        Rotation::Rpy(std::array::from_fn(|_| self.angle(general)))
+    }
+
+    /// Pose of a frame about `length` m away.
+    pub fn placement(&mut self, length: f64) -> Placement {
+        let xyz = self.vector(length).map(|x| self.value_or_zero(x));
+        Placement { xyz, rotation: if self.rng.chance(0.15) { Rotation::NONE } else { self.rotation() } }
+    }
+
+    /// Kind and axes of a joint.
+    pub fn kind(&mut self) -> JointKind {
+        match self.rng.weighted(&self.knobs.kinds) {
+            0 => JointKind::Pin { axis: self.direction() },
+            1 => JointKind::Slider { axis: self.direction() },
+            2 => JointKind::Cylindrical { axis: self.direction() },
+            3 => {
+                let (axis, pitch) = (self.direction(), self.rng.around(0.3));
+                JointKind::Helical { axis, pitch: self.value(pitch) }
+            }
+            4 => loop {
+                let axes = [self.direction(), self.direction()];
+                if sine(axes[0], axes[1]) > 0.5 {
+                    return JointKind::Universal { axes };
+                }
+            },
+            5 => JointKind::Planar { normal: self.direction() },
+            6 => JointKind::Spherical,
+            7 => JointKind::Floating,
+            _ => JointKind::Fixed,
+        }
+    }
+
+    /// One number per freedom: the same for all, or each its own, some of them zero.
+    pub fn per_freedom(&mut self, n: usize, chance: f64, low: f64, high: f64) -> Vec<Value> {
+        if !self.rng.chance(chance) {
+            return vec![Value::ZERO; n];
+        }
+        if n > 1 && self.rng.chance(0.4) {
+            let x = self.rng.range(low, high);
+            return vec![self.value(x); n];
+        }
+        (0..n)
+            .map(|_| {
+                let x = self.rng.range(low, high);
+                if n > 1 && self.rng.chance(0.3) {
+                    Value::ZERO
+                } else {
+                    self.value(x)
+                }
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,99 @@
+//! What a random mechanism may contain.
+
+use super::rng::Rng;
+
+/// Probabilities and ranges of [`super::random_model`]. The fields are independent of each other.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Knobs {
+    /// Smallest and largest number of bodies.
+    pub bodies: (usize, usize),
+    /// Probability that a body hangs on any earlier one instead of the latest.
+    pub branching: f64,
+    /// Probability of a further root on the ground.
+    pub roots: f64,
+    /// Probability that a placement or axis is general rather than along the axes.
+    pub skew: f64,
+    /// Factor on masses and lengths from parent to child.
+    pub taper: f64,
+    /// Weights of pin, slider, cylindrical, helical, universal, planar, spherical, floating, fixed.
+    pub kinds: [f64; 9],
+    /// Probability that a joint is driven.
+    pub prescribed: f64,
+    /// Probability that a joint of one freedom follows another.
+    pub mimic: f64,
+    /// Probability that a body between others has no inertia, or that of a point.
+    pub massless: f64,
+    /// Probability that an inertia is general: products, own axes.
+    pub products: f64,
+    /// Probability of damping on a joint.
+    pub damping: f64,
+    /// Probability of springs on a joint that can have them.
+    pub springs: f64,
+    /// Probability of armature on a joint.
+    pub armature: f64,
+    /// Probability of an external wrench on a body.
+    pub wrenches: f64,
+    /// Probability of a further named frame, for each body.
+    pub frames: f64,
+    /// Weights of constant, zero and given gravity.
+    pub gravity: [f64; 3],
+    /// Probability that a number is a run-time parameter.
+    pub params: f64,
+}
+
+impl Default for Knobs {
+    /// A plain open tree of pins under gravity: nothing else unless asked for.
+    fn default() -> Self {
+        Knobs {
+            bodies: (1, 6),
+            branching: 0.0,
+            roots: 0.0,
+            skew: 1.0,
+            taper: 0.9,
+            kinds: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            prescribed: 0.0,
+            mimic: 0.0,
+            massless: 0.0,
+            products: 1.0,
+            damping: 0.0,
+            springs: 0.0,
+            armature: 0.0,
+            wrenches: 0.0,
+            frames: 0.0,
+            gravity: [1.0, 0.0, 0.0],
+            params: 0.0,
+        }
+    }
+}
+
+impl Knobs {
+    /// Everything there is, on up to `bodies` bodies; the mix itself is random.
+    pub fn everything(seed: u64, bodies: usize) -> Knobs {
+        let mut rng = Rng::new(seed, 1);
+        let all = [4.0, 2.0, 1.5, 1.5, 1.5, 1.5, 1.5, 1.0, 1.5];
+        // One in three mechanisms has a few kinds of joints only.
+        let few = rng.chance(0.33);
+        let kinds = all.map(|w| if few && rng.chance(0.6) { 0.0 } else { w });
+        let kinds = if kinds[..8].iter().all(|w| *w == 0.0) { all } else { kinds };
+        let mut some = |p: f64| if rng.chance(0.5) { 0.0 } else { p };
+        Knobs {
+            bodies: (1, bodies),
+            branching: some(0.5),
+            roots: some(0.3),
+            prescribed: some(0.3),
+            mimic: some(0.6),
+            massless: some(0.5),
+            damping: some(0.5),
+            springs: some(0.5),
+            armature: some(0.4),
+            wrenches: some(0.4),
+            frames: some(0.4),
+            params: some(0.25),
+            products: rng.unit(),
+            skew: rng.pick(&[0.0, 0.2, 0.5, 0.8, 1.0]),
+            taper: rng.range(0.6, 1.1),
+            kinds,
+            gravity: [2.0, 1.0, 1.0],
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Random mechanisms and states.
+
+mod bodies;
+mod joints;
+mod knobs;
+mod model;
+mod rng;
+
+pub use knobs::Knobs;
+pub use model::random_model;
+pub use rng::Rng;

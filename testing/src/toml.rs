@@ -1,0 +1,203 @@
+//! Models written in the TOML format: to show a failing case, and to hold the reader against.
+
+use std::fmt::Write;
+
+use mbd_codegen::model::{Gravity, Joint, JointKind, Model, Motion, Placement, Rotation, Value, WrenchAxes};
+
+/// Order in which joints are written; the reader puts them depth first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// As in the model.
+    DepthFirst,
+    /// Generation after generation.
+    BreadthFirst,
+}
+
+/// The model as TOML, with joints and bodies in the model's order.
+pub fn to_toml(model: &Model) -> String {
+    to_toml_in(model, Order::DepthFirst)
+}
+
+/// The model as TOML.
+pub fn to_toml_in(model: &Model, order: Order) -> String {
+    let mut out = String::new();
+    line(&mut out, "name", quoted(&model.name));
+    let w = Writer { model };
+    line(
+        &mut out,
+        "gravity",
+        match model.gravity {
+            Gravity::Input => "\"input\"".to_string(),
+            Gravity::Constant(g) => w.list(&g, false),
+        },
+    );
+    if !model.params.is_empty() {
+        out.push_str("\n[params]\n");
+    }
+    for p in &model.params {
+        line(&mut out, &quoted(&p.name), format!("{:?}", p.default));
+    }
+    for body in &model.bodies {
+        out.push_str("\n[[body]]\n");
+        line(&mut out, "name", quoted(&body.name));
+        w.unless_zero(&mut out, "mass", body.mass);
+        w.vector(&mut out, "com", &body.com, false);
+        let [xx, yy, zz, xy, xz, yz] = body.inertia.map(|v| w.number(v, false));
+        if body.inertia[3..].iter().any(|v| *v != Value::ZERO) {
+            let all = format!("{{ xx = {xx}, yy = {yy}, zz = {zz}, xy = {xy}, xz = {xz}, yz = {yz} }}");
+            line(&mut out, "inertia", all);
+        } else {
+            line(&mut out, "inertia", format!("[{xx}, {yy}, {zz}]"));
+        }
+        if let Rotation::Rpy(rpy) = body.inertia_axes {
+            w.vector(&mut out, "inertia_rpy", &rpy, true);
+        }
+    }
+    for j in w.order(order) {
+        w.joint(&mut out, &model.joints[j]);
+    }
+    for frame in &model.frames {
+        out.push_str("\n[[frame]]\n");
+        line(&mut out, "name", quoted(&frame.name));
+        line(&mut out, "body", quoted(frame.body.map_or("ground", |b| &model.bodies[b].name)));
+        w.placement(&mut out, &frame.placement);
+    }
+    for wrench in &model.wrenches {
+        out.push_str("\n[[wrench]]\n");
+        line(&mut out, "name", quoted(&wrench.name));
+        line(&mut out, "body", quoted(&model.bodies[wrench.body].name));
+        if wrench.axes == WrenchAxes::World {
+            line(&mut out, "frame", quoted("world"));
+        }
+    }
+    out
+}
+
+fn line(out: &mut String, key: &str, value: String) {
+    let _ = writeln!(out, "{key} = {value}");
+}
+
+/// As a basic string; names have nothing in them that needs an escape.
+fn quoted(text: &str) -> String {
+    format!("\"{text}\"")
+}
+
+struct Writer<'m> {
+    model: &'m Model,
+}
+
+impl Writer<'_> {
+    /// Degrees where they give the same number again.
+    fn number(&self, v: Value, angle: bool) -> String {
+        match v {
+            Value::Param(k) => format!("{{ param = {} }}", quoted(&self.model.params[k].name)),
+            Value::Const(x) => {
+                let degrees = x.to_degrees().round();
+                match angle && degrees != 0.0 && degrees.to_radians() == x {
+                    true => format!("{{ deg = {degrees} }}"),
+                    false => format!("{x:?}"),
+                }
+            }
+        }
+    }
+
+    fn list(&self, values: &[Value], angle: bool) -> String {
+        format!("[{}]", values.iter().map(|v| self.number(*v, angle)).collect::<Vec<_>>().join(", "))
+    }
+
+    fn unless_zero(&self, out: &mut String, key: &str, v: Value) {
+        if v != Value::ZERO {
+            line(out, key, self.number(v, false));
+        }
+    }
+
+    fn vector(&self, out: &mut String, key: &str, values: &[Value], angle: bool) {
+        if values.iter().any(|v| *v != Value::ZERO) {
+            line(out, key, self.list(values, angle));
+        }
+    }
+
+    fn placement(&self, out: &mut String, p: &Placement) {
+        self.vector(out, "xyz", &p.xyz, false);
+        match &p.rotation {
+            Rotation::Rpy(rpy) => self.vector(out, "rpy", rpy, true),
+            Rotation::AxisAngle { axis, angle } => {
+                let angle = self.number(*angle, true);
+                line(out, "rotate", format!("{{ axis = {axis:?}, angle = {angle} }}"));
+            }
+        }
+    }
+
+    /// One number where all are the same, a list otherwise.
+    fn freedoms(&self, out: &mut String, key: &str, values: &[Value], angle: bool) {
+        let Some(first) = values.first() else { return };
+        if values.iter().all(|v| v == first) {
+            if *first != Value::ZERO {
+                line(out, key, self.number(*first, angle));
+            }
+        } else {
+            line(out, key, self.list(values, false));
+        }
+    }
+
+    fn joint(&self, out: &mut String, joint: &Joint) {
+        out.push_str("\n[[joint]]\n");
+        line(out, "name", quoted(&joint.name));
+        let (kind, axis, axis2) = match joint.kind {
+            JointKind::Pin { axis } => ("pin", Some(axis), None),
+            JointKind::Slider { axis } => ("slider", Some(axis), None),
+            JointKind::Cylindrical { axis } => ("cylindrical", Some(axis), None),
+            JointKind::Helical { axis, .. } => ("helical", Some(axis), None),
+            JointKind::Universal { axes } => ("universal", Some(axes[0]), Some(axes[1])),
+            JointKind::Planar { normal } => ("planar", Some(normal), None),
+            JointKind::Spherical => ("spherical", None, None),
+            JointKind::Floating => ("floating", None, None),
+            JointKind::Fixed => ("fixed", None, None),
+        };
+        line(out, "type", quoted(kind));
+        if let Some(parent) = joint.parent {
+            line(out, "parent", quoted(&self.model.bodies[parent].name));
+        }
+        line(out, "child", quoted(&self.model.bodies[joint.child].name));
+        self.placement(out, &joint.placement);
+        let default = if axis2.is_some() { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
+        if let Some(axis) = axis.filter(|a| *a != default) {
+            line(out, "axis", format!("{axis:?}"));
+        }
+        if let Some(axis2) = axis2.filter(|a| *a != [0.0, 1.0, 0.0]) {
+            line(out, "axis2", format!("{axis2:?}"));
+        }
+        if let JointKind::Helical { pitch, .. } = joint.kind {
+            line(out, "pitch", self.number(pitch, false));
+        }
+        self.freedoms(out, "damping", &joint.damping, false);
+        self.freedoms(out, "stiffness", &joint.stiffness, false);
+        let turns = matches!(joint.kind, JointKind::Pin { .. } | JointKind::Helical { .. });
+        self.freedoms(out, "rest", &joint.rest, turns);
+        self.freedoms(out, "armature", &joint.armature, false);
+        match joint.motion {
+            Motion::Free => {}
+            Motion::Prescribed => line(out, "motion", quoted("prescribed")),
+            Motion::Mimic { leader, ratio, offset } => {
+                let leader = quoted(&self.model.joints[leader].name);
+                let (ratio, offset) = (self.number(ratio, false), self.number(offset, turns));
+                line(out, "mimic", format!("{{ joint = {leader}, ratio = {ratio}, offset = {offset} }}"));
+            }
+        }
+    }
+
+    fn order(&self, order: Order) -> Vec<usize> {
+        let joints = &self.model.joints;
+        if order == Order::DepthFirst {
+            return (0..joints.len()).collect();
+        }
+        let mut list: Vec<usize> = (0..joints.len()).filter(|&j| joints[j].parent.is_none()).collect();
+        let mut at = 0;
+        while at < list.len() {
+            let body = joints[list[at]].child;
+            list.extend((0..joints.len()).filter(|&j| joints[j].parent == Some(body)));
+            at += 1;
+        }
+        list
+    }
+}
