@@ -1,0 +1,142 @@
+//! Generated code equals the interpreter bit for bit on a thousand random trees.
+//!
+//! What is compared is the emitted source text itself, run by a small evaluator (`common`); `compiled.rs` holds compiled
+//! code against the interpreter on fewer trees. Zeros may differ in sign, nothing else may differ, NaN is never right.
+
+mod common;
+
+use std::collections::HashMap;
+
+use common::{Array, Emitted};
+use mbd_codegen::generate::{generate, Group, Options};
+use mbd_codegen::plan::Plan;
+use mbd_runtime::sweep::FrameState;
+use mbd_runtime::System;
+use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+
+struct Case {
+    seed: u64,
+    plan: Plan,
+    efforts: bool,
+    emitted: Emitted,
+}
+
+impl Case {
+    fn new(seed: u64) -> Case {
+        // Most trees are small, some have up to twelve bodies.
+        let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
+        let model = random_model(seed, &Knobs::everything(seed, size));
+        let mut rng = Rng::new(seed, 4);
+        let options = Options {
+            outputs: Group::ALL.to_vec(),
+            efforts: rng.chance(0.8),
+            chunk: rng.pick(&[7, 40, 200, 1000]),
+            ..Options::default()
+        };
+        let plan = Plan::new(&model, options.plan);
+        let source = generate(&model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
+        Case { seed, plan, efforts: options.efforts, emitted: Emitted::parse(&source) }
+    }
+
+    fn inputs(&self, s: &State, p: &[f64]) -> HashMap<String, Array> {
+        let wrenches = Array { dims: vec![s.wrenches.len(), 6], data: s.wrenches.concat() };
+        let fields = [
+            ("q", Array::flat(&s.q)),
+            ("p", Array::flat(p)),
+            ("v", Array::flat(&s.v)),
+            ("self.tau", Array::flat(&s.tau)),
+            ("self.drive_q", Array::flat(&s.drive[0])),
+            ("self.drive_v", Array::flat(&s.drive[1])),
+            ("self.drive_a", Array::flat(&s.drive[2])),
+            ("self.wrenches", wrenches),
+            ("self.params", Array::flat(&s.params)),
+            ("self.gravity", Array::flat(&s.gravity)),
+        ];
+        fields.into_iter().map(|(name, a)| (name.to_string(), a)).collect()
+    }
+
+    fn compare(&self, what: &str, emitted: &Array, interpreted: &[f64]) {
+        assert_eq!(emitted.data.len(), interpreted.len(), "seed {}: {what}", self.seed);
+        for (k, (a, b)) in emitted.data.iter().zip(interpreted).enumerate() {
+            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
+            let text = || to_toml(&self.plan.model);
+            assert!(a.is_finite() && b.is_finite(), "seed {}: {what}[{k}] is {a} and {b}\n{}", self.seed, text());
+            assert!(same, "seed {}: {what}[{k}]: emitted {a:e}, interpreted {b:e}\n{}", self.seed, text());
+        }
+    }
+
+    fn check(&self, state: u64) {
+        let mut s = random_state(&self.plan, 10 * self.seed + state);
+        if !self.efforts {
+            s.tau.fill(0.0);
+        }
+        let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
+        let mut i = s.interpreter(&self.plan);
+        let mut p = vec![0.0; nv];
+        i.momenta(&s.q, &s.v, &mut p);
+        let inputs = self.inputs(&s, &p);
+        let run = |group: Group| self.emitted.run(group.name(), &inputs);
+        self.compare("momenta", &run(Group::Momenta)["p"], &p);
+        let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+        let rates = run(Group::Rates);
+        self.compare("qd", &rates["qd"], &qd);
+        self.compare("pd", &rates["pd"], &pd);
+        let map = self.emitted.run("coordinate_rates", &inputs);
+        i.coordinate_rates(&s.q, &s.v, &mut qd);
+        self.compare("coordinate rates", &map["qd"], &qd);
+        i.velocities(&s.q, &p, &mut v);
+        self.compare("velocities", &run(Group::Velocities)["v"], &v);
+        let (kinetic, potential) = i.energy(&s.q, &p);
+        self.compare("energy", &run(Group::Energy)["return"], &[kinetic, potential]);
+        let mut a = vec![0.0; nv];
+        i.accelerations(&s.q, &s.v, &mut a);
+        self.compare("accelerations", &run(Group::Accelerations)["a"], &a);
+        let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];
+        i.reactions(&s.q, &s.v, &mut a, &mut wrenches);
+        self.compare("reactions", &run(Group::Reactions)["reactions"], &wrenches.concat());
+        let mut m = vec![0.0; nv * nv];
+        i.mass_matrix(&s.q, &mut m);
+        self.compare("mass matrix", &run(Group::MassMatrix)["m"], &m);
+        let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
+        i.frames(&s.q, &s.v, &mut frames);
+        let all = |f: &dyn Fn(&FrameState<f64>) -> Vec<f64>| frames.iter().flat_map(f).collect::<Vec<f64>>();
+        let emitted = run(Group::Frames);
+        self.compare("rotations", &emitted["rotation"], &all(&|f| f.rotation.concat()));
+        self.compare("positions", &emitted["position"], &all(&|f| f.position.to_vec()));
+        self.compare("frame velocities", &emitted["velocity"], &all(&|f| [f.velocity.lin, f.velocity.ang].concat()));
+    }
+}
+
+/// Every tree is checked in two states; there is no way past `check`.
+fn batch(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
+        let case = Case::new(seed);
+        case.check(0);
+        case.check(1);
+    }
+}
+
+// Four tests, so that all cores have something to do.
+
+#[test]
+fn trees_0_to_249() {
+    batch(0..250);
+}
+
+#[test]
+fn trees_250_to_499() {
+    batch(250..500);
+}
+
+#[test]
+fn trees_500_to_749() {
+    batch(500..750);
+}
+
+#[test]
+fn trees_750_to_999() {
+    batch(750..1000);
+}
