@@ -7,6 +7,7 @@
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
+mod dual;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;
@@ -24,6 +25,7 @@ pub mod trig;
 #[cfg(feature = "alloc")]
 pub mod workspace;
 
+pub use dual::Dual;
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
