@@ -151,7 +151,8 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.momentum_rates(u, w, pd);
     }
 
-    /// Kinetic and potential energy, J. The potential is zero with every mass at the height of the ground's origin.
+    /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's origin;
+    /// what is welded to the ground does not count.
     pub fn energy(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) -> (S, S) {
         self.velocities(q, p, u, w, v);
         let kinetic = self.kinetic(p, w);

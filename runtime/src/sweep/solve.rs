@@ -72,9 +72,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
                 d = d.plus(&through);
             }
-            if let Some(parent) = node.parent {
-                let carried = self.force_out(poses, i, &d);
-                sol.d[parent] = sol.d[parent].plus(&carried);
+            match node.parent {
+                Some(parent) => {
+                    let carried = self.force_out(poses, i, &d);
+                    sol.d[parent] = sol.d[parent].plus(&carried);
+                }
+                // Coordinates solved at the ground feel its motion through the columns that end here.
+                None if !node.open.is_empty() => {
+                    let outer = self.motion_in(poses, i, &load.ground);
+                    let n = self.tree.nodes.len();
+                    for &h in &node.open {
+                        sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&outer);
+                    }
+                }
+                None => {}
             }
         }
         let ground = &self.tree.solve_at_ground;
