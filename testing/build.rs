@@ -1,1 +1,3 @@
+//! Generates code for random trees; `tests/compiled.rs` compiles it.
+
 fn main() {}

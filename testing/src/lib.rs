@@ -1,10 +1,11 @@
 //! Random mechanisms for the tests of the project: generator, states, and a writer of the TOML format.
 
+pub mod newton;
 pub mod random;
 pub mod state;
 pub mod toml;
 
-use mbd_codegen::model::Value;
+use mbd_codegen::model::{Gravity, JointKind, Model, Motion, Placement, Rotation, Value};
 
 /// A number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {
@@ -12,4 +13,44 @@ pub fn value(v: Value, params: &[f64]) -> f64 {
         Value::Const(x) => x,
         Value::Param(k) => params[k],
     }
+}
+
+/// The model with constants for its parameters.
+pub fn substituted(model: &Model, params: &[f64]) -> Model {
+    let of = |v: &mut Value| *v = Value::Const(value(*v, params));
+    let rotation = |r: &mut Rotation| match r {
+        Rotation::Rpy(rpy) => rpy.iter_mut().for_each(of),
+        Rotation::AxisAngle { angle, .. } => of(angle),
+    };
+    let placement = |p: &mut Placement| {
+        p.xyz.iter_mut().for_each(of);
+        rotation(&mut p.rotation);
+    };
+    let mut model = model.clone();
+    model.params.clear();
+    if let Gravity::Constant(g) = &mut model.gravity {
+        g.iter_mut().for_each(of);
+    }
+    for body in &mut model.bodies {
+        of(&mut body.mass);
+        body.com.iter_mut().chain(&mut body.inertia).for_each(of);
+        rotation(&mut body.inertia_axes);
+    }
+    for joint in &mut model.joints {
+        placement(&mut joint.placement);
+        for list in [&mut joint.damping, &mut joint.stiffness, &mut joint.rest, &mut joint.armature] {
+            list.iter_mut().for_each(of);
+        }
+        if let JointKind::Helical { pitch, .. } = &mut joint.kind {
+            of(pitch);
+        }
+        if let Motion::Mimic { ratio, offset, .. } = &mut joint.motion {
+            of(ratio);
+            of(offset);
+        }
+    }
+    for frame in &mut model.frames {
+        placement(&mut frame.placement);
+    }
+    model
 }

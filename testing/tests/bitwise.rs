@@ -74,6 +74,7 @@ impl Case {
         }
         let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
         let mut i = s.interpreter(&self.plan);
+        i.check_rank(&s.q).unwrap_or_else(|e| panic!("seed {}: {e}\n{}", self.seed, to_toml(&self.plan.model)));
         let mut p = vec![0.0; nv];
         i.momenta(&s.q, &s.v, &mut p);
         let inputs = self.inputs(&s, &p);

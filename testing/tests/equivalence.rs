@@ -1,0 +1,272 @@
+//! The same mechanism described in two ways moves in one way.
+
+use mbd_codegen::import::toml::read;
+use mbd_codegen::model::{Model, Motion, Rotation, Value};
+use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_runtime::sweep::{FrameState, Sweeps};
+use mbd_runtime::tree::Source;
+use mbd_runtime::workspace::Workspace;
+use mbd_runtime::Interpreter;
+use mbd_testing::newton::joint_rates;
+use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+use mbd_testing::{substituted, value};
+
+const TREES: u64 = 300;
+
+/// Everything the interpreter gives, by name.
+type Results = Vec<(&'static str, Vec<f64>)>;
+
+fn results(plan: &Plan, s: &State) -> Results {
+    let mut i = s.interpreter(plan);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+    i.momenta(&s.q, &s.v, &mut p);
+    i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+    let (kinetic, potential) = i.energy(&s.q, &p);
+    let mut a = vec![0.0; nv];
+    let mut reactions = vec![[0.0; 6]; plan.joint_nodes.len()];
+    i.reactions(&s.q, &s.v, &mut a, &mut reactions);
+    i.accelerations(&s.q, &s.v, &mut a);
+    let mut m = vec![0.0; nv * nv];
+    i.mass_matrix(&s.q, &mut m);
+    let mut frames = vec![FrameState::ground(); plan.frames.len()];
+    i.frames(&s.q, &s.v, &mut frames);
+    let frames = frames.iter().flat_map(|f| {
+        [f.rotation.concat(), f.position.to_vec(), f.velocity.lin.to_vec(), f.velocity.ang.to_vec()].concat()
+    });
+    let frames = frames.collect();
+    vec![
+        ("p", p),
+        ("v", v),
+        ("qd", qd),
+        ("pd", pd),
+        ("T", vec![kinetic]),
+        ("V", vec![potential]),
+        ("a", a),
+        ("reactions", reactions.concat()),
+        ("M", m),
+        ("frames", frames),
+    ]
+}
+
+/// Largest difference relative to the largest entry (at least 1).
+fn difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let size = a.iter().chain(b).fold(1.0_f64, |m, x| m.max(x.abs()));
+    let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs() / size);
+    worst.fold(0.0, |m, x| if x.is_finite() { m.max(x) } else { f64::INFINITY })
+}
+
+fn compare(seed: u64, model: &Model, a: &Results, b: &Results, tolerance: f64) -> f64 {
+    let mut worst = 0.0_f64;
+    for ((what, a), (_, b)) in a.iter().zip(b) {
+        let d = difference(a, b);
+        assert!(d <= tolerance, "seed {seed}: {what} differs by {d:.1e}\n{a:?}\n{b:?}\n{}", to_toml(model));
+        worst = worst.max(d);
+    }
+    worst
+}
+
+/// Parameters at some values, or the values themselves: the frames are chosen differently, the motion is the same.
+#[test]
+fn parameters_are_as_good_as_constants() {
+    let mut worst = 0.0_f64;
+    for seed in 0..TREES {
+        let model = random_model(seed, &Knobs { params: 0.4, ..Knobs::everything(seed, 8) });
+        let plan = Plan::new(&model, PlanOptions { snap: 0.0 });
+        let s = random_state(&plan, seed);
+        let plain = Plan::new(&substituted(&model, &s.params), PlanOptions { snap: 0.0 });
+        let mut s2 = s.clone();
+        s2.params.clear();
+        worst = worst.max(compare(seed, &model, &results(&plan, &s), &results(&plain, &s2), 1e-11));
+    }
+    println!("parameters against constants: {worst:.1e}");
+}
+
+/// Parts of base parameters moved to the parent: nothing that moves may notice.
+#[test]
+fn regrouped_trees_move_as_described_ones() {
+    let mut worst = 0.0_f64;
+    for seed in 0..TREES {
+        let model = random_model(seed, &Knobs::everything(seed, 8));
+        let plan = Plan::new(&model, PlanOptions::default());
+        let s = random_state(&plan, seed);
+        let regrouped = results(&plan, &s);
+        let tree = plan.tree(&s.params);
+        let sweeps = Sweeps { tree: &tree, trace: &() };
+        let mut w = Workspace::new(&tree);
+        let i = s.interpreter(&plan);
+        let u = i.inputs.view();
+        let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+        let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        let (mut a, mut m) = (vec![0.0; nv], vec![0.0; nv * nv]);
+        sweeps.momenta(&s.q, &s.v, &u, &mut w, &mut p);
+        sweeps.rates(&s.q, &p, &u, &mut w, &mut v, &mut qd, &mut pd);
+        let (kinetic, potential) = sweeps.energy(&s.q, &p, &u, &mut w, &mut v);
+        sweeps.accelerations(&s.q, &s.v, &u, &mut w, &mut a);
+        sweeps.mass_matrix(&s.q, &u, &mut w, &mut m);
+        for (what, described) in [
+            ("p", p),
+            ("v", v),
+            ("qd", qd),
+            ("pd", pd),
+            ("T", vec![kinetic]),
+            ("V", vec![potential]),
+            ("a", a),
+            ("M", m),
+        ] {
+            let (_, ours) = regrouped.iter().find(|(name, _)| *name == what).expect("it is there");
+            let d = difference(ours, &described);
+            assert!(d <= 1e-11, "seed {seed}: {what} differs by {d:.1e}\n{}", to_toml(&model));
+            worst = worst.max(d);
+        }
+    }
+    println!("regrouped against described: {worst:.1e}");
+}
+
+/// With `x_free = G x + offset`: `M = Gᵀ M_free G`, `p = Gᵀ p_free`, `ṗ = Gᵀ ṗ_free`, and what keeps the followers in step
+/// does no work: `Gᵀ M_free (a − a_free) = 0`.
+#[test]
+fn mimics_are_projections_of_free_joints() {
+    let (mut worst, mut seen) = (0.0_f64, 0);
+    for seed in 0..2 * TREES {
+        let model = random_model(seed, &Knobs { mimic: 0.7, ..Knobs::everything(seed, 8) });
+        let plan = Plan::new(&model, PlanOptions::default());
+        seen += usize::from(!plan.shared.is_empty());
+        let s = random_state(&plan, seed);
+        let mut released = model.clone();
+        for joint in &mut released.joints {
+            if let Motion::Mimic { .. } = joint.motion {
+                joint.motion = Motion::Free;
+            }
+        }
+        let free = Plan::new(&released, PlanOptions::default());
+        let n = free.dims.nv;
+        let at = |v: &[f64], drive: &[f64]| on_free(&free, &joint_rates(&plan, &s.params, v, drive));
+        let mut s_free = s.clone();
+        s_free.v = at(&s.v, &s.drive[1]);
+        s_free.q = coordinates_on_free(&plan, &free, &s);
+        // The force goes to the leader; the drives are what they were.
+        s_free.tau = leaders_only(&plan, &free, &s.tau);
+        let (ours, theirs) = (results(&plan, &s), results(&free, &s_free));
+        let of = |r: &Results, name: &str| r.iter().find(|(n, _)| *n == name).expect("it is there").1.clone();
+        let none = vec![0.0; plan.dims.drive_v];
+        let nv = plan.dims.nv;
+        let g: Vec<Vec<f64>> =
+            (0..nv).map(|k| at(&(0..nv).map(|j| f64::from(u8::from(j == k))).collect::<Vec<_>>(), &none)).collect();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let m_free = of(&theirs, "M");
+        let mg: Vec<Vec<f64>> =
+            g.iter().map(|g| (0..n).map(|r| dot(&m_free[r * n..(r + 1) * n], g)).collect()).collect();
+        let m: Vec<f64> = g.iter().flat_map(|a| mg.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
+        let project = |x: &[f64]| g.iter().map(|g| dot(g, x)).collect::<Vec<f64>>();
+        // Accelerations: both sides as forces.
+        let a = at(&of(&ours, "a"), &s.drive[2]);
+        let left: Vec<f64> = mg.iter().map(|mg| dot(mg, &a)).collect();
+        let right: Vec<f64> = mg.iter().map(|mg| dot(mg, &of(&theirs, "a"))).collect();
+        for (what, ours, theirs) in [
+            ("M", of(&ours, "M"), m),
+            ("p", of(&ours, "p"), project(&of(&theirs, "p"))),
+            ("pd", of(&ours, "pd"), project(&of(&theirs, "pd"))),
+            ("T", of(&ours, "T"), of(&theirs, "T")),
+            ("V", of(&ours, "V"), of(&theirs, "V")),
+            ("G M a", left, right),
+        ] {
+            let d = difference(&ours, &theirs);
+            assert!(d <= 1e-11, "seed {seed}: {what} differs by {d:.1e}\n{ours:?}\n{theirs:?}\n{}", to_toml(&model));
+            worst = worst.max(d);
+        }
+    }
+    println!("mimics against projections: {worst:.1e} on {seen} trees with shared coordinates");
+    assert!(seen > 100, "only {seen} trees have a mimic to test");
+}
+
+/// Values of every joint, in the order of the free model's state.
+fn on_free(free: &Plan, joints: &[Vec<f64>]) -> Vec<f64> {
+    let mut out = vec![0.0; free.dims.nv];
+    for slot in &free.slots {
+        if let Some(Source::State { v, .. }) = slot.at {
+            out[v..v + joints[slot.joint].len()].copy_from_slice(&joints[slot.joint]);
+        }
+    }
+    out
+}
+
+fn coordinates_on_free(plan: &Plan, free: &Plan, s: &State) -> Vec<f64> {
+    let joints = mbd_testing::newton::joint_coordinates(plan, &s.params, &s.q, &s.drive[0]);
+    let mut out = vec![0.0; free.dims.nq];
+    for slot in &free.slots {
+        if let Some(Source::State { q, .. }) = slot.at {
+            out[q..q + joints[slot.joint].len()].copy_from_slice(&joints[slot.joint]);
+        }
+    }
+    out
+}
+
+fn leaders_only(plan: &Plan, free: &Plan, tau: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; free.dims.nv];
+    for slot in &plan.slots {
+        let Some(Source::State { v: from, .. }) = slot.at else { continue };
+        let there = free.slots.iter().find(|s| s.joint == slot.joint).and_then(|s| s.at);
+        let Some(Source::State { v: to, .. }) = there else { panic!("a free joint stays free") };
+        let n = plan.model.joints[slot.joint].kind.nv();
+        out[to..to + n].copy_from_slice(&tau[from..from + n]);
+    }
+    out
+}
+
+/// Angles a little off right angles, taken as exact: the motion changes by no more than that.
+#[test]
+fn snapping_changes_no_more_than_the_angles() {
+    const OFF: f64 = 1e-8;
+    let (mut worst, mut noticed) = (0.0_f64, 0);
+    for seed in 0..TREES {
+        let knobs = Knobs { skew: 0.0, params: 0.0, ..Knobs::everything(seed, 6) };
+        let mut model = random_model(seed, &knobs);
+        let mut rng = Rng::new(seed, 7);
+        for joint in &mut model.joints {
+            let angles: &mut [Value] = match &mut joint.placement.rotation {
+                Rotation::Rpy(rpy) => rpy,
+                Rotation::AxisAngle { angle, .. } => std::slice::from_mut(angle),
+            };
+            for angle in angles {
+                *angle = Value::Const(value(*angle, &[]) + rng.around(OFF));
+            }
+        }
+        let snapped = Plan::new(&model, PlanOptions::default());
+        let exact = Plan::new(&model, PlanOptions { snap: 0.0 });
+        noticed += usize::from(!snapped.notices.is_empty());
+        assert!(exact.notices.is_empty(), "seed {seed}: {:?}", exact.notices);
+        let s = random_state(&exact, seed);
+        // 1.5707963 is 2.7e-8 off by itself. Three angles in each of six joints, and the condition of M behind velocities and
+        // accelerations: a few thousand times the angle.
+        worst = worst.max(compare(seed, &model, &results(&exact, &s), &results(&snapped, &s), 5e3 * OFF));
+    }
+    println!("snapped against exact: {worst:.1e} for angles {OFF:.0e} off, {noticed} models with a notice");
+    assert!(noticed > 200);
+}
+
+/// Two equal pendulums on the ground that move together swing as each of them would alone (a coordinate that is solved at
+/// the ground must feel that the ground accelerates against gravity).
+#[test]
+fn coupled_pendulums_on_the_ground_feel_gravity() {
+    let body =
+        |k: usize| format!("[[body]]\nname = \"b{k}\"\nmass = 2\ncom = [0.3, 0, 0]\ninertia = [0.1, 0.2, 0.3]\n");
+    let joint = |k: usize| format!("[[joint]]\nname = \"j{k}\"\ntype = \"pin\"\nchild = \"b{k}\"\naxis = [0, 1, 0]\n");
+    let alone = body(0) + &joint(0);
+    let coupled = alone.clone() + &body(1) + &joint(1) + "xyz = [1, 2, 3]\nmimic = { joint = \"j0\" }\n";
+    let acceleration = |text: &str| {
+        let (model, findings) = read("pendulum.toml", text);
+        let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+        let mut i: Interpreter<f64> = plan.interpreter(&[]);
+        let mut a = [0.0];
+        i.accelerations(&[0.4], &[0.7], &mut a);
+        a[0]
+    };
+    let expected = 2.0 * 9.81 * 0.3 * 0.4_f64.cos() / (0.2 + 2.0 * 0.3 * 0.3);
+    for text in [&alone, &coupled] {
+        assert!((acceleration(text) - expected).abs() < 1e-13 * expected, "{} {expected}", acceleration(text));
+    }
+}

@@ -1,0 +1,406 @@
+//! Identities of mechanics on random trees of everything: exact relations, no finite differences.
+//!
+//! Time derivatives are taken by dual numbers: the sweep for momenta, run with `q + ε q̇` and `v + ε v̇`, gives `p + ε ṗ`,
+//! which owes nothing to the sweep for `ṗ`.
+
+use mbd_codegen::model::JointKind;
+use mbd_codegen::plan::Plan;
+use mbd_runtime::spatial::{cross, Motion};
+use mbd_runtime::sweep::{FrameState, Sweeps};
+use mbd_runtime::tree::{Kind, Source};
+use mbd_runtime::workspace::Workspace;
+use mbd_runtime::{Dual, Interpreter, System};
+use mbd_testing::newton;
+use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::value;
+
+type D = Dual<f64>;
+
+const TREES: u64 = 1000;
+
+/// Relative to the largest entry involved. Rounding of one sweep is about 1e-15; the factor is the condition of the mass
+/// matrices of such trees (light tips on heavy bases, rotors of 0.01 beside bodies of 2 kg).
+const TOLERANCE: f64 = 1e-11;
+
+struct Case {
+    seed: u64,
+    plan: Plan,
+    s: State,
+    i: Interpreter<f64>,
+    qd: Vec<f64>,
+    p: Vec<f64>,
+    pd: Vec<f64>,
+    a: Vec<f64>,
+}
+
+impl Case {
+    fn new(seed: u64) -> Case {
+        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let s = random_state(&plan, seed);
+        Case::of(seed, plan, s)
+    }
+
+    fn of(seed: u64, plan: Plan, s: State) -> Case {
+        let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+        let mut i = s.interpreter(&plan);
+        let (mut qd, mut p, mut pd, mut a, mut v) =
+            (vec![0.0; nq], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]);
+        i.momenta(&s.q, &s.v, &mut p);
+        i.accelerations(&s.q, &s.v, &mut a);
+        i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+        i.coordinate_rates(&s.q, &s.v, &mut qd);
+        Case { seed, plan, s, i, qd, p, pd, a }
+    }
+
+    fn dual(&self) -> (Interpreter<D>, Vec<D>) {
+        let q = self.s.q.iter().zip(&self.qd).map(|(x, dx)| Dual::new(*x, *dx));
+        (self.s.interpreter_of(&self.plan, Dual::new), q.collect())
+    }
+
+    fn dual_v(&self) -> Vec<D> {
+        self.s.v.iter().zip(&self.a).map(|(x, dx)| Dual::new(*x, *dx)).collect()
+    }
+
+    fn dual_p(&self) -> Vec<D> {
+        self.p.iter().zip(&self.pd).map(|(x, dx)| Dual::new(*x, *dx)).collect()
+    }
+
+    /// Frames of the bodies, moving.
+    fn bodies(&self) -> Vec<FrameState<D>> {
+        let (mut i, q) = self.dual();
+        let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
+        i.frames(&q, &self.dual_v(), &mut frames);
+        newton::body_frames(&self.plan).into_iter().map(|k| frames[k]).collect()
+    }
+
+    /// The same for given velocities of state and drives, without derivatives.
+    fn bodies_at(&mut self, v: &[f64], drive: &[f64]) -> Vec<FrameState<f64>> {
+        self.i.inputs.drive_v.copy_from_slice(drive);
+        let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
+        self.i.frames(&self.s.q, v, &mut frames);
+        self.i.inputs.drive_v.copy_from_slice(&self.s.drive[1]);
+        newton::body_frames(&self.plan).into_iter().map(|k| frames[k]).collect()
+    }
+
+    fn near(&self, what: &str, a: &[f64], b: &[f64], scale: f64) -> f64 {
+        self.near_within(what, a, b, scale, TOLERANCE)
+    }
+
+    fn near_within(&self, what: &str, a: &[f64], b: &[f64], scale: f64, tolerance: f64) -> f64 {
+        assert_eq!(a.len(), b.len());
+        let size = a.iter().chain(b).fold(scale.max(1e-6), |m, x| m.max(x.abs()));
+        let worst = a.iter().zip(b).fold(0.0_f64, |m, (a, b)| if m.is_nan() { m } else { f64::max(m, (a - b).abs()) });
+        let finite = a.iter().chain(b).all(|x| x.is_finite());
+        let text = || mbd_testing::toml::to_toml(&self.plan.model);
+        assert!(finite && worst <= tolerance * size, "seed {}: {what}: {a:?}\n{b:?}\n{}", self.seed, text());
+        worst / size
+    }
+}
+
+fn largest(list: &[f64]) -> f64 {
+    list.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+/// Runs a check on all trees and shows the largest error.
+fn all(what: &str, check: impl Fn(&mut Case) -> f64) {
+    let mut worst = (0.0, 0);
+    for seed in 0..TREES {
+        let error = check(&mut Case::new(seed));
+        if error >= worst.0 {
+            worst = (error, seed);
+        }
+    }
+    println!("{what}: largest error {:.1e}, seed {}", worst.0, worst.1);
+}
+
+#[test]
+fn mass_matrix_is_that_of_the_bodies_and_positive() {
+    all("M against Jacobians", |c| {
+        let nv = c.plan.dims.nv;
+        let mut m = vec![0.0; nv * nv];
+        c.i.mass_matrix(&c.s.q, &mut m);
+        let none = vec![0.0; c.plan.dims.drive_v];
+        let unit = |k: usize| (0..nv).map(|j| f64::from(u8::from(j == k))).collect::<Vec<_>>();
+        let columns: Vec<_> = (0..nv).map(|k| c.bodies_at(&unit(k), &none)).collect();
+        let rotors: Vec<_> = (0..nv).map(|k| newton::joint_rates(&c.plan, &c.s.params, &unit(k), &none)).collect();
+        let model = &c.plan.model;
+        let mut dense = vec![0.0; nv * nv];
+        for a in 0..nv {
+            for b in 0..nv {
+                assert_eq!(m[a * nv + b], m[b * nv + a], "seed {}: M is symmetric", c.seed);
+                let bodies = (0..model.bodies.len())
+                    .map(|k| newton::twice_kinetic(model, &c.s.params, k, &columns[a][k], &columns[b][k]));
+                let joints = model.joints.iter().enumerate().map(|(j, joint)| {
+                    let pairs = rotors[a][j].iter().zip(&rotors[b][j]).zip(&joint.armature);
+                    pairs.map(|((x, y), i)| x * y * value(*i, &c.s.params)).sum::<f64>()
+                });
+                dense[a * nv + b] = bodies.sum::<f64>() + joints.sum::<f64>();
+            }
+        }
+        let matrix = nalgebra::DMatrix::from_row_slice(nv, nv, &m);
+        assert!(nv == 0 || matrix.cholesky().is_some(), "seed {}: M is positive definite", c.seed);
+        c.near_within("M", &m, &dense, 0.0, 1e-13)
+    });
+}
+
+#[test]
+fn momenta_and_velocities() {
+    all("p = M v, v(p(v)) = v", |c| {
+        let nv = c.plan.dims.nv;
+        let mut m = vec![0.0; nv * nv];
+        c.i.mass_matrix(&c.s.q, &mut m);
+        // Momenta of the prescribed motion alone.
+        let mut driven = vec![0.0; nv];
+        c.i.momenta(&c.s.q, &vec![0.0; nv], &mut driven);
+        let p: Vec<f64> = (0..nv).map(|a| driven[a] + (0..nv).map(|b| m[a * nv + b] * c.s.v[b]).sum::<f64>()).collect();
+        c.near_within("M v", &p, &c.p, 0.0, 1e-13);
+        let mut v = vec![0.0; nv];
+        c.i.velocities(&c.s.q, &c.p, &mut v);
+        c.near("v(p(v))", &v, &c.s.v, 0.0)
+    });
+}
+
+#[test]
+fn momentum_rates_are_the_derivative_of_the_momenta() {
+    all("d/dt p(q, v) = pd", |c| {
+        let (mut i, q) = c.dual();
+        let mut p = vec![D::default(); c.plan.dims.nv];
+        i.momenta(&q, &c.dual_v(), &mut p);
+        let rates: Vec<f64> = p.iter().map(|p| p.du).collect();
+        c.near("pd", &rates, &c.pd, largest(&c.s.tau))
+    });
+}
+
+#[test]
+fn accelerations_are_the_derivative_of_the_velocities() {
+    all("d/dt v(q, p) = a", |c| {
+        let (mut i, q) = c.dual();
+        let mut v = vec![D::default(); c.plan.dims.nv];
+        i.velocities(&q, &c.dual_p(), &mut v);
+        let rates: Vec<f64> = v.iter().map(|v| v.du).collect();
+        c.near("a", &rates, &c.a, 1.0)
+    });
+}
+
+#[test]
+fn energies_are_those_of_the_bodies() {
+    all("T and V against sums over bodies", |c| {
+        let (kinetic, potential) = c.i.energy(&c.s.q, &c.p);
+        let (v, drive) = (c.s.v.clone(), c.s.drive[1].clone());
+        let bodies = c.bodies_at(&v, &drive);
+        let (model, params) = (&c.plan.model, &c.s.params);
+        let rates = newton::joint_rates(&c.plan, params, &v, &drive);
+        let positions = newton::joint_coordinates(&c.plan, params, &c.s.q, &c.s.drive[0]);
+        let (mut twice, mut sum, mut size) = (0.0, 0.0, 1.0_f64);
+        for (k, at) in bodies.iter().enumerate() {
+            twice += newton::twice_kinetic(model, params, k, at, at);
+            let (m, centre) = newton::mass_centre(model, params, k, at);
+            // What is welded to the ground adds a constant, which is left out.
+            if c.plan.frames[newton::body_frames(&c.plan)[k]].node.is_none() {
+                continue;
+            }
+            for (g, x) in c.s.gravity.iter().zip(centre) {
+                sum -= m * g * x;
+                size = size.max((m * g * x).abs());
+            }
+        }
+        for (j, joint) in model.joints.iter().enumerate() {
+            for (rate, i) in rates[j].iter().zip(&joint.armature) {
+                twice += value(*i, params) * rate * rate;
+            }
+            for (k, stiffness) in joint.stiffness.iter().enumerate().filter(|_| springs(&joint.kind)) {
+                let stretch = positions[j][k] - value(joint.rest[k], params);
+                sum += 0.5 * value(*stiffness, params) * stretch * stretch;
+            }
+        }
+        c.near_within("V", &[potential], &[sum], size, 1e-13);
+        c.near("T", &[kinetic], &[0.5 * twice], 0.0)
+    });
+}
+
+fn springs(kind: &JointKind) -> bool {
+    !matches!(kind, JointKind::Spherical | JointKind::Floating)
+}
+
+#[test]
+fn energy_changes_by_the_power_put_in() {
+    all("dH/dt = power", |c| {
+        let (mut i, q) = c.dual();
+        let (kinetic, potential) = i.energy(&q, &c.dual_p());
+        let mut reactions = vec![[0.0; 6]; c.plan.joint_nodes.len()];
+        let mut a = vec![0.0; c.s.v.len()];
+        c.i.reactions(&c.s.q, &c.s.v, &mut a, &mut reactions);
+        let (model, params) = (&c.plan.model, &c.s.params);
+        let rates = newton::joint_rates(&c.plan, params, &c.s.v, &c.s.drive[1]);
+        let accelerations = newton::joint_rates(&c.plan, params, &a, &c.s.drive[2]);
+        let positions = newton::joint_coordinates(&c.plan, params, &c.s.q, &c.s.drive[0]);
+        let mut terms: Vec<f64> = c.s.tau.iter().zip(&c.s.v).map(|(f, v)| f * v).collect();
+        for (slot, wrench) in c.plan.slots.iter().zip(&reactions) {
+            let joint = &model.joints[slot.joint];
+            let rate = &rates[slot.joint];
+            if !matches!(newton::source(&c.plan, slot.joint), Some(Source::Drive { .. })) {
+                let damping = joint.damping.iter().zip(rate);
+                terms.extend(damping.map(|(d, v)| -(value(*d, params) * v * v)));
+                continue;
+            }
+            // What the drive puts in beside spring and damper of its own joint; the energy of the spring is part of H.
+            let position = &positions[slot.joint];
+            for (k, e) in newton::freedoms(&joint.kind, params, position).iter().enumerate() {
+                let along: f64 = e.iter().zip(wrench).map(|(e, f)| e * f).sum();
+                terms.push((along + value(joint.armature[k], params) * accelerations[slot.joint][k]) * rate[k]);
+            }
+            let mut coordinate_rates = rate.clone();
+            if let JointKind::Planar { .. } = joint.kind {
+                let (s, c) = position[2].sin_cos();
+                (coordinate_rates[0], coordinate_rates[1]) = (c * rate[0] - s * rate[1], s * rate[0] + c * rate[1]);
+            }
+            for k in (0..joint.kind.nv()).filter(|_| springs(&joint.kind)) {
+                let pull = value(joint.stiffness[k], params) * (position[k] - value(joint.rest[k], params));
+                terms.push(pull * coordinate_rates[k]);
+            }
+        }
+        let bodies = c.bodies();
+        for (wrench, given) in model.wrenches.iter().zip(&c.s.wrenches) {
+            let at = &bodies[wrench.body];
+            let velocity = re(&at.velocity);
+            let velocity = match wrench.axes {
+                mbd_codegen::model::WrenchAxes::Body => [velocity.lin, velocity.ang].concat(),
+                mbd_codegen::model::WrenchAxes::World => [turn(at, velocity.lin), turn(at, velocity.ang)].concat(),
+            };
+            terms.extend(velocity.iter().zip(given).map(|(v, f)| v * f));
+        }
+        let size = largest(&terms).max(kinetic.du.abs()).max(potential.du.abs());
+        c.near("power", &[kinetic.du + potential.du], &[terms.iter().sum()], size)
+    });
+}
+
+fn re(m: &Motion<D>) -> Motion<f64> {
+    Motion { lin: m.lin.map(|x| x.re), ang: m.ang.map(|x| x.re) }
+}
+
+/// A vector of a frame in ground axes.
+fn turn(at: &FrameState<D>, x: [f64; 3]) -> [f64; 3] {
+    at.rotation.map(|row| (0..3).map(|k| row[k].re * x[k]).sum())
+}
+
+/// A vector of the ground in the axes of a frame.
+fn turn_back(at: &FrameState<D>, x: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|k| (0..3).map(|i| at.rotation[i][k].re * x[i]).sum())
+}
+
+#[test]
+fn reactions_are_what_newton_and_euler_ask_for() {
+    all("reactions against momentum rates of the bodies", |c| {
+        let mut reactions = vec![[0.0; 6]; c.plan.joint_nodes.len()];
+        let mut a = vec![0.0; c.s.v.len()];
+        c.i.reactions(&c.s.q, &c.s.v, &mut a, &mut reactions);
+        c.near("a of the tree as described", &a, &c.a, 1.0);
+        let (model, params) = (&c.plan.model, &c.s.params);
+        let bodies = c.bodies();
+        // What every body needs: force, and moment about the origin of the ground.
+        let mut needed = Vec::new();
+        for (k, at) in bodies.iter().enumerate() {
+            let [p, l] = newton::momentum(model, params, k, at);
+            let (m, centre) = newton::mass_centre(model, params, k, at);
+            let weight = c.s.gravity.map(|g| m.re * g);
+            let moment = cross(centre.map(|x| x.re), weight);
+            let mut f: [f64; 3] = std::array::from_fn(|i| p[i].du - weight[i]);
+            let mut n: [f64; 3] = std::array::from_fn(|i| l[i].du - moment[i]);
+            for (wrench, given) in model.wrenches.iter().zip(&c.s.wrenches).filter(|(w, _)| w.body == k) {
+                let (mut force, mut couple) = ([given[0], given[1], given[2]], [given[3], given[4], given[5]]);
+                if wrench.axes == mbd_codegen::model::WrenchAxes::Body {
+                    (force, couple) = (turn(at, force), turn(at, couple));
+                }
+                let arm = cross(at.position.map(|x| x.re), force);
+                f = std::array::from_fn(|i| f[i] - force[i]);
+                n = std::array::from_fn(|i| n[i] - couple[i] - arm[i]);
+            }
+            needed.push([f, n]);
+        }
+        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        for (slot, wrench) in c.plan.slots.iter().zip(&reactions) {
+            let carried = newton::subtree(model, slot.joint);
+            let sum = |part: usize, i: usize| carried.iter().map(|&b| needed[b][part][i]).sum::<f64>();
+            let f: [f64; 3] = std::array::from_fn(|i| sum(0, i));
+            let at = &bodies[model.joints[slot.joint].child];
+            let arm = cross(at.position.map(|x| x.re), f);
+            let n: [f64; 3] = std::array::from_fn(|i| sum(1, i) - arm[i]);
+            theirs.extend([turn_back(at, f), turn_back(at, n)].concat());
+            ours.extend(wrench);
+        }
+        c.near("reactions", &ours, &theirs, 1.0)
+    });
+}
+
+#[test]
+fn momentum_of_free_trees_is_constant() {
+    let mut worst = 0.0_f64;
+    for seed in 0..TREES {
+        let knobs = Knobs { roots: 0.0, prescribed: 0.0, wrenches: 0.0, ..Knobs::everything(seed, 8) };
+        let mut model = random_model(seed, &Knobs { gravity: [0.0, 1.0, 0.0], ..knobs });
+        // One base, free in space.
+        let base = &mut model.joints[0];
+        base.kind = JointKind::Floating;
+        base.motion = mbd_codegen::model::Motion::Free;
+        for list in [&mut base.damping, &mut base.stiffness, &mut base.rest, &mut base.armature] {
+            *list = vec![mbd_codegen::model::Value::ZERO; 6];
+        }
+        let body = &mut model.bodies[base.child];
+        if body.inertia[0] == mbd_codegen::model::Value::ZERO {
+            body.mass = mbd_codegen::model::Value::ONE;
+            body.inertia[..3].fill(mbd_codegen::model::Value::Const(0.02));
+        }
+        for joint in &mut model.joints {
+            if matches!(joint.motion, mbd_codegen::model::Motion::Mimic { leader: 0, .. }) {
+                joint.motion = mbd_codegen::model::Motion::Free;
+            }
+        }
+        let plan = Plan::new(&model, Default::default());
+        let mut s = random_state(&plan, seed);
+        s.tau[..6].fill(0.0);
+        let c = Case::of(seed, plan, s);
+        let mut total = [0.0; 6];
+        let mut size = 1.0_f64;
+        for (k, at) in c.bodies().iter().enumerate() {
+            for (i, x) in newton::momentum(&model, &c.s.params, k, at).concat().iter().enumerate() {
+                total[i] += x.du;
+                size = size.max(x.du.abs());
+            }
+        }
+        worst = worst.max(c.near("momentum", &total, &[0.0; 6], size));
+    }
+    println!("momentum of free trees: largest rate {worst:.1e} of that of a body");
+}
+
+/// `M'E = 0` (without a rotor): once a freedom is eliminated, no inertia is left along it.
+#[test]
+fn reduced_inertia_has_nothing_along_its_freedoms() {
+    for seed in 0..TREES {
+        let knobs = Knobs { armature: 0.0, massless: 0.0, ..Knobs::everything(seed, 8) };
+        let plan = Plan::new(&random_model(seed, &knobs), Default::default());
+        let s = random_state(&plan, seed);
+        let tree = plan.tree(&s.params).regrouped();
+        let mut w = Workspace::new(&tree);
+        let sweeps = Sweeps { tree: &tree, trace: &() };
+        sweeps.articulate(&s.q, &s.drive[0], &mut w.poses);
+        sweeps.factor(&w.poses, &w.first, &mut w.factor);
+        for (i, node) in tree.nodes.iter().enumerate() {
+            if node.shared.is_some() || matches!(node.source, Source::Drive { .. }) {
+                continue;
+            }
+            let m = &w.factor.m[i];
+            let size = (0..6).fold(0.0_f64, |s, k| s.max(m.get(k, k).abs())).max(1e-3);
+            for k in 0..node.kind.nv() {
+                let along = m.times(&node.kind.axis(k).motion(1.0));
+                for j in 0..6 {
+                    assert!(along.get(j).abs() <= 1e-12 * size, "seed {seed}, node {i}, {:?}: {along:?}", node.kind);
+                }
+                // The rows of single freedoms are zero by construction, not by luck.
+                if let Kind::Pin | Kind::Slider = node.kind {
+                    assert_eq!(along.dot(&node.kind.axis(0).motion(1.0)), 0.0, "seed {seed}, node {i}");
+                }
+            }
+        }
+    }
+}
