@@ -49,9 +49,8 @@ pub struct Args {
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 12] = [
-    "path", "name", "outputs", "scalar", "base", "gravity", "efforts", "frames", "snap", "toml", "urdf", "runtime",
-];
+const KEYS: [&str; 12] =
+    ["path", "name", "outputs", "scalar", "base", "gravity", "efforts", "frames", "snap", "toml", "urdf", "runtime"];
 
 const EXAMPLE: &str = "as in `mbd_model! { path = \"models/arm.toml\", name = Arm }`";
 
@@ -97,7 +96,7 @@ pub fn parse(input: TokenStream, errors: &mut Vec<Message>) -> Args {
             // The facade states the runtime; a second one overrides it.
             errors.push(Message::new(key.span(), format!("argument `{word}` is given twice"), "keep one of them"));
         } else if !is_punct(segment.get(1), '=') || segment.len() < 3 {
-            let help = format!("write `{word} = ...`, {EXAMPLE}");
+            let help = format!("write `{word} = ...`");
             errors.push(Message::new(whole, format!("argument `{word}` has no value"), help));
         } else if let Err(error) = args.set(key, &segment[2..]) {
             errors.push(error);
@@ -112,7 +111,11 @@ pub fn parse(input: TokenStream, errors: &mut Vec<Message>) -> Args {
         errors.push(Message::new(Span::call_site(), "no model is given", help));
     }
     if !unnamed && !given(&["name"]) {
-        errors.push(Message::new(Span::call_site(), "argument `name` is missing", "add `name = Arm`, the type to make"));
+        errors.push(Message::new(
+            Span::call_site(),
+            "argument `name` is missing",
+            "add `name = Arm`, the type to make",
+        ));
     }
     args
 }
@@ -143,7 +146,13 @@ impl Args {
             "frames" => self.frames = frames(value)?,
             "snap" => match number(value) {
                 Some(x) if x >= 0.0 => self.options.plan.snap = x,
-                _ => return Err(Message::new(place(value), "`snap` has to be an angle in rad, 0 or more", "the default is 1e-6")),
+                _ => {
+                    return Err(Message::new(
+                        place(value),
+                        "`snap` has to be an angle in rad, 0 or more",
+                        "the default is 1e-6",
+                    ))
+                }
             },
             _ => self.runtime = Some(value.iter().cloned().collect()),
         }
@@ -172,7 +181,9 @@ fn text(key: &str, value: &[TokenTree]) -> Result<String, Message> {
     };
     literal.ok_or_else(|| {
         let help = match key {
-            "path" => "write the path itself, relative to the folder of Cargo.toml: `path = \"models/arm.toml\"`".to_string(),
+            "path" => {
+                "write the path itself, relative to the folder of Cargo.toml: `path = \"models/arm.toml\"`".to_string()
+            }
             _ => format!("write the description itself, `{key} = r#\"...\"#`, or name its file with `path`"),
         };
         Message::new(place(value), format!("`{key}` has to be a string literal"), help)
@@ -239,7 +250,11 @@ fn outputs(value: &[TokenTree]) -> Result<Vec<Group>, Message> {
             return Err(Message::new(place(&element), format!("unknown output {}", quote(&written)), help));
         };
         if chosen.contains(&group) {
-            return Err(Message::new(place(&element), format!("output `{written}` is listed twice"), "keep one of them"));
+            return Err(Message::new(
+                place(&element),
+                format!("output `{written}` is listed twice"),
+                "keep one of them",
+            ));
         }
         chosen.push(group);
     }

@@ -38,7 +38,8 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let generated = model.and_then(|m| match generate(&m, &args.options) {
         Ok(generated) => Some(generated.source),
         Err(message) => {
-            out.extend(Message::new(Span::call_site(), message, "").compile_error());
+            let place = text.as_ref().map_or(Span::call_site().into(), |t| t.place);
+            out.extend(Message::new(place, message, "").compile_error());
             None
         }
     });
@@ -79,7 +80,9 @@ fn read(source: &Source, place: Place, errors: &mut Vec<Message>) -> Option<Text
         Ok(text) => Some(Text { label: path.clone(), text, file: Some(file), place }),
         Err(error) => {
             let (message, help) = match error.kind() {
-                std::io::ErrorKind::NotFound => (format!("there is no file {}", quote(path)), similar_file(&file, path)),
+                std::io::ErrorKind::NotFound => {
+                    (format!("there is no file {}", quote(path)), similar_file(&file, path))
+                }
                 std::io::ErrorKind::InvalidData => {
                     (format!("{} is not UTF-8 text", quote(path)), "models are TOML or URDF text".to_string())
                 }
@@ -98,7 +101,9 @@ fn similar_file(file: &Path, path: &str) -> String {
     names.sort();
     let wanted = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     match closest(&wanted, names.iter().map(String::as_str)) {
-        Some(name) => format!("did you mean {}?", quote(&format!("{}{name}", path.strip_suffix(&wanted).unwrap_or("")))),
+        Some(name) => {
+            format!("did you mean {}?", quote(&format!("{}{name}", path.strip_suffix(&wanted).unwrap_or(""))))
+        }
         None => "paths are relative to the folder of Cargo.toml".to_string(),
     }
 }

@@ -13,7 +13,8 @@ pub fn source(options: &Options) -> String {
         Precision::F32 => "f32",
     };
     let array = format!("[{t}; {LENGTH}]");
-    let fields = ["tau", "drive_q", "drive_v", "drive_a", "params"].map(|f| (f, array.clone(), format!("[0.0; {LENGTH}]")));
+    let fields =
+        ["tau", "drive_q", "drive_v", "drive_a", "params"].map(|f| (f, array.clone(), format!("[0.0; {LENGTH}]")));
     let fields: Vec<(&str, String, String)> = fields
         .into_iter()
         .chain([
