@@ -1,5 +1,77 @@
 //! Symbolic code generator for multibody dynamics in Hamilton's canonical form.
+//!
+//! [`mbd_model!`] turns the description of a mechanism, a TOML or URDF file, into a type with straight-line functions while
+//! your program compiles. The same generator is in [`codegen`] for build scripts; [`runtime`] has the integrators, and an
+//! interpreter for models that are known at run time only.
 
 pub use mbd_codegen as codegen;
-pub use mbd_macros::*;
+#[doc(hidden)]
+pub use mbd_macros as macros;
 pub use mbd_runtime as runtime;
+
+/// Makes a type from the description of a mechanism.
+///
+/// ```
+/// use multibody::runtime::integrate::Rk4;
+/// use multibody::runtime::System;
+///
+/// multibody::mbd_model! {
+///     path = "models/ur5.urdf",
+///     name = Ur5,
+/// }
+///
+/// // The arm stretched out level, at rest, falling for a tenth of a second.
+/// let mut arm = Ur5::new();
+/// let (mut q, mut p) = (arm.neutral(), arm.rest());
+/// let [kinetic, potential] = arm.energy(&q, &p);
+/// let before = kinetic + potential;
+/// let mut rk4 = Rk4::new(&arm);
+/// for k in 0..100 {
+///     rk4.step(&mut arm, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p)?;
+/// }
+/// assert!(q[Ur5::Q_SHOULDER_LIFT_JOINT] > 0.04);
+/// let [kinetic, potential] = arm.energy(&q, &p);
+/// assert!(kinetic > 1.0);
+/// assert!((kinetic + potential - before).abs() < 1e-6);
+/// # Ok::<(), multibody::runtime::integrate::StepError>(())
+/// ```
+///
+/// # Arguments
+/// `path` and `name` have to be given, the others have defaults.
+///
+/// | argument | meaning | default |
+/// | --- | --- | --- |
+/// | `path = "models/arm.urdf"` | the description, a `.toml` or `.urdf` file; relative to the folder of `Cargo.toml` | |
+/// | `toml = r#"..."#`, `urdf = r#"..."#` | instead of `path`: the description itself | |
+/// | `name = Arm` | the type; attributes and a narrower visibility may stand before it: `pub(crate) Arm` | `pub` |
+/// | `outputs = [rates, energy]` | of `rates`, `velocities`, `momenta`, `energy`, `accelerations`, `reactions`, `mass_matrix`, `frames` | `[rates, momenta, energy]` |
+/// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |
+/// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |
+/// | `gravity = [0.0, 0.0, -1.62]` | in ground axes, m/s², instead of that of the file | the file's; of URDF `[0, 0, -9.81]` |
+/// | `efforts = false` | whether joint forces `tau` are inputs | `true` |
+/// | `frames = [tool0, "left-foot"]` | frames and bodies of the output `frames`, which this asks for | all |
+/// | `snap = 0.0` | angles this close to right angles become exact, rad | `1e-6` |
+/// | `runtime = path::to::mbd_runtime` | the runtime crate | that of this crate |
+///
+/// # What is made
+/// A type `Arm` with `new()`, a function for each output, the constants `NQ` and `NV` (numbers of coordinates and of
+/// velocities), names and indices of the coordinates (`Arm::Q_ELBOW`), and fields for what is given beside the state: joint
+/// forces `tau`, prescribed motions, wrenches, parameters. With `rates` among the outputs it is a
+/// [`System`](runtime::System) for the integrators. States are described in `docs/model-format.md`.
+///
+/// The expansion needs no standard library. A crate without one depends on `mbd-macros` and on `mbd-runtime` with
+/// `default-features = false` and calls `mbd_macros::mbd_model!`.
+///
+/// # Errors
+/// Everything wrong with the file is reported at the path, with its place in the file; what is wrong with the arguments,
+/// at the arguments. Warnings about the file are shown as uses of something deprecated, so `#[allow(deprecated)]` on a
+/// module around the call silences them. The file is watched: a change compiles the type anew.
+///
+/// Compile time grows with the model, in `cargo check` too. Large ones, more than some twenty velocities, are better
+/// generated once into a file.
+#[macro_export]
+macro_rules! mbd_model {
+    ($($argument:tt)*) => {
+        $crate::macros::mbd_model! { runtime = $crate::runtime, $($argument)* }
+    };
+}

@@ -10,7 +10,7 @@ use mbd_runtime::Scalar;
 use crate::emit;
 use crate::model::{Gravity, Model};
 use crate::plan::{Plan, PlanOptions};
-use crate::symbolic::{Counts, Expr, Graph, Program};
+use crate::symbolic::{Counts, Expr, Graph, Operand, Output, Program};
 
 /// Number type of the generated code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,15 +160,38 @@ pub struct Generated {
 /// Generates code for a checked model.
 ///
 /// # Errors
-/// An unknown frame name in the options, as a message.
+/// An unknown frame name in the options, or a number that is not finite in the code (a freedom without inertia, which the
+/// checks cannot see where parameters are involved), as a message.
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
     let plan = Plan::new(model, options.plan);
     let groups = options.outputs.iter().map(|&g| trace(&plan, g, options));
     let groups = groups.collect::<Result<Vec<_>, String>>()?;
+    groups.iter().try_for_each(|g| finite(&plan, g, options.precision))?;
     let counts = groups.iter().map(|g| (g.group, g.program.counts())).collect();
     let map = coordinate_map(&plan);
     let source = emit::source(&plan, options, &groups, &map);
     Ok(Generated { source, counts, notices: plan.notices.clone() })
+}
+
+/// Refuses infinities, which no literal can state, and with them models that divide by zero whatever the state is.
+fn finite(plan: &Plan, group: &GroupProgram, precision: Precision) -> Result<(), String> {
+    let fits = |x: f64| match precision {
+        Precision::F64 => x.is_finite(),
+        Precision::F32 => (x as f32).is_finite(),
+    };
+    let name = group.group.name();
+    for (_, op, (node, _)) in &group.program.steps {
+        if op.operands().any(|o| matches!(o, Operand::Const(bits) if !fits(f64::from_bits(bits)))) {
+            let body = node.map_or("ground", |i| plan.nodes[i].name.as_str());
+            return Err(format!(
+                "`{name}` contains an infinite number at body `{body}`: is there a freedom without inertia?"
+            ));
+        }
+    }
+    match group.program.outputs.iter().any(|o| matches!(o, Output::Const(x) if !fits(*x))) {
+        true => Err(format!("`{name}` has a result that is always infinite: is there a freedom without inertia?")),
+        false => Ok(()),
+    }
 }
 
 /// Symbolic inputs of one function.

@@ -1,0 +1,305 @@
+//! Arguments of the macro: `key = value` pairs, each understood by itself so that all errors come at once.
+
+use mbd_codegen::import::words::{did_you_mean, list, quote};
+use mbd_codegen::import::Base;
+use mbd_codegen::{Group, Options, Precision};
+use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
+
+use crate::literal;
+use crate::message::{Message, Place};
+
+/// Where the description stands.
+#[derive(Clone, Debug)]
+pub enum Source {
+    /// In a file.
+    File(String),
+    /// In the source: TOML.
+    Toml(String),
+    /// In the source: URDF.
+    Urdf(String),
+}
+
+/// Name of the type and what stands before it.
+#[derive(Clone, Debug)]
+pub struct Name {
+    /// Attributes.
+    pub attributes: TokenStream,
+    /// Visibility; empty: `pub`.
+    pub visibility: TokenStream,
+    /// The name.
+    pub ident: Ident,
+}
+
+/// All arguments, as far as they could be understood.
+#[derive(Clone, Debug, Default)]
+pub struct Args {
+    /// The description, and the literal that states it.
+    pub source: Option<(Source, Place)>,
+    /// The type.
+    pub name: Option<Name>,
+    /// How the root is attached.
+    pub base: Option<(Base, Place)>,
+    /// Gravity instead of the model's.
+    pub gravity: Option<[f64; 3]>,
+    /// Frames by name.
+    pub frames: Vec<(String, Place)>,
+    /// What goes to the generator as it is.
+    pub options: Options,
+    /// Path of the runtime crate.
+    pub runtime: Option<TokenStream>,
+}
+
+const KEYS: [&str; 12] =
+    ["path", "name", "outputs", "scalar", "base", "gravity", "efforts", "frames", "snap", "toml", "urdf", "runtime"];
+
+const EXAMPLE: &str = "as in `mbd_model! { path = \"models/arm.toml\", name = Arm }`";
+
+/// Splits at commas.
+fn segments(tokens: Vec<TokenTree>) -> Vec<Vec<TokenTree>> {
+    let comma = |t: &TokenTree| matches!(t, TokenTree::Punct(p) if p.as_char() == ',');
+    tokens.split(comma).filter(|s| !s.is_empty()).map(<[TokenTree]>::to_vec).collect()
+}
+
+/// Tokens without the invisible groups that a surrounding `macro_rules!` puts around its fragments.
+fn visible(tokens: TokenStream) -> Vec<TokenTree> {
+    let mut out = Vec::new();
+    for token in tokens {
+        match token {
+            TokenTree::Group(g) if g.delimiter() == Delimiter::None => out.extend(visible(g.stream())),
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+fn is_punct(token: Option<&TokenTree>, c: char) -> bool {
+    matches!(token, Some(TokenTree::Punct(p)) if p.as_char() == c)
+}
+
+/// Reads the arguments; what is wrong with them is added to `errors`.
+pub fn parse(input: TokenStream, errors: &mut Vec<Message>) -> Args {
+    let mut args = Args::default();
+    let mut seen: Vec<String> = Vec::new();
+    let clean = errors.len();
+    for segment in segments(visible(input)) {
+        let whole = Place::of(&segment, Span::call_site().into());
+        let TokenTree::Ident(key) = &segment[0] else {
+            errors.push(Message::new(whole, "expected an argument", format!("write `key = value`, {EXAMPLE}")));
+            continue;
+        };
+        let word = key.to_string();
+        let known = KEYS.contains(&word.as_str());
+        if !known {
+            let help = did_you_mean(&word, KEYS, || format!("the arguments are {}", list_all(KEYS)));
+            errors.push(Message::new(key.span(), format!("unknown argument {}", quote(&word)), help));
+        } else if seen.contains(&word) && word != "runtime" {
+            // The facade states the runtime; a second one overrides it.
+            errors.push(Message::new(key.span(), format!("argument `{word}` is given twice"), "keep one of them"));
+        } else if !is_punct(segment.get(1), '=') || segment.len() < 3 {
+            let help = format!("write `{word} = ...`");
+            errors.push(Message::new(whole, format!("argument `{word}` has no value"), help));
+        } else if let Err(error) = args.set(key, &segment[2..]) {
+            errors.push(error);
+        }
+        seen.push(word);
+    }
+    let given = |keys: &[&str]| keys.iter().any(|k| seen.iter().any(|s| s == k));
+    // What is missing may be what is misspelt: one message is enough then.
+    let unnamed = errors.len() > clean;
+    if !unnamed && !given(&["path", "toml", "urdf"]) {
+        let help = format!("add `path = \"...\"`, {EXAMPLE}, or `toml = \"...\"` with the description itself");
+        errors.push(Message::new(Span::call_site(), "no model is given", help));
+    }
+    if !unnamed && !given(&["name"]) {
+        errors.push(Message::new(
+            Span::call_site(),
+            "argument `name` is missing",
+            "add `name = Arm`, the type to make",
+        ));
+    }
+    args
+}
+
+fn list_all(names: impl IntoIterator<Item = &'static str>) -> String {
+    names.into_iter().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ")
+}
+
+impl Args {
+    fn set(&mut self, key: &Ident, value: &[TokenTree]) -> Result<(), Message> {
+        let word = key.to_string();
+        match word.as_str() {
+            "path" => self.set_source(key, Source::File(text(&word, value)?), value)?,
+            "toml" => self.set_source(key, Source::Toml(text(&word, value)?), value)?,
+            "urdf" => self.set_source(key, Source::Urdf(text(&word, value)?), value)?,
+            "name" => self.name = Some(name(value)?),
+            "outputs" => self.options.outputs = outputs(value)?,
+            "scalar" => {
+                let choices = [("f64", Precision::F64), ("f32", Precision::F32)];
+                self.options.precision = choice("scalar", value, &choices)?;
+            }
+            "base" => {
+                let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];
+                self.base = Some((choice("base", value, &choices)?, place(value)));
+            }
+            "gravity" => self.gravity = Some(gravity(value)?),
+            "efforts" => self.options.efforts = choice("efforts", value, &[("true", true), ("false", false)])?,
+            "frames" => self.frames = frames(value)?,
+            "snap" => match number(value) {
+                Some(x) if x >= 0.0 => self.options.plan.snap = x,
+                _ => {
+                    return Err(Message::new(
+                        place(value),
+                        "`snap` has to be an angle in rad, 0 or more",
+                        "the default is 1e-6",
+                    ))
+                }
+            },
+            _ => self.runtime = Some(value.iter().cloned().collect()),
+        }
+        Ok(())
+    }
+
+    fn set_source(&mut self, key: &Ident, source: Source, value: &[TokenTree]) -> Result<(), Message> {
+        if self.source.is_some() {
+            let message = format!("a second model: `{key}`");
+            return Err(Message::new(key.span(), message, "give one of `path`, `toml` and `urdf`"));
+        }
+        self.source = Some((source, place(value)));
+        Ok(())
+    }
+}
+
+/// Of a value, which has a token at least.
+fn place(value: &[TokenTree]) -> Place {
+    Place::of(value, Span::call_site().into())
+}
+
+fn text(key: &str, value: &[TokenTree]) -> Result<String, Message> {
+    let literal = match value {
+        [TokenTree::Literal(l)] => literal::string(&l.to_string()),
+        _ => None,
+    };
+    literal.ok_or_else(|| {
+        let help = match key {
+            "path" => {
+                "write the path itself, relative to the folder of Cargo.toml: `path = \"models/arm.toml\"`".to_string()
+            }
+            _ => format!("write the description itself, `{key} = r#\"...\"#`, or name its file with `path`"),
+        };
+        Message::new(place(value), format!("`{key}` has to be a string literal"), help)
+    })
+}
+
+fn name(value: &[TokenTree]) -> Result<Name, Message> {
+    let mut rest = value;
+    let mut attributes = TokenStream::new();
+    while let [TokenTree::Punct(p), TokenTree::Group(g), ..] = rest {
+        if p.as_char() != '#' || g.delimiter() != Delimiter::Bracket {
+            break;
+        }
+        attributes.extend(rest[..2].iter().cloned());
+        rest = &rest[2..];
+    }
+    let mut visibility = 0;
+    if matches!(rest.first(), Some(TokenTree::Ident(i)) if *i == "pub") {
+        visibility = 1;
+        if matches!(rest.get(1), Some(TokenTree::Group(g)) if g.delimiter() == Delimiter::Parenthesis) {
+            visibility = 2;
+        }
+    }
+    match &rest[visibility..] {
+        [TokenTree::Ident(ident)] => {
+            Ok(Name { attributes, visibility: rest[..visibility].iter().cloned().collect(), ident: ident.clone() })
+        }
+        _ => Err(Message::new(
+            place(value),
+            "`name` has to be the name of a type",
+            "write a name, with attributes and visibility where wanted: `name = Arm` or `name = pub(crate) Arm`",
+        )),
+    }
+}
+
+fn choice<T: Copy>(key: &str, value: &[TokenTree], choices: &[(&'static str, T)]) -> Result<T, Message> {
+    let written: String = value.iter().map(|t| t.to_string()).collect();
+    if let Some((_, chosen)) = choices.iter().find(|(name, _)| *name == written) {
+        return Ok(*chosen);
+    }
+    let names = || choices.iter().map(|(name, _)| *name);
+    let help = did_you_mean(&written, names(), || format!("choose one of {}", list(names())));
+    Err(Message::new(place(value), format!("`{key}` cannot be {}", quote(&written)), help))
+}
+
+/// Elements of `[a, b, c]`, each with a token at least.
+fn elements(key: &str, value: &[TokenTree], example: &str) -> Result<Vec<Vec<TokenTree>>, Message> {
+    match value {
+        [TokenTree::Group(g)] if g.delimiter() == Delimiter::Bracket => Ok(segments(visible(g.stream()))),
+        _ => {
+            let help = format!("write `{key} = {example}`");
+            Err(Message::new(place(value), format!("`{key}` has to be a list in brackets"), help))
+        }
+    }
+}
+
+fn outputs(value: &[TokenTree]) -> Result<Vec<Group>, Message> {
+    let mut chosen = Vec::new();
+    for element in elements("outputs", value, "[rates, energy]")? {
+        let written: String = element.iter().map(|t| t.to_string()).collect();
+        let names = || Group::ALL.into_iter().map(Group::name);
+        let Some(group) = Group::from_name(&written) else {
+            let help = did_you_mean(&written, names(), || format!("the outputs are {}", list_all(names())));
+            return Err(Message::new(place(&element), format!("unknown output {}", quote(&written)), help));
+        };
+        if chosen.contains(&group) {
+            return Err(Message::new(
+                place(&element),
+                format!("output `{written}` is listed twice"),
+                "keep one of them",
+            ));
+        }
+        chosen.push(group);
+    }
+    Ok(chosen)
+}
+
+fn frames(value: &[TokenTree]) -> Result<Vec<(String, Place)>, Message> {
+    let mut chosen: Vec<(String, Place)> = Vec::new();
+    for element in elements("frames", value, "[tool0, \"left-foot\"]")? {
+        let name = match element.as_slice() {
+            [TokenTree::Ident(i)] => Some(i.to_string()),
+            [TokenTree::Literal(l)] => literal::string(&l.to_string()),
+            _ => None,
+        };
+        let Some(name) = name else {
+            let help = "write a plain name, or a string where it is no identifier: `frames = [tool0, \"left-foot\"]`";
+            return Err(Message::new(place(&element), "expected the name of a frame or body", help));
+        };
+        if chosen.iter().any(|(n, _)| *n == name) {
+            let message = format!("frame {} is listed twice", quote(&name));
+            return Err(Message::new(place(&element), message, "keep one of them"));
+        }
+        chosen.push((name, place(&element)));
+    }
+    Ok(chosen)
+}
+
+fn number(value: &[TokenTree]) -> Option<f64> {
+    let (sign, literal) = match value {
+        [TokenTree::Literal(l)] => (1.0, l),
+        [minus, TokenTree::Literal(l)] if is_punct(Some(minus), '-') => (-1.0, l),
+        _ => return None,
+    };
+    literal::number(&literal.to_string()).map(|x| sign * x).filter(|x| x.is_finite())
+}
+
+fn gravity(value: &[TokenTree]) -> Result<[f64; 3], Message> {
+    let help = "write `gravity = [0.0, 0.0, -9.81]`: three numbers in m/s², in ground axes";
+    let parts = elements("gravity", value, "[0.0, 0.0, -9.81]")?;
+    let [x, y, z] = parts.as_slice() else {
+        return Err(Message::new(place(value), format!("`gravity` has {} numbers instead of 3", parts.len()), help));
+    };
+    let mut g = [0.0; 3];
+    for (to, from) in g.iter_mut().zip([x, y, z]) {
+        *to = number(from).ok_or_else(|| Message::new(place(from), "expected a number", help))?;
+    }
+    Ok(g)
+}

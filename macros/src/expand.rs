@@ -1,0 +1,226 @@
+//! From the arguments to the expansion.
+
+use std::path::{Path, PathBuf};
+
+use mbd_codegen::diag::{Diagnostic, Severity};
+use mbd_codegen::import::words::{closest, did_you_mean, list, quote};
+use mbd_codegen::import::{load, Base, ImportOptions};
+use mbd_codegen::model::Model;
+use mbd_codegen::{generate, Group};
+use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
+
+use crate::args::{self, Args, Name, Source};
+use crate::message::{Message, Place};
+use crate::stub;
+
+/// Stands for the path of the runtime until the text has become tokens: a path like `$crate::runtime` has none.
+const RUNTIME: &str = "__mbd_runtime";
+
+/// The expansion of `mbd_model! { input }`.
+pub fn expand(input: TokenStream) -> TokenStream {
+    let mut errors = Vec::new();
+    let mut args = args::parse(input, &mut errors);
+    let text = args.source.clone().and_then(|(source, place)| read(&source, place, &mut errors));
+    let mut watched = TokenStream::new();
+    let mut model = None;
+    if let Some(text) = &text {
+        let (read, findings) = text.load(&args);
+        model = read;
+        judge(text, &findings, model.as_ref(), &mut args, &mut errors);
+        watched.extend(text.tracked());
+        watched.extend(text.warnings(&findings));
+    }
+    let mut out: TokenStream = errors.iter().map(Message::compile_error).collect();
+    out.extend(watched);
+    let Some(name) = &args.name else { return out };
+    args.options.type_name = name.ident.to_string();
+    args.options.runtime = RUNTIME.to_string();
+    let generated = model.and_then(|m| match generate(&m, &args.options) {
+        Ok(generated) => Some(generated.source),
+        Err(message) => {
+            let place = text.as_ref().map_or(Span::call_site().into(), |t| t.place);
+            out.extend(Message::new(place, message, "").compile_error());
+            None
+        }
+    });
+    let source = generated.unwrap_or_else(|| stub::source(&args.options));
+    match source.parse::<TokenStream>() {
+        Ok(tokens) => out.extend(finish(tokens, name, args.runtime.as_ref())),
+        Err(error) => {
+            let help = "this is a mistake in the generator; please report it with the model";
+            let message = format!("the generated code is no Rust: {error}");
+            out.extend(Message::new(Span::call_site(), message, help).compile_error());
+        }
+    }
+    out
+}
+
+/// A description and where it came from.
+struct Text {
+    /// What the findings call it, the format as its extension.
+    label: String,
+    /// The description.
+    text: String,
+    /// The file to watch.
+    file: Option<PathBuf>,
+    /// Literal that states the path or the description.
+    place: Place,
+}
+
+/// Text of the description; a file that cannot be read is an error.
+fn read(source: &Source, place: Place, errors: &mut Vec<Message>) -> Option<Text> {
+    let path = match source {
+        Source::File(path) => path,
+        Source::Toml(text) => return Some(Text { label: "inline.toml".into(), text: text.clone(), file: None, place }),
+        Source::Urdf(text) => return Some(Text { label: "inline.urdf".into(), text: text.clone(), file: None, place }),
+    };
+    let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
+    let file = root.join(path);
+    match std::fs::read_to_string(&file) {
+        Ok(text) => Some(Text { label: path.clone(), text, file: Some(file), place }),
+        Err(error) => {
+            let (message, help) = match error.kind() {
+                std::io::ErrorKind::NotFound => {
+                    (format!("there is no file {}", quote(path)), similar_file(&file, path))
+                }
+                std::io::ErrorKind::InvalidData => {
+                    (format!("{} is not UTF-8 text", quote(path)), "models are TOML or URDF text".to_string())
+                }
+                _ => (format!("cannot read {}: {error}", quote(path)), "a path names the file of a model".to_string()),
+            };
+            errors.push(Message::new(place, message, help));
+            None
+        }
+    }
+}
+
+fn similar_file(file: &Path, path: &str) -> String {
+    let folder = file.parent().and_then(|f| std::fs::read_dir(f).ok());
+    let names = folder.into_iter().flatten().flatten().map(|e| e.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.collect();
+    names.sort();
+    let wanted = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    match closest(&wanted, names.iter().map(String::as_str)) {
+        Some(name) => {
+            format!("did you mean {}?", quote(&format!("{}{name}", path.strip_suffix(&wanted).unwrap_or(""))))
+        }
+        None => "paths are relative to the folder of Cargo.toml".to_string(),
+    }
+}
+
+impl Text {
+    fn is_toml(&self) -> bool {
+        Path::new(&self.label).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+    }
+
+    /// One finding as it is shown to the user.
+    fn shown(&self, d: &Diagnostic) -> (String, String) {
+        let at = match (&self.file, d.line) {
+            (Some(_), 0) => format!("{}: ", d.file),
+            (Some(_), line) => format!("{}:{line}:{}: ", d.file, d.column),
+            (None, 0) => String::new(),
+            (None, line) => format!("line {line}, column {} of the text: ", d.column),
+        };
+        (format!("{at}{}", d.message), d.help.clone())
+    }
+
+    fn load(&self, args: &Args) -> (Option<Model>, Vec<Diagnostic>) {
+        let base = args.base.map_or(Base::default(), |(base, _)| base);
+        // Said at the argument itself.
+        let base = if self.is_toml() { Base::default() } else { base };
+        let (model, findings) = load(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
+        (model, findings.0)
+    }
+
+    /// Has the compiler look at the file again when it changes.
+    fn tracked(&self) -> TokenStream {
+        let path = self.file.as_deref().and_then(Path::to_str).map(|p| Literal::string(p).to_string());
+        let text = path.map(|p| format!("const _: &[u8] = ::core::include_bytes!({p});"));
+        text.and_then(|t| t.parse().ok()).unwrap_or_default()
+    }
+
+    /// A macro has no warnings of its own; the use of something deprecated is one, with a text.
+    fn warnings(&self, findings: &[Diagnostic]) -> TokenStream {
+        let mut out = TokenStream::new();
+        for d in findings.iter().filter(|d| d.severity == Severity::Warning) {
+            let (message, help) = self.shown(d);
+            let note = Literal::string(&format!("{message}\nhelp: {help}"));
+            let item = format!(
+                "const _: () = {{ #[deprecated(note = {note})] const MODEL_WARNING: () = (); MODEL_WARNING }};"
+            );
+            let tokens = item.parse().unwrap_or_default();
+            out.extend(replace(tokens, &mut |token| match token {
+                TokenTree::Ident(i) if *i == "MODEL_WARNING" => {
+                    Some(TokenTree::from(Ident::new("MODEL_WARNING", self.place.0)).into())
+                }
+                _ => None,
+            }));
+        }
+        out
+    }
+}
+
+/// Makes errors of the findings, and checks the arguments that depend on the model.
+fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut Args, errors: &mut Vec<Message>) {
+    if let (true, Some((Base::Floating | Base::Planar, place))) = (text.is_toml(), args.base) {
+        let help = "leave `base` out; in the description the joints to `ground` say how the model is attached";
+        errors.push(Message::new(place, "a TOML model states its own base", help));
+    }
+    for d in findings.iter().filter(|d| d.severity == Severity::Error) {
+        let (message, help) = text.shown(d);
+        errors.push(Message::new(text.place, message, help));
+    }
+    // Whoever names frames wants them.
+    if !args.frames.is_empty() && !args.options.outputs.contains(&Group::Frames) {
+        args.options.outputs.push(Group::Frames);
+    }
+    let Some(model) = model else { return };
+    let names = || model.bodies.iter().map(|b| b.name.as_str()).chain(model.frames.iter().map(|f| f.name.as_str()));
+    for (frame, place) in &args.frames {
+        if names().any(|n| n == frame) {
+            args.options.frames.push(frame.clone());
+        } else {
+            let help = did_you_mean(frame, names(), || format!("there are {}", list(names())));
+            errors.push(Message::new(*place, format!("no frame or body is named {}", quote(frame)), help));
+        }
+    }
+}
+
+/// Tokens with some of them replaced, at any depth.
+fn replace(tokens: TokenStream, with: &mut impl FnMut(&TokenTree) -> Option<TokenStream>) -> TokenStream {
+    let mut out = Vec::new();
+    for token in tokens {
+        match (with(&token), token) {
+            (Some(new), _) => out.extend(new),
+            (None, TokenTree::Group(g)) => {
+                let mut inner = Tokens::new(g.delimiter(), replace(g.stream(), with));
+                inner.set_span(g.span());
+                out.push(inner.into());
+            }
+            (None, other) => out.push(other),
+        }
+    }
+    out.into_iter().collect()
+}
+
+/// Puts the user's name, visibility, attributes and runtime path into the generated tokens.
+fn finish(tokens: TokenStream, name: &Name, runtime: Option<&TokenStream>) -> TokenStream {
+    let runtime = runtime.cloned().unwrap_or_else(|| "::mbd_runtime".parse().unwrap_or_default());
+    let ident = name.ident.to_string();
+    let tokens = replace(tokens, &mut |token| match token {
+        TokenTree::Ident(i) if *i == RUNTIME => Some(runtime.clone()),
+        TokenTree::Ident(i) if *i == ident.as_str() => Some(TokenTree::from(name.ident.clone()).into()),
+        _ => None,
+    });
+    let mut out: Vec<TokenTree> = name.attributes.clone().into_iter().collect();
+    let mut tokens = tokens.into_iter().peekable();
+    while let Some(token) = tokens.next() {
+        let is = |t: Option<&TokenTree>, word: &str| matches!(t, Some(TokenTree::Ident(i)) if *i == word);
+        if is(Some(&token), "pub") && is(tokens.peek(), "struct") && !name.visibility.is_empty() {
+            out.extend(name.visibility.clone());
+        } else {
+            out.push(token);
+        }
+    }
+    out.into_iter().collect()
+}

@@ -1,0 +1,71 @@
+//! What stands in for a type that could not be made, so that its uses add no errors of their own.
+
+use mbd_codegen::{Options, Precision};
+
+/// So large that no index of a real state is out of bounds.
+const LENGTH: usize = 1000;
+
+/// A type with the functions of a generated one that take whatever they are given.
+pub fn source(options: &Options) -> String {
+    let (name, rt) = (&options.type_name, &options.runtime);
+    let t = match options.precision {
+        Precision::F64 => "f64",
+        Precision::F32 => "f32",
+    };
+    let array = format!("[{t}; {LENGTH}]");
+    let fields =
+        ["tau", "drive_q", "drive_v", "drive_a", "params"].map(|f| (f, array.clone(), format!("[0.0; {LENGTH}]")));
+    let fields: Vec<(&str, String, String)> = fields
+        .into_iter()
+        .chain([
+            ("wrenches", format!("[[{t}; 6]; {LENGTH}]"), format!("[[0.0; 6]; {LENGTH}]")),
+            ("gravity", format!("[{t}; 3]"), "[0.0; 3]".to_string()),
+        ])
+        .collect();
+    let declared: String = fields.iter().map(|(f, ty, _)| format!("#[doc = \"\"] pub {f}: {ty},")).collect();
+    let values: String = fields.iter().map(|(f, _, value)| format!("{f}: {value},")).collect();
+    let functions: String = [
+        ("rates", "q p qd pd"),
+        ("coordinate_rates", "q v qd"),
+        ("velocities", "q p v"),
+        ("momenta", "q v p"),
+        ("accelerations", "q v a"),
+        ("reactions", "q v reactions"),
+        ("mass_matrix", "q m"),
+        ("frames", "q v rotation position velocity"),
+    ]
+    .into_iter()
+    .map(|(f, arguments)| {
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let types: Vec<String> = (0..arguments.len()).map(|k| format!("A{k}")).collect();
+        let taken: Vec<String> = arguments.iter().zip(&types).map(|(a, ty)| format!("_{a}: {ty}")).collect();
+        format!("#[doc = \"\"] pub fn {f}<{}>(&self, {}) {{}}", types.join(", "), taken.join(", "))
+    })
+    .collect();
+    format!(
+        "/// Stands in for a model with errors.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct {name} {{ {declared} }}
+        #[allow(clippy::all, clippy::pedantic, dead_code)]
+        impl {name} {{
+            #[doc = \"\"] pub const NQ: usize = {LENGTH};
+            #[doc = \"\"] pub const NV: usize = {LENGTH};
+            #[doc = \"\"] pub const COORDINATES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
+            #[doc = \"\"] pub const VELOCITIES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
+            #[doc = \"\"] pub const fn new() -> Self {{ {name} {{ {values} }} }}
+            {functions}
+            #[doc = \"\"] pub fn energy<A0, A1>(&self, _q: A0, _p: A1) -> [{t}; 2] {{ [0.0; 2] }}
+        }}
+        impl ::core::default::Default for {name} {{ fn default() -> Self {{ Self::new() }} }}
+        impl {rt}::System for {name} {{
+            type Scalar = {t};
+            type Coordinates = {array};
+            type Momenta = {array};
+            fn neutral(&self) -> {array} {{ [0.0; {LENGTH}] }}
+            fn rest(&self) -> {array} {{ [0.0; {LENGTH}] }}
+            fn quaternions(&self) -> &[usize] {{ &[] }}
+            fn rates(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
+            fn coordinate_rates(&self, _q: &{array}, _v: &{array}, _qd: &mut {array}) {{}}
+        }}"
+    )
+}

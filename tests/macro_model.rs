@@ -1,0 +1,185 @@
+//! Types made by `mbd_model!`: they compile without a warning, and compute what the interpreter computes, bit for bit.
+#![deny(warnings, missing_docs, unused, nonstandard_style, unreachable_pub)]
+
+use multibody::codegen::import::{load, Base, ImportOptions};
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::integrate::Rk4;
+use multibody::runtime::{Interpreter, System};
+
+/// Types as a user's public module has them.
+pub mod made {
+    // Several in one module, and nothing imported.
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = DoublePendulum }
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = Again, outputs = [velocities], efforts = false }
+    multibody::mbd_model! { path = "models/ur5.urdf", name = pub(crate) Ur5 }
+    multibody::mbd_model! { path = "models/solo12.urdf", name = Solo12, base = floating }
+    multibody::mbd_model! {
+        path = r"models/double_pendulum.toml",
+        name = #[doc = "With a fine copy."] #[derive(Copy)] pub Single,
+        scalar = f32,
+        outputs = [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames],
+        gravity = [0, -1.62, 0.0],
+        frames = [tip, "upper"],
+        snap = 0,
+        runtime = multibody::runtime
+    }
+    multibody::mbd_model! {
+        toml = r#"
+            gravity = "input"
+            [params]
+            load = 1.5
+            [[body]]
+            name = "bob"
+            mass = { param = "load" }
+            com = [0, 0, -1]
+            inertia = [0.1, 0.1, 0.1]
+            [[joint]]
+            name = "pivot"
+            type = "spherical"
+            child = "bob"
+            [[wrench]]
+            body = "bob"
+        "#,
+        name = Bob,
+        outputs = [rates],
+    }
+    multibody::mbd_model! {
+        urdf = "<robot name='slide'><link name='a'><inertial><mass value='2'/><inertia ixx='1' ixy='0' ixz='0' \
+                iyy='1' iyz='0' izz='1'/></inertial></link></robot>",
+        name = Sled,
+        base = planar,
+        outputs = [mass_matrix, frames],
+    }
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = Bare, outputs = [] }
+
+    macro_rules! named {
+        ($path:literal, $name:ident, $outputs:tt, $runtime:path) => {
+            multibody::mbd_model! { path = $path, name = $name, outputs = $outputs, runtime = $runtime }
+        };
+    }
+    named!("models/double_pendulum.toml", Wrapped, [energy], ::multibody::runtime);
+}
+
+/// Warnings about a model can be silenced.
+#[allow(deprecated)]
+mod warned {
+    // An inertia that no body has.
+    multibody::mbd_model! {
+        urdf = "<robot name='w'><link name='r'/><link name='a'><inertial><mass value='2'/><inertia ixx='1' ixy='0' ixz='0' \
+                iyy='1' iyz='0' izz='3'/></inertial></link><joint name='j' type='continuous'><parent link='r'/>\
+                <child link='a'/></joint></robot>",
+        name = pub(super) Warned,
+    }
+}
+
+fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
+    let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
+    let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
+    let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+    let params = plan.default_params();
+    let gravity = plan.gravity(&params);
+    Interpreter::new(plan.tree(&params), gravity)
+}
+
+/// Numbers in (-1, 1) that no coincidence favours.
+fn numbers(seed: usize, out: &mut [f64]) {
+    for (k, x) in out.iter_mut().enumerate() {
+        *x = ((1 + seed * 31 + k) as f64 * 0.618_033_988_749_895).fract() * 2.0 - 1.0;
+    }
+}
+
+fn bits(x: &[f64]) -> Vec<u64> {
+    x.iter().map(|x| x.to_bits()).collect()
+}
+
+/// One type against the interpreter: rates, momenta, energies at a few states, then a step of the integrator.
+macro_rules! compare {
+    ($name:ident, $made:ident, $file:literal, $base:expr) => {
+        #[test]
+        fn $name() {
+            const NQ: usize = made::$made::NQ;
+            const NV: usize = made::$made::NV;
+            let (mut made, mut interpreter) = (made::$made::new(), interpreter($file, $base));
+            assert_eq!(made.neutral().as_slice(), interpreter.neutral());
+            assert_eq!(made.quaternions(), interpreter.quaternions());
+            for seed in 0..5 {
+                let (mut q, mut p, mut v) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
+                numbers(seed, &mut q);
+                numbers(seed + 50, &mut v);
+                numbers(seed + 90, &mut made.tau);
+                interpreter.inputs.tau.copy_from_slice(&made.tau);
+                for &k in made.quaternions() {
+                    let norm = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
+                    q[k..k + 4].iter_mut().for_each(|x| *x /= norm);
+                }
+                made.momenta(&q, &v, &mut p);
+                let mut p2 = vec![0.0; NV];
+                interpreter.momenta(&q, &v, &mut p2);
+                assert_eq!(bits(&p), bits(&p2), "p, state {seed}");
+
+                let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
+                let (mut v2, mut qd2, mut pd2) = (vec![0.0; NV], vec![0.0; NQ], vec![0.0; NV]);
+                made.rates(&q, &p, &mut qd, &mut pd);
+                interpreter.rates_into(&q, &p, &mut v2, &mut qd2, &mut pd2);
+                assert_eq!(bits(&qd), bits(&qd2), "qd, state {seed}");
+                assert_eq!(bits(&pd), bits(&pd2), "pd, state {seed}");
+
+                let energy = interpreter.energy(&q, &p);
+                assert_eq!(bits(&made.energy(&q, &p)), bits(&[energy.0, energy.1]), "energies, state {seed}");
+
+                let (mut q2, mut p2) = (q.to_vec(), p.to_vec());
+                let start = q;
+                Rk4::new(&made).step(&mut made, 0.0, 1e-3, &mut q, &mut p).expect("a small step");
+                Rk4::new(&interpreter).step(&mut interpreter, 0.0, 1e-3, &mut q2, &mut p2).expect("a small step");
+                assert_ne!(bits(&q), bits(&start));
+                assert_eq!((bits(&q), bits(&p)), (bits(&q2), bits(&p2)), "step from state {seed}");
+            }
+        }
+    };
+}
+
+compare!(double_pendulum, DoublePendulum, "models/double_pendulum.toml", Base::Fixed);
+compare!(ur5, Ur5, "models/ur5.urdf", Base::Fixed);
+compare!(solo12_floating, Solo12, "models/solo12.urdf", Base::Floating);
+
+#[test]
+fn arguments_take_effect() {
+    // All numbers of f32, moon gravity along -y, both frames asked for, in that order.
+    let single = made::Single::new();
+    let copy = single;
+    assert_eq!((made::Single::FRAME_TIP, made::Single::FRAME_UPPER), (0, 1));
+    let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; 2], [[0.0; 3]; 2], [[0.0; 6]; 2]);
+    copy.frames(&[0.0, 0.0], &[1.0, 0.0], &mut rotation, &mut position, &mut velocity);
+    assert_eq!(position, [[0.0, 0.0, -2.0_f32], [0.0; 3]]);
+    assert_eq!(velocity[0], [-2.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let [_, potential] = single.energy(&[0.5, 0.5], &[0.0, 0.0]);
+    assert_eq!(potential, 0.0, "no work along y");
+
+    // `efforts = false` leaves no field, and the output list no other function.
+    let again = made::Again {};
+    let mut v = [0.0; 2];
+    again.velocities(&[0.0, 0.0], &[1.0, 0.0], &mut v);
+    assert!(v[0] > 0.0);
+    assert_eq!(made::Wrapped::new().energy(&[0.0, 0.0], &[0.0, 0.0])[0], 0.0);
+    assert_eq!(made::Bare::NQ, 2);
+}
+
+#[test]
+fn inline_descriptions() {
+    let mut bob = made::Bob::default();
+    assert_eq!(bob.params, [1.5]);
+    bob.params[made::Bob::PARAM_LOAD] = 2.0;
+    bob.gravity = [0.0, 3.0, 0.0];
+    bob.wrenches[made::Bob::WRENCH_BOB][3] = 0.5;
+    assert_eq!(bob.neutral(), [0.0, 0.0, 0.0, 1.0]);
+    // At rest the moment about x is that of the weight, -m g y × (0, 0, -1), and the given one.
+    let (mut qd, mut pd) = ([1.0; 4], [1.0; 3]);
+    bob.rates(&[0.0, 0.0, 0.0, 1.0], &[0.0; 3], &mut qd, &mut pd);
+    assert_eq!(qd, [0.0; 4]);
+    assert_eq!(pd, [6.5, 0.0, 0.0]);
+
+    let mut m = [[0.0; 3]; 3];
+    made::Sled::new().mass_matrix(&[0.0; 3], &mut m);
+    assert_eq!(m, [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]]);
+    assert_eq!(warned::Warned::NV, 1);
+}

@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "models/double_pendulum.toml", name = Arm, base = floating }
+
+fn main() {}

@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "no/such/arm.toml", name = Arm }
+
+fn main() {}

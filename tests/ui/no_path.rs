@@ -1,0 +1,5 @@
+multibody::mbd_model! { name = Arm }
+
+fn main() {
+    let _ = Arm::new();
+}

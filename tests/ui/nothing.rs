@@ -1,0 +1,4 @@
+multibody::mbd_model! {}
+multibody::mbd_model! { "models/double_pendulum.toml", Arm }
+
+fn main() {}

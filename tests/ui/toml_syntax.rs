@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "models/syntax.toml", name = Arm }
+
+fn main() {}

@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "models/double_pendulum.toml", toml = "", name = Arm }
+
+fn main() {}

@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "main.rs", name = Arm }
+
+fn main() {}

@@ -1,0 +1,3 @@
+multibody::mbd_model! { path = "models/broken.urdf", name = Arm, base = floating }
+
+fn main() {}
