@@ -70,7 +70,7 @@ impl<'a> Body<'a> {
         let parts: Vec<&[Statement]> = statements.chunks(self.options.chunk).collect();
         let slots = self.slots(&parts);
         let len = slots.values().max().map_or(0, |m| m + 1);
-        let inputs = function.inputs.join(", ");
+        let inputs: String = function.inputs.iter().map(|i| format!("{i}, ")).collect();
         let _ = writeln!(out, "    pub fn {name}(&self, {}){} {{", function.arguments, function.returns);
         let _ = writeln!(out, "        let mut kept = [0.0; {len}];");
         for k in 0..parts.len() {
