@@ -10,7 +10,8 @@ use crate::generate::{Group, GroupProgram, Options};
 use crate::plan::Plan;
 use statements::Body;
 
-pub use names::identifier;
+pub use layout::joint_word;
+pub use names::{identifier, quantity};
 
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
 pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {
@@ -21,7 +22,7 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     let name = &options.type_name;
     let _ = writeln!(
         out,
-        "\n#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {name} {{"
+        "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {name} {{"
     );
     layout::constants(&mut out, plan, options);
     layout::constructor(&mut out, plan, options);
