@@ -50,7 +50,7 @@ impl Case {
             }
         }
         // Every number as it stands: Pinocchio knows nothing of snapped angles.
-        let plan = Plan::new(&model, PlanOptions { snap: 0.0 });
+        let plan = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let mut params = plan.default_params();
         for (value, param) in params.iter_mut().zip(plan.params()) {
             *value = data["params"][&param.name].as_f64().unwrap_or(*value);

@@ -170,8 +170,10 @@ pub struct Node<S> {
     pub inertia: RigidInertia<S>,
     /// Passive elements, one for each freedom.
     pub passive: Vec<Passive<S>>,
-    /// Coordinate shared by several nodes: index into [`Tree::shared`].
+    /// Coordinate shared by several nodes, or solved at another node: index into [`Tree::shared`].
     pub shared: Option<usize>,
+    /// The coordinate is this node's alone, only solved further inboard (with others, as a block).
+    pub deferred: bool,
     /// Shared coordinates with members in the subtree of this node that are not solved below it.
     pub open: Vec<usize>,
     /// Those solved at this node, before its own freedoms (its subtrees hold all members).

@@ -214,6 +214,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
         inertia: [0.0; 10],
         variable: Vec::new(),
         shared: None,
+        deferred: false,
         open: Vec::new(),
         solve_before: Vec::new(),
         solve_after: Vec::new(),

@@ -121,6 +121,7 @@ impl Plan {
             slide: S::constant(node.slide),
             inertia: self.inertia(node, params),
             shared: node.shared,
+            deferred: node.deferred,
             open: node.open.clone(),
             solve_before: node.solve_before.clone(),
             solve_after: node.solve_after.clone(),

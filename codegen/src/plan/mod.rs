@@ -1,6 +1,7 @@
 //! From the model to the structure the sweeps run on: elementary joints, merged bodies, chosen body frames, shared
 //! coordinates. Numbers stay [`Value`]s; [`Plan::tree`] turns them into any scalar.
 
+mod blocks;
 mod elements;
 mod frames;
 mod instantiate;
@@ -13,6 +14,7 @@ use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use crate::model::{Gravity, JointKind, Model, Motion, Param, Value};
 
+pub use blocks::Blocks;
 pub use rigid::Rigid;
 
 /// Angles this close to a multiple of 90° are taken as one, rad (see [`PlanOptions::snap`]).
@@ -24,11 +26,13 @@ pub struct PlanOptions {
     /// Angles of placements and directions of axes closer than this to right angles become exact, rad. 0 keeps every
     /// number of the description. A decimal π/2 costs a term wherever an exact zero would have stood.
     pub snap: f64,
+    /// Joints that are solved together.
+    pub blocks: Blocks,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        PlanOptions { snap: DEFAULT_SNAP }
+        PlanOptions { snap: DEFAULT_SNAP, blocks: Blocks::default() }
     }
 }
 
@@ -108,6 +112,8 @@ pub struct PlanNode {
     pub variable: Vec<(usize, Vec<PoseStep>)>,
     /// Index of a coordinate shared with other nodes.
     pub shared: Option<usize>,
+    /// See [`mbd_runtime::tree::Node`].
+    pub deferred: bool,
     /// See [`mbd_runtime::tree::Node`].
     pub open: Vec<usize>,
     /// See [`mbd_runtime::tree::Node`].
@@ -193,6 +199,9 @@ impl Plan {
             })
             .collect();
         shared::share(&mut plan);
+        if options.blocks == Blocks::Fewest {
+            blocks::choose(&mut plan);
+        }
         plan
     }
 

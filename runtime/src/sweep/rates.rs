@@ -15,8 +15,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             let Source::State { v, .. } = node.source else { continue };
             self.trace.at(Some(i), Quantity::MomentumRate);
-            let d = self.remainder_with_open(&w.factor, &w.velocity, i);
-            let (m, hat) = (&w.factor.m[i], &w.velocity.hat[i]);
+            let m = &w.factor.m[i];
+            // A freedom that is solved further inboard leaves M* whole here: then Ω takes the place of Ω̂, and its own
+            // column, M* E, is in M* already.
+            let (d, hat) = match node.deferred {
+                false => (self.remainder_with_open(&w.factor, &w.velocity, i, None), &w.velocity.hat[i]),
+                true => (self.remainder_with_open(&w.factor, &w.velocity, i, node.shared), &w.velocity.omega[i]),
+            };
             let gyro = match node.kind {
                 Kind::Pin => gyro_turn(m, hat, &d),
                 Kind::Slider => gyro_slide(m, hat, &d),

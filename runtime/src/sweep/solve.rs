@@ -216,13 +216,19 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Wrench (or momentum) that node `i` receives from its parent, in its own frame: `M'Ω̂ + D'` (4.43).
     pub(super) fn transmitted(&self, f: &Factor<S>, sol: &Solution<S>, i: usize) -> Force<S> {
-        f.m[i].times(&sol.hat[i]).plus(&self.remainder_with_open(f, sol, i))
+        f.m[i].times(&sol.hat[i]).plus(&self.remainder_with_open(f, sol, i, None))
     }
 
-    /// `D'` and what open coordinates add to it.
-    pub(super) fn remainder_with_open(&self, f: &Factor<S>, sol: &Solution<S>, i: usize) -> Force<S> {
+    /// `D'` and what open coordinates, all but one, add to it.
+    pub(super) fn remainder_with_open(
+        &self,
+        f: &Factor<S>,
+        sol: &Solution<S>,
+        i: usize,
+        except: Option<usize>,
+    ) -> Force<S> {
         let n = self.tree.nodes.len();
-        let open = self.tree.nodes[i].open.iter();
+        let open = self.tree.nodes[i].open.iter().filter(|&&g| Some(g) != except);
         open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.shared_rate[g])))
     }
 
