@@ -158,7 +158,7 @@ impl CodeArgs {
             precision: self.scalar.precision(),
             efforts: !self.no_efforts,
             frames: self.frames.clone(),
-            plan: PlanOptions { snap: self.snap },
+            plan: PlanOptions { snap: self.snap, ..PlanOptions::default() },
             chunk: self.chunk as usize,
             ..Options::default()
         }

@@ -163,7 +163,7 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     part("joint forces", here.abs_diff(other), options.efforts);
     part("external wrenches", here.saturating_sub(changed(&|m| m.wrenches.clear())?), true);
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
-    let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0 });
+    let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
     Ok(parts)
 }

@@ -60,7 +60,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
     }
-    let plan = Plan::new(&model, PlanOptions { snap: args.snap });
+    let plan = Plan::new(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() });
     source::tell_notices(path, &plan.notices);
     if plan.dims.drive_v > 0 {
         note(format_args!("{}: notice: prescribed joints are held at zero", path.display()));

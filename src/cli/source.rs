@@ -78,7 +78,7 @@ pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
 
 /// The plan of a model, with its notices told.
 pub fn plan(args: &ModelArgs, snap: f64) -> Outcome<Plan> {
-    let plan = Plan::new(&model_of(args)?, PlanOptions { snap });
+    let plan = Plan::new(&model_of(args)?, PlanOptions { snap, ..PlanOptions::default() });
     tell_notices(&args.model, &plan.notices);
     Ok(plan)
 }

@@ -75,9 +75,9 @@ fn parameters_are_as_good_as_constants() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
         let model = random_model(seed, &Knobs { params: 0.4, ..Knobs::everything(seed, 8) });
-        let plan = Plan::new(&model, PlanOptions { snap: 0.0 });
+        let plan = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let s = random_state(&plan, seed);
-        let plain = Plan::new(&substituted(&model, &s.params), PlanOptions { snap: 0.0 });
+        let plain = Plan::new(&substituted(&model, &s.params), PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let mut s2 = s.clone();
         s2.params.clear();
         worst = worst.max(compare(seed, &model, &results(&plan, &s), &results(&plain, &s2), 1e-11));
@@ -236,7 +236,7 @@ fn snapping_changes_no_more_than_the_angles() {
             }
         }
         let snapped = Plan::new(&model, PlanOptions::default());
-        let exact = Plan::new(&model, PlanOptions { snap: 0.0 });
+        let exact = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         noticed += usize::from(!snapped.notices.is_empty());
         assert!(exact.notices.is_empty(), "seed {seed}: {:?}", exact.notices);
         let s = random_state(&exact, seed);
