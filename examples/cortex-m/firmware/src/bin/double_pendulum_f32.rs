@@ -1,0 +1,5 @@
+//! The double pendulum in `f32`.
+#![no_std]
+#![no_main]
+
+firmware::firmware!(scenes::DoublePendulumF32);

@@ -1,0 +1,125 @@
+#!/usr/bin/env bash
+# Builds every scene for a Cortex-M, runs it in QEMU, runs its twin on the host, and compares the final states bit for
+# bit. Looks in each image for panics, allocation and (single precision) double-precision arithmetic in software.
+#
+#   ./run.sh            all scenes
+#   ./run.sh SCENE ...  some of them
+#
+# Needs qemu-system-arm and one of:
+# - a rustup toolchain with the target (rustup target add thumbv7em-none-eabihf): nothing else;
+# - Debian's rustc-web with rust-web-src and arm-none-eabi-ld, for machines that cannot fetch rustup targets
+#   (.ci/cortex-m-setup.sh installs them): core is then built from source.
+#
+# Single precision is built for the FPU of a Cortex-M4F and runs on an M4 and on an M7; double precision is built for
+# the FPU of a Cortex-M7 and runs there. The emulator counts instructions; it knows no pipeline, so these are not cycles.
+set -euo pipefail
+cd "$(dirname "$0")"
+
+target=thumbv7em-none-eabihf
+scenes=("$@")
+if [ ${#scenes[@]} -eq 0 ]; then
+    scenes=()
+    for file in firmware/src/bin/*.rs; do scenes+=("$(basename "$file" .rs)"); done
+fi
+
+fail() {
+    echo "run.sh: $*" >&2
+    exit 1
+}
+
+command -v qemu-system-arm > /dev/null || fail "qemu-system-arm is not installed (.ci/cortex-m-setup.sh)"
+nm=$(command -v arm-none-eabi-nm || command -v llvm-nm || command -v nm) || fail "no nm is installed (binutils)"
+
+# How to build: sets the array `cross`, run before cargo.
+flags=""
+build_args=(--release --locked --quiet --target "$target" --package firmware)
+if rustup target list --installed 2> /dev/null | grep -qx "$target"; then
+    cross=(env)
+else
+    # rustup's rustc may come first on PATH: ask the package where its own is. The library source must be of the same
+    # version as the compiler, and is: both packages come from one source.
+    rustc=$(dpkg -L rustc-web 2> /dev/null | grep 'bin/rustc$' | head -1) || true
+    [ -n "$rustc" ] || fail "neither the rustup target $target nor Debian's rustc-web is installed (.ci/cortex-m-setup.sh)"
+    cross=(env "RUSTC=$rustc" RUSTC_BOOTSTRAP=1)
+    flags="-C linker=arm-none-eabi-ld -C linker-flavor=ld"
+    build_args+=(-Zbuild-std=core)
+fi
+
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# build SCENE: prints the path of the image; the compiler's messages only if it fails (it warns of +fp64 every time).
+build() {
+    local scene=$1 directory extra
+    case $scene in
+        *_f32) directory=target/m4f extra="-C target-cpu=cortex-m4" ;;
+        *_f64) directory=target/m7 extra="-C target-cpu=cortex-m7 -C target-feature=+fp64" ;;
+        *) fail "$scene: the name of a scene ends in _f32 or _f64" ;;
+    esac
+    "${cross[@]}" RUSTFLAGS="$flags $extra" cargo build "${build_args[@]}" --bin "$scene" --target-dir "$directory" \
+        > "$log" 2>&1 || fail "$scene does not build:"$'\n'"$(cat "$log")"
+    echo "$directory/$target/release/$scene"
+}
+
+# forbid IMAGE PATTERN WHAT: no symbol of the image matches.
+forbid() {
+    local found
+    found=$("$nm" "$1" | grep -E "$2" || true)
+    [ -z "$found" ] || fail "$1 holds $3:"$'\n'"$found"
+}
+
+# emulate BOARD IMAGE: what the image prints.
+emulate() {
+    timeout 120 qemu-system-arm -M "$1" -nographic -monitor none -serial none \
+        -semihosting-config enable=on,target=native -icount shift=0 -kernel "$2" 2>&1 < /dev/null
+}
+
+# value NAME: the hexadecimal number on the line of that name, in decimal.
+value() {
+    echo $((16#$(sed -n "s/^$1 //p")))
+}
+
+# within_limits SCENE BYTES STACK INSTRUCTIONS: adds to `over` what is above the limits of limits.txt.
+over=""
+within_limits() {
+    local limits what value at=0
+    read -ra limits <<< "$(sed -n "s/^$1 //p" limits.txt)"
+    [ ${#limits[@]} -eq 3 ] || fail "limits.txt has no line for $1"
+    for what in "image bytes" "stack bytes" "instructions/step"; do
+        value=${*:$((at + 2)):1}
+        [ "$value" -le "${limits[$at]}" ] || over+="$1: $value $what, limit ${limits[$at]}"$'\n'
+        at=$((at + 1))
+    done
+}
+
+table=""
+for scene in "${scenes[@]}"; do
+    [ -f "firmware/src/bin/$scene.rs" ] || fail "no scene $scene"
+    image=$(build "$scene")
+    "$nm" "$image" | grep -q ' T main$' || fail "$image has no symbol table: nothing can be checked"
+    forbid "$image" 'panic|unwind' 'a panic path'
+    forbid "$image" 'alloc' 'an allocator'
+    boards="mps2-an500"
+    if [[ $scene == *_f32 ]]; then
+        forbid "$image" '__aeabi_(c?d|[a-z]+2d)' 'double-precision arithmetic in software'
+        boards="mps2-an386 mps2-an500"
+    fi
+    # The run is short: any profile of the host must give the same bits.
+    host=$(cargo run --locked --quiet --package twin -- "$scene")
+    for board in $boards; do
+        out=$(emulate "$board" "$image") || fail "$scene on $board: the run failed: $out"
+        state=$(grep '^state ' <<< "$out") || fail "$scene on $board: no state was printed: $out"
+        [ "$state" = "$host" ] ||
+            fail "$scene on $board: not the host's bits:"$'\n'"$(diff <(echo "$state") <(echo "$host"))"
+        # At 25 MHz and one instruction a nanosecond a tick is 40 instructions.
+        bytes=$(value image <<< "$out") stack=$(value stack <<< "$out")
+        instructions=$(($(value ticks <<< "$out") * 40 / $(value steps <<< "$out")))
+        table+=$(printf '%-22s %-11s %11d %11d %17d' "$scene" "$board" "$bytes" "$stack" "$instructions")$'\n'
+        within_limits "$scene" "$bytes" "$stack" "$instructions"
+    done
+done
+
+printf '%-22s %-11s %11s %11s %17s\n' scene board 'image bytes' 'stack bytes' instructions/step
+printf '%s' "$table"
+echo "every final state has the host's bits; no panic, no allocator"
+[ -z "$over" ] || fail "over the limits of limits.txt:"$'\n'"$over"

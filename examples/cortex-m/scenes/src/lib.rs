@@ -1,0 +1,91 @@
+//! What the firmware and its host twin both run: generated dynamics, 1000 steps of 1 ms.
+#![no_std]
+
+use mbd_runtime::integrate::Rk4;
+use mbd_runtime::{Real, Scalar, System};
+
+mbd_macros::mbd_model! {
+    path = "../../../models/double_pendulum.toml",
+    name = DoublePendulumF32,
+    scalar = f32,
+    outputs = [rates, momenta, energy]
+}
+mbd_macros::mbd_model! {
+    path = "../../../models/double_pendulum.toml",
+    name = DoublePendulumF64,
+    scalar = f64,
+    outputs = [rates, momenta, energy]
+}
+mbd_macros::mbd_model! {
+    path = "../../../models/ur5.urdf",
+    name = Ur5F32,
+    scalar = f32,
+    outputs = [rates, momenta, energy]
+}
+mbd_macros::mbd_model! {
+    path = "../../../models/ur5.urdf",
+    name = Ur5F64,
+    scalar = f64,
+    outputs = [rates, momenta, energy]
+}
+
+/// Number of steps.
+pub const STEPS: u32 = 1000;
+
+/// Coordinates and momenta of a system.
+pub type State<Y> = (<Y as System>::Coordinates, <Y as System>::Momenta);
+
+/// Runs a system for [`STEPS`] steps of 1 ms from rest, each joint 0.2 rad further out than the one before.
+///
+/// # Errors
+/// The number of the step after which the state is unusable. (The integrator's own error holds the time as a double:
+/// passing it on would bring a conversion in software into the single-precision image.)
+pub fn run<Y>(system: &mut Y) -> Result<State<Y>, u32>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    let (mut q, mut p) = (system.neutral(), system.rest());
+    let mut start = Y::Scalar::constant(0.3);
+    for q in q.as_mut() {
+        *q = start;
+        start = start + Y::Scalar::constant(0.2);
+    }
+    let h = Y::Scalar::constant(1.0e-3);
+    let mut integrator = Rk4::new(system);
+    let mut t = Y::Scalar::zero();
+    for step in 0..STEPS {
+        integrator.step(system, t, h, &mut q, &mut p).map_err(|_| step)?;
+        t = t + h;
+    }
+    Ok((q, p))
+}
+
+/// A number's bits, for a comparison that cannot be talked round.
+pub trait Bits: Copy {
+    /// The bits; of an `f32` in the lower half.
+    fn bits(self) -> u64;
+}
+
+impl Bits for f32 {
+    fn bits(self) -> u64 {
+        self.to_bits().into()
+    }
+}
+
+impl Bits for f64 {
+    fn bits(self) -> u64 {
+        self.to_bits()
+    }
+}
+
+/// Calls `$what!(name, path of the type)` for every scene: one firmware image each.
+#[macro_export]
+macro_rules! each_scene {
+    ($what:ident) => {
+        $what!(double_pendulum_f32, $crate::DoublePendulumF32);
+        $what!(double_pendulum_f64, $crate::DoublePendulumF64);
+        $what!(ur5_f32, $crate::Ur5F32);
+        $what!(ur5_f64, $crate::Ur5F64);
+    };
+}
