@@ -67,7 +67,8 @@ pub fn count_line(c: &Counts) -> Option<String> {
     })
 }
 
-fn joint_word(kind: &JointKind) -> &'static str {
+/// A joint's kind, as models name it.
+pub fn joint_word(kind: &JointKind) -> &'static str {
     match kind {
         JointKind::Pin { .. } => "pin",
         JointKind::Slider { .. } => "slider",

@@ -10,7 +10,8 @@ use crate::generate::{Group, GroupProgram, Options};
 use crate::plan::Plan;
 use statements::Body;
 
-pub use names::identifier;
+pub use layout::joint_word;
+pub use names::{identifier, quantity};
 
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
 pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {

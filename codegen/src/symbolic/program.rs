@@ -1,5 +1,9 @@
 //! Live operations of a graph, in order, and what they cost.
 
+use std::collections::BTreeMap;
+
+use mbd_runtime::sweep::Quantity;
+
 use super::{Expr, Graph, Label, Op, Operand};
 
 /// A signed result: a constant or a node.
@@ -62,6 +66,8 @@ pub struct Program {
     pub steps: Vec<(u32, Op, Label)>,
     /// Results, in the order they were asked for.
     pub outputs: Vec<Output>,
+    /// Operations the sweeps made, live or not, inputs left out.
+    pub created: BTreeMap<Quantity, usize>,
 }
 
 impl Program {
@@ -90,7 +96,13 @@ impl Program {
             let (op, label) = graph.get(id);
             (id, op, label)
         });
-        let mut program = Program { steps: steps.collect(), outputs };
+        let mut created = BTreeMap::new();
+        for (op, (_, what)) in (0..live.len() as u32).map(|id| graph.get(id)) {
+            if !matches!(op, Op::Input(_)) {
+                *created.entry(what).or_default() += 1;
+            }
+        }
+        let mut program = Program { steps: steps.collect(), outputs, created };
         program.turn_negated_differences();
         program
     }

@@ -1,0 +1,72 @@
+//! `mbd check`.
+
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+
+use multibody::codegen::emit::joint_word;
+use multibody::codegen::model::{Model, Value};
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::tree::Source;
+
+use super::args::CheckArgs;
+use super::{source, stale, Failure, Outcome};
+
+/// Checks models, or the generated files of a directory.
+pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
+    if let Some(directory) = &args.generated {
+        return stale::run(directory, args.update, out);
+    }
+    let mut worst = Ok(());
+    for path in &args.models {
+        match source::model(path, &args.import.import()) {
+            Ok(model) => summary(path, &model, out)?,
+            Err(Failure::Message(what, help)) => {
+                super::output::note(format_args!("error: {what}\n  help: {help}"));
+                worst = Err(Failure::Shown);
+            }
+            Err(failure) => worst = Err(failure),
+        }
+    }
+    worst
+}
+
+fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
+    let plan = Plan::new(model, PlanOptions::default());
+    source::tell_notices(path, &plan.notices);
+    let params = plan.default_params();
+    let value = |v: Value| match v {
+        Value::Const(x) => x,
+        Value::Param(k) => params[k],
+    };
+    let mass: f64 = model.bodies.iter().map(|b| value(b.mass)).sum();
+    let d = plan.dims;
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    for joint in &model.joints {
+        *kinds.entry(joint_word(&joint.kind)).or_default() += 1;
+    }
+    let kinds: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
+    let prescribed = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })));
+    let mut line = format!(
+        "{}: sound: {} bodies, {} joints ({}), nq {}, nv {}, mass {} kg",
+        path.display(),
+        model.bodies.len(),
+        model.joints.len(),
+        kinds.join(", "),
+        d.nq,
+        d.nv,
+        (mass * 1e9).round() / 1e9,
+    );
+    let follows = plan.slots.iter().filter(|s| s.at.is_none()).count();
+    // What is absent is not mentioned.
+    let counted = [
+        (follows, "joints that follow others"),
+        (prescribed.count(), "prescribed joints"),
+        (model.params.len(), "parameters"),
+        (model.wrenches.len(), "external wrenches"),
+    ];
+    for (n, what) in counted.into_iter().filter(|(n, _)| *n > 0) {
+        line += &format!(", {what}: {n}");
+    }
+    Ok(writeln!(out, "{line}")?)
+}

@@ -1,0 +1,223 @@
+//! `mbd count`.
+
+use std::collections::BTreeSet;
+use std::io::Write;
+
+use multibody::codegen::emit::quantity;
+use multibody::codegen::generate::{trace, GroupProgram};
+use multibody::codegen::model::{Gravity, Model, Value};
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::symbolic::Counts;
+use multibody::codegen::{Group, Options};
+use serde_json::json;
+
+use super::args::CountArgs;
+use super::generate::frame_failure;
+use super::rivals::{chain_of_pins, RIVALS};
+use super::{source, Outcome};
+
+/// Counts of one output.
+pub struct OutputCounts {
+    /// Which.
+    pub group: Group,
+    /// All of it.
+    pub counts: Counts,
+    /// By sweep.
+    pub sweeps: Vec<(&'static str, Counts)>,
+}
+
+/// What one part of the scene costs.
+struct Part {
+    what: &'static str,
+    operations: usize,
+    present: bool,
+}
+
+/// Counts and prints.
+pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
+    let plan = source::plan(&args.model, args.code.snap)?;
+    let options = args.code.options(&plan.model.name);
+    let counts = all(&plan, &options)?;
+    let parts = match options.outputs.first() {
+        Some(&group) => parts(&plan, &options, group)?,
+        None => Vec::new(),
+    };
+    if args.json {
+        return as_json(&plan, &counts, &parts, out);
+    }
+    writeln!(
+        out,
+        "{}: {} velocities, joint forces {}, gravity {}\n",
+        plan.model.name,
+        plan.dims.nv,
+        if options.efforts { "given" } else { "none" },
+        gravity(&plan)
+    )?;
+    table(&counts, true, out)?;
+    rivals(&plan, &counts, out)?;
+    let group = options.outputs.first().map_or("", |g| g.name());
+    if !parts.is_empty() {
+        writeln!(out, "\nWhat the scene costs in `{group}`:")?;
+    }
+    for part in &parts {
+        let (sign, hint) = match (part.what, part.present) {
+            (RIGHT_ANGLES, _) => ('-', ""),
+            (_, true) => ('+', ""),
+            (_, false) => ('+', "  (not in this scene)"),
+        };
+        writeln!(out, "  {:<32}{:>8}{hint}", part.what, format!("{sign}{}", part.operations))?;
+    }
+    Ok(())
+}
+
+const RIGHT_ANGLES: &str = "right angles taken as exact";
+
+/// Gravity as it is printed.
+pub fn gravity(plan: &Plan) -> String {
+    match plan.model.gravity {
+        Gravity::Constant(g) => match g.map(Value::constant) {
+            [Some(x), Some(y), Some(z)] => format!("{x},{y},{z} m/s²"),
+            _ => "a parameter".to_string(),
+        },
+        Gravity::Input => "an input".to_string(),
+    }
+}
+
+/// Counts of all outputs of the options.
+pub fn all(plan: &Plan, options: &Options) -> Outcome<Vec<OutputCounts>> {
+    options.outputs.iter().map(|&g| Ok(of_program(&trace(plan, g, options).map_err(frame_failure)?))).collect()
+}
+
+fn of_program(group: &GroupProgram) -> OutputCounts {
+    let program = &group.program;
+    let quantities: BTreeSet<_> = program.steps.iter().map(|(_, _, (_, what))| *what).collect();
+    let sweeps = quantities.into_iter().map(|q| (quantity(q).1, program.counts_where(|label| label.1 == q)));
+    let sweeps = sweeps.filter(|(_, c)| *c != Counts::default()).collect();
+    OutputCounts { group: group.group, counts: program.counts(), sweeps }
+}
+
+/// The table of counts, with a row for each sweep if wanted.
+pub fn table(counts: &[OutputCounts], sweeps: bool, out: &mut dyn Write) -> Outcome {
+    let names = counts.iter().flat_map(|c| c.sweeps.iter().map(|s| s.0));
+    let wide = names.filter(|_| sweeps).map(|n| n.chars().count() + 2).max().unwrap_or(0).max(16);
+    let mut row = |name: &str, numbers: [&str; 6]| {
+        let gap = " ".repeat(wide.saturating_sub(name.chars().count()));
+        let cells: String = numbers.iter().map(|n| format!("{n:>8}")).collect();
+        writeln!(out, "{name}{gap}{cells}")
+    };
+    row("operations", ["total", "add", "mul", "div", "sqrt", "sincos"])?;
+    for output in counts {
+        let mut line = |name: &str, c: &Counts| {
+            let n = [c.total(), c.additions, c.multiplications, c.divisions, c.roots, c.sincos].map(|n| n.to_string());
+            row(name, [&n[0], &n[1], &n[2], &n[3], &n[4], &n[5]])
+        };
+        line(output.group.name(), &output.counts)?;
+        for (name, counts) in output.sweeps.iter().filter(|_| sweeps) {
+            line(&format!("  {name}"), counts)?;
+        }
+    }
+    Ok(())
+}
+
+/// Published formulas beside the rates of a serial chain of pins; nothing for other mechanisms.
+pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outcome {
+    let rates = counts.iter().find(|c| c.group == Group::Rates);
+    let (Some(n), Some(rates)) = (chain_of_pins(plan), rates) else { return Ok(()) };
+    let ours = rates.counts.total();
+    writeln!(out, "\nForward dynamics of {n} pins in a row, published formulas (upper bounds for any such chain):")?;
+    writeln!(out, "  {:<36}{:>12}{:>8}", "this model, rates", "", ours)?;
+    for rival in &RIVALS {
+        let theirs = rival.operations(n);
+        let ratio = theirs as f64 / ours.max(1) as f64;
+        writeln!(out, "  {:<36}{:>12}{:>8}  {ratio:.2} times as many", rival.name, rival.formula(), theirs)?;
+    }
+    Ok(())
+}
+
+/// Differences of one output with parts of the scene left out.
+fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
+    let total = |plan: &Plan, options: &Options| -> Outcome<usize> {
+        Ok(trace(plan, group, options).map_err(frame_failure)?.program.counts().total())
+    };
+    let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
+        let mut model = plan.model.clone();
+        change(&mut model);
+        total(&Plan::new(&model, options.plan), options)
+    };
+    let here = total(plan, options)?;
+    let mut parts = Vec::new();
+    let mut part = |what, operations, present| {
+        if operations > 0 {
+            parts.push(Part { what, operations, present });
+        }
+    };
+    let weightless = Gravity::Constant([Value::ZERO; 3]);
+    if plan.model.gravity == weightless {
+        let down = [Value::ZERO, Value::ZERO, Value::Const(-9.81)];
+        part("gravity", changed(&|m| m.gravity = Gravity::Constant(down))?.saturating_sub(here), false);
+    } else {
+        part("gravity", here.saturating_sub(changed(&|m| m.gravity = weightless)?), true);
+    }
+    let other = total(plan, &Options { efforts: !options.efforts, ..options.clone() })?;
+    part("joint forces", here.abs_diff(other), options.efforts);
+    part("external wrenches", here.saturating_sub(changed(&|m| m.wrenches.clear())?), true);
+    part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
+    let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0 });
+    part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
+    Ok(parts)
+}
+
+fn without_passive(model: &mut Model) {
+    for joint in &mut model.joints {
+        for list in [&mut joint.damping, &mut joint.stiffness, &mut joint.armature] {
+            list.fill(Value::ZERO);
+        }
+    }
+}
+
+fn numbers(c: &Counts) -> serde_json::Map<String, serde_json::Value> {
+    let pairs = [
+        ("total", c.total()),
+        ("additions", c.additions),
+        ("multiplications", c.multiplications),
+        ("divisions", c.divisions),
+        ("square_roots", c.roots),
+        ("sine_cosine_pairs", c.sincos),
+    ];
+    pairs.into_iter().map(|(k, n)| (k.to_string(), json!(n))).collect()
+}
+
+fn as_json(plan: &Plan, counts: &[OutputCounts], parts: &[Part], out: &mut dyn Write) -> Outcome {
+    let outputs: Vec<_> = counts
+        .iter()
+        .map(|c| {
+            let sweeps: Vec<_> = c
+                .sweeps
+                .iter()
+                .map(|(name, counts)| {
+                    let mut sweep = numbers(counts);
+                    sweep.insert("sweep".into(), json!(name));
+                    sweep
+                })
+                .collect();
+            let mut output = numbers(&c.counts);
+            output.insert("output".into(), json!(c.group.name()));
+            output.insert("sweeps".into(), json!(sweeps));
+            output
+        })
+        .collect();
+    let published = chain_of_pins(plan).map_or(Vec::new(), |n| {
+        let rival = |r: &super::rivals::Rival| {
+            json!({ "name": r.name, "formula": r.formula(), "operations": r.operations(n) })
+        };
+        RIVALS.iter().map(rival).collect()
+    });
+    let parts: Vec<_> = parts
+        .iter()
+        .map(|p| json!({ "part": p.what, "operations": p.operations, "present": p.present }))
+        .collect();
+    let model = json!({ "name": plan.model.name, "nq": plan.dims.nq, "nv": plan.dims.nv });
+    let all = json!({ "model": model, "outputs": outputs, "published": published, "parts": parts });
+    let text = serde_json::to_string_pretty(&all).map_err(std::io::Error::from)?;
+    Ok(writeln!(out, "{text}")?)
+}

@@ -1,0 +1,152 @@
+//! `mbd eval`: numbers out, through the interpreter. `docs/eval-json.md` describes both sides.
+
+mod input;
+mod outer;
+
+use std::io::{Read, Write};
+
+use clap::ValueEnum;
+use multibody::codegen::plan::Plan;
+use multibody::runtime::Interpreter;
+use serde::Serialize;
+
+use super::args::{EvalArgs, Quantity};
+use super::output::{note, write_file};
+use super::{source, Failure, Outcome};
+use input::{Inputs, State};
+use outer::Outer;
+
+/// One state's results; what was not asked for is left out.
+#[derive(Default, Serialize)]
+struct Results {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    p: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    qd: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pd: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    qdd: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    kinetic: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    potential: Option<f64>,
+    #[serde(rename = "M", skip_serializing_if = "Option::is_none")]
+    m: Option<Vec<Vec<f64>>>,
+}
+
+impl Results {
+    /// First output that is not finite.
+    fn not_finite(&self) -> Option<&'static str> {
+        let bad = |list: &Option<Vec<f64>>| list.iter().flatten().any(|x| !x.is_finite());
+        let bad_number = |x: Option<f64>| x.is_some_and(|x| !x.is_finite());
+        let checks = [
+            ("p", bad(&self.p)),
+            ("qd", bad(&self.qd)),
+            ("pd", bad(&self.pd)),
+            ("qdd", bad(&self.qdd)),
+            ("kinetic", bad_number(self.kinetic)),
+            ("potential", bad_number(self.potential)),
+            ("M", self.m.iter().flatten().flatten().any(|x| !x.is_finite())),
+        ];
+        checks.into_iter().find(|(_, bad)| *bad).map(|(key, _)| key)
+    }
+}
+
+/// Reads states, evaluates, writes.
+pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
+    let plan = source::plan(&args.model, args.snap)?;
+    let outer = Outer::new(&plan, args.layout);
+    let (name, text) = match args.input.as_os_str() == "-" {
+        true => ("standard input".to_string(), standard_input()?),
+        false => (args.input.display().to_string(), source::read(&args.input)?),
+    };
+    let inputs = input::read(&text, &plan, &outer).map_err(|findings| {
+        for (place, what, help) in findings {
+            note(format_args!("{name}{place}: error: {what}\n  help: {help}"));
+        }
+        Failure::Shown
+    })?;
+    let wanted = match args.outputs.is_empty() {
+        true => Quantity::value_variants(),
+        false => &args.outputs[..],
+    };
+    let text = evaluate(&plan, &outer, &inputs, wanted).map_err(|(state, key)| {
+        Failure::new(
+            format!("{name}: states[{state}]: the result `{key}` is not finite"),
+            "look for very large inputs, or for bodies without inertia at the end of a chain",
+        )
+    })?;
+    match &args.output {
+        Some(file) => write_file(file, &text),
+        None => Ok(out.write_all(text.as_bytes())?),
+    }
+}
+
+fn standard_input() -> Outcome<String> {
+    let mut text = String::new();
+    let read = std::io::stdin().lock().read_to_string(&mut text);
+    read.map_err(|e| Failure::new(format!("cannot read standard input: {e}"), "pipe JSON in, as UTF-8"))?;
+    Ok(text)
+}
+
+/// JSON of all results, one state a line; or state and key of a result that is not finite.
+fn evaluate(
+    plan: &Plan,
+    outer: &Outer,
+    inputs: &Inputs,
+    wanted: &[Quantity],
+) -> Result<String, (usize, &'static str)> {
+    // Parameters of the file, not the defaults of the model.
+    let params = &inputs.params;
+    let mut interpreter = Interpreter::new(plan.tree(params), plan.gravity(params));
+    let mut lines = Vec::new();
+    for (k, state) in inputs.states.iter().enumerate() {
+        let results = results(plan, outer, &mut interpreter, state, wanted);
+        if let Some(key) = results.not_finite() {
+            return Err((k, key));
+        }
+        // Finite numbers and fixed keys always make a text.
+        lines.push(serde_json::to_string(&results).unwrap_or_default());
+    }
+    Ok(format!("{{\"states\": [\n{}\n]}}\n", lines.join(",\n")))
+}
+
+fn results(
+    plan: &Plan,
+    outer: &Outer,
+    interpreter: &mut Interpreter<f64>,
+    state: &State,
+    wanted: &[Quantity],
+) -> Results {
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let (q, v) = (&state.q, &state.v);
+    state.apply(interpreter);
+    let has = |what: Quantity| wanted.contains(&what);
+    let mut out = Results::default();
+    let mut p = vec![0.0; nv];
+    interpreter.momenta(q, v, &mut p);
+    if has(Quantity::CoordinateRates) || has(Quantity::MomentumRates) {
+        let (mut v2, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        interpreter.rates_into(q, &p, &mut v2, &mut qd, &mut pd);
+        out.qd = has(Quantity::CoordinateRates).then(|| outer.coordinate_rates(q, &qd));
+        out.pd = has(Quantity::MomentumRates).then(|| outer.derivative(q, v, &p, &pd));
+    }
+    if has(Quantity::Accelerations) {
+        let mut a = vec![0.0; nv];
+        interpreter.accelerations(q, v, &mut a);
+        out.qdd = Some(outer.derivative(q, v, v, &a));
+    }
+    if has(Quantity::Kinetic) || has(Quantity::Potential) {
+        let (kinetic, potential) = interpreter.energy(q, &p);
+        out.kinetic = has(Quantity::Kinetic).then_some(kinetic);
+        out.potential = has(Quantity::Potential).then_some(potential);
+    }
+    if has(Quantity::MassMatrix) {
+        let mut m = vec![0.0; nv * nv];
+        interpreter.mass_matrix(q, &mut m);
+        out.m = Some(outer.matrix(q, &m));
+    }
+    out.p = has(Quantity::Momenta).then(|| outer.velocities(q, &p));
+    out
+}

@@ -1,0 +1,32 @@
+//! `mbd explain`: what the generator made of a model on the way.
+
+mod frames;
+mod program;
+
+use std::io::Write;
+
+use multibody::codegen::generate::{trace, GroupProgram};
+use multibody::codegen::Options;
+
+use super::args::{ExplainArgs, Stage};
+use super::generate::frame_failure;
+use super::{source, Outcome};
+
+/// Prints one stage.
+pub fn run(args: &ExplainArgs, out: &mut dyn Write) -> Outcome {
+    let plan = source::plan(&args.model, args.code.snap)?;
+    let options: Options = args.code.options(&plan.model.name);
+    if args.after == Stage::Frames {
+        return frames::print(&plan, out);
+    }
+    for &group in &options.outputs {
+        let program: GroupProgram = trace(&plan, group, &options).map_err(frame_failure)?;
+        match args.after {
+            Stage::Frames => {}
+            Stage::Trace => program::created(&program, out)?,
+            Stage::Simplify => program::statements(&plan, &program, out)?,
+            Stage::Schedule => program::schedule(&program, options.chunk, out)?,
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,40 @@
+//! `mbd generate`.
+
+use std::io::Write;
+use std::path::Path;
+
+use multibody::codegen::{self, Options};
+
+use super::args::GenerateArgs;
+use super::output::write_file;
+use super::{source, Failure, Outcome};
+
+/// Generates code and prints or writes it.
+pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
+    let path = &args.model.model;
+    let model = source::model(path, &args.model.import())?;
+    let base = Options { runtime: args.runtime.clone(), source: shown(path), ..args.code.options(&model.name) };
+    let generated = codegen::generate(&model, &base).map_err(frame_failure)?;
+    source::tell_notices(path, &generated.notices);
+    match &args.output {
+        Some(file) => write_file(file, &generated.source),
+        None => Ok(out.write_all(generated.source.as_bytes())?),
+    }
+}
+
+/// The one thing that options can get wrong.
+pub fn frame_failure(message: String) -> Failure {
+    Failure::new(message, "--frames takes names of bodies and of [[frame]] tables; leave it out for all")
+}
+
+/// A path as the header of the code shows it: the same on every machine.
+pub fn shown(path: &Path) -> String {
+    let name = || path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let parts: Vec<String> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
+    let shown = match path.is_absolute() {
+        true => name(),
+        false => parts.into_iter().filter(|p| p != "." && p != "..").collect::<Vec<_>>().join("/"),
+    };
+    // It stands in a comment of one line.
+    shown.replace(char::is_control, "?")
+}

@@ -1,0 +1,73 @@
+//! From a path to a checked model and its plan, findings told on the way.
+
+use std::io::Read;
+use std::path::Path;
+
+use multibody::codegen::import::{load, words, ImportOptions};
+use multibody::codegen::model::Model;
+use multibody::codegen::plan::{Plan, PlanOptions};
+
+use super::args::ModelArgs;
+use super::output::note;
+use super::{Failure, Outcome};
+
+/// No description of a mechanism is that long; a device file may be.
+const LONGEST: u64 = 256 << 20;
+
+/// Text of a file.
+pub fn read(path: &Path) -> Outcome<String> {
+    let file = path.display();
+    let mut bytes = Vec::new();
+    let read = std::fs::File::open(path).and_then(|f| f.take(LONGEST + 1).read_to_end(&mut bytes));
+    if let Err(e) = read {
+        return Err(Failure::new(format!("cannot read `{file}`: {e}"), similar(path)));
+    }
+    if bytes.len() as u64 > LONGEST {
+        return Err(Failure::new(
+            format!("cannot read `{file}`: it is longer than {} MiB", LONGEST >> 20),
+            "name a file that holds one model",
+        ));
+    }
+    String::from_utf8(bytes).map_err(|e| {
+        let good = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]).into_owned();
+        let line = good.matches('\n').count() + 1;
+        let column = good.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+        note(format_args!("{file}:{line}:{column}: error: not UTF-8 text\n  help: save the file as UTF-8"));
+        Failure::Shown
+    })
+}
+
+/// What to do about a path that cannot be read.
+fn similar(path: &Path) -> String {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.sort_unstable();
+    let wanted = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let names = names.iter().map(String::as_str).filter(|n| *n != wanted);
+    words::did_you_mean(&wanted, names, || "check the path and that you may read it".to_string())
+}
+
+/// A checked model. Findings go to standard error, all of them.
+pub fn model(path: &Path, options: &ImportOptions) -> Outcome<Model> {
+    let text = read(path)?;
+    let (model, findings) = load(&path.to_string_lossy(), &text, options);
+    if !findings.0.is_empty() {
+        note(format_args!("{findings}"));
+    }
+    model.ok_or(Failure::Shown)
+}
+
+/// The plan of a model, with its notices told.
+pub fn plan(args: &ModelArgs, snap: f64) -> Outcome<Plan> {
+    let plan = Plan::new(&model(&args.model, &args.import())?, PlanOptions { snap });
+    tell_notices(&args.model, &plan.notices);
+    Ok(plan)
+}
+
+/// Notices of a plan.
+pub fn tell_notices(path: &Path, notices: &[String]) {
+    for notice in notices {
+        note(format_args!("{}: notice: {notice}", path.display()));
+    }
+}
