@@ -31,7 +31,7 @@ pub struct Chain10Planar {
     pub tau: [f64; 10],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Chain10Planar {
     /// Number of coordinates.
@@ -90,7 +90,6 @@ impl Chain10Planar {
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
     /// 666 operations: 298 additions, 359 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -889,7 +888,6 @@ impl Chain10Planar {
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 429 operations: 194 additions, 226 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -1679,7 +1677,6 @@ impl Chain10Planar {
 
     /// Kinetic and potential energy, J.
     /// 512 operations: 229 additions, 274 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -2289,7 +2286,6 @@ impl Chain10Planar {
 
     /// Accelerations: `(q, v) → v̇`.
     /// 666 operations: 302 additions, 355 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -3077,7 +3073,6 @@ impl Chain10Planar {
 
     /// Mass matrix, by rows.
     /// 358 operations: 159 additions, 199 multiplications, 0 divisions; apart: 0 square roots, 9 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn mass_matrix(&self, q: &[f64; 10], m: &mut [[f64; 10]; 10]) {
         let q_1 = q[1];
         let q_2 = q[2];

@@ -25,7 +25,7 @@ pub struct DoublePendulum {
     pub tau: [f64; 2],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl DoublePendulum {
     /// Number of coordinates.

@@ -29,7 +29,7 @@ pub struct Panda {
     pub tau: [f64; 8],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Panda {
     /// Number of coordinates.
@@ -82,8 +82,8 @@ impl Panda {
     /// 1104 operations: 542 additions, 555 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
         let mut kept = [0.0; 93];
-        self.rates_part1(q, p&mut kept);
-        self.rates_part2(q, p&mut kept);
+        self.rates_part1(q, p, &mut kept);
+        self.rates_part2(q, p, &mut kept);
         qd[0] = kept[44];
         qd[1] = -kept[45];
         qd[2] = -kept[46];
@@ -1476,7 +1476,6 @@ impl Panda {
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 796 operations: 390 additions, 399 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn velocities(&self, q: &[f64; 8], p: &[f64; 8], v: &mut [f64; 8]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -2341,7 +2340,6 @@ impl Panda {
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 381 operations: 170 additions, 211 multiplications, 0 divisions; apart: 0 square roots, 6 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn momenta(&self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -2787,7 +2785,6 @@ impl Panda {
 
     /// Kinetic and potential energy, J.
     /// 853 operations: 421 additions, 425 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn energy(&self, q: &[f64; 8], p: &[f64; 8]) -> [f64; 2] {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -3722,8 +3719,8 @@ impl Panda {
     /// 1616 operations: 772 additions, 837 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
         let mut kept = [0.0; 222];
-        self.accelerations_part1(q, v&mut kept);
-        self.accelerations_part2(q, v&mut kept);
+        self.accelerations_part1(q, v, &mut kept);
+        self.accelerations_part2(q, v, &mut kept);
         a[0] = kept[215];
         a[1] = -kept[216];
         a[2] = -kept[217];

@@ -34,7 +34,7 @@ pub struct Satellite {
     pub wrenches: [[f64; 6]; 1],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Satellite {
     /// Number of coordinates.
@@ -1019,7 +1019,6 @@ impl Satellite {
 
     /// Accelerations: `(q, v) → v̇`.
     /// 403 operations: 191 additions, 209 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn accelerations(&self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
         let v_0 = v[0];
         let v_1 = v[1];
@@ -1474,7 +1473,6 @@ impl Satellite {
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
     /// 595 operations: 293 additions, 299 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn reactions(&self, q: &[f64; 7], v: &[f64; 6], reactions: &mut [[f64; 6]; 3]) {
         let v_0 = v[0];
         let v_1 = v[1];

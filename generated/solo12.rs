@@ -33,7 +33,7 @@ pub struct Solo12 {
     pub tau: [f64; 18],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Solo12 {
     /// Number of coordinates.
@@ -106,9 +106,9 @@ impl Solo12 {
     /// 2233 operations: 1089 additions, 1130 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
         let mut kept = [0.0; 386];
-        self.rates_part1(q, p&mut kept);
-        self.rates_part2(q, p&mut kept);
-        self.rates_part3(q, p&mut kept);
+        self.rates_part1(q, p, &mut kept);
+        self.rates_part2(q, p, &mut kept);
+        self.rates_part3(q, p, &mut kept);
         qd[0] = kept[353];
         qd[1] = kept[354];
         qd[2] = -kept[355];
@@ -3328,8 +3328,8 @@ impl Solo12 {
     /// 1612 operations: 800 additions, 798 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 19], p: &[f64; 18], v: &mut [f64; 18]) {
         let mut kept = [0.0; 163];
-        self.velocities_part1(q, p&mut kept);
-        self.velocities_part2(q, p&mut kept);
+        self.velocities_part1(q, p, &mut kept);
+        self.velocities_part2(q, p, &mut kept);
         v[0] = -kept[150];
         v[1] = kept[149];
         v[2] = kept[148];
@@ -5382,7 +5382,6 @@ impl Solo12 {
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 614 operations: 270 additions, 344 multiplications, 0 divisions; apart: 0 square roots, 12 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn momenta(&self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
         let q_7 = q[7];
         let q_8 = q[8];
@@ -6112,8 +6111,8 @@ impl Solo12 {
     /// 1702 operations: 844 additions, 844 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 19], p: &[f64; 18]) -> [f64; 2] {
         let mut kept = [0.0; 155];
-        self.energy_part1(q, p&mut kept);
-        self.energy_part2(q, p&mut kept);
+        self.energy_part1(q, p, &mut kept);
+        self.energy_part2(q, p, &mut kept);
         let kinetic = -kept[153];
         let potential = -kept[154];
         [kinetic, potential]
@@ -8268,9 +8267,9 @@ impl Solo12 {
     /// 2880 operations: 1381 additions, 1485 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
         let mut kept = [0.0; 422];
-        self.accelerations_part1(q, v&mut kept);
-        self.accelerations_part2(q, v&mut kept);
-        self.accelerations_part3(q, v&mut kept);
+        self.accelerations_part1(q, v, &mut kept);
+        self.accelerations_part2(q, v, &mut kept);
+        self.accelerations_part3(q, v, &mut kept);
         a[0] = -kept[266];
         a[1] = kept[267];
         a[2] = kept[268];

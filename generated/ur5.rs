@@ -27,7 +27,7 @@ pub struct Ur5 {
     pub tau: [f64; 6],
 }
 
-#[allow(clippy::all, clippy::pedantic, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Ur5 {
     /// Number of coordinates.
@@ -70,7 +70,6 @@ impl Ur5 {
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
     /// 373 operations: 164 additions, 204 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -1013,7 +1012,6 @@ impl Ur5 {
 
     /// Kinetic and potential energy, J.
     /// 288 operations: 125 additions, 158 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -1360,7 +1358,6 @@ impl Ur5 {
 
     /// Accelerations: `(q, v) → v̇`.
     /// 553 operations: 242 additions, 306 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
-    #[rustfmt::skip]
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         let q_1 = q[1];
         let q_2 = q[2];

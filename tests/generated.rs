@@ -115,7 +115,6 @@ macro_rules! output {
         same("qd", state, &qd, &qd2);
         same("pd", state, &pd, &pd2);
         $system.coordinate_rates(&q, &v, &mut qd);
-        System::coordinate_rates(&$interpreter, &q.to_vec(), &v.to_vec(), &mut Vec::from(qd2));
         same("coordinate rates", state, &qd, &qd2);
     };
     (velocities, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {

@@ -187,10 +187,12 @@ impl ScalarArg {
 
 /// `mbd check`.
 #[derive(Args)]
-#[command(after_help = "Every finding names file, line and column and says what to do; all findings of a file come at once.
+#[command(
+    after_help = "Every finding names file, line and column and says what to do; all findings of a file come at once.
 
 With --generated, every file that manifest.toml in that directory lists is generated anew and compared with what is there:
-put it into your continuous integration, so that generated code never falls behind its model.")]
+put it into your continuous integration, so that generated code never falls behind its model."
+)]
 pub struct CheckArgs {
     /// Descriptions of mechanisms, `.toml` or `.urdf`
     #[arg(required_unless_present = "generated")]
@@ -207,9 +209,11 @@ pub struct CheckArgs {
 
 /// `mbd count`.
 #[derive(Args)]
-#[command(after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine stand
+#[command(
+    after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine stand
 apart. Below each output stand the sweeps it consists of; what a sweep shares with an earlier one is counted there.
-For serial chains of three or more pins on a fixed base, published formulas stand beside.")]
+For serial chains of three or more pins on a fixed base, published formulas stand beside."
+)]
 pub struct CountArgs {
     #[command(flatten)]
     pub model: ModelArgs,
@@ -222,11 +226,13 @@ pub struct CountArgs {
 
 /// `mbd generate`.
 #[derive(Args)]
-#[command(after_help = "The code depends on the runtime alone: no allocation, no std. Its header says where every coordinate stands and what each
+#[command(
+    after_help = "The code depends on the runtime alone: no allocation, no std. Its header says where every coordinate stands and what each
 function costs. The same model and options give the same bytes everywhere.
 
 In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
-file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime.")]
+file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."
+)]
 pub struct GenerateArgs {
     #[command(flatten)]
     pub model: ModelArgs,
@@ -303,14 +309,16 @@ pub enum Quantity {
 
 /// `mbd simulate`.
 #[derive(Args)]
-#[command(after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints stay where they are, dampers and springs of the
+#[command(
+    after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints stay where they are, dampers and springs of the
 model act. The method is the classical Runge-Kutta method of order 4 with a fixed step.
 
 The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
 floating joints neutral; every velocity 0.1 (rad/s or m/s).
 
 Without dampers the energy must stay what it is: its change is the error of the simulation, and is printed relative to the
-largest kinetic energy met.")]
+largest kinetic energy met."
+)]
 pub struct SimulateArgs {
     #[command(flatten)]
     pub model: ModelArgs,
@@ -345,13 +353,15 @@ pub struct SimulateArgs {
 
 /// `mbd explain`.
 #[derive(Args)]
-#[command(after_help = "frames    the tree the sweeps run on: which bodies have been merged, the screws from joint to joint, the zeros in the inertias
+#[command(
+    after_help = "frames    the tree the sweeps run on: which bodies have been merged, the screws from joint to joint, the zeros in the inertias
 trace     operations the sweeps made on symbols, and how many of them any output needs
 simplify  the program itself, one operation a line, under the body and quantity it belongs to
 schedule  its order: parts, values alive at once, longest chain of operations
 
 Rewriting happens while the sweeps run (0 + x, 1 x, 0 x, signs, constants, equal operations), so that what a sweep makes is
-simplified already: `trace` counts the operations that survived this, and `simplify` shows those that are also needed.")]
+simplified already: `trace` counts the operations that survived this, and `simplify` shows those that are also needed."
+)]
 pub struct ExplainArgs {
     #[command(flatten)]
     pub model: ModelArgs,

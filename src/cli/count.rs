@@ -53,7 +53,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         if options.efforts { "given" } else { "none" },
         gravity(&plan)
     )?;
-    table(&counts, true, out)?;
+    table(&counts, &options.outputs, out)?;
     rivals(&plan, &counts, out)?;
     let group = options.outputs.first().map_or("", |g| g.name());
     if !parts.is_empty() {
@@ -96,10 +96,10 @@ fn of_program(group: &GroupProgram) -> OutputCounts {
     OutputCounts { group: group.group, counts: program.counts(), sweeps }
 }
 
-/// The table of counts, with a row for each sweep if wanted.
-pub fn table(counts: &[OutputCounts], sweeps: bool, out: &mut dyn Write) -> Outcome {
-    let names = counts.iter().flat_map(|c| c.sweeps.iter().map(|s| s.0));
-    let wide = names.filter(|_| sweeps).map(|n| n.chars().count() + 2).max().unwrap_or(0).max(16);
+/// The table of counts, with a row for each sweep of the outputs in `detailed`.
+pub fn table(counts: &[OutputCounts], detailed: &[Group], out: &mut dyn Write) -> Outcome {
+    let names = counts.iter().filter(|c| detailed.contains(&c.group)).flat_map(|c| c.sweeps.iter().map(|s| s.0));
+    let wide = names.map(|n| n.chars().count() + 2).max().unwrap_or(0).max(16);
     let mut row = |name: &str, numbers: [&str; 6]| {
         let gap = " ".repeat(wide.saturating_sub(name.chars().count()));
         let cells: String = numbers.iter().map(|n| format!("{n:>8}")).collect();
@@ -112,7 +112,7 @@ pub fn table(counts: &[OutputCounts], sweeps: bool, out: &mut dyn Write) -> Outc
             row(name, [&n[0], &n[1], &n[2], &n[3], &n[4], &n[5]])
         };
         line(output.group.name(), &output.counts)?;
-        for (name, counts) in output.sweeps.iter().filter(|_| sweeps) {
+        for (name, counts) in output.sweeps.iter().filter(|_| detailed.contains(&output.group)) {
             line(&format!("  {name}"), counts)?;
         }
     }
@@ -124,7 +124,8 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
     let rates = counts.iter().find(|c| c.group == Group::Rates);
     let (Some(n), Some(rates)) = (chain_of_pins(plan), rates) else { return Ok(()) };
     let ours = rates.counts.total();
-    writeln!(out, "\nForward dynamics of {n} pins in a row, published formulas (upper bounds for any such chain):")?;
+    writeln!(out, "\nForward dynamics of {n} pins in a row, beside published formulas (upper bounds for any such chain, whereas the")?;
+    writeln!(out, "structure of this one is used; models/chain6.toml is a chain without any):")?;
     writeln!(out, "  {:<36}{:>12}{:>8}", "this model, rates", "", ours)?;
     for rival in &RIVALS {
         let theirs = rival.operations(n);
@@ -207,15 +208,12 @@ fn as_json(plan: &Plan, counts: &[OutputCounts], parts: &[Part], out: &mut dyn W
         })
         .collect();
     let published = chain_of_pins(plan).map_or(Vec::new(), |n| {
-        let rival = |r: &super::rivals::Rival| {
-            json!({ "name": r.name, "formula": r.formula(), "operations": r.operations(n) })
-        };
+        let rival =
+            |r: &super::rivals::Rival| json!({ "name": r.name, "formula": r.formula(), "operations": r.operations(n) });
         RIVALS.iter().map(rival).collect()
     });
-    let parts: Vec<_> = parts
-        .iter()
-        .map(|p| json!({ "part": p.what, "operations": p.operations, "present": p.present }))
-        .collect();
+    let parts: Vec<_> =
+        parts.iter().map(|p| json!({ "part": p.what, "operations": p.operations, "present": p.present })).collect();
     let model = json!({ "name": plan.model.name, "nq": plan.dims.nq, "nv": plan.dims.nv });
     let all = json!({ "model": model, "outputs": outputs, "published": published, "parts": parts });
     let text = serde_json::to_string_pretty(&all).map_err(std::io::Error::from)?;

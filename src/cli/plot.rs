@@ -15,15 +15,17 @@ pub struct Panel {
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-const WIDTH: u32 = 1100;
+/// The backend rounds to whole units: drawn so much larger than shown, lines are smooth.
+const SCALE: u32 = 3;
+const WIDTH: u32 = 1100 * SCALE;
 /// Width of the legend.
-const LEGEND: u32 = 210;
-const TITLE: u32 = 36;
+const LEGEND: u32 = 210 * SCALE;
+const TITLE: u32 = 36 * SCALE;
 /// Points of one line; more make large files and no better picture.
 const POINTS: usize = 600;
 /// Entries of a legend; more cannot be told apart.
 const ENTRIES: usize = 40;
-const ROW: u32 = 14;
+const ROW: u32 = 14 * SCALE;
 
 /// Panels below each other, all over the same time.
 pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
@@ -35,13 +37,22 @@ pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
         let drawn = draw(&root, title, panels, &heights);
         drawn.and_then(|()| root.present()).map_err(|e| e.to_string())?;
     }
-    Ok(text)
+    Ok(shrunk(&text))
+}
+
+/// The picture at the size it is shown; what is drawn keeps its units by the `viewBox`.
+fn shrunk(text: &str) -> String {
+    let number = |key: &str| {
+        let value = text.split(key).nth(1).and_then(|rest| rest.split('"').next());
+        value.and_then(|v| v.parse::<u32>().ok()).map(|v| (format!("{key}{v}\""), format!("{key}{}\"", v / SCALE)))
+    };
+    [" width=\"", " height=\""].into_iter().filter_map(number).fold(text.to_string(), |t, (a, b)| t.replacen(&a, &b, 1))
 }
 
 fn height(panel: &Panel, last: bool) -> u32 {
     let entries = panel.lines.iter().filter(|l| !l.0.is_empty()).count();
-    let legend = ROW * (entries.min(ENTRIES + 1) as u32) + 40;
-    legend.max(if last { 230 } else { 300 })
+    let legend = ROW * (entries.min(ENTRIES + 1) as u32) + 40 * SCALE;
+    legend.max(SCALE * if last { 230 } else { 300 })
 }
 
 fn draw(
@@ -51,8 +62,8 @@ fn draw(
     heights: &[u32],
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     root.fill(&WHITE)?;
-    let style = ("sans-serif", 18).into_font().color(&BLACK);
-    root.draw(&Text::new(title.to_string(), (16, 12), style))?;
+    let style = ("sans-serif", 18 * SCALE).into_font().color(&BLACK);
+    root.draw(&Text::new(title.to_string(), (16 * SCALE as i32, 12 * SCALE as i32), style))?;
     let mut rest = root.split_vertically(TITLE).1;
     for (panel, &height) in panels.iter().zip(heights) {
         let (here, below) = rest.split_vertically(height);
@@ -77,30 +88,32 @@ fn draw_chart(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std
     // A constant still wants a range.
     let pad = ((high - low) * 0.05).max(low.abs().max(high.abs()) * 1e-3).max(1e-18);
     let mut chart = ChartBuilder::on(area)
-        .margin(8)
-        .x_label_area_size(38)
-        .y_label_area_size(78)
+        .margin(8 * SCALE)
+        .x_label_area_size(38 * SCALE)
+        .y_label_area_size(78 * SCALE)
         .build_cartesian_2d(0.0..end, low - pad..high + pad)?;
     let step = tick(high - low + 2.0 * pad, 6);
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(222, 222, 222))
+        .bold_line_style(RGBColor(222, 222, 222).stroke_width(SCALE))
+        .axis_style(RGBColor(90, 90, 90).stroke_width(SCALE))
+        .set_all_tick_mark_size(4 * SCALE)
         .x_desc("time [s]")
         .y_desc(panel.label.as_str())
         .x_labels(11)
         .y_labels(6)
         .x_label_formatter(&|t| number(*t, tick(end, 11)))
         .y_label_formatter(&|y| number(*y, step))
-        .label_style(("sans-serif", 12))
-        .axis_desc_style(("sans-serif", 13))
+        .label_style(("sans-serif", 12 * SCALE))
+        .axis_desc_style(("sans-serif", 13 * SCALE))
         .draw()?;
     let stride = panel.t.len().div_ceil(POINTS).max(1);
     for (k, (_, values)) in panel.lines.iter().enumerate() {
         let last = panel.t.len().saturating_sub(1);
         let points = panel.t.iter().copied().zip(values.iter().copied()).enumerate();
         let points = points.filter(|(i, _)| i % stride == 0 || *i == last).map(|(_, point)| point);
-        chart.draw_series(LineSeries::new(points, colour(k).stroke_width(1)))?;
+        chart.draw_series(LineSeries::new(points, colour(k).stroke_width(SCALE)))?;
     }
     Ok(())
 }
@@ -108,16 +121,17 @@ fn draw_chart(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std
 fn draw_legend(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     let named: Vec<(usize, &str)> =
         panel.lines.iter().enumerate().map(|(k, l)| (k, l.0.as_str())).filter(|(_, n)| !n.is_empty()).collect();
-    let style = ("sans-serif", 11).into_font().color(&BLACK);
-    let row = |k: usize| 14 + (k as u32 * ROW) as i32;
+    let style = ("sans-serif", 11 * SCALE).into_font().color(&BLACK);
+    let unit = SCALE as i32;
+    let row = |k: usize| 14 * unit + (k as u32 * ROW) as i32;
     for (place, (k, name)) in named.iter().take(ENTRIES).enumerate() {
         let y = row(place);
-        area.draw(&PathElement::new([(4, y), (22, y)], colour(*k).stroke_width(2)))?;
-        area.draw(&Text::new(shortened(name), (28, y - 6), style.clone()))?;
+        area.draw(&PathElement::new([(4 * unit, y), (22 * unit, y)], colour(*k).stroke_width(2 * SCALE)))?;
+        area.draw(&Text::new(shortened(name), (28 * unit, y - 6 * unit), style.clone()))?;
     }
     if named.len() > ENTRIES {
         let rest = format!("and {} more", named.len() - ENTRIES);
-        area.draw(&Text::new(rest, (28, row(ENTRIES) - 6), style))?;
+        area.draw(&Text::new(rest, (28 * unit, row(ENTRIES) - 6 * unit), style))?;
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 use multibody::codegen::model::{Gravity, JointKind, Value};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::integrate::Rk4;
+use multibody::runtime::interp::RankLoss;
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
@@ -130,7 +131,8 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     Ok((q, v))
 }
 
-fn default_start(plan: &Plan) -> Vec<f64> {
+/// The start that the help states: see `mbd simulate --help`.
+pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
     let mut q = interpreter.neutral();
     let mut angle = 0.3;
@@ -148,8 +150,8 @@ fn default_start(plan: &Plan) -> Vec<f64> {
     q
 }
 
-/// Steps and records.
-fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), time: f64, steps: u64, every: u64) -> Outcome<Record> {
+/// Steps and records, through the interpreter.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), time: f64, steps: u64, every: u64) -> Outcome<Record> {
     let params = plan.default_params();
     let gravity = match plan.model.gravity {
         // As the fields of generated code start.
@@ -159,6 +161,7 @@ fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), time: f64, steps: u64, ev
     let mut system = Interpreter::new(plan.tree(&params), gravity);
     // A second one for the energy, so that the first is left as the integrator knows it.
     let mut observer = system.clone();
+    observer.check_rank(&q).map_err(|e| rank_failure(plan, &e))?;
     let (mut q, mut p) = (q, vec![0.0; plan.dims.nv]);
     system.momenta(&q, &v, &mut p);
     let h = time / steps as f64;
@@ -187,6 +190,15 @@ fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), time: f64, steps: u64, ev
     }
     progress.clear();
     Ok(record)
+}
+
+/// A mechanism that cannot move by its own laws.
+pub fn rank_failure(plan: &Plan, e: &RankLoss) -> Failure {
+    let name = plan.velocity_names().get(e.velocity).cloned().unwrap_or_default();
+    Failure::new(
+        format!("the mass matrix is singular: freedom `{name}` moves an inertia of {:e}", e.inertia),
+        "give the bodies behind this joint mass and inertia, or the joint an armature",
+    )
 }
 
 /// A line on a terminal that tells how far a long run is.
@@ -269,7 +281,7 @@ pub fn panels(plan: &Plan, record: &Record) -> Vec<Panel> {
             lines: chosen.into_iter().map(line).collect(),
         });
     }
-    let label = "energy change / largest kinetic energy".to_string();
+    let label = "relative energy change".to_string();
     panels.push(Panel { label, t: record.t.clone(), lines: vec![(String::new(), record.errors())] });
     panels
 }

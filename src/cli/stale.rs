@@ -86,7 +86,8 @@ fn read(path: &Path) -> Outcome<Manifest> {
     })
 }
 
-const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
+const KEYS: &str =
+    "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
                     `gravity`, `scalar`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// What a file should hold.
@@ -172,10 +173,7 @@ fn strays(directory: &Path, wanted: &[(String, String)]) -> Outcome<usize> {
     names.sort_unstable();
     for name in &names {
         let path = directory.join(name);
-        note(format_args!(
-            "{}: error: not in {MANIFEST}\n  help: add it to the manifest or delete it",
-            path.display()
-        ));
+        note(format_args!("{}: error: not in {MANIFEST}\n  help: add it to the manifest or delete it", path.display()));
     }
     Ok(names.len())
 }

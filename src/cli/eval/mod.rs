@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
 use super::output::{note, write_file};
+use super::simulate::rank_failure;
 use super::{source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;
@@ -71,11 +72,9 @@ pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
         true => Quantity::value_variants(),
         false => &args.outputs[..],
     };
-    let text = evaluate(&plan, &outer, &inputs, wanted).map_err(|(state, key)| {
-        Failure::new(
-            format!("{name}: states[{state}]: the result `{key}` is not finite"),
-            "look for very large inputs, or for bodies without inertia at the end of a chain",
-        )
+    let text = evaluate(&plan, &outer, &inputs, wanted).map_err(|(state, failure)| match failure {
+        Failure::Message(what, help) => Failure::new(format!("{name}: states[{state}]: {what}"), help),
+        other => other,
     })?;
     match &args.output {
         Some(file) => write_file(file, &text),
@@ -90,21 +89,23 @@ fn standard_input() -> Outcome<String> {
     Ok(text)
 }
 
-/// JSON of all results, one state a line; or state and key of a result that is not finite.
-fn evaluate(
-    plan: &Plan,
-    outer: &Outer,
-    inputs: &Inputs,
-    wanted: &[Quantity],
-) -> Result<String, (usize, &'static str)> {
+/// JSON of all results, one state a line; or the state that has none, and why.
+fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) -> Result<String, (usize, Failure)> {
     // Parameters of the file, not the defaults of the model.
     let params = &inputs.params;
     let mut interpreter = Interpreter::new(plan.tree(params), plan.gravity(params));
+    // Momenta and the mass matrix exist without inertia; nothing else does.
+    let needs_rank = wanted.iter().any(|w| !matches!(w, Quantity::Momenta | Quantity::MassMatrix));
     let mut lines = Vec::new();
     for (k, state) in inputs.states.iter().enumerate() {
+        state.apply(&mut interpreter);
+        if needs_rank {
+            interpreter.check_rank(&state.q).map_err(|e| (k, rank_failure(plan, &e)))?;
+        }
         let results = results(plan, outer, &mut interpreter, state, wanted);
         if let Some(key) = results.not_finite() {
-            return Err((k, key));
+            let what = format!("the result `{key}` is not finite");
+            return Err((k, Failure::new(what, "look for very large numbers in the input")));
         }
         // Finite numbers and fixed keys always make a text.
         lines.push(serde_json::to_string(&results).unwrap_or_default());
@@ -121,7 +122,6 @@ fn results(
 ) -> Results {
     let (nq, nv) = (plan.dims.nq, plan.dims.nv);
     let (q, v) = (&state.q, &state.v);
-    state.apply(interpreter);
     let has = |what: Quantity| wanted.contains(&what);
     let mut out = Results::default();
     let mut p = vec![0.0; nv];

@@ -32,7 +32,11 @@ pub fn print(plan: &Plan, out: &mut dyn Write) -> Outcome {
     let turns = plan.nodes.iter().flat_map(|n| &n.place).filter(|s| matches!(s, PoseStep::Turn { .. }));
     let (right, all) = turns.fold((0, 0), |(r, a), s| (r + usize::from(is_right(s)), a + 1));
     let zeros = plan.nodes.iter().flat_map(|n| n.inertia).filter(|x| *x == 0.0).count();
-    writeln!(out, "\nVanished: {right} of {all} constant turns are right angles; {zeros} of {} inertia numbers are zero.", 10 * plan.nodes.len())?;
+    writeln!(
+        out,
+        "\nVanished: {right} of {all} constant turns are right angles; {zeros} of {} inertia numbers are zero.",
+        10 * plan.nodes.len()
+    )?;
     Ok(())
 }
 

@@ -100,7 +100,10 @@ pub fn schedule(group: &GroupProgram, chunk: usize, out: &mut dyn Write) -> Outc
     writeln!(out, "  values alive at once, inputs left out: at most {most} (in: {place})")?;
     let depth = depth(group);
     let width = statements as f64 / depth.max(1) as f64;
-    writeln!(out, "  longest chain of operations: {depth}; {width:.1} could run at once on average, each taking one step\n")?;
+    writeln!(
+        out,
+        "  longest chain of operations: {depth}; {width:.1} could run at once on average, each taking one step\n"
+    )?;
     Ok(())
 }
 
