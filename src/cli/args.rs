@@ -82,13 +82,9 @@ pub struct ModelArgs {
     pub model: PathBuf,
     #[command(flatten)]
     pub import: ImportArgs,
-}
-
-impl ModelArgs {
-    /// As the readers take it.
-    pub fn import(&self) -> ImportOptions {
-        self.import.import()
-    }
+    /// Bodies on which an external wrench acts, in body axes, beside those the model names; with commas between
+    #[arg(long = "wrench", value_name = "LIST", value_delimiter = ',')]
+    pub wrenches: Vec<String>,
 }
 
 /// Attachment of the root.

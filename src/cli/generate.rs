@@ -12,7 +12,7 @@ use super::{source, Failure, Outcome};
 /// Generates code and prints or writes it.
 pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
-    let model = source::model(path, &args.model.import())?;
+    let model = source::model_of(&args.model)?;
     let base = Options { runtime: args.runtime.clone(), source: shown(path), ..args.code.options(&model.name) };
     let generated = codegen::generate(&model, &base).map_err(frame_failure)?;
     source::tell_notices(path, &generated.notices);

@@ -55,7 +55,7 @@ impl Record {
 /// Simulates and writes.
 pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
-    let mut model = source::model(path, &args.model.import())?;
+    let mut model = source::model_of(&args.model)?;
     let damped = model.joints.iter().any(|j| j.damping.iter().any(|d| *d != Value::ZERO));
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));

@@ -4,7 +4,7 @@ use std::io::Read;
 use std::path::Path;
 
 use multibody::codegen::import::{load, words, ImportOptions};
-use multibody::codegen::model::Model;
+use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::plan::{Plan, PlanOptions};
 
 use super::args::ModelArgs;
@@ -58,9 +58,27 @@ pub fn model(path: &Path, options: &ImportOptions) -> Outcome<Model> {
     model.ok_or(Failure::Shown)
 }
 
+/// The model of a command's arguments, with the wrenches they ask for.
+pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
+    let mut model = model(&args.model, &args.import.import())?;
+    for name in &args.wrenches {
+        let names = model.bodies.iter().map(|b| b.name.as_str());
+        let Some(body) = model.bodies.iter().position(|b| b.name == *name) else {
+            let help = words::did_you_mean(name, names.clone(), || format!("bodies are {}", words::list(names)));
+            return Err(Failure::new(format!("--wrench: no body is named {}", words::quote(name)), help));
+        };
+        if model.wrenches.iter().any(|w| w.name == *name) {
+            let what = format!("--wrench: there is a wrench named {} already", words::quote(name));
+            return Err(Failure::new(what, "name each body once, and none that the model names"));
+        }
+        model.wrenches.push(Wrench { name: name.clone(), body, axes: WrenchAxes::Body });
+    }
+    Ok(model)
+}
+
 /// The plan of a model, with its notices told.
 pub fn plan(args: &ModelArgs, snap: f64) -> Outcome<Plan> {
-    let plan = Plan::new(&model(&args.model, &args.import())?, PlanOptions { snap });
+    let plan = Plan::new(&model_of(args)?, PlanOptions { snap });
     tell_notices(&args.model, &plan.notices);
     Ok(plan)
 }
