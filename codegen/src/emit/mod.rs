@@ -22,7 +22,7 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     let name = &options.type_name;
     let _ = writeln!(
         out,
-        "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {name} {{"
+        "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]\n#[rustfmt::skip]\nimpl {name} {{"
     );
     layout::constants(&mut out, plan, options);
     layout::constructor(&mut out, plan, options);
