@@ -69,8 +69,12 @@ fn weights(elements: &Elements) -> Vec<usize> {
 
 /// Way to the axis of an element: constants factored into screws, parameters left as they stand.
 fn factored(pose: &[PoseStep]) -> Screws {
+    let lengths = |pose: &[PoseStep]| {
+        let shifts = pose.iter().map(|step| if let PoseStep::Shift { r, .. } = step { r.constant() } else { None });
+        shifts.flatten().fold(0.0, |sum, r| sum + r.abs())
+    };
     if let Some(t) = constant(pose) {
-        return screws(&t);
+        return screws(&t, lengths(pose));
     }
     // Constant stretches between parameters are factored each by itself.
     let mut steps = Vec::new();
@@ -84,7 +88,7 @@ fn factored(pose: &[PoseStep]) -> Screws {
         stretch.clear();
         steps.push(*step);
     }
-    let rest = constant(&stretch).map_or(screws(&Rigid::IDENTITY), |t| screws(&t));
+    let rest = screws(&constant(&stretch).unwrap_or(Rigid::IDENTITY), lengths(&stretch));
     steps.extend(rest.steps);
     Screws { steps, turn: rest.turn, slide: rest.slide }
 }
@@ -165,7 +169,8 @@ fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn,
     let along = point[0] * ux + point[1] * uy + point[2] * uz;
     let h = (point[2] - along * uz) / (sine * sine);
     if sine < 1e-6 || h.abs() > 20.0 * size {
-        return ((1.0, 0.0), 0.0); // nearly parallel: the common normal is too far away to be of use
+        // Nearly parallel: the common normal is too far away to be of use, but its direction is not.
+        return (unit(-uy, ux), point[2]);
     }
     (unit(-uy, ux), if h.abs() <= ROUND_OFF * size { 0.0 } else { h })
 }

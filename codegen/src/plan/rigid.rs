@@ -110,15 +110,17 @@ fn shift_step(steps: &mut Vec<PoseStep>, axis: Axis, r: f64) {
 }
 
 /// Factors a pose into screws. Axes that nearly coincide in direction have their common normal far away: then the
-/// displacement is made first and the screws only turn.
-pub fn screws(t: &Rigid) -> Screws {
+/// displacement is made first and the screws only turn. `lengths` is the size of what the displacement was made of, which
+/// tells its round-off.
+pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let (rot, pos) = (&t.rot, t.pos);
     let size = pos.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let scale = lengths.max(size);
     let sin_alpha = rot[0][2].hypot(rot[1][2]);
     let mut steps = Vec::new();
     if sin_alpha < ROUND_OFF {
         // Parallel axes: the first screw only points x at the other axis.
-        let (x, y) = (clean(pos[0], size), clean(pos[1], size));
+        let (x, y) = (clean(pos[0], scale), clean(pos[1], scale));
         let gamma = if y == 0.0 { (1.0, 0.0) } else { clean_turn(x, y) };
         let a = gamma.0 * x + gamma.1 * y;
         let up = rot[2][2].signum();
@@ -128,33 +130,43 @@ pub fn screws(t: &Rigid) -> Screws {
         // R = Rz(γ) Rx(0 or π) Rz(θ)
         let (c, s) = (rot[0][0], rot[1][0]);
         let turn = clean_turn(gamma.0 * c + gamma.1 * s, up * (gamma.0 * s - gamma.1 * c));
-        return Screws { steps, turn, slide: up * clean(pos[2], size) };
+        return Screws { steps, turn, slide: up * clean(pos[2], scale) };
     }
     let sign = if rot[1][2] > 0.0 { -1.0 } else { 1.0 };
-    let gamma = clean_turn(-rot[1][2] * sign, rot[0][2] * sign);
+    let mut gamma = clean_turn(-rot[1][2] * sign, rot[0][2] * sign);
+    if gamma.1.abs() < ROUND_OFF / sin_alpha {
+        // The nearer the axes to parallel, the less certain the direction of their normal. What is dropped here comes back
+        // in the last turn, which is what is left of the rotation.
+        gamma = (gamma.0.signum(), 0.0);
+    }
     let alpha = clean_turn(rot[2][2], sign * sin_alpha);
-    let turn = clean_turn(rot[2][1] * sign, rot[2][0] * sign);
+    let row = |k: usize| gamma.0 * rot[0][k] + gamma.1 * rot[1][k];
+    let turn = clean_turn(row(0), -row(1));
     let across = [gamma.0 * pos[0] + gamma.1 * pos[1], gamma.0 * pos[1] - gamma.1 * pos[0]];
-    let d = -across[1] / alpha.1;
-    let b = pos[2] - alpha.0 * d;
+    let mut d = -across[1] / alpha.1;
+    let mut b = pos[2] - alpha.0 * d;
+    if b.abs() <= ROUND_OFF * scale / sin_alpha {
+        // As little certain as the normal; all but `b sin α` of it comes back in the last slide.
+        (b, d) = (0.0, d + alpha.0 * b);
+    }
     if sin_alpha < 1e-6 || b.abs().max(d.abs()) > 20.0 * size {
         for (axis, r) in [Axis::X, Axis::Y, Axis::Z].into_iter().zip(pos) {
-            shift_step(&mut steps, axis, clean(r, size));
+            shift_step(&mut steps, axis, clean(r, scale));
         }
         turn_step(&mut steps, Axis::Z, gamma);
         turn_step(&mut steps, Axis::X, alpha);
         return Screws { steps, turn, slide: 0.0 };
     }
-    shift_step(&mut steps, Axis::Z, clean(b, size));
+    shift_step(&mut steps, Axis::Z, b);
     turn_step(&mut steps, Axis::Z, gamma);
-    shift_step(&mut steps, Axis::X, clean(across[0], size));
+    shift_step(&mut steps, Axis::X, clean(across[0], scale));
     turn_step(&mut steps, Axis::X, alpha);
-    Screws { steps, turn, slide: clean(d, size) }
+    Screws { steps, turn, slide: clean(d, scale) }
 }
 
 /// A constant pose as steps, nothing left over.
 pub fn all_steps(t: &Rigid) -> Vec<PoseStep> {
-    let Screws { mut steps, turn, slide } = screws(t);
+    let Screws { mut steps, turn, slide } = screws(t, 0.0);
     shift_step(&mut steps, Axis::Z, slide);
     turn_step(&mut steps, Axis::Z, turn);
     steps

@@ -1,0 +1,180 @@
+//! Operation counts of random mechanisms: limits, and that what a scene does not have costs nothing.
+
+use mbd_codegen::generate::{generate, trace};
+use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::symbolic::Counts;
+use mbd_codegen::{Group, Options};
+use mbd_runtime::sweep::Quantity;
+use mbd_testing::random::{random_model, Knobs};
+
+const NONE: Gravity = Gravity::Constant([Value::ZERO; 3]);
+
+fn program(model: &Model, group: Group, efforts: bool) -> mbd_codegen::symbolic::Program {
+    let options = Options { efforts, ..Options::default() };
+    trace(&Plan::new(model, options.plan), group, &options).expect("no frames are named").program
+}
+
+fn counts(model: &Model, group: Group) -> Counts {
+    program(model, group, false).counts()
+}
+
+/// A chain of `n` pins, general in every number.
+fn general_chain(seed: u64, n: usize) -> Model {
+    let knobs = Knobs { bodies: (n, n), gravity: [0.0, 1.0, 0.0], ..Knobs::default() };
+    let mut model = random_model(seed, &knobs);
+    // Identity placements happen one time in six; here nothing may be aligned.
+    for (k, joint) in model.joints.iter_mut().enumerate() {
+        if joint.placement.rotation == Rotation::NONE {
+            joint.placement.rotation = Rotation::Rpy([0.3, 0.7, 1.1 + k as f64].map(Value::Const));
+        }
+    }
+    model
+}
+
+/// The same in a plane: vertical axes, placements turned about them.
+fn planar_chain(seed: u64, n: usize) -> Model {
+    let mut model = general_chain(seed, n);
+    for joint in &mut model.joints {
+        joint.kind = JointKind::Pin { axis: [0.0, 0.0, 1.0] };
+        joint.placement.rotation = Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(0.4)]);
+        joint.placement.xyz[2] = Value::ZERO;
+    }
+    model
+}
+
+/// What a general chain of pins may cost: 294 operations a body, less 440 for the ends.
+#[test]
+fn general_chains_stay_below_their_limit() {
+    for seed in 0..5 {
+        let mut last = 0;
+        for n in 3..=20 {
+            let count = counts(&general_chain(seed, n), Group::Rates).total();
+            assert!(count <= 294 * n - 440, "seed {seed}: {count} operations for {n} bodies");
+            assert!(count > last, "seed {seed}: {count} operations for {n} bodies, {last} for one less");
+            last = count;
+        }
+        println!("seed {seed}: {last} operations for 20 bodies, limit {}", 294 * 20 - 440);
+    }
+}
+
+/// Planar chains: the cost of one more body is always the same, and a fraction of that in space.
+#[test]
+fn planar_chains_are_cheap() {
+    for seed in 0..5 {
+        let count = |n: usize| counts(&planar_chain(seed, n), Group::Rates).total();
+        let step = count(5) - count(4);
+        println!("seed {seed}: {} operations for 10 bodies, {step} for each more", count(10));
+        for n in 4..20 {
+            assert_eq!(count(n + 1) - count(n), step, "seed {seed}, {n} bodies");
+        }
+        // What it was when this was written: a gate, not a theorem.
+        assert!(step <= 63, "seed {seed}: {step} operations a body");
+    }
+}
+
+/// Inertial forces only: no operation of the rates belongs to gravity or wrenches.
+#[test]
+fn absent_loads_cost_nothing() {
+    for seed in 0..100 {
+        let knobs = Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6) };
+        let mut model = random_model(seed, &knobs);
+        model.gravity = NONE;
+        let loads = program(&model, Group::Rates, true).counts_where(|(_, what)| *what == Quantity::Load);
+        assert_eq!(loads, Counts::default(), "seed {seed}");
+        let without = counts(&model, Group::Rates).total();
+        model.gravity = Gravity::Input;
+        assert!(counts(&model, Group::Rates).total() >= without, "seed {seed}");
+    }
+}
+
+/// Wrenches and gravity are no part of velocities, momenta and the mass matrix; wrenches none of the energy.
+#[test]
+fn loads_stay_out_of_what_does_not_depend_on_them() {
+    for seed in 0..100 {
+        let mut model = random_model(seed, &Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6) });
+        let all = |model: &Model, groups: &[Group]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
+        let kinematic = [Group::Velocities, Group::Momenta, Group::MassMatrix, Group::Frames];
+        let before = (all(&model, &kinematic), counts(&model, Group::Energy));
+        model.wrenches.push(Wrench { name: "w".to_string(), body: 0, axes: WrenchAxes::World });
+        assert_eq!(before, (all(&model, &kinematic), counts(&model, Group::Energy)), "seed {seed}: a wrench");
+        model.gravity = Gravity::Input;
+        assert_eq!(before.0, all(&model, &kinematic), "seed {seed}: gravity");
+    }
+}
+
+/// Joint forces cost at most one addition each, and nothing where there are none.
+#[test]
+fn efforts_cost_one_addition_each() {
+    for seed in 0..100 {
+        let model = random_model(seed, &Knobs::everything(seed, 6));
+        let nv = Plan::new(&model, Options::default().plan).dims.nv;
+        let [with, without] = [true, false].map(|efforts| program(&model, Group::Rates, efforts).counts());
+        assert!(with.additions <= without.additions + nv, "seed {seed}");
+        assert_eq!((with.multiplications, with.divisions), (without.multiplications, without.divisions), "seed {seed}");
+    }
+}
+
+/// Outputs cost nothing unless they are asked for, and do not change each other.
+#[test]
+fn outputs_are_independent() {
+    for seed in 0..30 {
+        let model = random_model(seed, &Knobs::everything(seed, 5));
+        let generated = |outputs: Vec<Group>| {
+            generate(&model, &Options { outputs, ..Options::default() }).unwrap_or_else(|e| panic!("seed {seed}: {e}"))
+        };
+        let all = generated(Group::ALL.to_vec());
+        for (k, group) in Group::ALL.into_iter().enumerate() {
+            let one = generated(vec![group]);
+            assert_eq!(one.counts, [all.counts[k]], "seed {seed}: {group:?}");
+            for other in Group::ALL.into_iter().filter(|g| *g != group) {
+                assert!(
+                    !one.source.contains(&format!("pub fn {}(", other.name())),
+                    "seed {seed}: {group:?}, {other:?}"
+                );
+            }
+        }
+    }
+}
+
+/// A frame that is not asked for is not computed.
+#[test]
+fn frames_are_chosen_one_by_one() {
+    let model = random_model(3, &Knobs { bodies: (6, 6), ..Knobs::default() });
+    let count = |frames: Vec<String>| {
+        let options = Options { frames, ..Options::default() };
+        let plan = Plan::new(&model, options.plan);
+        trace(&plan, Group::Frames, &options).expect("the frames exist").program.counts().total()
+    };
+    let names: Vec<String> = model.joints.iter().map(|j| model.bodies[j.child].name.clone()).collect();
+    let each: Vec<usize> = names.iter().map(|n| count(vec![n.clone()])).collect();
+    assert!(each.windows(2).all(|w| w[0] < w[1]), "{each:?}: farther out costs more");
+    assert!(count(names) > each[5]);
+}
+
+/// The more of a mechanism is aligned, the less it costs; the same chain with symmetric links costs less still.
+#[test]
+fn structure_pays() {
+    for seed in 0..20 {
+        let total = |model: &Model| counts(model, Group::Rates).total();
+        let general = general_chain(seed, 8);
+        let mut aligned = general.clone();
+        for joint in &mut aligned.joints {
+            let turn = Rotation::Rpy([Value::Const(std::f64::consts::FRAC_PI_2), Value::ZERO, Value::ZERO]);
+            joint.kind = JointKind::Pin { axis: [0.0, 0.0, 1.0] };
+            joint.placement.rotation = turn;
+        }
+        let mut symmetric = aligned.clone();
+        for body in &mut symmetric.bodies {
+            body.com = [Value::ZERO, Value::ZERO, body.com[2]];
+            body.inertia[3..].fill(Value::ZERO);
+            body.inertia_axes = Rotation::NONE;
+        }
+        let counts = [&general, &aligned, &symmetric, &planar_chain(seed, 8)].map(total);
+        println!(
+            "seed {seed}: general {}, aligned {}, symmetric {}, planar {}",
+            counts[0], counts[1], counts[2], counts[3]
+        );
+        assert!(counts.windows(2).all(|w| w[0] > w[1]), "seed {seed}: {counts:?}");
+    }
+}
