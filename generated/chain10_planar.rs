@@ -31,7 +31,7 @@ pub struct Chain10Planar {
     pub tau: [f64; 10],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl Chain10Planar {
     /// Number of coordinates.

@@ -8,12 +8,12 @@
 //   q[1] v[1] elbow: pin, moves lower
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 13 + 20 + 1 = 34; 0, 2
-//   velocities: 6 + 8 + 1 = 15; 0, 1
+//   rates: 14 + 18 + 1 = 33; 0, 2
+//   velocities: 7 + 7 + 1 = 15; 0, 1
 //   momenta: 4 + 6 + 0 = 10; 0, 1
-//   energy: 9 + 16 + 1 = 26; 0, 2
-//   accelerations: 16 + 23 + 1 = 40; 0, 2
-//   reactions: 36 + 42 + 1 = 79; 0, 2
+//   energy: 10 + 14 + 1 = 25; 0, 2
+//   accelerations: 19 + 27 + 1 = 47; 0, 2
+//   reactions: 52 + 59 + 1 = 112; 0, 2
 //   mass_matrix: 4 + 1 + 0 = 5; 0, 1
 //   frames: 6 + 6 + 0 = 12; 0, 2
 
@@ -25,7 +25,7 @@ pub struct DoublePendulum {
     pub tau: [f64; 2],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl DoublePendulum {
     /// Number of coordinates.
@@ -61,7 +61,7 @@ impl DoublePendulum {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 34 operations: 13 additions, 20 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 33 operations: 14 additions, 18 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
         let q_0 = q[0];
@@ -75,29 +75,29 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.7498500299940012 * lower_sin0;
-        let lower_inertia1 = lower_sin0 * lower_inertia0;
-        let lower_inertia2 = lower_inertia1 - 0.7498500299940012;
-        let lower_inertia3 = 0.5 * lower_sin0;
-        let lower_inertia4 = 0.5 * lower_cos0;
-        let lower_inertia5 = lower_inertia4 + 1.5;
-        let lower_inertia6 = lower_inertia2 + 1.3334000000000001;
+        let lower_inertia0 = 0.5 * lower_sin0;
+        let lower_inertia1 = 0.5 * lower_cos0;
+        let lower_inertia2 = lower_inertia1 + lower_inertia1;
+        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
+        let lower_inertia4 = lower_inertia1 + 1.5;
+        let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
+        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia6;
-        // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = 2.9994001199760048 * p_1;
-        let lower_rest1 = 0.5 * lower_rest0;
-        let lower_rest2 = lower_cos0 * lower_rest1;
-        let lower_rest3 = p_1 + lower_rest2;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
+        let upper_pivot1 = lower_inertia6 * upper_pivot0;
+        let upper_pivot2 = lower_inertia5 - upper_pivot1;
+        let upper_pivot3 = 1.0 / upper_pivot2;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = p_0 - lower_rest3;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
+        let upper_rest0 = 2.9994001199760048 * p_1;
+        let upper_rest1 = lower_inertia6 * upper_rest0;
+        let upper_rest2 = p_0 - upper_rest1;
+        let upper_rest3 = upper_pivot3 * upper_rest2;
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = upper_pivot0 * upper_rest3;
+        let upper_vel1 = upper_rest0 - upper_vel0;
         // lower: velocity and joint rate (4.40)
-        let lower_vel0 = lower_sin0 * upper_rest1;
-        let lower_vel1 = lower_cos0 * upper_rest1;
-        let lower_vel2 = 1.4997000599880024 * lower_vel1;
-        let lower_vel3 = upper_rest1 + lower_vel2;
-        let lower_vel4 = lower_rest0 - lower_vel3;
+        let lower_vel0 = lower_sin0 * upper_rest3;
+        let lower_vel1 = upper_rest3 + upper_vel1;
         // upper: gravity and wrenches
         let upper_load0 = 9.81 * upper_cos0;
         let upper_load1 = 9.81 * upper_sin0;
@@ -106,54 +106,52 @@ impl DoublePendulum {
         let lower_load1 = lower_sin0 * upper_load0;
         let lower_load2 = lower_load0 + lower_load1;
         // upper: momentum rate (4.36)
-        let upper_pdot0 = lower_inertia5 * upper_load1;
-        let upper_pdot1 = lower_inertia3 * upper_load0;
+        let upper_pdot0 = lower_inertia4 * upper_load1;
+        let upper_pdot1 = lower_inertia0 * upper_load0;
         let upper_pdot2 = upper_pdot0 + upper_pdot1;
         // lower: momentum rate (4.36)
-        let lower_pdot0 = 0.7498500299940012 * lower_vel1;
-        let lower_pdot1 = lower_rest1 - lower_pdot0;
-        let lower_pdot2 = lower_vel0 * lower_pdot1;
-        let lower_pdot3 = 0.5 * lower_load2;
-        let lower_pdot4 = lower_pdot2 + lower_pdot3;
-        let lower_pdot5 = tau_0 - upper_pdot2;
-        let lower_pdot6 = tau_1 - lower_pdot4;
-        qd[0] = upper_rest1;
-        qd[1] = lower_vel4;
-        pd[0] = lower_pdot5;
-        pd[1] = lower_pdot6;
+        let lower_pdot0 = 0.5 * lower_vel1;
+        let lower_pdot1 = lower_vel0 * lower_pdot0;
+        let lower_pdot2 = 0.5 * lower_load2;
+        let lower_pdot3 = lower_pdot1 + lower_pdot2;
+        let lower_pdot4 = tau_0 - upper_pdot2;
+        let lower_pdot5 = tau_1 - lower_pdot3;
+        qd[0] = upper_rest3;
+        qd[1] = upper_vel1;
+        pd[0] = lower_pdot4;
+        pd[1] = lower_pdot5;
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 15 operations: 6 additions, 8 multiplications, 1 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    /// 15 operations: 7 additions, 7 multiplications, 1 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 2], p: &[f64; 2], v: &mut [f64; 2]) {
         let q_1 = q[1];
         let p_0 = p[0];
         let p_1 = p[1];
         // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
+        let (_, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.7498500299940012 * lower_sin0;
-        let lower_inertia1 = lower_sin0 * lower_inertia0;
-        let lower_inertia2 = lower_inertia1 - 0.7498500299940012;
+        let lower_inertia0 = 0.5 * lower_cos0;
+        let lower_inertia1 = lower_inertia0 + lower_inertia0;
+        let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
         let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
+        let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia3;
-        // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = 2.9994001199760048 * p_1;
-        let lower_rest1 = 0.5 * lower_rest0;
-        let lower_rest2 = lower_cos0 * lower_rest1;
-        let lower_rest3 = p_1 + lower_rest2;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
+        let upper_pivot1 = lower_inertia4 * upper_pivot0;
+        let upper_pivot2 = lower_inertia3 - upper_pivot1;
+        let upper_pivot3 = 1.0 / upper_pivot2;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = p_0 - lower_rest3;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = lower_cos0 * upper_rest1;
-        let lower_vel1 = 1.4997000599880024 * lower_vel0;
-        let lower_vel2 = upper_rest1 + lower_vel1;
-        let lower_vel3 = lower_rest0 - lower_vel2;
-        v[0] = upper_rest1;
-        v[1] = lower_vel3;
+        let upper_rest0 = 2.9994001199760048 * p_1;
+        let upper_rest1 = lower_inertia4 * upper_rest0;
+        let upper_rest2 = p_0 - upper_rest1;
+        let upper_rest3 = upper_pivot3 * upper_rest2;
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = upper_pivot0 * upper_rest3;
+        let upper_vel1 = upper_rest0 - upper_vel0;
+        v[0] = upper_rest3;
+        v[1] = upper_vel1;
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -183,7 +181,7 @@ impl DoublePendulum {
     }
 
     /// Kinetic and potential energy, J.
-    /// 26 operations: 9 additions, 16 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 25 operations: 10 additions, 14 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 2], p: &[f64; 2]) -> [f64; 2] {
         let q_0 = q[0];
@@ -195,37 +193,35 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.7498500299940012 * lower_sin0;
-        let lower_inertia1 = lower_sin0 * lower_inertia0;
-        let lower_inertia2 = lower_inertia1 - 0.7498500299940012;
-        let lower_inertia3 = 0.5 * lower_sin0;
-        let lower_inertia4 = 0.5 * lower_cos0;
-        let lower_inertia5 = lower_inertia4 + 1.5;
-        let lower_inertia6 = lower_inertia2 + 1.3334000000000001;
+        let lower_inertia0 = 0.5 * lower_sin0;
+        let lower_inertia1 = 0.5 * lower_cos0;
+        let lower_inertia2 = lower_inertia1 + lower_inertia1;
+        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
+        let lower_inertia4 = lower_inertia1 + 1.5;
+        let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
+        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia6;
-        // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = 2.9994001199760048 * p_1;
-        let lower_rest1 = 0.5 * lower_rest0;
-        let lower_rest2 = lower_cos0 * lower_rest1;
-        let lower_rest3 = p_1 + lower_rest2;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
+        let upper_pivot1 = lower_inertia6 * upper_pivot0;
+        let upper_pivot2 = lower_inertia5 - upper_pivot1;
+        let upper_pivot3 = 1.0 / upper_pivot2;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = p_0 - lower_rest3;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = lower_cos0 * upper_rest1;
-        let lower_vel1 = 1.4997000599880024 * lower_vel0;
-        let lower_vel2 = upper_rest1 + lower_vel1;
-        let lower_vel3 = lower_rest0 - lower_vel2;
+        let upper_rest0 = 2.9994001199760048 * p_1;
+        let upper_rest1 = lower_inertia6 * upper_rest0;
+        let upper_rest2 = p_0 - upper_rest1;
+        let upper_rest3 = upper_pivot3 * upper_rest2;
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = upper_pivot0 * upper_rest3;
+        let upper_vel1 = upper_rest0 - upper_vel0;
         // upper: energy
-        let upper_energy0 = p_0 * upper_rest1;
+        let upper_energy0 = p_0 * upper_rest3;
         // lower: energy
-        let lower_energy0 = p_1 * lower_vel3;
+        let lower_energy0 = p_1 * upper_vel1;
         let lower_energy1 = upper_energy0 + lower_energy0;
         let lower_energy2 = 0.5 * lower_energy1;
         // upper: gravity and wrenches
-        let upper_load0 = upper_cos0 * lower_inertia5;
-        let upper_load1 = upper_sin0 * lower_inertia3;
+        let upper_load0 = upper_cos0 * lower_inertia4;
+        let upper_load1 = upper_sin0 * lower_inertia0;
         let upper_load2 = upper_load0 - upper_load1;
         // ground: energy
         let ground_energy0 = 9.81 * upper_load2;
@@ -235,7 +231,7 @@ impl DoublePendulum {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 40 operations: 16 additions, 23 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 47 operations: 19 additions, 27 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         let q_0 = q[0];
@@ -249,16 +245,26 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.7498500299940012 * lower_sin0;
-        let lower_inertia1 = lower_sin0 * lower_inertia0;
-        let lower_inertia2 = lower_cos0 * lower_inertia0;
-        let lower_inertia3 = lower_inertia1 - 0.7498500299940012;
-        let lower_inertia4 = lower_inertia3 + 1.5;
+        let lower_inertia0 = 0.5 * lower_sin0;
+        let lower_inertia1 = 0.5 * lower_cos0;
+        let lower_inertia2 = lower_inertia1 + lower_inertia1;
+        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
+        let lower_inertia4 = lower_inertia1 + 1.5;
         let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
+        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia5;
-        let upper_pivot1 = lower_inertia2 * upper_pivot0;
-        let upper_pivot2 = lower_inertia4 * upper_pivot0;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia0;
+        let upper_pivot1 = 2.9994001199760048 * lower_inertia1;
+        let upper_pivot2 = 2.9994001199760048 * lower_inertia6;
+        let upper_pivot3 = lower_inertia0 * upper_pivot2;
+        let upper_pivot4 = lower_inertia0 - upper_pivot3;
+        let upper_pivot5 = lower_inertia1 * upper_pivot2;
+        let upper_pivot6 = lower_inertia4 - upper_pivot5;
+        let upper_pivot7 = lower_inertia6 * upper_pivot2;
+        let upper_pivot8 = lower_inertia5 - upper_pivot7;
+        let upper_pivot9 = 1.0 / upper_pivot8;
+        let upper_pivot10 = upper_pivot4 * upper_pivot9;
+        let upper_pivot11 = upper_pivot6 * upper_pivot9;
         // lower: velocity and joint rate (4.40)
         let lower_vel0 = v_0 * lower_sin0;
         let lower_vel1 = v_0 + v_1;
@@ -268,40 +274,36 @@ impl DoublePendulum {
         let lower_load2 = lower_vel0 * lower_load0;
         let lower_load3 = v_1 * lower_vel0;
         // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = tau_1 - lower_load2;
-        let lower_rest1 = 2.9994001199760048 * lower_rest0;
-        let lower_rest2 = 0.5 * lower_rest1;
-        let lower_rest3 = 0.7498500299940012 * lower_load3;
-        let lower_rest4 = lower_rest2 + lower_rest3;
-        let lower_rest5 = lower_sin0 * lower_load1;
-        let lower_rest6 = lower_cos0 * lower_rest4;
-        let lower_rest7 = lower_rest5 - lower_rest6;
-        let lower_rest8 = tau_1 - lower_rest7;
+        let lower_rest0 = 0.5 * lower_load3;
+        let lower_rest1 = lower_load2 - lower_rest0;
+        let lower_rest2 = lower_sin0 * lower_load1;
+        let lower_rest3 = lower_rest1 - lower_rest2;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_0 - lower_rest8;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
+        let upper_rest0 = tau_1 - lower_rest1;
+        let upper_rest1 = 2.9994001199760048 * upper_rest0;
+        let upper_rest2 = lower_inertia6 * upper_rest1;
+        let upper_rest3 = lower_rest3 + upper_rest2;
+        let upper_rest4 = tau_0 - upper_rest3;
+        let upper_rest5 = upper_pivot9 * upper_rest4;
         // upper: acceleration
         let upper_acc0 = 9.81 * upper_cos0;
         let upper_acc1 = 9.81 * upper_sin0;
-        let upper_acc2 = upper_pivot1 * upper_acc0;
-        let upper_acc3 = upper_pivot2 * upper_acc1;
-        let upper_acc4 = upper_acc2 - upper_acc3;
-        let upper_acc5 = upper_rest1 + upper_acc4;
-        // lower: acceleration
-        let lower_acc0 = upper_acc1 + upper_acc5;
-        let lower_acc1 = lower_cos0 * lower_acc0;
-        let lower_acc2 = lower_sin0 * upper_acc0;
-        let lower_acc3 = lower_acc1 + lower_acc2;
-        let lower_acc4 = lower_load3 - lower_acc3;
-        let lower_acc5 = 1.4997000599880024 * lower_acc4;
-        let lower_acc6 = upper_acc5 - lower_acc5;
-        let lower_acc7 = lower_rest1 - lower_acc6;
+        let upper_acc2 = upper_pivot10 * upper_acc0;
+        let upper_acc3 = upper_pivot11 * upper_acc1;
+        let upper_acc4 = upper_acc2 + upper_acc3;
+        let upper_acc5 = upper_rest5 - upper_acc4;
+        let upper_acc6 = upper_pivot0 * upper_acc0;
+        let upper_acc7 = upper_pivot1 * upper_acc1;
+        let upper_acc8 = upper_acc6 + upper_acc7;
+        let upper_acc9 = upper_pivot2 * upper_acc5;
+        let upper_acc10 = upper_acc8 + upper_acc9;
+        let upper_acc11 = upper_rest1 - upper_acc10;
         a[0] = upper_acc5;
-        a[1] = lower_acc7;
+        a[1] = upper_acc11;
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
-    /// 79 operations: 36 additions, 42 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 112 operations: 52 additions, 59 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
         let q_0 = q[0];
@@ -315,25 +317,38 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.7498500299940012 * lower_sin0;
-        let lower_inertia1 = lower_sin0 * lower_inertia0;
-        let lower_inertia2 = lower_cos0 * lower_inertia0;
-        let lower_inertia3 = lower_inertia1 - 1.0;
-        let lower_inertia4 = lower_inertia1 + 0.2501499700059988;
-        let lower_inertia5 = lower_inertia3 - 1.0;
-        let lower_inertia6 = lower_inertia4 + 1.0;
-        let lower_inertia7 = lower_inertia4 + 0.5;
-        let lower_inertia8 = lower_inertia4 + 0.33340000000000003;
+        let lower_inertia0 = 0.5 * lower_sin0;
+        let lower_inertia1 = 0.5 * lower_cos0;
+        let lower_inertia2 = lower_inertia1 + 1.0;
+        let lower_inertia3 = lower_inertia1 + lower_inertia2;
+        let lower_inertia4 = lower_inertia3 + 0.33340000000000003;
+        let lower_inertia5 = lower_inertia2 + 0.5;
+        let lower_inertia6 = lower_inertia4 + 0.33340000000000003;
+        let lower_inertia7 = lower_inertia1 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia8;
-        let upper_pivot1 = lower_inertia2 * upper_pivot0;
-        let upper_pivot2 = lower_inertia7 * upper_pivot0;
-        let upper_pivot3 = lower_inertia2 * upper_pivot1;
-        let upper_pivot4 = lower_inertia5 + upper_pivot3;
-        let upper_pivot5 = lower_inertia2 * upper_pivot2;
-        let upper_pivot6 = lower_inertia2 - upper_pivot5;
-        let upper_pivot7 = lower_inertia7 * upper_pivot2;
-        let upper_pivot8 = lower_inertia6 - upper_pivot7;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia0;
+        let upper_pivot1 = 2.9994001199760048 * lower_inertia1;
+        let upper_pivot2 = 2.9994001199760048 * lower_inertia7;
+        let upper_pivot3 = lower_inertia0 * upper_pivot0;
+        let upper_pivot4 = upper_pivot3 - 2.0;
+        let upper_pivot5 = lower_inertia0 * upper_pivot1;
+        let upper_pivot6 = lower_inertia0 * upper_pivot2;
+        let upper_pivot7 = lower_inertia0 - upper_pivot6;
+        let upper_pivot8 = lower_inertia1 * upper_pivot1;
+        let upper_pivot9 = upper_pivot8 - 2.0;
+        let upper_pivot10 = lower_inertia1 * upper_pivot2;
+        let upper_pivot11 = lower_inertia5 - upper_pivot10;
+        let upper_pivot12 = lower_inertia7 * upper_pivot2;
+        let upper_pivot13 = lower_inertia6 - upper_pivot12;
+        let upper_pivot14 = 1.0 / upper_pivot13;
+        let upper_pivot15 = upper_pivot7 * upper_pivot14;
+        let upper_pivot16 = upper_pivot11 * upper_pivot14;
+        let upper_pivot17 = upper_pivot7 * upper_pivot15;
+        let upper_pivot18 = upper_pivot4 + upper_pivot17;
+        let upper_pivot19 = upper_pivot7 * upper_pivot16;
+        let upper_pivot20 = upper_pivot5 + upper_pivot19;
+        let upper_pivot21 = upper_pivot11 * upper_pivot16;
+        let upper_pivot22 = upper_pivot9 + upper_pivot21;
         // lower: velocity and joint rate (4.40)
         let lower_vel0 = v_0 * lower_sin0;
         let lower_vel1 = v_0 * lower_cos0;
@@ -352,35 +367,46 @@ impl DoublePendulum {
         let lower_load7 = v_1 * lower_vel1;
         let lower_load8 = v_1 * lower_vel0;
         // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = tau_1 - lower_load6;
-        let lower_rest1 = 2.9994001199760048 * lower_rest0;
-        let lower_rest2 = 0.5 * lower_rest1;
-        let lower_rest3 = lower_load3 + lower_rest2;
-        let lower_rest4 = 0.2501499700059988 * lower_load8;
-        let lower_rest5 = lower_load2 - lower_load7;
-        let lower_rest6 = lower_rest3 - lower_rest4;
-        let lower_rest7 = lower_cos0 * lower_rest5;
-        let lower_rest8 = lower_sin0 * lower_rest6;
-        let lower_rest9 = lower_rest7 + lower_rest8;
-        let lower_rest10 = lower_sin0 * lower_rest5;
-        let lower_rest11 = lower_cos0 * lower_rest6;
-        let lower_rest12 = lower_rest10 - lower_rest11;
-        let lower_rest13 = tau_1 - lower_rest12;
-        let lower_rest14 = upper_load1 + lower_rest9;
+        let lower_rest0 = 0.5 * lower_load8;
+        let lower_rest1 = lower_load6 - lower_rest0;
+        let lower_rest2 = lower_load2 - lower_load7;
+        let lower_rest3 = lower_load3 - lower_load8;
+        let lower_rest4 = lower_cos0 * lower_rest2;
+        let lower_rest5 = lower_sin0 * lower_rest3;
+        let lower_rest6 = lower_rest4 + lower_rest5;
+        let lower_rest7 = lower_sin0 * lower_rest2;
+        let lower_rest8 = lower_cos0 * lower_rest3;
+        let lower_rest9 = lower_rest7 - lower_rest8;
+        let lower_rest10 = lower_rest1 - lower_rest9;
+        let lower_rest11 = upper_load1 + lower_rest6;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_0 - lower_rest13;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
-        let upper_rest2 = lower_inertia2 * upper_rest1;
-        let upper_rest3 = lower_rest14 - upper_rest2;
+        let upper_rest0 = tau_1 - lower_rest1;
+        let upper_rest1 = 2.9994001199760048 * upper_rest0;
+        let upper_rest2 = lower_inertia0 * upper_rest1;
+        let upper_rest3 = lower_inertia1 * upper_rest1;
         let upper_rest4 = lower_inertia7 * upper_rest1;
-        let upper_rest5 = lower_rest12 - upper_rest4;
+        let upper_rest5 = lower_rest11 + upper_rest2;
+        let upper_rest6 = lower_rest9 - upper_rest3;
+        let upper_rest7 = lower_rest10 + upper_rest4;
+        let upper_rest8 = tau_0 - upper_rest7;
+        let upper_rest9 = upper_pivot14 * upper_rest8;
+        let upper_rest10 = upper_pivot7 * upper_rest9;
+        let upper_rest11 = upper_rest5 + upper_rest10;
+        let upper_rest12 = upper_pivot11 * upper_rest9;
+        let upper_rest13 = upper_rest6 - upper_rest12;
         // upper: acceleration
         let upper_acc0 = 9.81 * upper_cos0;
         let upper_acc1 = 9.81 * upper_sin0;
-        let upper_acc2 = upper_pivot1 * upper_acc0;
-        let upper_acc3 = upper_pivot2 * upper_acc1;
-        let upper_acc4 = upper_acc2 - upper_acc3;
-        let upper_acc5 = upper_rest1 + upper_acc4;
+        let upper_acc2 = upper_pivot15 * upper_acc0;
+        let upper_acc3 = upper_pivot16 * upper_acc1;
+        let upper_acc4 = upper_acc2 + upper_acc3;
+        let upper_acc5 = upper_rest9 - upper_acc4;
+        let upper_acc6 = upper_pivot0 * upper_acc0;
+        let upper_acc7 = upper_pivot1 * upper_acc1;
+        let upper_acc8 = upper_acc6 + upper_acc7;
+        let upper_acc9 = upper_pivot2 * upper_acc5;
+        let upper_acc10 = upper_acc8 + upper_acc9;
+        let upper_acc11 = upper_rest1 - upper_acc10;
         // lower: acceleration
         let lower_acc0 = upper_acc1 + upper_acc5;
         let lower_acc1 = lower_cos0 * upper_acc0;
@@ -392,29 +418,38 @@ impl DoublePendulum {
         let lower_acc7 = lower_load7 - lower_acc3;
         let lower_acc8 = lower_load8 - lower_acc6;
         // upper: reaction wrench (4.66)
-        let upper_react0 = upper_pivot4 * upper_acc0;
-        let upper_react1 = upper_pivot6 * upper_acc1;
+        let upper_react0 = upper_pivot18 * upper_acc0;
+        let upper_react1 = upper_pivot20 * upper_acc1;
         let upper_react2 = upper_react0 + upper_react1;
-        let upper_react3 = upper_pivot6 * upper_acc0;
-        let upper_react4 = upper_pivot8 * upper_acc1;
-        let upper_react5 = upper_react3 - upper_react4;
-        let upper_react6 = upper_rest3 - upper_react2;
-        let upper_react7 = upper_rest5 + upper_react5;
+        let upper_react3 = upper_pivot20 * upper_acc0;
+        let upper_react4 = upper_pivot22 * upper_acc1;
+        let upper_react5 = upper_react3 + upper_react4;
+        let upper_react6 = upper_rest11 - upper_react2;
+        let upper_react7 = upper_rest13 + upper_react5;
         // lower: reaction wrench (4.66)
-        let lower_react0 = 0.2501499700059988 * lower_acc8;
-        let lower_react1 = lower_load2 - lower_acc7;
-        let lower_react2 = lower_react0 - lower_rest3;
+        let lower_react0 = 0.5 * upper_acc5;
+        let lower_react1 = lower_acc8 - lower_react0;
+        let lower_react2 = 0.5 * lower_acc8;
+        let lower_react3 = 0.33340000000000003 * upper_acc5;
+        let lower_react4 = lower_react2 - lower_react3;
+        let lower_react5 = 0.5 * upper_acc11;
+        let lower_react6 = 0.33340000000000003 * upper_acc11;
+        let lower_react7 = lower_load3 + lower_react5;
+        let lower_react8 = lower_load6 + lower_react6;
+        let lower_react9 = lower_load2 - lower_acc7;
+        let lower_react10 = lower_react1 - lower_react7;
+        let lower_react11 = lower_react8 - lower_react4;
         reactions[0][0] = upper_react7;
         reactions[0][1] = 0.0;
         reactions[0][2] = upper_react6;
         reactions[0][3] = 0.0;
         reactions[0][4] = tau_0;
         reactions[0][5] = 0.0;
-        reactions[1][0] = lower_react2;
+        reactions[1][0] = lower_react10;
         reactions[1][1] = 0.0;
-        reactions[1][2] = lower_react1;
+        reactions[1][2] = lower_react9;
         reactions[1][3] = 0.0;
-        reactions[1][4] = tau_1;
+        reactions[1][4] = lower_react11;
         reactions[1][5] = 0.0;
     }
 

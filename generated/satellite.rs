@@ -34,7 +34,7 @@ pub struct Satellite {
     pub wrenches: [[f64; 6]; 1],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl Satellite {
     /// Number of coordinates.

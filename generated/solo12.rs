@@ -33,7 +33,7 @@ pub struct Solo12 {
     pub tau: [f64; 18],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl Solo12 {
     /// Number of coordinates.

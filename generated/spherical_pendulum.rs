@@ -25,7 +25,7 @@ pub struct SphericalPendulum {
     pub tau: [f64; 4],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl SphericalPendulum {
     /// Number of coordinates.

@@ -27,7 +27,7 @@ pub struct Ur5 {
     pub tau: [f64; 6],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
 #[rustfmt::skip]
 impl Ur5 {
     /// Number of coordinates.
