@@ -7,7 +7,9 @@ pub mod generate;
 pub mod import;
 pub mod layout;
 pub mod model;
+pub mod options;
 pub mod plan;
 pub mod symbolic;
+pub mod trace;
 
 pub use generate::{generate, Generated, Group, Options, Precision};

@@ -5,10 +5,11 @@ use std::fmt::Write;
 use mbd_runtime::tree::Source;
 
 use super::names::constant;
-use crate::generate::{chosen_frames, Group, GroupProgram, Options};
 use crate::model::{Gravity, JointKind, Value};
+use crate::options::{Group, Options};
 use crate::plan::Plan;
 use crate::symbolic::Counts;
+use crate::trace::{chosen_frames, GroupProgram};
 
 /// Shape of one generated function.
 pub struct Function {

@@ -6,8 +6,9 @@ mod statements;
 
 use std::fmt::Write;
 
-use crate::generate::{Group, GroupProgram, Options};
+use crate::options::{Group, Options};
 use crate::plan::Plan;
+use crate::trace::GroupProgram;
 use statements::Body;
 
 pub use layout::joint_word;

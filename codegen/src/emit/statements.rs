@@ -5,9 +5,10 @@ use std::fmt::Write;
 
 use super::layout::Function;
 use super::names::{identifier, quantity};
-use crate::generate::{GroupProgram, InputArray, Options, Precision};
+use crate::options::{Options, Precision};
 use crate::plan::Plan;
 use crate::symbolic::{Label, Op, Operand, Output};
+use crate::trace::{GroupProgram, InputArray};
 
 /// A program with names for its values and places for its results.
 pub struct Body<'a> {

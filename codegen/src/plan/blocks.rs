@@ -7,7 +7,8 @@
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan};
-use crate::generate::{trace, Group, Options};
+use crate::options::{Group, Options};
+use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
 const LONGEST: usize = 10;

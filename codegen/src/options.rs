@@ -1,0 +1,115 @@
+//! What is to be generated, and how.
+
+use crate::plan::PlanOptions;
+
+/// Number type of the generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// `f64`.
+    F64,
+    /// `f32`.
+    F32,
+}
+
+impl Precision {
+    /// Its name in Rust.
+    pub fn name(self) -> &'static str {
+        match self {
+            Precision::F64 => "f64",
+            Precision::F32 => "f32",
+        }
+    }
+}
+
+/// What generated code can compute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Group {
+    /// `(q, p) → (q̇, ṗ)`; makes the type a `System`.
+    Rates,
+    /// `(q, p) → v`.
+    Velocities,
+    /// `(q, v) → p`.
+    Momenta,
+    /// `(q, p) →` kinetic and potential energy.
+    Energy,
+    /// `(q, v) → v̇`.
+    Accelerations,
+    /// `(q, v) →` the wrench that each joint transmits.
+    Reactions,
+    /// `q → M`.
+    MassMatrix,
+    /// `(q, v) →` placements and velocities of frames.
+    Frames,
+}
+
+impl Group {
+    /// All of them.
+    pub const ALL: [Group; 8] = [
+        Group::Rates,
+        Group::Velocities,
+        Group::Momenta,
+        Group::Energy,
+        Group::Accelerations,
+        Group::Reactions,
+        Group::MassMatrix,
+        Group::Frames,
+    ];
+
+    /// Name of the generated function, and of the output in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Group::Rates => "rates",
+            Group::Velocities => "velocities",
+            Group::Momenta => "momenta",
+            Group::Energy => "energy",
+            Group::Accelerations => "accelerations",
+            Group::Reactions => "reactions",
+            Group::MassMatrix => "mass_matrix",
+            Group::Frames => "frames",
+        }
+    }
+
+    /// The group of a name.
+    pub fn from_name(name: &str) -> Option<Group> {
+        Group::ALL.into_iter().find(|g| g.name() == name)
+    }
+}
+
+/// How code is generated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// Name of the generated type.
+    pub type_name: String,
+    /// What it computes.
+    pub outputs: Vec<Group>,
+    /// Its numbers.
+    pub precision: Precision,
+    /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
+    pub efforts: bool,
+    /// Names of the frames of [`Group::Frames`]; empty means all.
+    pub frames: Vec<String>,
+    /// How the structure is chosen.
+    pub plan: PlanOptions,
+    /// Path of the runtime crate in the generated code.
+    pub runtime: String,
+    /// Where the model came from, for the header.
+    pub source: String,
+    /// Statements in one function at the most; longer programs are split.
+    pub chunk: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            type_name: "Model".to_string(),
+            outputs: vec![Group::Rates, Group::Momenta, Group::Energy],
+            precision: Precision::F64,
+            efforts: true,
+            frames: Vec::new(),
+            plan: PlanOptions::default(),
+            runtime: "::mbd_runtime".to_string(),
+            source: String::new(),
+            chunk: 1000,
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! The sweeps run on symbols: from a plan to the program of each output group.
+
+use mbd_runtime::spatial::Motion;
+use mbd_runtime::sweep::{FrameState, Inputs, Sweeps};
+use mbd_runtime::tree::Tree;
+use mbd_runtime::workspace::Workspace;
+use mbd_runtime::Scalar;
+
+use crate::model::Gravity;
+use crate::options::{Group, Options};
+use crate::plan::Plan;
+use crate::symbolic::{Expr, Graph, Program};
+
+/// One array of numbers that generated code is called with; the order of [`Signature::arrays`] numbers its inputs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputArray {
+    /// Expression in the generated code: `q`, `p`, `self.tau`.
+    pub name: String,
+    /// Length; for wrenches, six times their number.
+    pub len: usize,
+    /// Whether it is an array of arrays of six.
+    pub sixes: bool,
+}
+
+/// Program of one output group.
+#[derive(Clone, Debug)]
+pub struct GroupProgram {
+    /// Which.
+    pub group: Group,
+    /// Input arrays, numbered through.
+    pub inputs: Vec<InputArray>,
+    /// The program.
+    pub program: Program,
+}
+
+/// Symbolic inputs of one function.
+struct Symbols<'g> {
+    graph: &'g Graph,
+    arrays: Vec<InputArray>,
+    next: usize,
+}
+
+impl<'g> Symbols<'g> {
+    fn array(&mut self, name: &str, len: usize) -> Vec<Expr<'g>> {
+        self.arrays.push(InputArray { name: name.to_string(), len, sixes: name == "self.wrenches" });
+        self.next += len;
+        (self.next - len..self.next).map(|k| self.graph.input(k)).collect()
+    }
+}
+
+/// Frames of the options, as indices into the plan's.
+pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, String> {
+    if options.frames.is_empty() {
+        return Ok((0..plan.frames.len()).collect());
+    }
+    let find = |name: &String| {
+        plan.frames.iter().position(|f| f.name == *name).ok_or_else(|| format!("no frame or body is named `{name}`"))
+    };
+    options.frames.iter().map(find).collect()
+}
+
+/// Runs the sweeps of one group on symbols.
+///
+/// # Errors
+/// An unknown frame name in the options, as a message.
+pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgram, String> {
+    let graph = Graph::default();
+    let mut symbols = Symbols { graph: &graph, arrays: Vec::new(), next: 0 };
+    let dims = plan.dims;
+    let q = symbols.array("q", dims.nq);
+    let second = match group {
+        Group::Rates | Group::Velocities | Group::Energy => symbols.array("p", dims.nv),
+        Group::Momenta | Group::Accelerations | Group::Reactions | Group::Frames => symbols.array("v", dims.nv),
+        Group::MassMatrix => Vec::new(),
+    };
+    let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
+    let drive_q = symbols.array("self.drive_q", dims.drive_q);
+    let drive_v = symbols.array("self.drive_v", dims.drive_v);
+    let drive_a = symbols.array("self.drive_a", dims.drive_v);
+    let flat = symbols.array("self.wrenches", 6 * dims.wrenches);
+    let wrenches: Vec<[Expr; 6]> = flat.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
+    let params = symbols.array("self.params", plan.model.params.len());
+    let gravity: [Expr; 3] = match plan.model.gravity {
+        Gravity::Constant(g) => g.map(|v| match v {
+            crate::model::Value::Const(x) => Expr::Const(x),
+            crate::model::Value::Param(k) => params[k],
+        }),
+        Gravity::Input => {
+            let g = symbols.array("self.gravity", 3);
+            std::array::from_fn(|k| g[k])
+        }
+    };
+    let inputs =
+        Inputs { tau: &tau, drive_q: &drive_q, drive_v: &drive_v, drive_a: &drive_a, wrenches: &wrenches, gravity };
+    let physical: Tree<Expr> = plan.tree(&params);
+    let tree = if group == Group::Reactions { physical } else { physical.regrouped() };
+    let frames = chosen_frames(plan, options)?;
+    let outputs = run(&graph, &tree, group, &q, &second, &inputs, &frames);
+    let program = Program::new(&graph, &outputs);
+    Ok(GroupProgram { group, inputs: symbols.arrays, program })
+}
+
+fn run<'g>(
+    graph: &'g Graph,
+    tree: &Tree<Expr<'g>>,
+    group: Group,
+    q: &[Expr<'g>],
+    second: &[Expr<'g>],
+    inputs: &Inputs<Expr<'g>>,
+    frames: &[usize],
+) -> Vec<Expr<'g>> {
+    let sweeps = Sweeps { tree, trace: graph };
+    let mut w = Workspace::new(tree);
+    let dims = tree.dims;
+    let zeros = |n: usize| vec![Expr::zero(); n];
+    let mut v = zeros(dims.nv);
+    match group {
+        Group::Rates => {
+            let (mut qd, mut pd) = (zeros(dims.nq), zeros(dims.nv));
+            sweeps.rates(q, second, inputs, &mut w, &mut v, &mut qd, &mut pd);
+            qd.extend(pd);
+            qd
+        }
+        Group::Velocities => {
+            sweeps.velocities(q, second, inputs, &mut w, &mut v);
+            v
+        }
+        Group::Momenta => {
+            sweeps.momenta(q, second, inputs, &mut w, &mut v);
+            v
+        }
+        Group::Energy => {
+            let (kinetic, potential) = sweeps.energy(q, second, inputs, &mut w, &mut v);
+            vec![kinetic, potential]
+        }
+        Group::Accelerations => {
+            sweeps.accelerations(q, second, inputs, &mut w, &mut v);
+            v
+        }
+        Group::Reactions => {
+            sweeps.accelerations(q, second, inputs, &mut w, &mut v);
+            let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
+            sweeps.reactions(&w, &mut out);
+            out.concat()
+        }
+        Group::MassMatrix => {
+            let mut m = zeros(dims.nv * dims.nv);
+            sweeps.mass_matrix(q, inputs, &mut w, &mut m);
+            m
+        }
+        Group::Frames => {
+            let mut states = vec![FrameState::ground(); frames.len()];
+            let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut states);
+            sweeps.frame_states(q, second, inputs, &mut w, pairs);
+            let motion = |m: Motion<Expr<'g>>| [m.lin, m.ang].concat();
+            let rotations = states.iter().flat_map(|s| s.rotation.concat()).collect::<Vec<_>>();
+            let positions = states.iter().flat_map(|s| s.position);
+            let velocities = states.iter().flat_map(|s| motion(s.velocity));
+            rotations.into_iter().chain(positions).chain(velocities).collect()
+        }
+    }
+}
+
+/// Program of `q̇ = N(q) v`.
+pub(crate) fn coordinate_map(plan: &Plan) -> GroupProgram {
+    let graph = Graph::default();
+    let mut symbols = Symbols { graph: &graph, arrays: Vec::new(), next: 0 };
+    let q = symbols.array("q", plan.dims.nq);
+    let v = symbols.array("v", plan.dims.nv);
+    let params = symbols.array("self.params", plan.model.params.len());
+    let tree: Tree<Expr> = plan.tree(&params);
+    let mut qd = vec![Expr::zero(); plan.dims.nq];
+    Sweeps { tree: &tree, trace: &graph }.coordinate_rates(&q, &v, &mut qd);
+    GroupProgram { group: Group::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd) }
+}
