@@ -217,7 +217,7 @@ impl Progress {
     fn show(&mut self, t: f64) {
         // Asking for the time at every step would cost as much as a small step.
         self.calls = self.calls.wrapping_add(1);
-        if self.calls % 256 != 0 || Instant::now() < self.next || !std::io::stderr().is_terminal() {
+        if self.calls & 255 != 0 || Instant::now() < self.next || !std::io::stderr().is_terminal() {
             return;
         }
         self.next = Instant::now() + Duration::from_millis(250);

@@ -1,0 +1,84 @@
+//! Values of arguments, read and refused.
+
+use multibody::codegen::import::words;
+use multibody::codegen::Group;
+
+use super::{OutputList, DEFAULT_RUNTIME};
+
+/// A finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    let x: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    if x.is_finite() {
+        Ok(x)
+    } else {
+        Err("the number must be finite".to_string())
+    }
+}
+
+/// A positive number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let x = finite(text)?;
+    if x > 0.0 {
+        Ok(x)
+    } else {
+        Err("the number must be positive".to_string())
+    }
+}
+
+/// A small angle: beyond some degrees, snapping would change the mechanism.
+pub fn snap(text: &str) -> Result<f64, String> {
+    let x = finite(text)?;
+    if (0.0..=0.1).contains(&x) {
+        Ok(x)
+    } else {
+        Err("the angle must lie between 0 and 0.1 rad".to_string())
+    }
+}
+
+/// Three numbers with commas between.
+pub fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers = text.split(',').map(finite).collect::<Result<Vec<f64>, String>>()?;
+    numbers.try_into().map_err(|n: Vec<f64>| format!("{} number(s) where x,y,z are expected", n.len()))
+}
+
+/// An output by its name, or all of them.
+pub fn outputs(text: &str) -> Result<OutputList, String> {
+    if text == "all" {
+        return Ok(OutputList(Group::ALL.to_vec()));
+    }
+    let names = || Group::ALL.iter().map(|g| g.name()).chain(["all"]);
+    let unknown = || words::did_you_mean(text, names(), || format!("outputs are {}", words::list(names())));
+    Group::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
+}
+
+/// A path of Rust, `::multibody::runtime`.
+pub fn rust_path(text: &str) -> Result<String, String> {
+    let word = |w: &str| {
+        w.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && w.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    };
+    match text.trim_start_matches("::").split("::").all(word) {
+        true => Ok(text.to_string()),
+        false => Err(format!("not a path of Rust such as `{DEFAULT_RUNTIME}`")),
+    }
+}
+
+/// A name that can stand for a type.
+pub fn type_name(text: &str) -> Result<String, String> {
+    let word = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    if word && text.starts_with(|c: char| c.is_ascii_uppercase()) && text != "Self" {
+        Ok(text.to_string())
+    } else {
+        Err("a type is named with letters, digits and `_`, an upper-case letter first".to_string())
+    }
+}
+
+/// `double_pendulum` as `DoublePendulum`.
+pub fn camel_case(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+    let camel: String = words.map(|w| w[..1].to_ascii_uppercase() + &w[1..]).collect();
+    match camel.starts_with(|c: char| c.is_ascii_alphabetic()) && camel != "Self" {
+        true => camel,
+        false => format!("Model{camel}"),
+    }
+}
