@@ -1,4 +1,5 @@
 //! The command `mbd`, run as a program.
+#![cfg(feature = "cli")]
 
 mod command;
 

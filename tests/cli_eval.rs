@@ -1,4 +1,5 @@
 //! `mbd eval`, run as a program.
+#![cfg(feature = "cli")]
 
 mod command;
 

@@ -12,7 +12,7 @@ use multibody::codegen::{Group, Options};
 use serde_json::json;
 
 use super::args::CountArgs;
-use super::generate::frame_failure;
+use super::generate;
 use super::rivals::{chain_of_pins, RIVALS};
 use super::{source, Outcome};
 
@@ -85,7 +85,7 @@ pub fn gravity(plan: &Plan) -> String {
 
 /// Counts of all outputs of the options.
 pub fn all(plan: &Plan, options: &Options) -> Outcome<Vec<OutputCounts>> {
-    options.outputs.iter().map(|&g| Ok(of_program(&trace(plan, g, options).map_err(frame_failure)?))).collect()
+    options.outputs.iter().map(|&g| Ok(of_program(&trace(plan, g, options).map_err(generate::failure)?))).collect()
 }
 
 fn of_program(group: &GroupProgram) -> OutputCounts {
@@ -138,7 +138,7 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
 /// Differences of one output with parts of the scene left out.
 fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     let total = |plan: &Plan, options: &Options| -> Outcome<usize> {
-        Ok(trace(plan, group, options).map_err(frame_failure)?.program.counts().total())
+        Ok(trace(plan, group, options).map_err(generate::failure)?.program.counts().total())
     };
     let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
         let mut model = plan.model.clone();

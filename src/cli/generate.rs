@@ -14,7 +14,7 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
     let model = source::model_of(&args.model)?;
     let base = Options { runtime: args.runtime.clone(), source: shown(path), ..args.code.options(&model.name) };
-    let generated = codegen::generate(&model, &base).map_err(frame_failure)?;
+    let generated = codegen::generate(&model, &base).map_err(failure)?;
     source::tell_notices(path, &generated.notices);
     match &args.output {
         Some(file) => write_file(file, &generated.source),
@@ -22,9 +22,13 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
-/// The one thing that options can get wrong.
-pub fn frame_failure(message: String) -> Failure {
-    Failure::new(message, "--frames takes names of bodies and of [[frame]] tables; leave it out for all")
+/// What a sound model can still get wrong: frames of the options, freedoms without inertia.
+pub fn failure(message: String) -> Failure {
+    let help = match message.starts_with("no frame") {
+        true => "--frames takes names of bodies and of [[frame]] tables; leave it out for all",
+        false => "give the bodies behind that joint mass and inertia, or the joint an armature",
+    };
+    Failure::new(message, help)
 }
 
 /// A path as the header of the code shows it: the same on every machine.

@@ -10,7 +10,7 @@ use multibody::codegen::{self, Group, Options, Precision};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
-use super::generate::{frame_failure, shown};
+use super::generate::{self, shown};
 use super::output::{note, write_file};
 use super::{source, Failure, Outcome};
 
@@ -123,7 +123,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),
     };
     let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
-    Ok(codegen::generate(&model, &options).map_err(frame_failure)?.source)
+    Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
 }
 
 /// Module of a file, if it can be one.

@@ -9,7 +9,7 @@ use multibody::codegen::generate::{trace, GroupProgram};
 use multibody::codegen::Options;
 
 use super::args::{ExplainArgs, Stage};
-use super::generate::frame_failure;
+use super::generate;
 use super::{source, Outcome};
 
 /// Prints one stage.
@@ -20,7 +20,7 @@ pub fn run(args: &ExplainArgs, out: &mut dyn Write) -> Outcome {
         return frames::print(&plan, out);
     }
     for &group in &options.outputs {
-        let program: GroupProgram = trace(&plan, group, &options).map_err(frame_failure)?;
+        let program: GroupProgram = trace(&plan, group, &options).map_err(generate::failure)?;
         match args.after {
             Stage::Frames => {}
             Stage::Trace => program::created(&program, out)?,
