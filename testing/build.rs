@@ -1,3 +1,60 @@
-//! Generates code for random trees; `tests/compiled.rs` compiles it.
+//! Generates code for random trees, which `tests/compiled.rs` includes: the way a user's build script goes.
 
-fn main() {}
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use mbd_codegen::model::{Gravity, Value};
+use mbd_codegen::plan::Plan;
+
+// The generator of random trees belongs to the crate this script builds, so it is taken in as source.
+#[path = "src/batch.rs"]
+mod batch;
+#[allow(dead_code, unused_imports)]
+#[path = "src/random/mod.rs"]
+mod random;
+
+/// The crate's own, which `random` uses.
+fn value(v: Value, params: &[f64]) -> f64 {
+    match v {
+        Value::Const(x) => x,
+        Value::Param(k) => params[k],
+    }
+}
+
+fn main() {
+    for file in ["build.rs", "src/batch.rs", "src/random"] {
+        println!("cargo::rerun-if-changed={file}");
+    }
+    let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo sets it"));
+    let mut all = String::new();
+    for k in 0..batch::TREES {
+        let (model, options) = batch::tree(k);
+        let code = mbd_codegen::generate(&model, &options).unwrap_or_else(|e| panic!("tree {k}: {e}"));
+        let file = out.join(format!("tree{k}.rs"));
+        std::fs::write(&file, code.source).expect("OUT_DIR can be written");
+        let plan = Plan::new(&model, options.plan);
+        let mut fields = Vec::new();
+        if options.efforts && plan.dims.nv > 0 {
+            fields.push("tau");
+        }
+        if plan.dims.drive_q > 0 {
+            fields.extend(["drive_q", "drive_v", "drive_a"]);
+        }
+        if plan.dims.wrenches > 0 {
+            fields.push("wrenches");
+        }
+        if !model.params.is_empty() {
+            fields.push("params");
+        }
+        if model.gravity == Gravity::Input {
+            fields.push("gravity");
+        }
+        let number = options.precision.name();
+        let (frames, joints) = (plan.frames.len(), plan.joint_nodes.len());
+        let _ = writeln!(all, "pub mod tree{k} {{\n    include!({:?});\n}}", file.display().to_string());
+        let _ = writeln!(all, "runner!(run{k}, tree{k}, {number}, [{}], {frames}, {joints});", fields.join(", "));
+    }
+    let names: Vec<String> = (0..batch::TREES).map(|k| format!("run{k}")).collect();
+    let _ = writeln!(all, "pub const RUNNERS: [Runner; {}] = [{}];", names.len(), names.join(", "));
+    std::fs::write(out.join("all.rs"), all).expect("OUT_DIR can be written");
+}

@@ -1,5 +1,6 @@
 //! Random mechanisms for the tests of the project: generator, states, and a writer of the TOML format.
 
+pub mod batch;
 pub mod newton;
 pub mod random;
 pub mod state;

@@ -32,7 +32,8 @@ impl Case {
         let options = Options {
             outputs: Group::ALL.to_vec(),
             efforts: rng.chance(0.8),
-            chunk: rng.pick(&[7, 40, 200, 1000]),
+            // Small parts make long sources.
+            chunk: if size < 4 { rng.pick(&[7, 1000]) } else { rng.pick(&[60, 200, 1000]) },
             ..Options::default()
         };
         let plan = Plan::new(&model, options.plan);

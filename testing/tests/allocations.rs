@@ -1,0 +1,47 @@
+//! The interpreter and the integrators allocate when they are made, never afterwards.
+
+use allocation_counter::measure;
+use mbd_codegen::plan::Plan;
+use mbd_runtime::integrate::Rk4;
+use mbd_runtime::sweep::FrameState;
+use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::state::random_state;
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(measure(|| drop(std::hint::black_box(vec![1_u8; 100]))).count_total, 1);
+}
+
+#[test]
+fn nothing_is_allocated_after_construction() {
+    for seed in 0..200 {
+        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let s = random_state(&plan, seed);
+        let mut i = s.interpreter(&plan);
+        let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+        let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        let (mut a, mut m) = (vec![0.0; nv], vec![0.0; nv * nv]);
+        let mut reactions = vec![[0.0; 6]; plan.joint_nodes.len()];
+        let mut frames = vec![FrameState::ground(); plan.frames.len()];
+        let mut energy = (0.0, 0.0);
+        let (mut q, mut p_stepped) = (s.q.clone(), p.clone());
+        let mut rk4 = Rk4::new(&i);
+        let (mut rank, mut step) = (Ok(()), Ok(()));
+        let all = measure(|| {
+            i.momenta(&s.q, &s.v, &mut p);
+            i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+            i.velocities(&s.q, &p, &mut v);
+            energy = i.energy(&s.q, &p);
+            i.accelerations(&s.q, &s.v, &mut a);
+            i.reactions(&s.q, &s.v, &mut a, &mut reactions);
+            i.mass_matrix(&s.q, &mut m);
+            i.frames(&s.q, &s.v, &mut frames);
+            rank = i.check_rank(&s.q);
+            p_stepped.copy_from_slice(&p);
+            step = rk4.step(&mut i, 0.0, 1e-4, &mut q, &mut p_stepped);
+        });
+        assert_eq!(all.count_total, 0, "seed {seed}: {all:?}");
+        assert_eq!((rank, step), (Ok(()), Ok(())), "seed {seed}");
+        assert!(energy.0.is_finite() && energy.1.is_finite(), "seed {seed}");
+    }
+}

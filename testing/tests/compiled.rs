@@ -1,0 +1,196 @@
+//! Compiled code against the interpreter: bit for bit in double precision, within rounding in single.
+
+#[allow(dead_code)]
+mod batch {
+    use mbd_testing::state::State;
+
+    /// Results by name, in a fixed order.
+    pub type Results = Vec<(&'static str, Vec<f64>)>;
+    /// Runs one tree on a state and its momenta.
+    pub type Runner = fn(&State, &[f64]) -> Results;
+
+    /// A number type of generated code.
+    pub trait Number: Copy + Default + Into<f64> {
+        fn of(x: f64) -> Self;
+    }
+    impl Number for f64 {
+        fn of(x: f64) -> Self {
+            x
+        }
+    }
+    impl Number for f32 {
+        fn of(x: f64) -> Self {
+            x as f32
+        }
+    }
+
+    fn array<T: Number, const N: usize>(x: &[f64]) -> [T; N] {
+        assert_eq!(x.len(), N);
+        std::array::from_fn(|k| T::of(x[k]))
+    }
+
+    fn numbers<T: Number>(x: &[T]) -> Vec<f64> {
+        x.iter().map(|x| (*x).into()).collect()
+    }
+
+    macro_rules! runner {
+        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], $frames:literal, $joints:literal) => {
+            pub fn $run(s: &State, p: &[f64]) -> Results {
+                use $tree::Tree;
+                const NQ: usize = Tree::NQ;
+                const NV: usize = Tree::NV;
+                #[allow(unused_mut)]
+                let mut tree = Tree::new();
+                $(runner!(@field $field tree s);)*
+                let (q, v, p): ([$t; NQ], [$t; NV], [$t; NV]) = (array(&s.q), array(&s.v), array(p));
+                let (mut qd, mut pd, mut out) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
+                let mut results = Vec::new();
+                tree.momenta(&q, &v, &mut out);
+                results.push(("p", numbers(&out)));
+                tree.rates(&q, &p, &mut qd, &mut pd);
+                results.push(("qd", numbers(&qd)));
+                results.push(("pd", numbers(&pd)));
+                tree.velocities(&q, &p, &mut out);
+                results.push(("v", numbers(&out)));
+                results.push(("energy", numbers(&tree.energy(&q, &p))));
+                tree.accelerations(&q, &v, &mut out);
+                results.push(("a", numbers(&out)));
+                let mut reactions = [[0.0; 6]; $joints];
+                tree.reactions(&q, &v, &mut reactions);
+                results.push(("reactions", numbers(&reactions.concat())));
+                let mut m = [[0.0; NV]; NV];
+                tree.mass_matrix(&q, &mut m);
+                results.push(("M", numbers(&m.concat())));
+                let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; $frames], [[0.0; 3]; $frames], [[0.0; 6]; $frames]);
+                tree.frames(&q, &v, &mut rotation, &mut position, &mut velocity);
+                results.push(("rotations", numbers(&rotation.concat().concat())));
+                results.push(("positions", numbers(&position.concat())));
+                results.push(("frame velocities", numbers(&velocity.concat())));
+                results
+            }
+        };
+        (@field tau $tree:ident $s:ident) => { $tree.tau = array(&$s.tau); };
+        (@field drive_q $tree:ident $s:ident) => { $tree.drive_q = array(&$s.drive[0]); };
+        (@field drive_v $tree:ident $s:ident) => { $tree.drive_v = array(&$s.drive[1]); };
+        (@field drive_a $tree:ident $s:ident) => { $tree.drive_a = array(&$s.drive[2]); };
+        (@field params $tree:ident $s:ident) => { $tree.params = array(&$s.params); };
+        (@field gravity $tree:ident $s:ident) => { $tree.gravity = array(&$s.gravity); };
+        (@field wrenches $tree:ident $s:ident) => {
+            for (to, from) in $tree.wrenches.iter_mut().zip(&$s.wrenches) {
+                *to = array(from);
+            }
+        };
+    }
+
+    include!(concat!(env!("OUT_DIR"), "/all.rs"));
+}
+
+use batch::{Results, RUNNERS};
+use mbd_codegen::plan::Plan;
+use mbd_runtime::sweep::FrameState;
+use mbd_runtime::{Interpreter, Scalar};
+use mbd_testing::batch::{is_single, tree};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+
+/// What the interpreter says, with the momenta it is given.
+fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Results {
+    let of = |x: &[f64]| x.iter().map(|x| S::constant(*x)).collect::<Vec<S>>();
+    let back = |x: &[S]| x.iter().map(|x| (*x).into()).collect::<Vec<f64>>();
+    let mut i: Interpreter<S> = s.interpreter_of(plan, |x, _| S::constant(x));
+    let (q, v, p) = (of(&s.q), of(&s.v), of(p));
+    let (mut qd, mut pd, mut out, mut m) = (q.clone(), v.clone(), v.clone(), of(&vec![0.0; v.len() * v.len()]));
+    let mut results = Vec::new();
+    i.momenta(&q, &v, &mut out);
+    results.push(("p", back(&out)));
+    i.rates_into(&q, &p, &mut out, &mut qd, &mut pd);
+    results.push(("qd", back(&qd)));
+    results.push(("pd", back(&pd)));
+    i.velocities(&q, &p, &mut out);
+    results.push(("v", back(&out)));
+    let (kinetic, potential) = i.energy(&q, &p);
+    results.push(("energy", back(&[kinetic, potential])));
+    i.accelerations(&q, &v, &mut out);
+    results.push(("a", back(&out)));
+    let mut reactions = vec![[S::zero(); 6]; plan.joint_nodes.len()];
+    i.reactions(&q, &v, &mut out, &mut reactions);
+    results.push(("reactions", back(&reactions.concat())));
+    i.mass_matrix(&q, &mut m);
+    results.push(("M", back(&m)));
+    let mut frames = vec![FrameState::ground(); plan.frames.len()];
+    i.frames(&q, &v, &mut frames);
+    let all = |f: &dyn Fn(&FrameState<S>) -> Vec<S>| back(&frames.iter().flat_map(f).collect::<Vec<S>>());
+    results.push(("rotations", all(&|f| f.rotation.concat())));
+    results.push(("positions", all(&|f| f.position.to_vec())));
+    results.push(("frame velocities", all(&|f| [f.velocity.lin, f.velocity.ang].concat())));
+    results
+}
+
+/// Plan, state and momenta of tree `k`, both rounded to the precision of its code.
+fn case(k: u64, state: u64) -> (Plan, State, Vec<f64>) {
+    let (model, options) = tree(k);
+    let plan = Plan::new(&model, options.plan);
+    let mut s = random_state(&plan, 100 * k + state);
+    if !options.efforts {
+        s.tau.fill(0.0);
+    }
+    if is_single(k) {
+        let lists = [&mut s.q, &mut s.v, &mut s.tau, &mut s.params].into_iter().chain(&mut s.drive);
+        let wrenches = s.wrenches.iter_mut().flatten().chain(&mut s.gravity);
+        lists.flatten().chain(wrenches).for_each(|x| *x = f64::from(*x as f32));
+    }
+    let mut p = vec![0.0; s.v.len()];
+    s.interpreter(&plan).momenta(&s.q, &s.v, &mut p);
+    if is_single(k) {
+        p.iter_mut().for_each(|x| *x = f64::from(*x as f32));
+    }
+    (plan, s, p)
+}
+
+#[test]
+fn double_precision_is_the_same_bit_for_bit() {
+    let mut numbers = 0;
+    for (k, run) in (0..).zip(RUNNERS).filter(|(k, _)| !is_single(*k)) {
+        for state in 0..5 {
+            let (plan, s, p) = case(k, state);
+            for ((what, compiled), (_, expected)) in run(&s, &p).iter().zip(interpreted::<f64>(&plan, &s, &p)) {
+                assert_eq!(compiled.len(), expected.len(), "tree {k}: {what}");
+                for (a, b) in compiled.iter().zip(&expected) {
+                    let same = (a + 0.0).to_bits() == (b + 0.0).to_bits() && a.is_finite();
+                    assert!(same, "tree {k}, state {state}: {what}: {a:e} {b:e}\n{}", to_toml(&plan.model));
+                    numbers += 1;
+                }
+            }
+        }
+    }
+    println!("{numbers} numbers compared");
+}
+
+/// Generated code folds constants in double precision and rounds them once, the interpreter rounds every step: both stray
+/// from the exact result by rounding errors of the same size. So a difference is judged by the error of the interpreter in
+/// single precision against that in double precision (the largest of a result), not by a bound
+/// from condition numbers, which would be far too wide: no more than eight times as large, and at least what a hundred
+/// roundings give.
+#[test]
+fn single_precision_is_as_good_as_the_interpreters() {
+    let mut worst = (0.0_f64, String::new());
+    for (k, run) in (0..).zip(RUNNERS).filter(|(k, _)| is_single(*k)) {
+        for state in 0..5 {
+            let (plan, s, p) = case(k, state);
+            let exact = interpreted::<f64>(&plan, &s, &p);
+            let single = interpreted::<f32>(&plan, &s, &p);
+            for (((what, compiled), (_, single)), (_, exact)) in run(&s, &p).iter().zip(&single).zip(&exact) {
+                let size = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+                let off = |x: &[f64]| x.iter().zip(exact).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                let (ours, theirs) = (off(compiled), off(single));
+                let allowed = 8.0 * theirs + 100.0 * f64::from(f32::EPSILON) * size;
+                assert!(compiled.iter().all(|x| x.is_finite()), "tree {k}: {what}");
+                assert!(ours <= allowed, "tree {k}, state {state}: {what}: {ours:e} off, interpreter {theirs:e}");
+                if ours / size > worst.0 {
+                    worst = (ours / size, format!("{what} of tree {k}, interpreter {:.1e}", theirs / size));
+                }
+            }
+        }
+    }
+    println!("single precision: largest relative error {:.1e} ({})", worst.0, worst.1);
+}
