@@ -6,7 +6,7 @@ use std::io::Write;
 use multibody::codegen::emit::quantity;
 use multibody::codegen::generate::{trace, GroupProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::plan::{Blocks, Plan, PlanOptions};
 use multibody::codegen::symbolic::Counts;
 use multibody::codegen::{Group, Options};
 use serde_json::json;
@@ -61,7 +61,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     }
     for part in &parts {
         let (sign, hint) = match (part.what, part.present) {
-            (RIGHT_ANGLES, _) => ('-', ""),
+            (RIGHT_ANGLES | BLOCKS, _) => ('-', ""),
             (_, true) => ('+', ""),
             (_, false) => ('+', "  (not in this scene)"),
         };
@@ -71,6 +71,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
 }
 
 const RIGHT_ANGLES: &str = "right angles taken as exact";
+const BLOCKS: &str = "joints solved as blocks";
 
 /// Gravity as it is printed.
 pub fn gravity(plan: &Plan) -> String {
@@ -165,6 +166,8 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
     let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
+    let single = Plan::new(&plan.model, PlanOptions { blocks: Blocks::None, ..options.plan });
+    part(BLOCKS, total(&single, options)?.saturating_sub(here), true);
     Ok(parts)
 }
 

@@ -2,7 +2,7 @@
 
 use multibody::codegen::layout;
 use multibody::codegen::model::{JointKind, Motion};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::plan::{Blocks, Plan, PlanOptions};
 use multibody::runtime::layout::{Form, Layout, Part};
 use multibody::runtime::tree::Source;
 
@@ -64,7 +64,9 @@ impl Outer {
                 mimic => mimic,
             };
         }
-        Outer::new(&Plan::new(&model, PlanOptions::default()), LayoutArg::Mbd)
+        // Only its names are used: no search for blocks.
+        let options = PlanOptions { blocks: Blocks::None, ..PlanOptions::default() };
+        Outer::new(&Plan::new(&model, options), LayoutArg::Mbd)
     }
 
     /// Coordinates from there to here.
