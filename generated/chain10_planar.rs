@@ -3622,7 +3622,7 @@ impl ::multibody::runtime::System for Chain10Planar {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         Self::rates(self, q, p, qd, pd);
     }
 

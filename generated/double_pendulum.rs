@@ -590,7 +590,7 @@ impl ::multibody::runtime::System for DoublePendulum {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
         Self::rates(self, q, p, qd, pd);
     }
 

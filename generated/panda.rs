@@ -5869,7 +5869,7 @@ impl ::multibody::runtime::System for Panda {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
         Self::rates(self, q, p, qd, pd);
     }
 

@@ -2570,7 +2570,7 @@ impl ::multibody::runtime::System for Satellite {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 

@@ -12362,7 +12362,7 @@ impl ::multibody::runtime::System for Solo12 {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
         Self::rates(self, q, p, qd, pd);
     }
 

@@ -1267,7 +1267,7 @@ impl ::multibody::runtime::System for SphericalPendulum {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
         Self::rates(self, q, p, qd, pd);
     }
 

@@ -2228,7 +2228,7 @@ impl ::multibody::runtime::System for Ur5 {
     }
 
     #[inline]
-    fn rates(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
+    fn state_rates(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 

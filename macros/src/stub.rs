@@ -64,7 +64,7 @@ pub fn source(options: &Options) -> String {
             fn neutral(&self) -> {array} {{ [0.0; {LENGTH}] }}
             fn rest(&self) -> {array} {{ [0.0; {LENGTH}] }}
             fn quaternions(&self) -> &[usize] {{ &[] }}
-            fn rates(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
+            fn state_rates(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
             fn coordinate_rates(&self, _q: &{array}, _v: &{array}, _qd: &mut {array}) {{}}
         }}"
     )

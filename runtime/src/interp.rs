@@ -184,10 +184,18 @@ impl<S: Real> Interpreter<S> {
         let own = own.flat_map(|(v, freedoms)| freedoms.enumerate().map(move |(k, f)| (v + k, f)));
         let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));
         let shared = self.tree.shared.iter().zip(&self.work.factor.shared).map(|(&v, pivot)| (v, pivot.rho));
+        // A zero pivot spoils those inboard of it: it is the one to name.
+        let mut spoiled = None;
         for (velocity, rho) in own.chain(shared) {
-            if !(rho.is_finite() && rho > S::zero()) {
-                return Err(RankLoss { velocity, inertia: 1.0 / rho.to_f64() });
+            let loss = RankLoss { velocity, inertia: 1.0 / rho.to_f64() };
+            if loss.inertia.is_nan() {
+                spoiled = spoiled.or(Some(loss));
+            } else if !(rho.is_finite() && rho > S::zero()) {
+                return Err(loss);
             }
+        }
+        if let Some(loss) = spoiled {
+            return Err(loss);
         }
         Ok(())
     }
@@ -218,7 +226,7 @@ impl<S: Scalar> System for Interpreter<S> {
         &self.quaternions
     }
 
-    fn rates(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+    fn state_rates(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.rates(q, p, &self.inputs.view(), &mut self.work, &mut self.v, qd, pd);
     }

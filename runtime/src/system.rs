@@ -47,7 +47,7 @@ pub trait System {
     /// Index into `q` of the first component of every unit quaternion.
     fn quaternions(&self) -> &[usize];
     /// Rates of the state at time `t` (s): `q̇` and `ṗ`.
-    fn rates(
+    fn state_rates(
         &mut self,
         t: Self::Scalar,
         q: &Self::Coordinates,

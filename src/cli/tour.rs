@@ -186,7 +186,7 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
         f64::from(rounds) * states.len() as f64 / clock.elapsed().as_secs_f64()
     };
     let fast = timed(300, &mut |s| {
-        System::rates(generated, 0.0, black_box(&s.q), black_box(&s.p), &mut qd, &mut pd);
+        generated.rates(black_box(&s.q), black_box(&s.p), &mut qd, &mut pd);
         black_box((&qd, &pd));
     });
     let slow = timed(30, &mut |s| {

@@ -420,7 +420,7 @@ impl {rt}::System for {name} {{
     }}
 
     #[inline]
-    fn rates(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
+    fn state_rates(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
         Self::rates(self, q, p, qd, pd);
     }}
 

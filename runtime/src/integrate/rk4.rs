@@ -57,13 +57,13 @@ where
     ) -> Result<(), StepError> {
         let c = Y::Scalar::constant;
         let half = h * c(0.5);
-        system.rates(t, q, p, &mut self.kq, &mut self.kp);
+        system.state_rates(t, q, p, &mut self.kq, &mut self.kp);
         self.sum_q.as_mut().copy_from_slice(self.kq.as_ref());
         self.sum_p.as_mut().copy_from_slice(self.kp.as_ref());
         for (fraction, weight) in [(half, c(2.0)), (half, c(2.0)), (h, c(1.0))] {
             advance(self.q.as_mut(), q.as_ref(), fraction, self.kq.as_ref());
             advance(self.p.as_mut(), p.as_ref(), fraction, self.kp.as_ref());
-            system.rates(t + fraction, &self.q, &self.p, &mut self.kq, &mut self.kp);
+            system.state_rates(t + fraction, &self.q, &self.p, &mut self.kq, &mut self.kp);
             accumulate(self.sum_q.as_mut(), weight, self.kq.as_ref());
             accumulate(self.sum_p.as_mut(), weight, self.kp.as_ref());
         }
