@@ -9,7 +9,7 @@ use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::codegen::{Group, Options};
 use multibody::runtime::integrate::Rk4;
-use multibody::runtime::{Interpreter, System};
+use multibody::runtime::Interpreter;
 
 use super::output::{note, write_file};
 use super::simulate::{default_start, panels, simulate, title, Record};
