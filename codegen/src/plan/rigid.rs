@@ -50,16 +50,15 @@ impl Rigid {
         Rigid { rot: [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]], pos: [0.0, 0.0, r] }
     }
 
-    /// The smallest rotation that takes z to the unit vector `a`.
+    /// The smallest rotation that takes z to the unit vector `a`; half a turn about x if that is −z.
     pub fn align_z(a: Vec3<f64>) -> Rigid {
         let [x, y, z] = a;
-        if z < -1.0 + 1e-9 {
-            // About x by half a turn, then whatever is left.
-            let rest = Rigid::align_z([x, -y, -z]).rot;
-            let half = [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
-            return Rigid { rot: half, pos: [0.0; 3] }.then(&Rigid { rot: rest, pos: [0.0; 3] });
+        let across = x * x + y * y;
+        if across == 0.0 && z < 0.0 {
+            return Rigid { rot: [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], pos: [0.0; 3] };
         }
-        let k = 1.0 / (1.0 + z);
+        // 1 / (1 + z), without its cancellation towards −z.
+        let k = if z < 0.0 { (1.0 - z) / across } else { 1.0 / (1.0 + z) };
         let rot = [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]];
         Rigid { rot, pos: [0.0; 3] }
     }
@@ -170,4 +169,34 @@ pub fn all_steps(t: &Rigid) -> Vec<PoseStep> {
     shift_step(&mut steps, Axis::Z, slide);
     turn_step(&mut steps, Axis::Z, turn);
     steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alignment_is_a_rotation_to_the_last_digits() {
+        for off in [0.0_f64, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 1.0, 2.0, 3.0] {
+            for (s, c) in [(0.0, 1.0), (1.0, 0.0), (0.6, -0.8)] {
+                let angle = std::f64::consts::PI - off;
+                let (x, z) = if off == 0.0 { (0.0, -1.0) } else { (angle.sin(), angle.cos()) };
+                let a = [c * x, s * x, z];
+                let r = Rigid::align_z(a);
+                let product = r.inverse().then(&r).rot;
+                for (i, row) in product.iter().enumerate() {
+                    for (k, entry) in row.iter().enumerate() {
+                        let one = if i == k { 1.0 } else { 0.0 };
+                        assert!((entry - one).abs() < 4.0 * f64::EPSILON, "{a:?}: {product:?}");
+                    }
+                }
+                let axis = r.turn([0.0, 0.0, 1.0]);
+                assert!(axis.iter().zip(a).all(|(x, y)| (x - y).abs() < f64::EPSILON), "{axis:?} {a:?}");
+                // The smallest rotation turns about an axis across z.
+                if off > 0.0 {
+                    assert_eq!(r.rot[0][1], r.rot[1][0], "{a:?}");
+                }
+            }
+        }
+    }
 }

@@ -49,7 +49,7 @@ impl Builder<'_> {
         }
         match self.rng.below(20) {
             0..=9 => Value::ZERO,
-            10 => Value::Const(1.570_796_3),
+            10 => Value::Const((QUARTERS[0] * 1e7).floor() / 1e7),
             11 => self.value(QUARTERS[0]),
             _ => Value::Const(self.rng.pick(&QUARTERS)),
         }

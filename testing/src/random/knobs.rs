@@ -75,13 +75,16 @@ impl Knobs {
         let few = rng.chance(0.33);
         let kinds = all.map(|w| if few && rng.chance(0.6) { 0.0 } else { w });
         let kinds = if kinds[..8].iter().all(|w| *w == 0.0) { all } else { kinds };
+        let mimic = if rng.chance(0.5) { 0.8 } else { 0.0 };
+        // Only joints of one freedom can lead and follow.
+        let single = if mimic > 0.0 { 3.0 } else { 1.0 };
+        let kinds = std::array::from_fn(|k| if matches!(k, 0 | 1 | 3) { single * kinds[k] } else { kinds[k] });
         let mut some = |p: f64| if rng.chance(0.5) { 0.0 } else { p };
         Knobs {
             bodies: (1, bodies),
             branching: some(0.5),
             roots: some(0.3),
             prescribed: some(0.3),
-            mimic: some(0.6),
             massless: some(0.5),
             damping: some(0.5),
             springs: some(0.5),
@@ -92,6 +95,7 @@ impl Knobs {
             products: rng.unit(),
             skew: rng.pick(&[0.0, 0.2, 0.5, 0.8, 1.0]),
             taper: rng.range(0.6, 1.1),
+            mimic,
             kinds,
             gravity: [2.0, 1.0, 1.0],
         }
