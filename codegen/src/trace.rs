@@ -11,7 +11,7 @@ use crate::options::{Group, Options};
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph, Program};
 
-/// One array of numbers that generated code is called with; the order of [`Signature::arrays`] numbers its inputs.
+/// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputArray {
     /// Expression in the generated code: `q`, `p`, `self.tau`.
