@@ -1,0 +1,95 @@
+//! Generates the code of the robots listed in the file that `RIVALS_ROBOTS` names.
+
+use mbd_codegen::import::{load, Base, ImportOptions};
+use mbd_codegen::layout::pinocchio;
+use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_codegen::{generate, Group, Options};
+use std::fmt::Write;
+
+fn main() {
+    println!("cargo:rerun-if-env-changed=RIVALS_ROBOTS");
+    println!("cargo:rerun-if-env-changed=RIVALS_CHUNK");
+    let list = std::env::var("RIVALS_ROBOTS").expect("RIVALS_ROBOTS names the list of robots");
+    println!("cargo:rerun-if-changed={list}");
+    let mut lib = String::new();
+    for line in std::fs::read_to_string(&list).expect("the list").lines() {
+        let [name, base, path] = line.split(' ').collect::<Vec<_>>()[..] else { panic!("{line}: name base file") };
+        robot(&mut lib, name, base, path);
+    }
+    write("robots.rs", &lib);
+}
+
+fn write(file: &str, text: &str) {
+    let out = std::env::var("OUT_DIR").expect("cargo sets it");
+    std::fs::write(format!("{out}/{file}"), text).expect("written");
+}
+
+fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
+    println!("cargo:rerun-if-changed={path}");
+    let text = std::fs::read_to_string(path).expect("the model");
+    let base = if base == "floating" { Base::Floating } else { Base::Fixed };
+    let (model, findings) = load(path, &text, &ImportOptions { base, gravity: None });
+    let mut model = model.unwrap_or_else(|| panic!("{findings}"));
+    // Pinocchio's forward dynamics knows no dampers.
+    for joint in &mut model.joints {
+        joint.damping.fill(mbd_codegen::model::Value::Const(0.0));
+    }
+    let chunk = std::env::var("RIVALS_CHUNK").ok().map(|c| c.parse().expect("RIVALS_CHUNK is a number"));
+    let options = Options {
+        type_name: "Kernel".to_string(),
+        outputs: vec![Group::Rates, Group::Accelerations],
+        chunk: chunk.unwrap_or(Options::default().chunk),
+        source: name.to_string(),
+        ..Options::default()
+    };
+    let generated = generate(&model, &options).expect("code");
+    write(&format!("{name}.rs"), &generated.source);
+    let plan = Plan::new(&model, PlanOptions::default());
+    let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
+    for part in pinocchio(&plan).parts {
+        let (here, there, n) = part.form.sizes();
+        assert_eq!(here, there, "{name}: coordinates of one form");
+        (0..here).for_each(|k| q[part.q.0 + k] = part.q.1 + k);
+        (0..n).for_each(|k| v[part.v.0 + k] = part.v.1 + k);
+    }
+    let ops = |g: Group| generated.counts.iter().find(|c| c.0 == g).expect("generated").1.total();
+    let (rates, accelerations) = (ops(Group::Rates), ops(Group::Accelerations));
+    let (nq, nv) = (q.len(), v.len());
+    let _ = write!(
+        lib,
+        "
+#[allow(dead_code)]
+pub mod {name} {{
+    include!(concat!(env!(\"OUT_DIR\"), \"/{name}.rs\"));
+
+    // The joint forces are read where the caller has them, as the rivals read theirs.
+    const _: () = assert!(core::mem::size_of::<Kernel>() == {nv} * 8);
+
+    /// # Safety
+    /// Pointers to {nq}, {nv}, {nv} and {nq} + {nv} numbers.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_rates(q: *const f64, p: *const f64, tau: *const f64, out: *mut f64) {{
+        (*tau.cast::<Kernel>()).rates(&*q.cast(), &*p.cast(), &mut *out.cast(), &mut *out.add({nq}).cast());
+    }}
+
+    /// # Safety
+    /// Pointers to {nq}, {nv}, {nv} and {nv} numbers.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_accelerations(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64) {{
+        (*tau.cast::<Kernel>()).accelerations(&*q.cast(), &*v.cast(), &mut *out.cast());
+    }}
+
+    /// Where our coordinates and velocities stand in Pinocchio's state; operations of rates and accelerations.
+    ///
+    /// # Safety
+    /// Pointers to {nq}, {nv} and 2 numbers.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_about(q: *mut i32, v: *mut i32, operations: *mut i32) {{
+        *q.cast() = {q:?} as [i32; {nq}];
+        *v.cast() = {v:?} as [i32; {nv}];
+        *operations.cast() = [{rates}, {accelerations}];
+    }}
+}}
+"
+    );
+}
