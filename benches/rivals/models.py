@@ -69,9 +69,11 @@ axis = {show(rng.normal(size=3))}""")
 
 
 def snapped(matrix):
-    """A rotation whose entries next to 0 and ±1 are those."""
-    near = np.round(matrix)
-    return np.where(np.abs(matrix - near) < SNAP, near, matrix)
+    """A rotation without entries next to 0, if that leaves it one; what then stands alone in its row is 1 or -1."""
+    close = np.where(np.abs(matrix) < SNAP, 0.0, matrix)
+    alone = np.count_nonzero(close, axis=1, keepdims=True) == 1
+    close = np.where(alone, np.sign(close), close)
+    return close if np.abs(close @ close.T - np.eye(3)).max() < 1e-13 else matrix
 
 
 def cleaned(x):

@@ -4,7 +4,9 @@ use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::layout::pinocchio;
 use mbd_codegen::plan::{Plan, PlanOptions};
 use mbd_codegen::{generate, Group, Options};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::{Read as _, Write as _};
+use std::process::{Command, Stdio};
 
 fn main() {
     println!("cargo:rerun-if-env-changed=RIVALS_ROBOTS");
@@ -22,6 +24,21 @@ fn main() {
 fn write(file: &str, text: &str) {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
     std::fs::write(format!("{out}/{file}"), text).expect("written");
+}
+
+/// The code as the command in `RIVALS_FILTER` leaves it, for experiments.
+fn filtered(source: String) -> String {
+    println!("cargo:rerun-if-env-changed=RIVALS_FILTER");
+    let Ok(command) = std::env::var("RIVALS_FILTER") else { return source };
+    let mut child = Command::new("sh").arg("-c").arg(&command).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
+    let child = child.as_mut().expect("a command");
+    let mut input = child.stdin.take().expect("piped");
+    let writer = std::thread::spawn(move || input.write_all(source.as_bytes()));
+    let mut out = String::new();
+    child.stdout.take().expect("piped").read_to_string(&mut out).expect("text");
+    writer.join().expect("no panic").expect("read by the command");
+    assert!(child.wait().expect("ended").success(), "{command}");
+    out
 }
 
 fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
@@ -43,7 +60,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
         ..Options::default()
     };
     let generated = generate(&model, &options).expect("code");
-    write(&format!("{name}.rs"), &generated.source);
+    write(&format!("{name}.rs"), &filtered(generated.source));
     let plan = Plan::new(&model, PlanOptions::default());
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {

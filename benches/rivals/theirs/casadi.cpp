@@ -25,7 +25,7 @@ int main(int, char ** argv)
     SX a(model.nv, 1);
     for (int k = 0; k < model.nv; ++k) a(k) = data.ddq[k];
     // Common subexpressions: CasADi's symbols are not shared by themselves.
-    casadi::Function f("casadi_kernel", {q, v, tau}, {cse(a)});
+    casadi::Function f(std::string(argv[2]) + "_function", {q, v, tau}, {cse(a)});
     int operations = 0;
     for (int k = 0; k < f.n_instructions(); ++k) {
         const auto op = f.instruction_id(k);

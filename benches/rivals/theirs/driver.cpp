@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <numeric>
@@ -25,9 +26,9 @@ using Kernel = void (*)(const double *, const double *, const double *, double *
 using About = void (*)(int *, int *, int *);
 
 constexpr int STATES = 256;
-// Code in single calls and code in lanes are compared with ABA; both are to agree with it to this, relative to the
+// Every contestant is to agree with Pinocchio to this, relative to the
 // largest entry. It leaves room for the condition of the mass matrix, not for a wrong term.
-constexpr double TOLERANCE = 1e-7;
+constexpr double TOLERANCE = 1e-9;
 
 struct Contestant {
     std::string name, function;
@@ -210,13 +211,15 @@ static std::vector<Contestant> contestants(const std::string & robot, const pino
         add(tool, "theirs.so", symbol, 1, false, false, ops);
         add(tool + "_lanes", "theirs_lanes.so", symbol, 8, false, false, ops);
     }
-    for (const bool rates : {true, false}) {
-        const std::string what = rates ? "_rates" : "_accelerations";
-        const int ops = operations[rates ? 0 : 1];
-        for (const std::string build : {"plain", "native"})
-            add("ours_" + build + what, "ours_" + build + ".so", robot + what, 1, true, rates, ops);
-        add("ours_clang" + what, "ours_clang.so", robot + what, 1, true, rates, ops);
-        add("ours_clang_lanes" + what, "ours_clang_lanes.so", robot + what, 8, true, rates, ops);
+    // Every build of ours that is there.
+    for (const auto & entry : std::filesystem::directory_iterator(libraries.build)) {
+        const std::string file = entry.path().filename(), build = entry.path().stem();
+        if (file.rfind("ours_", 0) || entry.path().extension() != ".so") continue;
+        const int lanes = build.find("_lanes") == std::string::npos ? 1 : 8;
+        for (const bool rates : {true, false}) {
+            const std::string what = rates ? "_rates" : "_accelerations";
+            add(build + what, file, robot + what, lanes, true, rates, operations[rates ? 0 : 1]);
+        }
     }
     return all;
 }

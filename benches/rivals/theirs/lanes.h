@@ -4,6 +4,7 @@
 
 #if defined(LANES)
 typedef double real __attribute__((ext_vector_type(8)));
+#define sqrt __builtin_elementwise_sqrt
 /* Sines and cosines of the C library's vector half (libmvec). */
 #if defined(__AVX512F__)
 real _ZGVeN8v_sin(real);
