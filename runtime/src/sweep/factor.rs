@@ -10,35 +10,50 @@ use crate::Scalar;
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `M*`, `U`, `Mj`, `M'` of every node (4.48, 4.44).
     pub fn factor(&self, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
-        let n = self.tree.nodes.len();
+        self.factor_begin(f);
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.factor_node(i, poses, first, f);
+        }
+        self.factor_ground(f);
+    }
+
+    /// Before the first [`Sweeps::factor_node`]: every body by itself.
+    pub fn factor_begin(&self, f: &mut Factor<S>) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             f.m[i] = node.inertia.articulated();
         }
         f.columns.fill(Force::zero());
         f.gram.fill(S::zero());
-        for i in (0..n).rev() {
-            let node = &self.tree.nodes[i];
-            self.trace.at(Some(i), Quantity::Pivot);
-            let mut m = f.m[i]; // M*_i (4.48)
-            for (k, &g) in node.solve_before.iter().enumerate() {
-                self.solve_shared(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
-            }
-            for k in 0..node.kind.nv() {
-                self.eliminate(i, k, first[i] + k, &mut m, f);
-            }
-            for (k, &g) in node.solve_after.iter().enumerate() {
-                self.solve_shared(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
-            }
-            f.m[i] = m; // M'_i (4.44)
-            let Some(parent) = node.parent else { continue };
-            self.trace.at(Some(i), Quantity::Inertia);
-            let carried = self.steps(poses, i).rev().fold(m, |m, step| step.inertia(&m));
-            f.m[parent] = f.m[parent].plus(&carried);
-            for &g in &node.open {
-                let column = self.force_out(poses, i, &f.columns[g * n + i]);
-                f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
-            }
+    }
+
+    /// [`Sweeps::factor`] for node `i` alone, all nodes behind it being done.
+    pub fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
+        let n = self.tree.nodes.len();
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Pivot);
+        let mut m = f.m[i]; // M*_i (4.48)
+        for (k, &g) in node.solve_before.iter().enumerate() {
+            self.solve_shared(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
         }
+        for k in 0..node.kind.nv() {
+            self.eliminate(i, k, first[i] + k, &mut m, f);
+        }
+        for (k, &g) in node.solve_after.iter().enumerate() {
+            self.solve_shared(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
+        }
+        f.m[i] = m; // M'_i (4.44)
+        let Some(parent) = node.parent else { return };
+        self.trace.at(Some(i), Quantity::Inertia);
+        let carried = self.steps(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+        f.m[parent] = f.m[parent].plus(&carried);
+        for &g in &node.open {
+            let column = self.force_out(poses, i, &f.columns[g * n + i]);
+            f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
+        }
+    }
+
+    /// After the last [`Sweeps::factor_node`]: coordinates solved at the ground.
+    pub fn factor_ground(&self, f: &mut Factor<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
             self.trace.at(None, Quantity::Pivot);

@@ -20,22 +20,28 @@ pub struct FrameState<S> {
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `Ω_i = X_i Ω_λ + E v` from given velocities.
     pub(super) fn velocity_kinematics(&self, v: &[S], drive: &[S], w: &mut Workspace<S>) {
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Velocity);
-            let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
-            let hat = self.motion_in(&w.poses, i, &outer);
-            let mut omega = hat;
-            for k in 0..node.kind.nv() {
-                let rate = match node.source {
-                    Source::State { v: at, .. } => node.ratio * v[at + k],
-                    Source::Drive { v: at, .. } => node.ratio * drive[at + k],
-                };
-                w.velocity.rate[w.first[i] + k] = rate;
-                node.kind.axis(k).add_to(&mut omega, rate);
-            }
-            w.velocity.hat[i] = hat;
-            w.velocity.omega[i] = omega;
+        for i in 0..self.tree.nodes.len() {
+            self.velocity_node(i, v, drive, w);
         }
+    }
+
+    /// `Ω` of node `i` from given velocities, its parent being done.
+    pub fn velocity_node(&self, i: usize, v: &[S], drive: &[S], w: &mut Workspace<S>) {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Velocity);
+        let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
+        let hat = self.motion_in(&w.poses, i, &outer);
+        let mut omega = hat;
+        for k in 0..node.kind.nv() {
+            let rate = match node.source {
+                Source::State { v: at, .. } => node.ratio * v[at + k],
+                Source::Drive { v: at, .. } => node.ratio * drive[at + k],
+            };
+            w.velocity.rate[w.first[i] + k] = rate;
+            node.kind.axis(k).add_to(&mut omega, rate);
+        }
+        w.velocity.hat[i] = hat;
+        w.velocity.omega[i] = omega;
     }
 
     /// Poses of all nodes in the ground.

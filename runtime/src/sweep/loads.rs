@@ -10,10 +10,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Everything [`Sweeps::momentum_rates`] needs of gravity and wrenches.
     pub(super) fn loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         self.gravity_moments(w);
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Load);
-            let g = node.parent.map_or(u.gravity, |p| w.loads.gravity[p]);
-            w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
+        for i in 0..self.tree.nodes.len() {
+            self.gravity_node(i, u, w);
         }
         self.wrench_loads(u, w);
         if self.tree.wrenches.is_empty() {
@@ -29,24 +27,41 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// Gravity in the axes of node `i`, its parent being done.
+    pub fn gravity_node(&self, i: usize, u: &Inputs<S>, w: &mut Workspace<S>) {
+        self.trace.at(Some(i), Quantity::Load);
+        let g = self.tree.nodes[i].parent.map_or(u.gravity, |p| w.loads.gravity[p]);
+        w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
+    }
+
     /// First moment and mass of every subtree: `s_i = m c + Σ (R s_c + m_c r)`.
     pub(super) fn gravity_moments(&self, w: &mut Workspace<S>) {
+        self.moment_begin(w);
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.moment_node(i, w);
+        }
+    }
+
+    /// Before the first [`Sweeps::moment_node`]: every body by itself.
+    pub fn moment_begin(&self, w: &mut Workspace<S>) {
         w.loads.ground_moment = self.tree.ground_moment;
         for (i, node) in self.tree.nodes.iter().enumerate() {
             w.loads.moment[i] = node.inertia.moment;
             w.loads.mass[i] = node.inertia.mass;
         }
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.trace.at(Some(i), Quantity::Load);
-            let mass = w.loads.mass[i];
-            let out = self.steps(&w.poses, i).rev().fold(w.loads.moment[i], |s, step| step.moment(mass, s));
-            match self.tree.nodes[i].parent {
-                Some(p) => {
-                    w.loads.moment[p] = add3(w.loads.moment[p], out);
-                    w.loads.mass[p] = w.loads.mass[p] + mass;
-                }
-                None => w.loads.ground_moment = add3(w.loads.ground_moment, out),
+    }
+
+    /// First moment and mass behind node `i` added to its parent's, all nodes behind it being done.
+    pub fn moment_node(&self, i: usize, w: &mut Workspace<S>) {
+        self.trace.at(Some(i), Quantity::Load);
+        let mass = w.loads.mass[i];
+        let out = self.steps(&w.poses, i).rev().fold(w.loads.moment[i], |s, step| step.moment(mass, s));
+        match self.tree.nodes[i].parent {
+            Some(p) => {
+                w.loads.moment[p] = add3(w.loads.moment[p], out);
+                w.loads.mass[p] = w.loads.mass[p] + mass;
             }
+            None => w.loads.ground_moment = add3(w.loads.ground_moment, out),
         }
     }
 

@@ -16,6 +16,7 @@ mod rates;
 mod solve;
 
 pub use kinematics::FrameState;
+pub use solve::Load;
 
 use crate::spatial::{Force, Motion, Step};
 use crate::tree::{Node, Tree};

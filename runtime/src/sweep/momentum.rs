@@ -9,52 +9,69 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `P*_i = M_i Ω_i + Σ Xᵀ P*_c`, `p = EᵀP*` and the rotors, after a velocity sweep.
     pub(super) fn momentum_sweep(&self, w: &mut Workspace<S>, p: &mut [S]) {
         p.fill(S::zero());
+        self.momentum_begin(w);
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.momentum_node(i, w, p);
+        }
+    }
+
+    /// Before the first [`Sweeps::momentum_node`]: `M_i Ω_i` of every body by itself.
+    pub fn momentum_begin(&self, w: &mut Workspace<S>) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = node.inertia.momentum(&w.velocity.omega[i]);
         }
-        for i in (0..self.tree.nodes.len()).rev() {
-            let node = &self.tree.nodes[i];
-            self.trace.at(Some(i), Quantity::Momentum);
-            let total = w.force[i];
-            if let Source::State { v, .. } = node.source {
-                for (k, passive) in node.passive.iter().enumerate() {
-                    let along = node.kind.axis(k).dot(&total) + passive.armature * w.velocity.rate[w.first[i] + k];
-                    p[v + k] = p[v + k] + node.ratio * along;
-                }
+    }
+
+    /// `p` of node `i` (added to `p`) and `P*` carried to its parent, all nodes behind it being done.
+    pub fn momentum_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Momentum);
+        let total = w.force[i];
+        if let Source::State { v, .. } = node.source {
+            for (k, passive) in node.passive.iter().enumerate() {
+                let along = node.kind.axis(k).dot(&total) + passive.armature * w.velocity.rate[w.first[i] + k];
+                p[v + k] = p[v + k] + node.ratio * along;
             }
-            if let Some(parent) = node.parent {
-                let out = self.force_out(&w.poses, i, &total);
-                w.force[parent] = w.force[parent].plus(&out);
-            }
+        }
+        if let Some(parent) = node.parent {
+            let out = self.force_out(&w.poses, i, &total);
+            w.force[parent] = w.force[parent].plus(&out);
         }
     }
 
     /// `T = ½ pᵀq̇`, prescribed freedoms with the momentum their joints carry.
     pub(super) fn kinetic(&self, p: &[S], w: &Workspace<S>) -> S {
         let mut twice = S::zero();
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Energy);
-            let rate = |k: usize| w.velocity.rate[w.first[i] + k];
-            match node.source {
-                Source::State { v, .. } if node.shared.is_none() => {
-                    for k in 0..node.kind.nv() {
-                        twice = twice + p[v + k] * rate(k);
-                    }
-                }
-                Source::State { .. } => {}
-                Source::Drive { .. } => {
-                    let momentum = self.transmitted(&w.factor, &w.velocity, i);
-                    for (k, passive) in node.passive.iter().enumerate() {
-                        let along = node.kind.axis(k).dot(&momentum) + passive.armature * rate(k);
-                        twice = twice + along * rate(k);
-                    }
-                }
-            }
+        for i in 0..self.tree.nodes.len() {
+            twice = self.kinetic_node(i, p, w, twice);
         }
         for (g, &v) in self.tree.shared.iter().enumerate() {
             twice = twice + p[v] * w.velocity.shared_rate[g];
         }
         S::constant(0.5) * twice
+    }
+
+    /// Twice the kinetic energy with the share of node `i` added.
+    pub fn kinetic_node(&self, i: usize, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Energy);
+        let rate = |k: usize| w.velocity.rate[w.first[i] + k];
+        match node.source {
+            Source::State { v, .. } if node.shared.is_none() => {
+                for k in 0..node.kind.nv() {
+                    twice = twice + p[v + k] * rate(k);
+                }
+            }
+            Source::State { .. } => {}
+            Source::Drive { .. } => {
+                let momentum = self.transmitted(&w.factor, &w.velocity, i);
+                for (k, passive) in node.passive.iter().enumerate() {
+                    let along = node.kind.axis(k).dot(&momentum) + passive.armature * rate(k);
+                    twice = twice + along * rate(k);
+                }
+            }
+        }
+        twice
     }
 }

@@ -12,36 +12,42 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of it is needed.
     pub(super) fn momentum_rates(&self, u: &Inputs<S>, w: &Workspace<S>, pd: &mut [S]) {
         pd.fill(S::zero());
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            let Source::State { v, .. } = node.source else { continue };
-            self.trace.at(Some(i), Quantity::MomentumRate);
-            let m = &w.factor.m[i];
-            // A freedom that is solved further inboard leaves M* whole here: then Ω takes the place of Ω̂, and its own
-            // column, M* E, is in M* already.
-            let (d, hat) = match node.deferred {
-                false => (self.remainder_with_open(&w.factor, &w.velocity, i, None), &w.velocity.hat[i]),
-                true => (self.remainder_with_open(&w.factor, &w.velocity, i, node.shared), &w.velocity.omega[i]),
-            };
-            let gyro = match node.kind {
-                Kind::Pin => gyro_turn(m, hat, &d),
-                Kind::Slider => gyro_slide(m, hat, &d),
-                Kind::Helical { pitch } => gyro_turn(m, hat, &d) + pitch * gyro_slide(m, hat, &d),
-                Kind::Planar | Kind::Spherical | Kind::Floating => {
-                    let force = w.velocity.omega[i].cross_force(&m.times(hat).plus(&d));
-                    for k in 0..node.kind.nv() {
-                        let axis = node.kind.axis(k);
-                        let sum = self.applied(w, i, &axis) - axis.dot(&force);
-                        pd[v + k] = sum + self.passive(node, w, i, k);
-                    }
-                    continue;
-                }
-            };
-            let sum = self.applied(w, i, &node.kind.axis(0)) - gyro;
-            pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+        for i in 0..self.tree.nodes.len() {
+            self.momentum_rate_node(i, w, pd);
         }
         for (pd, tau) in pd.iter_mut().zip(u.tau) {
             *pd = *pd + *tau;
         }
+    }
+
+    /// [`Sweeps::momentum_rates`] for node `i` alone, without `τ`; added to `pd`.
+    pub fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
+        let node = &self.tree.nodes[i];
+        let Source::State { v, .. } = node.source else { return };
+        self.trace.at(Some(i), Quantity::MomentumRate);
+        let m = &w.factor.m[i];
+        // A freedom that is solved further inboard leaves M* whole here: then Ω takes the place of Ω̂, and its own
+        // column, M* E, is in M* already.
+        let (d, hat) = match node.deferred {
+            false => (self.remainder_with_open(&w.factor, &w.velocity, i, None), &w.velocity.hat[i]),
+            true => (self.remainder_with_open(&w.factor, &w.velocity, i, node.shared), &w.velocity.omega[i]),
+        };
+        let gyro = match node.kind {
+            Kind::Pin => gyro_turn(m, hat, &d),
+            Kind::Slider => gyro_slide(m, hat, &d),
+            Kind::Helical { pitch } => gyro_turn(m, hat, &d) + pitch * gyro_slide(m, hat, &d),
+            Kind::Planar | Kind::Spherical | Kind::Floating => {
+                let force = w.velocity.omega[i].cross_force(&m.times(hat).plus(&d));
+                for k in 0..node.kind.nv() {
+                    let axis = node.kind.axis(k);
+                    let sum = self.applied(w, i, &axis) - axis.dot(&force);
+                    pd[v + k] = sum + self.passive(node, w, i, k);
+                }
+                return;
+            }
+        };
+        let sum = self.applied(w, i, &node.kind.axis(0)) - gyro;
+        pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
     }
 
     /// `Eᵀ T*`: gravity and external wrenches.
@@ -71,36 +77,39 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn solve_accelerations(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         let nv = self.tree.dims.nv;
         w.generalized[..nv].fill(S::zero());
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Load);
-            let omega = w.velocity.omega[i];
-            let mut seed = omega.cross_force(&node.inertia.momentum(&omega));
-            if !self.tree.wrenches.is_empty() {
-                seed = seed.minus(&w.loads.own[i]);
-            }
-            w.force[i] = seed;
-            let mut joint = Motion::zero();
-            for k in 0..node.kind.nv() {
-                joint = joint.plus(&node.kind.axis(k).motion(w.velocity.rate[w.first[i] + k]));
-                if let Source::State { v, .. } = node.source {
-                    w.generalized[v + k] = w.generalized[v + k] + node.ratio * self.passive(node, w, i, k);
-                }
-            }
-            w.imposed[i] = omega.cross_motion(&joint);
+        for i in 0..self.tree.nodes.len() {
+            self.acceleration_seed_node(i, w);
         }
         for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
             *f = *f + *tau;
         }
-        let [x, y, z] = u.gravity;
-        let load = Load {
-            p: &w.generalized,
-            drive: u.drive_a,
-            seeds: Some(&w.force),
-            imposed: Some(&w.imposed),
-            ground: Motion { lin: [-x, -y, -z], ang: [S::zero(); 3] },
-            what: Quantity::Acceleration,
-        };
-        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
+        self.solve(
+            &w.poses,
+            &w.first,
+            &w.factor,
+            &Load::accelerations(u, &w.generalized, &w.force, &w.imposed),
+            &mut w.acceleration,
+        );
+    }
+
+    /// `Ω × P − T`, `Ω × E v` and the passive forces of node `i` for [`Sweeps::solve_accelerations`].
+    pub fn acceleration_seed_node(&self, i: usize, w: &mut Workspace<S>) {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Load);
+        let omega = w.velocity.omega[i];
+        let mut seed = omega.cross_force(&node.inertia.momentum(&omega));
+        if !self.tree.wrenches.is_empty() {
+            seed = seed.minus(&w.loads.own[i]);
+        }
+        w.force[i] = seed;
+        let mut joint = Motion::zero();
+        for k in 0..node.kind.nv() {
+            joint = joint.plus(&node.kind.axis(k).motion(w.velocity.rate[w.first[i] + k]));
+            if let Source::State { v, .. } = node.source {
+                w.generalized[v + k] = w.generalized[v + k] + node.ratio * self.passive(node, w, i, k);
+            }
+        }
+        w.imposed[i] = omega.cross_motion(&joint);
     }
 }
 

@@ -11,7 +11,8 @@ use crate::workspace::{Factor, Poses, Solution, Workspace};
 use crate::Scalar;
 
 /// A right-hand side.
-pub(super) struct Load<'a, S> {
+#[derive(Clone, Copy, Debug)]
+pub struct Load<'a, S> {
     /// For each velocity index: `p` or joint force.
     pub p: &'a [S],
     /// For each prescribed freedom: rate or acceleration.
@@ -26,6 +27,22 @@ pub(super) struct Load<'a, S> {
     pub what: Quantity,
 }
 
+impl<'a, S: Scalar> Load<'a, S> {
+    /// Velocity level: momenta `p` and prescribed rates.
+    pub fn velocities(p: &'a [S], u: &Inputs<'a, S>) -> Self {
+        Load { p, drive: u.drive_v, seeds: None, imposed: None, ground: Motion::zero(), what: Quantity::Velocity }
+    }
+
+    /// Acceleration level: joint forces `p`, `D` and imposed motion of every node, a ground that accelerates against
+    /// gravity.
+    pub fn accelerations(u: &Inputs<'a, S>, p: &'a [S], seeds: &'a [Force<S>], imposed: &'a [Motion<S>]) -> Self {
+        let [x, y, z] = u.gravity;
+        let ground = Motion { lin: [-x, -y, -z], ang: [S::zero(); 3] };
+        let (seeds, imposed) = (Some(seeds), Some(imposed));
+        Load { p, drive: u.drive_a, seeds, imposed, ground, what: Quantity::Acceleration }
+    }
+}
+
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Solves for rates (or accelerations).
     pub(super) fn solve(
@@ -36,58 +53,79 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         load: &Load<S>,
         sol: &mut Solution<S>,
     ) {
-        self.remainders(poses, first, f, load, sol);
-        self.motions(poses, first, f, load, sol);
+        self.remainder_begin(load, sol);
+        for i in (0..self.tree.nodes.len()).rev() {
+            self.remainder_node(i, poses, first, f, load, sol);
+        }
+        self.remainder_ground(f, load, sol);
+        self.motion_ground(f, load, sol);
+        for i in 0..self.tree.nodes.len() {
+            self.motion_node(i, poses, first, f, load, sol);
+        }
     }
 
-    /// `D`, `D'` and `(p − d) / Mj`, leaves to base.
-    fn remainders(&self, poses: &Poses<S>, first: &[usize], f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+    /// Before the first [`Sweeps::remainder_node`].
+    pub fn remainder_begin(&self, load: &Load<S>, sol: &mut Solution<S>) {
         match load.seeds {
             Some(seeds) => sol.d.copy_from_slice(seeds),
             None => sol.d.fill(Force::zero()),
         }
         // `shared_rate` holds the momentum remainder of open coordinates until the forward sweep overwrites it.
         sol.shared_rate.fill(S::zero());
-        for i in (0..self.tree.nodes.len()).rev() {
-            let node = &self.tree.nodes[i];
-            self.trace.at(Some(i), Quantity::Remainder);
-            let mut d = sol.d[i]; // D_i (4.49)
-            for (k, &g) in node.solve_before.iter().enumerate() {
-                let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
-                d = d.plus(&f.shared[g].u.times(e));
+    }
+
+    /// `D`, `D'` and `(p − d) / Mj` of node `i`, all nodes behind it being done.
+    pub fn remainder_node(
+        &self,
+        i: usize,
+        poses: &Poses<S>,
+        first: &[usize],
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+    ) {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Remainder);
+        let mut d = sol.d[i]; // D_i (4.49)
+        for (k, &g) in node.solve_before.iter().enumerate() {
+            let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
+            d = d.plus(&f.shared[g].u.times(e));
+        }
+        for k in 0..node.kind.nv() {
+            self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
+        }
+        for (k, &g) in node.solve_after.iter().enumerate() {
+            let e = self.shared_remainder(g, f, load, sol, Self::open_after(node, k + 1));
+            d = d.plus(&f.shared[g].u.times(e));
+        }
+        sol.d[i] = d; // D'_i (4.45)
+        if let Some(imposed) = load.imposed {
+            let through = f.m[i].times(&imposed[i]);
+            let n = self.tree.nodes.len();
+            for &h in &node.open {
+                sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&imposed[i]);
             }
-            for k in 0..node.kind.nv() {
-                self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
+            d = d.plus(&through);
+        }
+        match node.parent {
+            Some(parent) => {
+                let carried = self.force_out(poses, i, &d);
+                sol.d[parent] = sol.d[parent].plus(&carried);
             }
-            for (k, &g) in node.solve_after.iter().enumerate() {
-                let e = self.shared_remainder(g, f, load, sol, Self::open_after(node, k + 1));
-                d = d.plus(&f.shared[g].u.times(e));
-            }
-            sol.d[i] = d; // D'_i (4.45)
-            if let Some(imposed) = load.imposed {
-                let through = f.m[i].times(&imposed[i]);
+            // Coordinates solved at the ground feel its motion through the columns that end here.
+            None if !node.open.is_empty() => {
+                let outer = self.motion_in(poses, i, &load.ground);
                 let n = self.tree.nodes.len();
                 for &h in &node.open {
-                    sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&imposed[i]);
+                    sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&outer);
                 }
-                d = d.plus(&through);
             }
-            match node.parent {
-                Some(parent) => {
-                    let carried = self.force_out(poses, i, &d);
-                    sol.d[parent] = sol.d[parent].plus(&carried);
-                }
-                // Coordinates solved at the ground feel its motion through the columns that end here.
-                None if !node.open.is_empty() => {
-                    let outer = self.motion_in(poses, i, &load.ground);
-                    let n = self.tree.nodes.len();
-                    for &h in &node.open {
-                        sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&outer);
-                    }
-                }
-                None => {}
-            }
+            None => {}
         }
+    }
+
+    /// After the last [`Sweeps::remainder_node`]: coordinates solved at the ground.
+    pub fn remainder_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
             self.shared_remainder(g, f, load, sol, ground[k + 1..].iter().copied());
@@ -150,46 +188,57 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         e
     }
 
-    /// `Ω̂`, rates, `Ω`, base to leaves.
-    fn motions(&self, poses: &Poses<S>, first: &[usize], f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
-        let ng = self.tree.shared.len();
+    /// Before the first [`Sweeps::motion_node`]: coordinates solved at the ground.
+    pub fn motion_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate().rev() {
             self.trace.at(None, load.what);
             self.shared_motion(g, f, &Motion::zero(), ground[k + 1..].iter().copied(), sol);
         }
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), load.what);
-            let outer = node.parent.map_or(load.ground, |p| sol.omega[p]);
-            let mut hat = self.motion_in(poses, i, &outer);
-            if let Some(imposed) = load.imposed {
-                hat = hat.plus(&imposed[i]);
-            }
-            sol.hat[i] = hat; // Ω̂_i
-            for (k, &g) in node.solve_after.iter().enumerate().rev() {
-                self.shared_motion(g, f, &hat, Self::open_after(node, k + 1), sol);
-            }
-            let mut omega = hat;
-            for k in (0..node.kind.nv()).rev() {
-                let freedom = first[i] + k;
-                let rate = match (node.shared, node.source) {
-                    (Some(g), _) => node.ratio * sol.shared_rate[g],
-                    (None, Source::Drive { .. }) => sol.e[freedom],
-                    (None, Source::State { .. }) => {
-                        let pivot = &f.pivots[freedom];
-                        let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
-                        Self::open_after(node, 0)
-                            .fold(rate, |rate, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h])
-                    }
-                };
-                sol.rate[freedom] = rate;
-                node.kind.axis(k).add_to(&mut omega, rate);
-            }
-            for (k, &g) in node.solve_before.iter().enumerate().rev() {
-                self.shared_motion(g, f, &omega, Self::open_before(node, k + 1), sol);
-            }
-            sol.omega[i] = omega; // Ω_i
+    }
+
+    /// `Ω̂`, rates and `Ω` of node `i`, its parent being done.
+    pub fn motion_node(
+        &self,
+        i: usize,
+        poses: &Poses<S>,
+        first: &[usize],
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+    ) {
+        let ng = self.tree.shared.len();
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), load.what);
+        let outer = node.parent.map_or(load.ground, |p| sol.omega[p]);
+        let mut hat = self.motion_in(poses, i, &outer);
+        if let Some(imposed) = load.imposed {
+            hat = hat.plus(&imposed[i]);
         }
+        sol.hat[i] = hat; // Ω̂_i
+        for (k, &g) in node.solve_after.iter().enumerate().rev() {
+            self.shared_motion(g, f, &hat, Self::open_after(node, k + 1), sol);
+        }
+        let mut omega = hat;
+        for k in (0..node.kind.nv()).rev() {
+            let freedom = first[i] + k;
+            let rate = match (node.shared, node.source) {
+                (Some(g), _) => node.ratio * sol.shared_rate[g],
+                (None, Source::Drive { .. }) => sol.e[freedom],
+                (None, Source::State { .. }) => {
+                    let pivot = &f.pivots[freedom];
+                    let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
+                    Self::open_after(node, 0)
+                        .fold(rate, |rate, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h])
+                }
+            };
+            sol.rate[freedom] = rate;
+            node.kind.axis(k).add_to(&mut omega, rate);
+        }
+        for (k, &g) in node.solve_before.iter().enumerate().rev() {
+            self.shared_motion(g, f, &omega, Self::open_before(node, k + 1), sol);
+        }
+        sol.omega[i] = omega; // Ω_i
     }
 
     fn shared_motion(
@@ -209,9 +258,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Velocity level: `p → Ω, v`.
     pub(super) fn solve_velocities(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        let load =
-            Load { p, drive: u.drive_v, seeds: None, imposed: None, ground: Motion::zero(), what: Quantity::Velocity };
-        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+        self.solve(&w.poses, &w.first, &w.factor, &Load::velocities(p, u), &mut w.velocity);
     }
 
     /// Wrench (or momentum) that node `i` receives from its parent, in its own frame: `M'Ω̂ + D'` (4.43).
