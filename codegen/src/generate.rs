@@ -3,7 +3,7 @@
 
 use crate::emit;
 use crate::model::Model;
-pub use crate::options::{Group, Options, Precision};
+pub use crate::options::{Arithmetic, Group, Options, Precision};
 use crate::plan::Plan;
 use crate::symbolic::{Counts, Operand, Output};
 use crate::trace::coordinate_map;

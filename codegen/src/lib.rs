@@ -12,4 +12,4 @@ pub mod plan;
 pub mod symbolic;
 pub mod trace;
 
-pub use generate::{generate, Generated, Group, Options, Precision};
+pub use generate::{generate, Arithmetic, Generated, Group, Options, Precision};

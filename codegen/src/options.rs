@@ -21,6 +21,26 @@ impl Precision {
     }
 }
 
+/// How faithfully the emitted operations follow those of the sweeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Arithmetic {
+    /// The operations as the sweeps make them: the bits of the interpreter.
+    #[default]
+    Exact,
+    /// Rewritten, regrouped, fused and scheduled for speed: other rounding, no larger errors.
+    Fast,
+}
+
+impl Arithmetic {
+    /// Its name in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Arithmetic::Exact => "exact",
+            Arithmetic::Fast => "fast",
+        }
+    }
+}
+
 /// What generated code can compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
@@ -96,6 +116,8 @@ pub struct Options {
     pub source: String,
     /// Statements in one function at the most; longer programs are split.
     pub chunk: usize,
+    /// Whether operations may be rewritten.
+    pub arithmetic: Arithmetic,
 }
 
 impl Default for Options {
@@ -110,6 +132,7 @@ impl Default for Options {
             runtime: "::mbd_runtime".to_string(),
             source: String::new(),
             chunk: 1000,
+            arithmetic: Arithmetic::default(),
         }
     }
 }

@@ -9,7 +9,7 @@ use mbd_runtime::Scalar;
 use crate::model::Gravity;
 use crate::options::{Group, Options};
 use crate::plan::Plan;
-use crate::symbolic::{Expr, Graph, Program};
+use crate::symbolic::{passes, Expr, Graph, Program};
 
 /// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -96,7 +96,7 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let tree = if group == Group::Reactions { physical } else { physical.regrouped() };
     let frames = chosen_frames(plan, options)?;
     let outputs = run(&graph, &tree, group, &q, &second, &inputs, &frames);
-    let program = Program::new(&graph, &outputs);
+    let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);
     Ok(GroupProgram { group, inputs: symbols.arrays, program })
 }
 

@@ -2,7 +2,7 @@
 
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
-use mbd_codegen::{Group, Options, Precision};
+use mbd_codegen::{Arithmetic, Group, Options, Precision};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
 use crate::literal;
@@ -49,8 +49,21 @@ pub struct Args {
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 12] =
-    ["path", "name", "outputs", "scalar", "base", "gravity", "efforts", "frames", "snap", "toml", "urdf", "runtime"];
+const KEYS: [&str; 13] = [
+    "path",
+    "name",
+    "outputs",
+    "scalar",
+    "arithmetic",
+    "base",
+    "gravity",
+    "efforts",
+    "frames",
+    "snap",
+    "toml",
+    "urdf",
+    "runtime",
+];
 
 const EXAMPLE: &str = "as in `mbd_model! { path = \"models/arm.toml\", name = Arm }`";
 
@@ -136,6 +149,10 @@ impl Args {
             "scalar" => {
                 let choices = [("f64", Precision::F64), ("f32", Precision::F32)];
                 self.options.precision = choice("scalar", value, &choices)?;
+            }
+            "arithmetic" => {
+                let choices = [Arithmetic::Exact, Arithmetic::Fast].map(|a| (a.name(), a));
+                self.options.arithmetic = choice("arithmetic", value, &choices)?;
             }
             "base" => {
                 let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{self, Group, Options, Precision};
+use multibody::codegen::{self, Arithmetic, Group, Options, Precision};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
@@ -36,6 +36,7 @@ struct Entry {
     base: Option<String>,
     gravity: Option<[f64; 3]>,
     scalar: Option<String>,
+    arithmetic: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -88,7 +89,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 
 const KEYS: &str =
     "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
-                    `gravity`, `scalar`, `efforts`, `frames`, `snap`, `chunk`";
+                    `gravity`, `scalar`, `arithmetic`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// What a file should hold.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -111,10 +112,17 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         Some(other) => return Err(wrong(format!("`{other}` is no number type"))),
     };
     let default = Options::default();
+    let arithmetic = match entry.arithmetic.as_deref() {
+        None => default.arithmetic,
+        Some("exact") => Arithmetic::Exact,
+        Some("fast") => Arithmetic::Fast,
+        Some(other) => return Err(wrong(format!("`{other}` is no arithmetic"))),
+    };
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
         precision,
+        arithmetic,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
         plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), ..PlanOptions::default() },

@@ -176,6 +176,10 @@ impl<'a> Body<'a> {
             Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
             Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
             Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
+            Op::Fma(f) => {
+                let (p, s) = (if f.minus_product { "-" } else { "" }, if f.minus_addend { "-" } else { "+" });
+                format!("{p}({} * {}) {s} {}", text(&f.a), text(&f.b), text(&f.c))
+            }
             Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, self.names[a]),
             Op::Sin(_) | Op::Cos(_) => unreachable!("written as pairs"),
         }

@@ -29,6 +29,8 @@ pub enum Op {
     Mul(Operand, Operand),
     /// `a / b`.
     Div(Operand, Operand),
+    /// `±a · b ± c`; made by passes, never by sweeps.
+    Fma(Fma),
     /// Square root.
     Sqrt(u32),
     /// Sine.
@@ -37,15 +39,31 @@ pub enum Op {
     Cos(u32),
 }
 
+/// A product and a sum in one operation: `±a · b ± c`. One rounding where the target fuses, two where it does not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Fma {
+    /// First factor.
+    pub a: Operand,
+    /// Second factor.
+    pub b: Operand,
+    /// The addend.
+    pub c: Operand,
+    /// Whether the product is subtracted.
+    pub minus_product: bool,
+    /// Whether the addend is subtracted.
+    pub minus_addend: bool,
+}
+
 impl Op {
     /// The operands, where there are any.
     pub fn operands(&self) -> impl Iterator<Item = Operand> {
-        let (a, b) = match *self {
-            Op::Input(_) => (None, None),
-            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => (Some(a), Some(b)),
-            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => (Some(Operand::Node(a)), None),
+        let all = match *self {
+            Op::Input(_) => [None; 3],
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],
+            Op::Fma(f) => [Some(f.a), Some(f.b), Some(f.c)],
+            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => [Some(Operand::Node(a)), None, None],
         };
-        a.into_iter().chain(b)
+        all.into_iter().flatten()
     }
 }
 

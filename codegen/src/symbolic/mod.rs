@@ -4,8 +4,10 @@
 //! of constants, order of commutative operands, sharing of equal operations. A program therefore gives the bits that the
 //! same sweep gives on numbers, up to the sign of zero.
 
+mod evaluate;
 mod expr;
+pub mod passes;
 mod program;
 
-pub use expr::{Expr, Graph, Label, Op, Operand};
+pub use expr::{Expr, Fma, Graph, Label, Op, Operand};
 pub use program::{Counts, Output, Program};

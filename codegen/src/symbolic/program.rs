@@ -53,6 +53,10 @@ impl Counts {
             Op::Add(..) | Op::Sub(..) => self.additions += 1,
             Op::Mul(..) => self.multiplications += 1,
             Op::Div(..) => self.divisions += 1,
+            Op::Fma(_) => {
+                self.additions += 1;
+                self.multiplications += 1;
+            }
             Op::Sqrt(_) => self.roots += 1,
             Op::Sin(_) | Op::Cos(_) => self.sincos += usize::from(!sine_of_pair),
         }

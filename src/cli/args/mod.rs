@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{Group, Options, Precision};
+use multibody::codegen::{Arithmetic, Group, Options, Precision};
 use values::{camel_case, finite, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
@@ -122,6 +122,9 @@ pub struct CodeArgs {
     /// Number type
     #[arg(long, value_enum, default_value_t = ScalarArg::F64)]
     pub scalar: ScalarArg,
+    /// Whether operations may be rewritten for speed, or give the interpreter's bits
+    #[arg(long, value_enum, default_value_t = ArithmeticArg::of(Arithmetic::default()))]
+    pub arithmetic: ArithmeticArg,
     /// No joint forces: they are zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -165,7 +168,33 @@ impl CodeArgs {
             frames: self.frames.clone(),
             plan: PlanOptions { snap: self.snap, ..PlanOptions::default() },
             chunk: self.chunk as usize,
+            arithmetic: self.arithmetic.arithmetic(),
             ..Options::default()
+        }
+    }
+}
+
+/// Rewriting of generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ArithmeticArg {
+    /// The interpreter's operations, bit for bit
+    Exact,
+    /// Fewer operations, in an order that processors like; errors are no larger
+    Fast,
+}
+
+impl ArithmeticArg {
+    fn of(arithmetic: Arithmetic) -> ArithmeticArg {
+        match arithmetic {
+            Arithmetic::Exact => ArithmeticArg::Exact,
+            Arithmetic::Fast => ArithmeticArg::Fast,
+        }
+    }
+
+    fn arithmetic(self) -> Arithmetic {
+        match self {
+            ArithmeticArg::Exact => Arithmetic::Exact,
+            ArithmeticArg::Fast => Arithmetic::Fast,
         }
     }
 }

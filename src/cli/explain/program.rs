@@ -57,6 +57,10 @@ pub fn statements(plan: &Plan, group: &GroupProgram, out: &mut dyn Write) -> Out
             Op::Sub(a, b) => format!("{} - {}", operand(a), operand(b)),
             Op::Mul(a, b) => format!("{} * {}", operand(a), operand(b)),
             Op::Div(a, b) => format!("{} / {}", operand(a), operand(b)),
+            Op::Fma(f) => {
+                let (p, s) = (if f.minus_product { "-" } else { "" }, if f.minus_addend { '-' } else { '+' });
+                format!("{p}{} * {} {s} {}", operand(&f.a), operand(&f.b), operand(&f.c))
+            }
             Op::Sqrt(a) => format!("sqrt({})", name(*a)),
             Op::Sin(a) => format!("sin({})", name(*a)),
             Op::Cos(a) => format!("cos({})", name(*a)),
