@@ -16,11 +16,11 @@
 //   q[9] v[9] pin10: pin, moves link10
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 298 + 359 + 9 = 666; 0, 10
-//   velocities: 194 + 226 + 9 = 429; 0, 9
+//   rates: 288 + 357 + 9 = 654; 0, 10
+//   velocities: 183 + 225 + 9 = 417; 0, 9
 //   momenta: 82 + 109 + 0 = 191; 0, 9
-//   energy: 229 + 274 + 9 = 512; 0, 10
-//   accelerations: 302 + 355 + 9 = 666; 0, 10
+//   energy: 215 + 267 + 9 = 491; 0, 10
+//   accelerations: 295 + 361 + 9 = 665; 0, 10
 //   mass_matrix: 159 + 199 + 0 = 358; 0, 9
 
 /// Dynamics of `chain10_planar` in canonical form: rates, velocities, momenta, energy, accelerations, mass_matrix. Set the fields between calls.
@@ -89,7 +89,7 @@ impl Chain10Planar {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 666 operations: 298 additions, 359 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 654 operations: 288 additions, 357 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -142,63 +142,67 @@ impl Chain10Planar {
         // link10: sine and cosine, rotation
         let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
         // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.29940119760479045 * link10_sin0;
-        let link10_inertia1 = link10_sin0 * link10_inertia0;
-        let link10_inertia2 = link10_cos0 * link10_inertia0;
-        let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
-        let link10_inertia4 = 0.05 * link10_sin0;
-        let link10_inertia5 = 0.05 * link10_cos0;
-        let link10_inertia6 = 0.25 * link10_inertia2;
-        let link10_inertia7 = 0.25 * link10_inertia3;
-        let link10_inertia8 = 0.25 * link10_inertia7;
-        let link10_inertia9 = link10_inertia5 + 0.15000000000000002;
-        let link10_inertia10 = link10_inertia7 + 0.15000000000000002;
-        let link10_inertia11 = link10_inertia8 + 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia11;
-        let link9_pivot1 = link10_inertia6 * link9_pivot0;
-        let link9_pivot2 = link10_inertia10 * link9_pivot0;
-        let link9_pivot3 = link10_inertia6 * link9_pivot1;
-        let link9_pivot4 = link10_inertia1 + link9_pivot3;
-        let link9_pivot5 = link10_inertia6 * link9_pivot2;
-        let link9_pivot6 = link10_inertia2 - link9_pivot5;
-        let link9_pivot7 = link10_inertia10 * link9_pivot2;
-        let link9_pivot8 = link10_inertia3 - link9_pivot7;
+        let link10_inertia0 = 0.05 * link10_sin0;
+        let link10_inertia1 = 0.05 * link10_cos0;
+        let link10_inertia2 = link10_inertia1 + link10_inertia1;
+        let link10_inertia3 = 0.25 * link10_inertia2;
+        let link10_inertia4 = link10_inertia3 + 0.00835;
+        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+        let link10_inertia7 = 0.25 * link10_inertia1;
+        let link10_inertia8 = link10_inertia7 + 0.00835;
         // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_pivot4 + link9_pivot8;
-        let link9_inertia1 = link9_sin0 * link9_inertia0;
-        let link9_inertia2 = link9_cos0 + link9_cos0;
-        let link9_inertia3 = link9_pivot6 * link9_inertia2;
-        let link9_inertia4 = link9_inertia1 - link9_inertia3;
-        let link9_inertia5 = link9_sin0 * link9_inertia4;
-        let link9_inertia6 = link9_cos0 * link9_inertia4;
-        let link9_inertia7 = link9_pivot6 + link9_inertia6;
-        let link9_inertia8 = link9_pivot4 - link9_inertia5;
-        let link9_inertia9 = link9_pivot8 - link9_inertia5;
-        let link9_inertia10 = link9_cos0 * link10_inertia4;
-        let link9_inertia11 = link9_sin0 * link10_inertia9;
-        let link9_inertia12 = link9_inertia10 + link9_inertia11;
-        let link9_inertia13 = link9_sin0 * link10_inertia4;
-        let link9_inertia14 = link9_cos0 * link10_inertia9;
-        let link9_inertia15 = link9_inertia13 - link9_inertia14;
-        let link9_inertia16 = 0.25 * link9_inertia7;
-        let link9_inertia17 = 0.25 * link9_inertia9;
-        let link9_inertia18 = 0.25 * link9_inertia17;
-        let link9_inertia19 = link9_inertia15 - 0.25;
-        let link9_inertia20 = link9_inertia17 + 0.25;
-        let link9_inertia21 = link9_inertia18 + 0.05835;
+        let link9_inertia0 = link9_cos0 * link10_inertia0;
+        let link9_inertia1 = link9_sin0 * link10_inertia5;
+        let link9_inertia2 = link9_inertia0 + link9_inertia1;
+        let link9_inertia3 = link9_sin0 * link10_inertia0;
+        let link9_inertia4 = link9_cos0 * link10_inertia5;
+        let link9_inertia5 = link9_inertia3 - link9_inertia4;
+        let link9_inertia6 = link9_sin0 * link10_inertia1;
+        let link9_inertia7 = link9_inertia0 + link9_inertia6;
+        let link9_inertia8 = link9_cos0 * link10_inertia1;
+        let link9_inertia9 = link9_inertia3 - link9_inertia8;
+        // link9: U, Mj, k and the reduced inertia M' (4.44)
+        let link9_pivot0 = 119.76047904191617 * link9_inertia7;
+        let link9_pivot1 = 119.76047904191617 * link9_inertia9;
+        let link9_pivot2 = 119.76047904191617 * link10_inertia8;
+        let link9_pivot3 = link9_inertia7 * link9_pivot0;
+        let link9_pivot4 = link9_inertia7 * link9_pivot1;
+        let link9_pivot5 = link9_inertia7 * link9_pivot2;
+        let link9_pivot6 = link9_inertia2 - link9_pivot5;
+        let link9_pivot7 = link9_inertia9 * link9_pivot1;
+        let link9_pivot8 = link9_inertia9 * link9_pivot2;
+        let link9_pivot9 = link9_inertia5 - link9_pivot8;
+        let link9_pivot10 = link10_inertia8 * link9_pivot2;
+        let link9_pivot11 = link10_inertia6 - link9_pivot10;
+        let link9_pivot12 = 1.0 / link9_pivot11;
+        let link9_pivot13 = link9_pivot6 * link9_pivot12;
+        let link9_pivot14 = link9_pivot9 * link9_pivot12;
+        let link9_pivot15 = link9_pivot6 * link9_pivot13;
+        let link9_pivot16 = link9_pivot3 + link9_pivot15;
+        let link9_pivot17 = link9_pivot6 * link9_pivot14;
+        let link9_pivot18 = link9_pivot4 + link9_pivot17;
+        let link9_pivot19 = link9_pivot9 * link9_pivot14;
+        let link9_pivot20 = link9_pivot7 + link9_pivot19;
+        // link9: inertia carried to the parent, M* (4.48)
+        let link9_inertia10 = 0.25 * link9_pivot18;
+        let link9_inertia11 = 0.25 * link9_pivot20;
+        let link9_inertia12 = 0.25 * link9_inertia11;
+        let link9_inertia13 = link9_inertia5 - 0.25;
+        let link9_inertia14 = link9_inertia11 - 0.25;
+        let link9_inertia15 = link9_inertia12 - 0.05835;
         // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia21;
-        let link8_pivot1 = link9_inertia16 * link8_pivot0;
-        let link8_pivot2 = link9_inertia20 * link8_pivot0;
-        let link8_pivot3 = link9_inertia16 * link8_pivot1;
-        let link8_pivot4 = link9_inertia8 + link8_pivot3;
-        let link8_pivot5 = link9_inertia16 * link8_pivot2;
-        let link8_pivot6 = link9_inertia7 - link8_pivot5;
-        let link8_pivot7 = link9_inertia20 * link8_pivot2;
-        let link8_pivot8 = link9_inertia9 - link8_pivot7;
+        let link8_pivot0 = 1.0 / link9_inertia15;
+        let link8_pivot1 = link9_inertia10 * link8_pivot0;
+        let link8_pivot2 = link9_inertia14 * link8_pivot0;
+        let link8_pivot3 = link9_inertia10 * link8_pivot1;
+        let link8_pivot4 = link9_pivot16 - link8_pivot3;
+        let link8_pivot5 = link9_inertia10 * link8_pivot2;
+        let link8_pivot6 = link9_pivot18 - link8_pivot5;
+        let link8_pivot7 = link9_inertia14 * link8_pivot2;
+        let link8_pivot8 = link9_pivot20 - link8_pivot7;
         // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pivot4 + link8_pivot8;
+        let link8_inertia0 = link8_pivot4 - link8_pivot8;
         let link8_inertia1 = link8_sin0 * link8_inertia0;
         let link8_inertia2 = link8_cos0 + link8_cos0;
         let link8_inertia3 = link8_pivot6 * link8_inertia2;
@@ -207,31 +211,31 @@ impl Chain10Planar {
         let link8_inertia6 = link8_cos0 * link8_inertia4;
         let link8_inertia7 = link8_pivot6 - link8_inertia6;
         let link8_inertia8 = link8_pivot4 - link8_inertia5;
-        let link8_inertia9 = link8_pivot8 - link8_inertia5;
-        let link8_inertia10 = link8_cos0 * link9_inertia12;
-        let link8_inertia11 = link8_sin0 * link9_inertia19;
+        let link8_inertia9 = link8_pivot8 + link8_inertia5;
+        let link8_inertia10 = link8_cos0 * link9_inertia2;
+        let link8_inertia11 = link8_sin0 * link9_inertia13;
         let link8_inertia12 = link8_inertia10 - link8_inertia11;
-        let link8_inertia13 = link8_sin0 * link9_inertia12;
-        let link8_inertia14 = link8_cos0 * link9_inertia19;
+        let link8_inertia13 = link8_sin0 * link9_inertia2;
+        let link8_inertia14 = link8_cos0 * link9_inertia13;
         let link8_inertia15 = link8_inertia13 + link8_inertia14;
         let link8_inertia16 = 0.25 * link8_inertia7;
         let link8_inertia17 = 0.25 * link8_inertia9;
         let link8_inertia18 = 0.25 * link8_inertia17;
         let link8_inertia19 = link8_inertia15 - 0.35000000000000003;
-        let link8_inertia20 = link8_inertia17 + 0.35000000000000003;
-        let link8_inertia21 = link8_inertia18 + 0.08335000000000001;
+        let link8_inertia20 = link8_inertia17 - 0.35000000000000003;
+        let link8_inertia21 = link8_inertia18 - 0.08335000000000001;
         // link7: U, Mj, k and the reduced inertia M' (4.44)
         let link7_pivot0 = 1.0 / link8_inertia21;
         let link7_pivot1 = link8_inertia16 * link7_pivot0;
         let link7_pivot2 = link8_inertia20 * link7_pivot0;
         let link7_pivot3 = link8_inertia16 * link7_pivot1;
-        let link7_pivot4 = link8_inertia8 + link7_pivot3;
+        let link7_pivot4 = link8_inertia8 - link7_pivot3;
         let link7_pivot5 = link8_inertia16 * link7_pivot2;
         let link7_pivot6 = link8_inertia7 - link7_pivot5;
         let link7_pivot7 = link8_inertia20 * link7_pivot2;
         let link7_pivot8 = link8_inertia9 - link7_pivot7;
         // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pivot4 + link7_pivot8;
+        let link7_inertia0 = link7_pivot4 - link7_pivot8;
         let link7_inertia1 = link7_sin0 * link7_inertia0;
         let link7_inertia2 = link7_cos0 + link7_cos0;
         let link7_inertia3 = link7_pivot6 * link7_inertia2;
@@ -240,7 +244,7 @@ impl Chain10Planar {
         let link7_inertia6 = link7_cos0 * link7_inertia4;
         let link7_inertia7 = link7_pivot6 + link7_inertia6;
         let link7_inertia8 = link7_pivot4 - link7_inertia5;
-        let link7_inertia9 = link7_pivot8 - link7_inertia5;
+        let link7_inertia9 = link7_pivot8 + link7_inertia5;
         let link7_inertia10 = link7_cos0 * link8_inertia12;
         let link7_inertia11 = link7_sin0 * link8_inertia19;
         let link7_inertia12 = link7_inertia10 - link7_inertia11;
@@ -251,20 +255,20 @@ impl Chain10Planar {
         let link7_inertia17 = 0.25 * link7_inertia9;
         let link7_inertia18 = 0.25 * link7_inertia17;
         let link7_inertia19 = link7_inertia15 - 0.45;
-        let link7_inertia20 = link7_inertia17 + 0.45;
-        let link7_inertia21 = link7_inertia18 + 0.10835;
+        let link7_inertia20 = link7_inertia17 - 0.45;
+        let link7_inertia21 = link7_inertia18 - 0.10835;
         // link6: U, Mj, k and the reduced inertia M' (4.44)
         let link6_pivot0 = 1.0 / link7_inertia21;
         let link6_pivot1 = link7_inertia16 * link6_pivot0;
         let link6_pivot2 = link7_inertia20 * link6_pivot0;
         let link6_pivot3 = link7_inertia16 * link6_pivot1;
-        let link6_pivot4 = link7_inertia8 + link6_pivot3;
+        let link6_pivot4 = link7_inertia8 - link6_pivot3;
         let link6_pivot5 = link7_inertia16 * link6_pivot2;
         let link6_pivot6 = link7_inertia7 - link6_pivot5;
         let link6_pivot7 = link7_inertia20 * link6_pivot2;
         let link6_pivot8 = link7_inertia9 - link6_pivot7;
         // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pivot4 + link6_pivot8;
+        let link6_inertia0 = link6_pivot4 - link6_pivot8;
         let link6_inertia1 = link6_sin0 * link6_inertia0;
         let link6_inertia2 = link6_cos0 + link6_cos0;
         let link6_inertia3 = link6_pivot6 * link6_inertia2;
@@ -273,7 +277,7 @@ impl Chain10Planar {
         let link6_inertia6 = link6_cos0 * link6_inertia4;
         let link6_inertia7 = link6_pivot6 - link6_inertia6;
         let link6_inertia8 = link6_pivot4 - link6_inertia5;
-        let link6_inertia9 = link6_pivot8 - link6_inertia5;
+        let link6_inertia9 = link6_pivot8 + link6_inertia5;
         let link6_inertia10 = link6_cos0 * link7_inertia12;
         let link6_inertia11 = link6_sin0 * link7_inertia19;
         let link6_inertia12 = link6_inertia10 - link6_inertia11;
@@ -284,20 +288,20 @@ impl Chain10Planar {
         let link6_inertia17 = 0.25 * link6_inertia9;
         let link6_inertia18 = 0.25 * link6_inertia17;
         let link6_inertia19 = link6_inertia15 - 0.55;
-        let link6_inertia20 = link6_inertia17 + 0.55;
-        let link6_inertia21 = link6_inertia18 + 0.13335;
+        let link6_inertia20 = link6_inertia17 - 0.55;
+        let link6_inertia21 = link6_inertia18 - 0.13335;
         // link5: U, Mj, k and the reduced inertia M' (4.44)
         let link5_pivot0 = 1.0 / link6_inertia21;
         let link5_pivot1 = link6_inertia16 * link5_pivot0;
         let link5_pivot2 = link6_inertia20 * link5_pivot0;
         let link5_pivot3 = link6_inertia16 * link5_pivot1;
-        let link5_pivot4 = link6_inertia8 + link5_pivot3;
+        let link5_pivot4 = link6_inertia8 - link5_pivot3;
         let link5_pivot5 = link6_inertia16 * link5_pivot2;
         let link5_pivot6 = link6_inertia7 - link5_pivot5;
         let link5_pivot7 = link6_inertia20 * link5_pivot2;
         let link5_pivot8 = link6_inertia9 - link5_pivot7;
         // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pivot4 + link5_pivot8;
+        let link5_inertia0 = link5_pivot4 - link5_pivot8;
         let link5_inertia1 = link5_sin0 * link5_inertia0;
         let link5_inertia2 = link5_cos0 + link5_cos0;
         let link5_inertia3 = link5_pivot6 * link5_inertia2;
@@ -306,7 +310,7 @@ impl Chain10Planar {
         let link5_inertia6 = link5_cos0 * link5_inertia4;
         let link5_inertia7 = link5_pivot6 + link5_inertia6;
         let link5_inertia8 = link5_pivot4 - link5_inertia5;
-        let link5_inertia9 = link5_pivot8 - link5_inertia5;
+        let link5_inertia9 = link5_pivot8 + link5_inertia5;
         let link5_inertia10 = link5_cos0 * link6_inertia12;
         let link5_inertia11 = link5_sin0 * link6_inertia19;
         let link5_inertia12 = link5_inertia10 - link5_inertia11;
@@ -317,20 +321,20 @@ impl Chain10Planar {
         let link5_inertia17 = 0.25 * link5_inertia9;
         let link5_inertia18 = 0.25 * link5_inertia17;
         let link5_inertia19 = link5_inertia15 - 0.65;
-        let link5_inertia20 = link5_inertia17 + 0.65;
-        let link5_inertia21 = link5_inertia18 + 0.15835;
+        let link5_inertia20 = link5_inertia17 - 0.65;
+        let link5_inertia21 = link5_inertia18 - 0.15835;
         // link4: U, Mj, k and the reduced inertia M' (4.44)
         let link4_pivot0 = 1.0 / link5_inertia21;
         let link4_pivot1 = link5_inertia16 * link4_pivot0;
         let link4_pivot2 = link5_inertia20 * link4_pivot0;
         let link4_pivot3 = link5_inertia16 * link4_pivot1;
-        let link4_pivot4 = link5_inertia8 + link4_pivot3;
+        let link4_pivot4 = link5_inertia8 - link4_pivot3;
         let link4_pivot5 = link5_inertia16 * link4_pivot2;
         let link4_pivot6 = link5_inertia7 - link4_pivot5;
         let link4_pivot7 = link5_inertia20 * link4_pivot2;
         let link4_pivot8 = link5_inertia9 - link4_pivot7;
         // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pivot4 + link4_pivot8;
+        let link4_inertia0 = link4_pivot4 - link4_pivot8;
         let link4_inertia1 = link4_sin0 * link4_inertia0;
         let link4_inertia2 = link4_cos0 + link4_cos0;
         let link4_inertia3 = link4_pivot6 * link4_inertia2;
@@ -339,7 +343,7 @@ impl Chain10Planar {
         let link4_inertia6 = link4_cos0 * link4_inertia4;
         let link4_inertia7 = link4_pivot6 - link4_inertia6;
         let link4_inertia8 = link4_pivot4 - link4_inertia5;
-        let link4_inertia9 = link4_pivot8 - link4_inertia5;
+        let link4_inertia9 = link4_pivot8 + link4_inertia5;
         let link4_inertia10 = link4_cos0 * link5_inertia12;
         let link4_inertia11 = link4_sin0 * link5_inertia19;
         let link4_inertia12 = link4_inertia10 - link4_inertia11;
@@ -350,20 +354,20 @@ impl Chain10Planar {
         let link4_inertia17 = 0.25 * link4_inertia9;
         let link4_inertia18 = 0.25 * link4_inertia17;
         let link4_inertia19 = link4_inertia15 - 0.75;
-        let link4_inertia20 = link4_inertia17 + 0.75;
-        let link4_inertia21 = link4_inertia18 + 0.18334999999999999;
+        let link4_inertia20 = link4_inertia17 - 0.75;
+        let link4_inertia21 = link4_inertia18 - 0.18334999999999999;
         // link3: U, Mj, k and the reduced inertia M' (4.44)
         let link3_pivot0 = 1.0 / link4_inertia21;
         let link3_pivot1 = link4_inertia16 * link3_pivot0;
         let link3_pivot2 = link4_inertia20 * link3_pivot0;
         let link3_pivot3 = link4_inertia16 * link3_pivot1;
-        let link3_pivot4 = link4_inertia8 + link3_pivot3;
+        let link3_pivot4 = link4_inertia8 - link3_pivot3;
         let link3_pivot5 = link4_inertia16 * link3_pivot2;
         let link3_pivot6 = link4_inertia7 - link3_pivot5;
         let link3_pivot7 = link4_inertia20 * link3_pivot2;
         let link3_pivot8 = link4_inertia9 - link3_pivot7;
         // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pivot4 + link3_pivot8;
+        let link3_inertia0 = link3_pivot4 - link3_pivot8;
         let link3_inertia1 = link3_sin0 * link3_inertia0;
         let link3_inertia2 = link3_cos0 + link3_cos0;
         let link3_inertia3 = link3_pivot6 * link3_inertia2;
@@ -372,7 +376,7 @@ impl Chain10Planar {
         let link3_inertia6 = link3_cos0 * link3_inertia4;
         let link3_inertia7 = link3_pivot6 + link3_inertia6;
         let link3_inertia8 = link3_pivot4 - link3_inertia5;
-        let link3_inertia9 = link3_pivot8 - link3_inertia5;
+        let link3_inertia9 = link3_pivot8 + link3_inertia5;
         let link3_inertia10 = link3_cos0 * link4_inertia12;
         let link3_inertia11 = link3_sin0 * link4_inertia19;
         let link3_inertia12 = link3_inertia10 - link3_inertia11;
@@ -383,26 +387,26 @@ impl Chain10Planar {
         let link3_inertia17 = 0.25 * link3_inertia9;
         let link3_inertia18 = 0.25 * link3_inertia17;
         let link3_inertia19 = link3_inertia15 - 0.85;
-        let link3_inertia20 = link3_inertia17 + 0.85;
-        let link3_inertia21 = link3_inertia18 + 0.20834999999999998;
+        let link3_inertia20 = link3_inertia17 - 0.85;
+        let link3_inertia21 = link3_inertia18 - 0.20834999999999998;
         // link2: U, Mj, k and the reduced inertia M' (4.44)
         let link2_pivot0 = 1.0 / link3_inertia21;
         let link2_pivot1 = link3_inertia16 * link2_pivot0;
         let link2_pivot2 = link3_inertia20 * link2_pivot0;
         let link2_pivot3 = link3_inertia16 * link2_pivot1;
-        let link2_pivot4 = link3_inertia8 + link2_pivot3;
+        let link2_pivot4 = link3_inertia8 - link2_pivot3;
         let link2_pivot5 = link3_inertia16 * link2_pivot2;
         let link2_pivot6 = link3_inertia7 - link2_pivot5;
         let link2_pivot7 = link3_inertia20 * link2_pivot2;
         let link2_pivot8 = link3_inertia9 - link2_pivot7;
         // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pivot4 + link2_pivot8;
+        let link2_inertia0 = link2_pivot4 - link2_pivot8;
         let link2_inertia1 = link2_sin0 * link2_inertia0;
         let link2_inertia2 = link2_cos0 + link2_cos0;
         let link2_inertia3 = link2_pivot6 * link2_inertia2;
         let link2_inertia4 = link2_inertia1 + link2_inertia3;
         let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link2_pivot8 - link2_inertia5;
+        let link2_inertia6 = link2_pivot8 + link2_inertia5;
         let link2_inertia7 = link2_cos0 * link3_inertia12;
         let link2_inertia8 = link2_sin0 * link3_inertia19;
         let link2_inertia9 = link2_inertia7 - link2_inertia8;
@@ -412,38 +416,29 @@ impl Chain10Planar {
         let link2_inertia13 = 0.25 * link2_inertia6;
         let link2_inertia14 = 0.25 * link2_inertia13;
         let link2_inertia15 = link2_inertia12 - 0.95;
-        let link2_inertia16 = link2_inertia14 + 0.23334999999999997;
+        let link2_inertia16 = link2_inertia14 - 0.23334999999999997;
         // link1: U, Mj, k and the reduced inertia M' (4.44)
         let link1_pivot0 = 1.0 / link2_inertia16;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = 0.05 * link10_rest0;
-        let link10_rest2 = link10_sin0 * link10_rest1;
-        let link10_rest3 = link10_cos0 * link10_rest1;
-        let link10_rest4 = 0.25 * link10_rest3;
-        let link10_rest5 = p_9 + link10_rest4;
         // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest5;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia6 * link9_rest1;
-        let link9_rest3 = link10_rest2 - link9_rest2;
-        let link9_rest4 = link10_inertia10 * link9_rest1;
-        let link9_rest5 = link10_rest3 + link9_rest4;
-        let link9_rest6 = link9_cos0 * link9_rest3;
-        let link9_rest7 = link9_sin0 * link9_rest5;
-        let link9_rest8 = link9_rest6 + link9_rest7;
-        let link9_rest9 = link9_sin0 * link9_rest3;
-        let link9_rest10 = link9_cos0 * link9_rest5;
-        let link9_rest11 = link9_rest9 - link9_rest10;
-        let link9_rest12 = 0.25 * link9_rest11;
-        let link9_rest13 = p_8 - link9_rest12;
+        let link9_rest0 = 119.76047904191617 * p_9;
+        let link9_rest1 = link9_inertia7 * link9_rest0;
+        let link9_rest2 = link9_inertia9 * link9_rest0;
+        let link9_rest3 = link10_inertia8 * link9_rest0;
+        let link9_rest4 = p_8 - link9_rest3;
+        let link9_rest5 = link9_pivot12 * link9_rest4;
+        let link9_rest6 = link9_pivot6 * link9_rest5;
+        let link9_rest7 = link9_rest1 + link9_rest6;
+        let link9_rest8 = link9_pivot9 * link9_rest5;
+        let link9_rest9 = link9_rest2 + link9_rest8;
+        let link9_rest10 = 0.25 * link9_rest9;
+        let link9_rest11 = p_8 - link9_rest10;
         // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest13;
+        let link8_rest0 = p_7 - link9_rest11;
         let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia16 * link8_rest1;
-        let link8_rest3 = link9_rest8 + link8_rest2;
-        let link8_rest4 = link9_inertia20 * link8_rest1;
-        let link8_rest5 = link9_rest11 - link8_rest4;
+        let link8_rest2 = link9_inertia10 * link8_rest1;
+        let link8_rest3 = link9_rest7 - link8_rest2;
+        let link8_rest4 = link9_inertia14 * link8_rest1;
+        let link8_rest5 = link9_rest9 - link8_rest4;
         let link8_rest6 = link8_cos0 * link8_rest3;
         let link8_rest7 = link8_sin0 * link8_rest5;
         let link8_rest8 = link8_rest6 - link8_rest7;
@@ -456,7 +451,7 @@ impl Chain10Planar {
         let link7_rest0 = p_6 - link8_rest13;
         let link7_rest1 = link7_pivot0 * link7_rest0;
         let link7_rest2 = link8_inertia16 * link7_rest1;
-        let link7_rest3 = link8_rest8 - link7_rest2;
+        let link7_rest3 = link8_rest8 + link7_rest2;
         let link7_rest4 = link8_inertia20 * link7_rest1;
         let link7_rest5 = link8_rest11 - link7_rest4;
         let link7_rest6 = link7_cos0 * link7_rest3;
@@ -471,7 +466,7 @@ impl Chain10Planar {
         let link6_rest0 = p_5 - link7_rest13;
         let link6_rest1 = link6_pivot0 * link6_rest0;
         let link6_rest2 = link7_inertia16 * link6_rest1;
-        let link6_rest3 = link7_rest8 + link6_rest2;
+        let link6_rest3 = link7_rest8 - link6_rest2;
         let link6_rest4 = link7_inertia20 * link6_rest1;
         let link6_rest5 = link7_rest11 - link6_rest4;
         let link6_rest6 = link6_cos0 * link6_rest3;
@@ -486,7 +481,7 @@ impl Chain10Planar {
         let link5_rest0 = p_4 - link6_rest13;
         let link5_rest1 = link5_pivot0 * link5_rest0;
         let link5_rest2 = link6_inertia16 * link5_rest1;
-        let link5_rest3 = link6_rest8 - link5_rest2;
+        let link5_rest3 = link6_rest8 + link5_rest2;
         let link5_rest4 = link6_inertia20 * link5_rest1;
         let link5_rest5 = link6_rest11 - link5_rest4;
         let link5_rest6 = link5_cos0 * link5_rest3;
@@ -501,7 +496,7 @@ impl Chain10Planar {
         let link4_rest0 = p_3 - link5_rest13;
         let link4_rest1 = link4_pivot0 * link4_rest0;
         let link4_rest2 = link5_inertia16 * link4_rest1;
-        let link4_rest3 = link5_rest8 + link4_rest2;
+        let link4_rest3 = link5_rest8 - link4_rest2;
         let link4_rest4 = link5_inertia20 * link4_rest1;
         let link4_rest5 = link5_rest11 - link4_rest4;
         let link4_rest6 = link4_cos0 * link4_rest3;
@@ -516,7 +511,7 @@ impl Chain10Planar {
         let link3_rest0 = p_2 - link4_rest13;
         let link3_rest1 = link3_pivot0 * link3_rest0;
         let link3_rest2 = link4_inertia16 * link3_rest1;
-        let link3_rest3 = link4_rest8 - link3_rest2;
+        let link3_rest3 = link4_rest8 + link3_rest2;
         let link3_rest4 = link4_inertia20 * link3_rest1;
         let link3_rest5 = link4_rest11 - link3_rest4;
         let link3_rest6 = link3_cos0 * link3_rest3;
@@ -531,7 +526,7 @@ impl Chain10Planar {
         let link2_rest0 = p_1 - link3_rest13;
         let link2_rest1 = link2_pivot0 * link2_rest0;
         let link2_rest2 = link3_inertia16 * link2_rest1;
-        let link2_rest3 = link3_rest8 + link2_rest2;
+        let link2_rest3 = link3_rest8 - link2_rest2;
         let link2_rest4 = link3_inertia20 * link2_rest1;
         let link2_rest5 = link3_rest11 - link2_rest4;
         let link2_rest6 = link2_sin0 * link2_rest3;
@@ -548,12 +543,11 @@ impl Chain10Planar {
         let link2_vel2 = link2_cos0 * link2_vel0;
         let link2_vel3 = link2_pivot1 * link2_vel1;
         let link2_vel4 = link2_pivot2 * link2_vel2;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link1_rest1 - link2_vel5;
-        let link2_vel7 = link2_rest1 - link2_vel6;
-        let link2_vel8 = link1_rest1 + link2_vel7;
+        let link2_vel5 = link2_vel3 + link2_vel4;
+        let link2_vel6 = link2_rest1 - link2_vel5;
+        let link2_vel7 = link1_rest1 - link2_vel6;
         // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel8;
+        let link3_vel0 = 0.25 * link2_vel6;
         let link3_vel1 = link2_vel2 + link3_vel0;
         let link3_vel2 = link3_cos0 * link2_vel1;
         let link3_vel3 = link3_sin0 * link3_vel1;
@@ -563,12 +557,11 @@ impl Chain10Planar {
         let link3_vel7 = link3_vel5 - link3_vel6;
         let link3_vel8 = link3_pivot1 * link3_vel4;
         let link3_vel9 = link3_pivot2 * link3_vel7;
-        let link3_vel10 = link3_vel8 + link3_vel9;
-        let link3_vel11 = link2_vel8 + link3_vel10;
-        let link3_vel12 = link3_rest1 - link3_vel11;
-        let link3_vel13 = link2_vel8 + link3_vel12;
+        let link3_vel10 = link3_vel8 - link3_vel9;
+        let link3_vel11 = link3_rest1 + link3_vel10;
+        let link3_vel12 = link2_vel6 - link3_vel11;
         // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel13;
+        let link4_vel0 = 0.25 * link3_vel11;
         let link4_vel1 = link3_vel7 + link4_vel0;
         let link4_vel2 = link4_cos0 * link3_vel4;
         let link4_vel3 = link4_sin0 * link4_vel1;
@@ -578,12 +571,11 @@ impl Chain10Planar {
         let link4_vel7 = link4_vel5 - link4_vel6;
         let link4_vel8 = link4_pivot1 * link4_vel4;
         let link4_vel9 = link4_pivot2 * link4_vel7;
-        let link4_vel10 = link4_vel8 - link4_vel9;
-        let link4_vel11 = link3_vel13 - link4_vel10;
-        let link4_vel12 = link4_rest1 - link4_vel11;
-        let link4_vel13 = link3_vel13 + link4_vel12;
+        let link4_vel10 = link4_vel8 + link4_vel9;
+        let link4_vel11 = link4_rest1 - link4_vel10;
+        let link4_vel12 = link3_vel11 - link4_vel11;
         // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel13;
+        let link5_vel0 = 0.25 * link4_vel11;
         let link5_vel1 = link4_vel7 + link5_vel0;
         let link5_vel2 = link5_cos0 * link4_vel4;
         let link5_vel3 = link5_sin0 * link5_vel1;
@@ -593,12 +585,11 @@ impl Chain10Planar {
         let link5_vel7 = link5_vel5 - link5_vel6;
         let link5_vel8 = link5_pivot1 * link5_vel4;
         let link5_vel9 = link5_pivot2 * link5_vel7;
-        let link5_vel10 = link5_vel8 + link5_vel9;
-        let link5_vel11 = link4_vel13 + link5_vel10;
-        let link5_vel12 = link5_rest1 - link5_vel11;
-        let link5_vel13 = link4_vel13 + link5_vel12;
+        let link5_vel10 = link5_vel8 - link5_vel9;
+        let link5_vel11 = link5_rest1 + link5_vel10;
+        let link5_vel12 = link4_vel11 - link5_vel11;
         // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel13;
+        let link6_vel0 = 0.25 * link5_vel11;
         let link6_vel1 = link5_vel7 + link6_vel0;
         let link6_vel2 = link6_cos0 * link5_vel4;
         let link6_vel3 = link6_sin0 * link6_vel1;
@@ -608,12 +599,11 @@ impl Chain10Planar {
         let link6_vel7 = link6_vel5 - link6_vel6;
         let link6_vel8 = link6_pivot1 * link6_vel4;
         let link6_vel9 = link6_pivot2 * link6_vel7;
-        let link6_vel10 = link6_vel8 - link6_vel9;
-        let link6_vel11 = link5_vel13 - link6_vel10;
-        let link6_vel12 = link6_rest1 - link6_vel11;
-        let link6_vel13 = link5_vel13 + link6_vel12;
+        let link6_vel10 = link6_vel8 + link6_vel9;
+        let link6_vel11 = link6_rest1 - link6_vel10;
+        let link6_vel12 = link5_vel11 - link6_vel11;
         // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel13;
+        let link7_vel0 = 0.25 * link6_vel11;
         let link7_vel1 = link6_vel7 + link7_vel0;
         let link7_vel2 = link7_cos0 * link6_vel4;
         let link7_vel3 = link7_sin0 * link7_vel1;
@@ -623,12 +613,11 @@ impl Chain10Planar {
         let link7_vel7 = link7_vel5 - link7_vel6;
         let link7_vel8 = link7_pivot1 * link7_vel4;
         let link7_vel9 = link7_pivot2 * link7_vel7;
-        let link7_vel10 = link7_vel8 + link7_vel9;
-        let link7_vel11 = link6_vel13 + link7_vel10;
-        let link7_vel12 = link7_rest1 - link7_vel11;
-        let link7_vel13 = link6_vel13 + link7_vel12;
+        let link7_vel10 = link7_vel8 - link7_vel9;
+        let link7_vel11 = link7_rest1 + link7_vel10;
+        let link7_vel12 = link6_vel11 - link7_vel11;
         // link8: velocity and joint rate (4.40)
-        let link8_vel0 = 0.25 * link7_vel13;
+        let link8_vel0 = 0.25 * link7_vel11;
         let link8_vel1 = link7_vel7 + link8_vel0;
         let link8_vel2 = link8_cos0 * link7_vel4;
         let link8_vel3 = link8_sin0 * link8_vel1;
@@ -638,37 +627,33 @@ impl Chain10Planar {
         let link8_vel7 = link8_vel5 - link8_vel6;
         let link8_vel8 = link8_pivot1 * link8_vel4;
         let link8_vel9 = link8_pivot2 * link8_vel7;
-        let link8_vel10 = link8_vel8 - link8_vel9;
-        let link8_vel11 = link7_vel13 - link8_vel10;
-        let link8_vel12 = link8_rest1 - link8_vel11;
-        let link8_vel13 = link7_vel13 + link8_vel12;
+        let link8_vel10 = link8_vel8 + link8_vel9;
+        let link8_vel11 = link8_rest1 - link8_vel10;
+        let link8_vel12 = link7_vel11 - link8_vel11;
         // link9: velocity and joint rate (4.40)
-        let link9_vel0 = 0.25 * link8_vel13;
+        let link9_vel0 = 0.25 * link8_vel11;
         let link9_vel1 = link8_vel7 + link9_vel0;
-        let link9_vel2 = link9_cos0 * link8_vel4;
-        let link9_vel3 = link9_sin0 * link9_vel1;
+        let link9_vel2 = link9_pivot13 * link8_vel4;
+        let link9_vel3 = link9_pivot14 * link9_vel1;
         let link9_vel4 = link9_vel2 + link9_vel3;
-        let link9_vel5 = link9_cos0 * link9_vel1;
-        let link9_vel6 = link9_sin0 * link8_vel4;
-        let link9_vel7 = link9_vel5 - link9_vel6;
-        let link9_vel8 = link9_pivot1 * link9_vel4;
-        let link9_vel9 = link9_pivot2 * link9_vel7;
-        let link9_vel10 = link9_vel8 + link9_vel9;
-        let link9_vel11 = link8_vel13 + link9_vel10;
-        let link9_vel12 = link9_rest1 - link9_vel11;
-        let link9_vel13 = link8_vel13 + link9_vel12;
+        let link9_vel5 = link9_rest5 - link9_vel4;
+        let link9_vel6 = link8_vel11 + link9_vel5;
+        let link9_vel7 = link9_pivot0 * link8_vel4;
+        let link9_vel8 = link9_pivot1 * link9_vel1;
+        let link9_vel9 = link9_vel7 + link9_vel8;
+        let link9_vel10 = link9_pivot2 * link9_vel5;
+        let link9_vel11 = link9_vel9 + link9_vel10;
+        let link9_vel12 = link9_rest0 - link9_vel11;
+        let link9_vel13 = link9_cos0 * link8_vel4;
+        let link9_vel14 = link9_sin0 * link9_vel1;
+        let link9_vel15 = link9_vel13 + link9_vel14;
+        let link9_vel16 = link9_cos0 * link9_vel1;
+        let link9_vel17 = link9_sin0 * link8_vel4;
+        let link9_vel18 = link9_vel16 - link9_vel17;
         // link10: velocity and joint rate (4.40)
-        let link10_vel0 = 0.25 * link9_vel13;
-        let link10_vel1 = link9_vel7 + link10_vel0;
-        let link10_vel2 = link10_cos0 * link9_vel4;
-        let link10_vel3 = link10_sin0 * link10_vel1;
-        let link10_vel4 = link10_vel2 + link10_vel3;
-        let link10_vel5 = link10_cos0 * link10_vel1;
-        let link10_vel6 = link10_sin0 * link9_vel4;
-        let link10_vel7 = link10_vel5 - link10_vel6;
-        let link10_vel8 = 5.9880239520958085 * link10_vel7;
-        let link10_vel9 = link9_vel13 + link10_vel8;
-        let link10_vel10 = link10_rest0 - link10_vel9;
+        let link10_vel0 = 0.25 * link9_vel5;
+        let link10_vel1 = link9_vel18 - link10_vel0;
+        let link10_vel2 = link9_vel5 + link9_vel12;
         // link1: gravity and wrenches
         let link1_load0 = 9.81 * link1_cos0;
         let link1_load1 = 9.81 * link1_sin0;
@@ -740,131 +725,134 @@ impl Chain10Planar {
         let link2_pdot0 = link2_pivot6 * link2_vel1;
         let link2_pdot1 = link2_inertia0 * link2_vel2;
         let link2_pdot2 = link2_pdot0 - link2_pdot1;
-        let link2_pdot3 = link2_rest5 + link2_pdot2;
+        let link2_pdot3 = link2_rest5 - link2_pdot2;
         let link2_pdot4 = link2_pivot6 * link2_vel2;
-        let link2_pdot5 = link2_rest3 + link2_pdot4;
+        let link2_pdot5 = link2_rest3 - link2_pdot4;
         let link2_pdot6 = link2_vel1 * link2_pdot3;
         let link2_pdot7 = link2_vel2 * link2_pdot5;
         let link2_pdot8 = link2_pdot6 - link2_pdot7;
         let link2_pdot9 = link3_inertia19 * link2_load5;
         let link2_pdot10 = link3_inertia12 * link2_load2;
         let link2_pdot11 = link2_pdot9 - link2_pdot10;
-        let link2_pdot12 = link2_pdot8 + link2_pdot11;
+        let link2_pdot12 = link2_pdot8 - link2_pdot11;
         // link3: momentum rate (4.36)
         let link3_pdot0 = link3_pivot6 * link3_vel4;
         let link3_pdot1 = link3_inertia0 * link3_vel7;
         let link3_pdot2 = link3_pdot0 + link3_pdot1;
-        let link3_pdot3 = link3_rest5 - link3_pdot2;
+        let link3_pdot3 = link3_rest5 + link3_pdot2;
         let link3_pdot4 = link3_pivot6 * link3_vel7;
-        let link3_pdot5 = link3_rest3 - link3_pdot4;
+        let link3_pdot5 = link3_rest3 + link3_pdot4;
         let link3_pdot6 = link3_vel4 * link3_pdot3;
         let link3_pdot7 = link3_vel7 * link3_pdot5;
         let link3_pdot8 = link3_pdot6 - link3_pdot7;
         let link3_pdot9 = link4_inertia19 * link3_load5;
         let link3_pdot10 = link4_inertia12 * link3_load2;
         let link3_pdot11 = link3_pdot9 - link3_pdot10;
-        let link3_pdot12 = link3_pdot8 + link3_pdot11;
+        let link3_pdot12 = link3_pdot8 - link3_pdot11;
         // link4: momentum rate (4.36)
         let link4_pdot0 = link4_pivot6 * link4_vel4;
         let link4_pdot1 = link4_inertia0 * link4_vel7;
         let link4_pdot2 = link4_pdot0 - link4_pdot1;
-        let link4_pdot3 = link4_rest5 + link4_pdot2;
+        let link4_pdot3 = link4_rest5 - link4_pdot2;
         let link4_pdot4 = link4_pivot6 * link4_vel7;
-        let link4_pdot5 = link4_rest3 + link4_pdot4;
+        let link4_pdot5 = link4_rest3 - link4_pdot4;
         let link4_pdot6 = link4_vel4 * link4_pdot3;
         let link4_pdot7 = link4_vel7 * link4_pdot5;
         let link4_pdot8 = link4_pdot6 - link4_pdot7;
         let link4_pdot9 = link5_inertia19 * link4_load5;
         let link4_pdot10 = link5_inertia12 * link4_load2;
         let link4_pdot11 = link4_pdot9 - link4_pdot10;
-        let link4_pdot12 = link4_pdot8 + link4_pdot11;
+        let link4_pdot12 = link4_pdot8 - link4_pdot11;
         // link5: momentum rate (4.36)
         let link5_pdot0 = link5_pivot6 * link5_vel4;
         let link5_pdot1 = link5_inertia0 * link5_vel7;
         let link5_pdot2 = link5_pdot0 + link5_pdot1;
-        let link5_pdot3 = link5_rest5 - link5_pdot2;
+        let link5_pdot3 = link5_rest5 + link5_pdot2;
         let link5_pdot4 = link5_pivot6 * link5_vel7;
-        let link5_pdot5 = link5_rest3 - link5_pdot4;
+        let link5_pdot5 = link5_rest3 + link5_pdot4;
         let link5_pdot6 = link5_vel4 * link5_pdot3;
         let link5_pdot7 = link5_vel7 * link5_pdot5;
         let link5_pdot8 = link5_pdot6 - link5_pdot7;
         let link5_pdot9 = link6_inertia19 * link5_load5;
         let link5_pdot10 = link6_inertia12 * link5_load2;
         let link5_pdot11 = link5_pdot9 - link5_pdot10;
-        let link5_pdot12 = link5_pdot8 + link5_pdot11;
+        let link5_pdot12 = link5_pdot8 - link5_pdot11;
         // link6: momentum rate (4.36)
         let link6_pdot0 = link6_pivot6 * link6_vel4;
         let link6_pdot1 = link6_inertia0 * link6_vel7;
         let link6_pdot2 = link6_pdot0 - link6_pdot1;
-        let link6_pdot3 = link6_rest5 + link6_pdot2;
+        let link6_pdot3 = link6_rest5 - link6_pdot2;
         let link6_pdot4 = link6_pivot6 * link6_vel7;
-        let link6_pdot5 = link6_rest3 + link6_pdot4;
+        let link6_pdot5 = link6_rest3 - link6_pdot4;
         let link6_pdot6 = link6_vel4 * link6_pdot3;
         let link6_pdot7 = link6_vel7 * link6_pdot5;
         let link6_pdot8 = link6_pdot6 - link6_pdot7;
         let link6_pdot9 = link7_inertia19 * link6_load5;
         let link6_pdot10 = link7_inertia12 * link6_load2;
         let link6_pdot11 = link6_pdot9 - link6_pdot10;
-        let link6_pdot12 = link6_pdot8 + link6_pdot11;
+        let link6_pdot12 = link6_pdot8 - link6_pdot11;
         // link7: momentum rate (4.36)
         let link7_pdot0 = link7_pivot6 * link7_vel4;
         let link7_pdot1 = link7_inertia0 * link7_vel7;
         let link7_pdot2 = link7_pdot0 + link7_pdot1;
-        let link7_pdot3 = link7_rest5 - link7_pdot2;
+        let link7_pdot3 = link7_rest5 + link7_pdot2;
         let link7_pdot4 = link7_pivot6 * link7_vel7;
-        let link7_pdot5 = link7_rest3 - link7_pdot4;
+        let link7_pdot5 = link7_rest3 + link7_pdot4;
         let link7_pdot6 = link7_vel4 * link7_pdot3;
         let link7_pdot7 = link7_vel7 * link7_pdot5;
         let link7_pdot8 = link7_pdot6 - link7_pdot7;
         let link7_pdot9 = link8_inertia19 * link7_load5;
         let link7_pdot10 = link8_inertia12 * link7_load2;
         let link7_pdot11 = link7_pdot9 - link7_pdot10;
-        let link7_pdot12 = link7_pdot8 + link7_pdot11;
+        let link7_pdot12 = link7_pdot8 - link7_pdot11;
         // link8: momentum rate (4.36)
         let link8_pdot0 = link8_pivot6 * link8_vel4;
         let link8_pdot1 = link8_inertia0 * link8_vel7;
         let link8_pdot2 = link8_pdot0 - link8_pdot1;
-        let link8_pdot3 = link8_rest5 + link8_pdot2;
+        let link8_pdot3 = link8_rest5 - link8_pdot2;
         let link8_pdot4 = link8_pivot6 * link8_vel7;
-        let link8_pdot5 = link8_rest3 + link8_pdot4;
+        let link8_pdot5 = link8_rest3 - link8_pdot4;
         let link8_pdot6 = link8_vel4 * link8_pdot3;
         let link8_pdot7 = link8_vel7 * link8_pdot5;
         let link8_pdot8 = link8_pdot6 - link8_pdot7;
-        let link8_pdot9 = link9_inertia19 * link8_load5;
-        let link8_pdot10 = link9_inertia12 * link8_load2;
+        let link8_pdot9 = link9_inertia13 * link8_load5;
+        let link8_pdot10 = link9_inertia2 * link8_load2;
         let link8_pdot11 = link8_pdot9 - link8_pdot10;
-        let link8_pdot12 = link8_pdot8 + link8_pdot11;
+        let link8_pdot12 = link8_pdot8 - link8_pdot11;
         // link9: momentum rate (4.36)
-        let link9_pdot0 = link9_pivot6 * link9_vel4;
-        let link9_pdot1 = link9_inertia0 * link9_vel7;
-        let link9_pdot2 = link9_pdot0 + link9_pdot1;
-        let link9_pdot3 = link9_rest5 + link9_pdot2;
-        let link9_pdot4 = link9_pivot6 * link9_vel7;
-        let link9_pdot5 = link9_rest3 - link9_pdot4;
-        let link9_pdot6 = link9_vel4 * link9_pdot3;
-        let link9_pdot7 = link9_vel7 * link9_pdot5;
-        let link9_pdot8 = link9_pdot6 + link9_pdot7;
-        let link9_pdot9 = link10_inertia9 * link9_load5;
-        let link9_pdot10 = link10_inertia4 * link9_load2;
-        let link9_pdot11 = link9_pdot9 + link9_pdot10;
-        let link9_pdot12 = link9_pdot8 + link9_pdot11;
+        let link9_pdot0 = link9_pivot16 - link9_pivot20;
+        let link9_pdot1 = link9_pivot18 * link8_vel4;
+        let link9_pdot2 = link9_vel1 * link9_pdot0;
+        let link9_pdot3 = link9_pdot1 - link9_pdot2;
+        let link9_pdot4 = link9_rest9 - link9_pdot3;
+        let link9_pdot5 = link9_pivot18 * link9_vel1;
+        let link9_pdot6 = link9_rest7 - link9_pdot5;
+        let link9_pdot7 = link8_vel4 * link9_pdot4;
+        let link9_pdot8 = link9_vel1 * link9_pdot6;
+        let link9_pdot9 = link9_pdot7 - link9_pdot8;
+        let link9_pdot10 = link10_inertia5 * link9_load5;
+        let link9_pdot11 = link10_inertia0 * link9_load2;
+        let link9_pdot12 = link9_pdot10 + link9_pdot11;
+        let link9_pdot13 = link9_pdot9 + link9_pdot12;
         // link10: momentum rate (4.36)
-        let link10_pdot0 = 0.29940119760479045 * link10_vel7;
-        let link10_pdot1 = link10_rest1 - link10_pdot0;
-        let link10_pdot2 = link10_vel4 * link10_pdot1;
-        let link10_pdot3 = 0.05 * link10_load2;
+        let link10_pdot0 = link10_inertia1 * link10_vel2;
+        let link10_pdot1 = link10_inertia0 * link10_vel2;
+        let link10_pdot2 = link9_vel15 * link10_pdot0;
+        let link10_pdot3 = link10_vel1 * link10_pdot1;
         let link10_pdot4 = link10_pdot2 + link10_pdot3;
-        let link10_pdot5 = tau_0 + link1_pdot2;
-        let link10_pdot6 = tau_1 + link2_pdot12;
-        let link10_pdot7 = tau_2 + link3_pdot12;
-        let link10_pdot8 = tau_3 + link4_pdot12;
-        let link10_pdot9 = tau_4 + link5_pdot12;
-        let link10_pdot10 = tau_5 + link6_pdot12;
-        let link10_pdot11 = tau_6 + link7_pdot12;
-        let link10_pdot12 = tau_7 + link8_pdot12;
-        let link10_pdot13 = tau_8 - link9_pdot12;
-        let link10_pdot14 = tau_9 - link10_pdot4;
-        qd[0] = link1_rest1;
+        let link10_pdot5 = 0.05 * link10_load2;
+        let link10_pdot6 = link10_pdot4 - link10_pdot5;
+        let link10_pdot7 = tau_0 + link1_pdot2;
+        let link10_pdot8 = tau_1 - link2_pdot12;
+        let link10_pdot9 = tau_2 - link3_pdot12;
+        let link10_pdot10 = tau_3 - link4_pdot12;
+        let link10_pdot11 = tau_4 - link5_pdot12;
+        let link10_pdot12 = tau_5 - link6_pdot12;
+        let link10_pdot13 = tau_6 - link7_pdot12;
+        let link10_pdot14 = tau_7 - link8_pdot12;
+        let link10_pdot15 = tau_8 - link9_pdot13;
+        let link10_pdot16 = tau_9 + link10_pdot6;
+        qd[0] = -link1_rest1;
         qd[1] = link2_vel7;
         qd[2] = link3_vel12;
         qd[3] = link4_vel12;
@@ -872,22 +860,22 @@ impl Chain10Planar {
         qd[5] = link6_vel12;
         qd[6] = link7_vel12;
         qd[7] = link8_vel12;
-        qd[8] = link9_vel12;
-        qd[9] = link10_vel10;
-        pd[0] = link10_pdot5;
-        pd[1] = link10_pdot6;
-        pd[2] = link10_pdot7;
-        pd[3] = link10_pdot8;
-        pd[4] = link10_pdot9;
-        pd[5] = link10_pdot10;
-        pd[6] = link10_pdot11;
-        pd[7] = link10_pdot12;
-        pd[8] = link10_pdot13;
-        pd[9] = link10_pdot14;
+        qd[8] = link9_vel6;
+        qd[9] = link9_vel12;
+        pd[0] = link10_pdot7;
+        pd[1] = link10_pdot8;
+        pd[2] = link10_pdot9;
+        pd[3] = link10_pdot10;
+        pd[4] = link10_pdot11;
+        pd[5] = link10_pdot12;
+        pd[6] = link10_pdot13;
+        pd[7] = link10_pdot14;
+        pd[8] = link10_pdot15;
+        pd[9] = link10_pdot16;
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 429 operations: 194 additions, 226 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
+    /// 417 operations: 183 additions, 225 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -927,53 +915,66 @@ impl Chain10Planar {
         // link10: sine and cosine, rotation
         let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
         // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.29940119760479045 * link10_sin0;
-        let link10_inertia1 = link10_sin0 * link10_inertia0;
-        let link10_inertia2 = link10_cos0 * link10_inertia0;
-        let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
-        let link10_inertia4 = 0.25 * link10_inertia2;
-        let link10_inertia5 = 0.25 * link10_inertia3;
-        let link10_inertia6 = 0.25 * link10_inertia5;
-        let link10_inertia7 = link10_inertia5 + 0.15000000000000002;
-        let link10_inertia8 = link10_inertia6 + 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia8;
-        let link9_pivot1 = link10_inertia4 * link9_pivot0;
-        let link9_pivot2 = link10_inertia7 * link9_pivot0;
-        let link9_pivot3 = link10_inertia4 * link9_pivot1;
-        let link9_pivot4 = link10_inertia1 + link9_pivot3;
-        let link9_pivot5 = link10_inertia4 * link9_pivot2;
-        let link9_pivot6 = link10_inertia2 - link9_pivot5;
-        let link9_pivot7 = link10_inertia7 * link9_pivot2;
-        let link9_pivot8 = link10_inertia3 - link9_pivot7;
+        let link10_inertia0 = 0.05 * link10_sin0;
+        let link10_inertia1 = 0.05 * link10_cos0;
+        let link10_inertia2 = link10_inertia1 + link10_inertia1;
+        let link10_inertia3 = 0.25 * link10_inertia2;
+        let link10_inertia4 = link10_inertia3 + 0.00835;
+        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+        let link10_inertia7 = 0.25 * link10_inertia1;
+        let link10_inertia8 = link10_inertia7 + 0.00835;
         // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_pivot4 + link9_pivot8;
-        let link9_inertia1 = link9_sin0 * link9_inertia0;
-        let link9_inertia2 = link9_cos0 + link9_cos0;
-        let link9_inertia3 = link9_pivot6 * link9_inertia2;
-        let link9_inertia4 = link9_inertia1 - link9_inertia3;
-        let link9_inertia5 = link9_sin0 * link9_inertia4;
-        let link9_inertia6 = link9_cos0 * link9_inertia4;
-        let link9_inertia7 = link9_pivot6 + link9_inertia6;
-        let link9_inertia8 = link9_pivot4 - link9_inertia5;
-        let link9_inertia9 = link9_pivot8 - link9_inertia5;
-        let link9_inertia10 = 0.25 * link9_inertia7;
-        let link9_inertia11 = 0.25 * link9_inertia9;
+        let link9_inertia0 = link9_cos0 * link10_inertia0;
+        let link9_inertia1 = link9_sin0 * link10_inertia5;
+        let link9_inertia2 = link9_inertia0 + link9_inertia1;
+        let link9_inertia3 = link9_sin0 * link10_inertia0;
+        let link9_inertia4 = link9_cos0 * link10_inertia5;
+        let link9_inertia5 = link9_inertia3 - link9_inertia4;
+        let link9_inertia6 = link9_sin0 * link10_inertia1;
+        let link9_inertia7 = link9_inertia0 + link9_inertia6;
+        let link9_inertia8 = link9_cos0 * link10_inertia1;
+        let link9_inertia9 = link9_inertia3 - link9_inertia8;
+        // link9: U, Mj, k and the reduced inertia M' (4.44)
+        let link9_pivot0 = 119.76047904191617 * link9_inertia7;
+        let link9_pivot1 = 119.76047904191617 * link9_inertia9;
+        let link9_pivot2 = 119.76047904191617 * link10_inertia8;
+        let link9_pivot3 = link9_inertia7 * link9_pivot0;
+        let link9_pivot4 = link9_inertia7 * link9_pivot1;
+        let link9_pivot5 = link9_inertia7 * link9_pivot2;
+        let link9_pivot6 = link9_inertia2 - link9_pivot5;
+        let link9_pivot7 = link9_inertia9 * link9_pivot1;
+        let link9_pivot8 = link9_inertia9 * link9_pivot2;
+        let link9_pivot9 = link9_inertia5 - link9_pivot8;
+        let link9_pivot10 = link10_inertia8 * link9_pivot2;
+        let link9_pivot11 = link10_inertia6 - link9_pivot10;
+        let link9_pivot12 = 1.0 / link9_pivot11;
+        let link9_pivot13 = link9_pivot6 * link9_pivot12;
+        let link9_pivot14 = link9_pivot9 * link9_pivot12;
+        let link9_pivot15 = link9_pivot6 * link9_pivot13;
+        let link9_pivot16 = link9_pivot3 + link9_pivot15;
+        let link9_pivot17 = link9_pivot6 * link9_pivot14;
+        let link9_pivot18 = link9_pivot4 + link9_pivot17;
+        let link9_pivot19 = link9_pivot9 * link9_pivot14;
+        let link9_pivot20 = link9_pivot7 + link9_pivot19;
+        // link9: inertia carried to the parent, M* (4.48)
+        let link9_inertia10 = 0.25 * link9_pivot18;
+        let link9_inertia11 = 0.25 * link9_pivot20;
         let link9_inertia12 = 0.25 * link9_inertia11;
-        let link9_inertia13 = link9_inertia11 + 0.25;
-        let link9_inertia14 = link9_inertia12 + 0.05835;
+        let link9_inertia13 = link9_inertia11 - 0.25;
+        let link9_inertia14 = link9_inertia12 - 0.05835;
         // link8: U, Mj, k and the reduced inertia M' (4.44)
         let link8_pivot0 = 1.0 / link9_inertia14;
         let link8_pivot1 = link9_inertia10 * link8_pivot0;
         let link8_pivot2 = link9_inertia13 * link8_pivot0;
         let link8_pivot3 = link9_inertia10 * link8_pivot1;
-        let link8_pivot4 = link9_inertia8 + link8_pivot3;
+        let link8_pivot4 = link9_pivot16 - link8_pivot3;
         let link8_pivot5 = link9_inertia10 * link8_pivot2;
-        let link8_pivot6 = link9_inertia7 - link8_pivot5;
+        let link8_pivot6 = link9_pivot18 - link8_pivot5;
         let link8_pivot7 = link9_inertia13 * link8_pivot2;
-        let link8_pivot8 = link9_inertia9 - link8_pivot7;
+        let link8_pivot8 = link9_pivot20 - link8_pivot7;
         // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pivot4 + link8_pivot8;
+        let link8_inertia0 = link8_pivot4 - link8_pivot8;
         let link8_inertia1 = link8_sin0 * link8_inertia0;
         let link8_inertia2 = link8_cos0 + link8_cos0;
         let link8_inertia3 = link8_pivot6 * link8_inertia2;
@@ -982,24 +983,24 @@ impl Chain10Planar {
         let link8_inertia6 = link8_cos0 * link8_inertia4;
         let link8_inertia7 = link8_pivot6 - link8_inertia6;
         let link8_inertia8 = link8_pivot4 - link8_inertia5;
-        let link8_inertia9 = link8_pivot8 - link8_inertia5;
+        let link8_inertia9 = link8_pivot8 + link8_inertia5;
         let link8_inertia10 = 0.25 * link8_inertia7;
         let link8_inertia11 = 0.25 * link8_inertia9;
         let link8_inertia12 = 0.25 * link8_inertia11;
-        let link8_inertia13 = link8_inertia11 + 0.35000000000000003;
-        let link8_inertia14 = link8_inertia12 + 0.08335000000000001;
+        let link8_inertia13 = link8_inertia11 - 0.35000000000000003;
+        let link8_inertia14 = link8_inertia12 - 0.08335000000000001;
         // link7: U, Mj, k and the reduced inertia M' (4.44)
         let link7_pivot0 = 1.0 / link8_inertia14;
         let link7_pivot1 = link8_inertia10 * link7_pivot0;
         let link7_pivot2 = link8_inertia13 * link7_pivot0;
         let link7_pivot3 = link8_inertia10 * link7_pivot1;
-        let link7_pivot4 = link8_inertia8 + link7_pivot3;
+        let link7_pivot4 = link8_inertia8 - link7_pivot3;
         let link7_pivot5 = link8_inertia10 * link7_pivot2;
         let link7_pivot6 = link8_inertia7 - link7_pivot5;
         let link7_pivot7 = link8_inertia13 * link7_pivot2;
         let link7_pivot8 = link8_inertia9 - link7_pivot7;
         // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pivot4 + link7_pivot8;
+        let link7_inertia0 = link7_pivot4 - link7_pivot8;
         let link7_inertia1 = link7_sin0 * link7_inertia0;
         let link7_inertia2 = link7_cos0 + link7_cos0;
         let link7_inertia3 = link7_pivot6 * link7_inertia2;
@@ -1008,24 +1009,24 @@ impl Chain10Planar {
         let link7_inertia6 = link7_cos0 * link7_inertia4;
         let link7_inertia7 = link7_pivot6 + link7_inertia6;
         let link7_inertia8 = link7_pivot4 - link7_inertia5;
-        let link7_inertia9 = link7_pivot8 - link7_inertia5;
+        let link7_inertia9 = link7_pivot8 + link7_inertia5;
         let link7_inertia10 = 0.25 * link7_inertia7;
         let link7_inertia11 = 0.25 * link7_inertia9;
         let link7_inertia12 = 0.25 * link7_inertia11;
-        let link7_inertia13 = link7_inertia11 + 0.45;
-        let link7_inertia14 = link7_inertia12 + 0.10835;
+        let link7_inertia13 = link7_inertia11 - 0.45;
+        let link7_inertia14 = link7_inertia12 - 0.10835;
         // link6: U, Mj, k and the reduced inertia M' (4.44)
         let link6_pivot0 = 1.0 / link7_inertia14;
         let link6_pivot1 = link7_inertia10 * link6_pivot0;
         let link6_pivot2 = link7_inertia13 * link6_pivot0;
         let link6_pivot3 = link7_inertia10 * link6_pivot1;
-        let link6_pivot4 = link7_inertia8 + link6_pivot3;
+        let link6_pivot4 = link7_inertia8 - link6_pivot3;
         let link6_pivot5 = link7_inertia10 * link6_pivot2;
         let link6_pivot6 = link7_inertia7 - link6_pivot5;
         let link6_pivot7 = link7_inertia13 * link6_pivot2;
         let link6_pivot8 = link7_inertia9 - link6_pivot7;
         // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pivot4 + link6_pivot8;
+        let link6_inertia0 = link6_pivot4 - link6_pivot8;
         let link6_inertia1 = link6_sin0 * link6_inertia0;
         let link6_inertia2 = link6_cos0 + link6_cos0;
         let link6_inertia3 = link6_pivot6 * link6_inertia2;
@@ -1034,24 +1035,24 @@ impl Chain10Planar {
         let link6_inertia6 = link6_cos0 * link6_inertia4;
         let link6_inertia7 = link6_pivot6 - link6_inertia6;
         let link6_inertia8 = link6_pivot4 - link6_inertia5;
-        let link6_inertia9 = link6_pivot8 - link6_inertia5;
+        let link6_inertia9 = link6_pivot8 + link6_inertia5;
         let link6_inertia10 = 0.25 * link6_inertia7;
         let link6_inertia11 = 0.25 * link6_inertia9;
         let link6_inertia12 = 0.25 * link6_inertia11;
-        let link6_inertia13 = link6_inertia11 + 0.55;
-        let link6_inertia14 = link6_inertia12 + 0.13335;
+        let link6_inertia13 = link6_inertia11 - 0.55;
+        let link6_inertia14 = link6_inertia12 - 0.13335;
         // link5: U, Mj, k and the reduced inertia M' (4.44)
         let link5_pivot0 = 1.0 / link6_inertia14;
         let link5_pivot1 = link6_inertia10 * link5_pivot0;
         let link5_pivot2 = link6_inertia13 * link5_pivot0;
         let link5_pivot3 = link6_inertia10 * link5_pivot1;
-        let link5_pivot4 = link6_inertia8 + link5_pivot3;
+        let link5_pivot4 = link6_inertia8 - link5_pivot3;
         let link5_pivot5 = link6_inertia10 * link5_pivot2;
         let link5_pivot6 = link6_inertia7 - link5_pivot5;
         let link5_pivot7 = link6_inertia13 * link5_pivot2;
         let link5_pivot8 = link6_inertia9 - link5_pivot7;
         // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pivot4 + link5_pivot8;
+        let link5_inertia0 = link5_pivot4 - link5_pivot8;
         let link5_inertia1 = link5_sin0 * link5_inertia0;
         let link5_inertia2 = link5_cos0 + link5_cos0;
         let link5_inertia3 = link5_pivot6 * link5_inertia2;
@@ -1060,24 +1061,24 @@ impl Chain10Planar {
         let link5_inertia6 = link5_cos0 * link5_inertia4;
         let link5_inertia7 = link5_pivot6 + link5_inertia6;
         let link5_inertia8 = link5_pivot4 - link5_inertia5;
-        let link5_inertia9 = link5_pivot8 - link5_inertia5;
+        let link5_inertia9 = link5_pivot8 + link5_inertia5;
         let link5_inertia10 = 0.25 * link5_inertia7;
         let link5_inertia11 = 0.25 * link5_inertia9;
         let link5_inertia12 = 0.25 * link5_inertia11;
-        let link5_inertia13 = link5_inertia11 + 0.65;
-        let link5_inertia14 = link5_inertia12 + 0.15835;
+        let link5_inertia13 = link5_inertia11 - 0.65;
+        let link5_inertia14 = link5_inertia12 - 0.15835;
         // link4: U, Mj, k and the reduced inertia M' (4.44)
         let link4_pivot0 = 1.0 / link5_inertia14;
         let link4_pivot1 = link5_inertia10 * link4_pivot0;
         let link4_pivot2 = link5_inertia13 * link4_pivot0;
         let link4_pivot3 = link5_inertia10 * link4_pivot1;
-        let link4_pivot4 = link5_inertia8 + link4_pivot3;
+        let link4_pivot4 = link5_inertia8 - link4_pivot3;
         let link4_pivot5 = link5_inertia10 * link4_pivot2;
         let link4_pivot6 = link5_inertia7 - link4_pivot5;
         let link4_pivot7 = link5_inertia13 * link4_pivot2;
         let link4_pivot8 = link5_inertia9 - link4_pivot7;
         // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pivot4 + link4_pivot8;
+        let link4_inertia0 = link4_pivot4 - link4_pivot8;
         let link4_inertia1 = link4_sin0 * link4_inertia0;
         let link4_inertia2 = link4_cos0 + link4_cos0;
         let link4_inertia3 = link4_pivot6 * link4_inertia2;
@@ -1086,24 +1087,24 @@ impl Chain10Planar {
         let link4_inertia6 = link4_cos0 * link4_inertia4;
         let link4_inertia7 = link4_pivot6 - link4_inertia6;
         let link4_inertia8 = link4_pivot4 - link4_inertia5;
-        let link4_inertia9 = link4_pivot8 - link4_inertia5;
+        let link4_inertia9 = link4_pivot8 + link4_inertia5;
         let link4_inertia10 = 0.25 * link4_inertia7;
         let link4_inertia11 = 0.25 * link4_inertia9;
         let link4_inertia12 = 0.25 * link4_inertia11;
-        let link4_inertia13 = link4_inertia11 + 0.75;
-        let link4_inertia14 = link4_inertia12 + 0.18334999999999999;
+        let link4_inertia13 = link4_inertia11 - 0.75;
+        let link4_inertia14 = link4_inertia12 - 0.18334999999999999;
         // link3: U, Mj, k and the reduced inertia M' (4.44)
         let link3_pivot0 = 1.0 / link4_inertia14;
         let link3_pivot1 = link4_inertia10 * link3_pivot0;
         let link3_pivot2 = link4_inertia13 * link3_pivot0;
         let link3_pivot3 = link4_inertia10 * link3_pivot1;
-        let link3_pivot4 = link4_inertia8 + link3_pivot3;
+        let link3_pivot4 = link4_inertia8 - link3_pivot3;
         let link3_pivot5 = link4_inertia10 * link3_pivot2;
         let link3_pivot6 = link4_inertia7 - link3_pivot5;
         let link3_pivot7 = link4_inertia13 * link3_pivot2;
         let link3_pivot8 = link4_inertia9 - link3_pivot7;
         // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pivot4 + link3_pivot8;
+        let link3_inertia0 = link3_pivot4 - link3_pivot8;
         let link3_inertia1 = link3_sin0 * link3_inertia0;
         let link3_inertia2 = link3_cos0 + link3_cos0;
         let link3_inertia3 = link3_pivot6 * link3_inertia2;
@@ -1112,64 +1113,55 @@ impl Chain10Planar {
         let link3_inertia6 = link3_cos0 * link3_inertia4;
         let link3_inertia7 = link3_pivot6 + link3_inertia6;
         let link3_inertia8 = link3_pivot4 - link3_inertia5;
-        let link3_inertia9 = link3_pivot8 - link3_inertia5;
+        let link3_inertia9 = link3_pivot8 + link3_inertia5;
         let link3_inertia10 = 0.25 * link3_inertia7;
         let link3_inertia11 = 0.25 * link3_inertia9;
         let link3_inertia12 = 0.25 * link3_inertia11;
-        let link3_inertia13 = link3_inertia11 + 0.85;
-        let link3_inertia14 = link3_inertia12 + 0.20834999999999998;
+        let link3_inertia13 = link3_inertia11 - 0.85;
+        let link3_inertia14 = link3_inertia12 - 0.20834999999999998;
         // link2: U, Mj, k and the reduced inertia M' (4.44)
         let link2_pivot0 = 1.0 / link3_inertia14;
         let link2_pivot1 = link3_inertia10 * link2_pivot0;
         let link2_pivot2 = link3_inertia13 * link2_pivot0;
         let link2_pivot3 = link3_inertia10 * link2_pivot1;
-        let link2_pivot4 = link3_inertia8 + link2_pivot3;
+        let link2_pivot4 = link3_inertia8 - link2_pivot3;
         let link2_pivot5 = link3_inertia10 * link2_pivot2;
         let link2_pivot6 = link3_inertia7 - link2_pivot5;
         let link2_pivot7 = link3_inertia13 * link2_pivot2;
         let link2_pivot8 = link3_inertia9 - link2_pivot7;
         // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pivot4 + link2_pivot8;
+        let link2_inertia0 = link2_pivot4 - link2_pivot8;
         let link2_inertia1 = link2_sin0 * link2_inertia0;
         let link2_inertia2 = link2_cos0 + link2_cos0;
         let link2_inertia3 = link2_pivot6 * link2_inertia2;
         let link2_inertia4 = link2_inertia1 + link2_inertia3;
         let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link2_pivot8 - link2_inertia5;
+        let link2_inertia6 = link2_pivot8 + link2_inertia5;
         let link2_inertia7 = 0.25 * link2_inertia6;
         let link2_inertia8 = 0.25 * link2_inertia7;
-        let link2_inertia9 = link2_inertia8 + 0.23334999999999997;
+        let link2_inertia9 = link2_inertia8 - 0.23334999999999997;
         // link1: U, Mj, k and the reduced inertia M' (4.44)
         let link1_pivot0 = 1.0 / link2_inertia9;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = 0.05 * link10_rest0;
-        let link10_rest2 = link10_sin0 * link10_rest1;
-        let link10_rest3 = link10_cos0 * link10_rest1;
-        let link10_rest4 = 0.25 * link10_rest3;
-        let link10_rest5 = p_9 + link10_rest4;
         // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest5;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia4 * link9_rest1;
-        let link9_rest3 = link10_rest2 - link9_rest2;
-        let link9_rest4 = link10_inertia7 * link9_rest1;
-        let link9_rest5 = link10_rest3 + link9_rest4;
-        let link9_rest6 = link9_cos0 * link9_rest3;
-        let link9_rest7 = link9_sin0 * link9_rest5;
-        let link9_rest8 = link9_rest6 + link9_rest7;
-        let link9_rest9 = link9_sin0 * link9_rest3;
-        let link9_rest10 = link9_cos0 * link9_rest5;
-        let link9_rest11 = link9_rest9 - link9_rest10;
-        let link9_rest12 = 0.25 * link9_rest11;
-        let link9_rest13 = p_8 - link9_rest12;
+        let link9_rest0 = 119.76047904191617 * p_9;
+        let link9_rest1 = link9_inertia7 * link9_rest0;
+        let link9_rest2 = link9_inertia9 * link9_rest0;
+        let link9_rest3 = link10_inertia8 * link9_rest0;
+        let link9_rest4 = p_8 - link9_rest3;
+        let link9_rest5 = link9_pivot12 * link9_rest4;
+        let link9_rest6 = link9_pivot6 * link9_rest5;
+        let link9_rest7 = link9_rest1 + link9_rest6;
+        let link9_rest8 = link9_pivot9 * link9_rest5;
+        let link9_rest9 = link9_rest2 + link9_rest8;
+        let link9_rest10 = 0.25 * link9_rest9;
+        let link9_rest11 = p_8 - link9_rest10;
         // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest13;
+        let link8_rest0 = p_7 - link9_rest11;
         let link8_rest1 = link8_pivot0 * link8_rest0;
         let link8_rest2 = link9_inertia10 * link8_rest1;
-        let link8_rest3 = link9_rest8 + link8_rest2;
+        let link8_rest3 = link9_rest7 - link8_rest2;
         let link8_rest4 = link9_inertia13 * link8_rest1;
-        let link8_rest5 = link9_rest11 - link8_rest4;
+        let link8_rest5 = link9_rest9 - link8_rest4;
         let link8_rest6 = link8_cos0 * link8_rest3;
         let link8_rest7 = link8_sin0 * link8_rest5;
         let link8_rest8 = link8_rest6 - link8_rest7;
@@ -1182,7 +1174,7 @@ impl Chain10Planar {
         let link7_rest0 = p_6 - link8_rest13;
         let link7_rest1 = link7_pivot0 * link7_rest0;
         let link7_rest2 = link8_inertia10 * link7_rest1;
-        let link7_rest3 = link8_rest8 - link7_rest2;
+        let link7_rest3 = link8_rest8 + link7_rest2;
         let link7_rest4 = link8_inertia13 * link7_rest1;
         let link7_rest5 = link8_rest11 - link7_rest4;
         let link7_rest6 = link7_cos0 * link7_rest3;
@@ -1197,7 +1189,7 @@ impl Chain10Planar {
         let link6_rest0 = p_5 - link7_rest13;
         let link6_rest1 = link6_pivot0 * link6_rest0;
         let link6_rest2 = link7_inertia10 * link6_rest1;
-        let link6_rest3 = link7_rest8 + link6_rest2;
+        let link6_rest3 = link7_rest8 - link6_rest2;
         let link6_rest4 = link7_inertia13 * link6_rest1;
         let link6_rest5 = link7_rest11 - link6_rest4;
         let link6_rest6 = link6_cos0 * link6_rest3;
@@ -1212,7 +1204,7 @@ impl Chain10Planar {
         let link5_rest0 = p_4 - link6_rest13;
         let link5_rest1 = link5_pivot0 * link5_rest0;
         let link5_rest2 = link6_inertia10 * link5_rest1;
-        let link5_rest3 = link6_rest8 - link5_rest2;
+        let link5_rest3 = link6_rest8 + link5_rest2;
         let link5_rest4 = link6_inertia13 * link5_rest1;
         let link5_rest5 = link6_rest11 - link5_rest4;
         let link5_rest6 = link5_cos0 * link5_rest3;
@@ -1227,7 +1219,7 @@ impl Chain10Planar {
         let link4_rest0 = p_3 - link5_rest13;
         let link4_rest1 = link4_pivot0 * link4_rest0;
         let link4_rest2 = link5_inertia10 * link4_rest1;
-        let link4_rest3 = link5_rest8 + link4_rest2;
+        let link4_rest3 = link5_rest8 - link4_rest2;
         let link4_rest4 = link5_inertia13 * link4_rest1;
         let link4_rest5 = link5_rest11 - link4_rest4;
         let link4_rest6 = link4_cos0 * link4_rest3;
@@ -1242,7 +1234,7 @@ impl Chain10Planar {
         let link3_rest0 = p_2 - link4_rest13;
         let link3_rest1 = link3_pivot0 * link3_rest0;
         let link3_rest2 = link4_inertia10 * link3_rest1;
-        let link3_rest3 = link4_rest8 - link3_rest2;
+        let link3_rest3 = link4_rest8 + link3_rest2;
         let link3_rest4 = link4_inertia13 * link3_rest1;
         let link3_rest5 = link4_rest11 - link3_rest4;
         let link3_rest6 = link3_cos0 * link3_rest3;
@@ -1257,7 +1249,7 @@ impl Chain10Planar {
         let link2_rest0 = p_1 - link3_rest13;
         let link2_rest1 = link2_pivot0 * link2_rest0;
         let link2_rest2 = link3_inertia10 * link2_rest1;
-        let link2_rest3 = link3_rest8 + link2_rest2;
+        let link2_rest3 = link3_rest8 - link2_rest2;
         let link2_rest4 = link3_inertia13 * link2_rest1;
         let link2_rest5 = link3_rest11 - link2_rest4;
         let link2_rest6 = link2_sin0 * link2_rest3;
@@ -1274,12 +1266,11 @@ impl Chain10Planar {
         let link2_vel2 = link2_cos0 * link2_vel0;
         let link2_vel3 = link2_pivot1 * link2_vel1;
         let link2_vel4 = link2_pivot2 * link2_vel2;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link1_rest1 - link2_vel5;
-        let link2_vel7 = link2_rest1 - link2_vel6;
-        let link2_vel8 = link1_rest1 + link2_vel7;
+        let link2_vel5 = link2_vel3 + link2_vel4;
+        let link2_vel6 = link2_rest1 - link2_vel5;
+        let link2_vel7 = link1_rest1 - link2_vel6;
         // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel8;
+        let link3_vel0 = 0.25 * link2_vel6;
         let link3_vel1 = link2_vel2 + link3_vel0;
         let link3_vel2 = link3_cos0 * link2_vel1;
         let link3_vel3 = link3_sin0 * link3_vel1;
@@ -1289,12 +1280,11 @@ impl Chain10Planar {
         let link3_vel7 = link3_vel5 - link3_vel6;
         let link3_vel8 = link3_pivot1 * link3_vel4;
         let link3_vel9 = link3_pivot2 * link3_vel7;
-        let link3_vel10 = link3_vel8 + link3_vel9;
-        let link3_vel11 = link2_vel8 + link3_vel10;
-        let link3_vel12 = link3_rest1 - link3_vel11;
-        let link3_vel13 = link2_vel8 + link3_vel12;
+        let link3_vel10 = link3_vel8 - link3_vel9;
+        let link3_vel11 = link3_rest1 + link3_vel10;
+        let link3_vel12 = link2_vel6 - link3_vel11;
         // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel13;
+        let link4_vel0 = 0.25 * link3_vel11;
         let link4_vel1 = link3_vel7 + link4_vel0;
         let link4_vel2 = link4_cos0 * link3_vel4;
         let link4_vel3 = link4_sin0 * link4_vel1;
@@ -1304,12 +1294,11 @@ impl Chain10Planar {
         let link4_vel7 = link4_vel5 - link4_vel6;
         let link4_vel8 = link4_pivot1 * link4_vel4;
         let link4_vel9 = link4_pivot2 * link4_vel7;
-        let link4_vel10 = link4_vel8 - link4_vel9;
-        let link4_vel11 = link3_vel13 - link4_vel10;
-        let link4_vel12 = link4_rest1 - link4_vel11;
-        let link4_vel13 = link3_vel13 + link4_vel12;
+        let link4_vel10 = link4_vel8 + link4_vel9;
+        let link4_vel11 = link4_rest1 - link4_vel10;
+        let link4_vel12 = link3_vel11 - link4_vel11;
         // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel13;
+        let link5_vel0 = 0.25 * link4_vel11;
         let link5_vel1 = link4_vel7 + link5_vel0;
         let link5_vel2 = link5_cos0 * link4_vel4;
         let link5_vel3 = link5_sin0 * link5_vel1;
@@ -1319,12 +1308,11 @@ impl Chain10Planar {
         let link5_vel7 = link5_vel5 - link5_vel6;
         let link5_vel8 = link5_pivot1 * link5_vel4;
         let link5_vel9 = link5_pivot2 * link5_vel7;
-        let link5_vel10 = link5_vel8 + link5_vel9;
-        let link5_vel11 = link4_vel13 + link5_vel10;
-        let link5_vel12 = link5_rest1 - link5_vel11;
-        let link5_vel13 = link4_vel13 + link5_vel12;
+        let link5_vel10 = link5_vel8 - link5_vel9;
+        let link5_vel11 = link5_rest1 + link5_vel10;
+        let link5_vel12 = link4_vel11 - link5_vel11;
         // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel13;
+        let link6_vel0 = 0.25 * link5_vel11;
         let link6_vel1 = link5_vel7 + link6_vel0;
         let link6_vel2 = link6_cos0 * link5_vel4;
         let link6_vel3 = link6_sin0 * link6_vel1;
@@ -1334,12 +1322,11 @@ impl Chain10Planar {
         let link6_vel7 = link6_vel5 - link6_vel6;
         let link6_vel8 = link6_pivot1 * link6_vel4;
         let link6_vel9 = link6_pivot2 * link6_vel7;
-        let link6_vel10 = link6_vel8 - link6_vel9;
-        let link6_vel11 = link5_vel13 - link6_vel10;
-        let link6_vel12 = link6_rest1 - link6_vel11;
-        let link6_vel13 = link5_vel13 + link6_vel12;
+        let link6_vel10 = link6_vel8 + link6_vel9;
+        let link6_vel11 = link6_rest1 - link6_vel10;
+        let link6_vel12 = link5_vel11 - link6_vel11;
         // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel13;
+        let link7_vel0 = 0.25 * link6_vel11;
         let link7_vel1 = link6_vel7 + link7_vel0;
         let link7_vel2 = link7_cos0 * link6_vel4;
         let link7_vel3 = link7_sin0 * link7_vel1;
@@ -1349,12 +1336,11 @@ impl Chain10Planar {
         let link7_vel7 = link7_vel5 - link7_vel6;
         let link7_vel8 = link7_pivot1 * link7_vel4;
         let link7_vel9 = link7_pivot2 * link7_vel7;
-        let link7_vel10 = link7_vel8 + link7_vel9;
-        let link7_vel11 = link6_vel13 + link7_vel10;
-        let link7_vel12 = link7_rest1 - link7_vel11;
-        let link7_vel13 = link6_vel13 + link7_vel12;
+        let link7_vel10 = link7_vel8 - link7_vel9;
+        let link7_vel11 = link7_rest1 + link7_vel10;
+        let link7_vel12 = link6_vel11 - link7_vel11;
         // link8: velocity and joint rate (4.40)
-        let link8_vel0 = 0.25 * link7_vel13;
+        let link8_vel0 = 0.25 * link7_vel11;
         let link8_vel1 = link7_vel7 + link8_vel0;
         let link8_vel2 = link8_cos0 * link7_vel4;
         let link8_vel3 = link8_sin0 * link8_vel1;
@@ -1364,35 +1350,24 @@ impl Chain10Planar {
         let link8_vel7 = link8_vel5 - link8_vel6;
         let link8_vel8 = link8_pivot1 * link8_vel4;
         let link8_vel9 = link8_pivot2 * link8_vel7;
-        let link8_vel10 = link8_vel8 - link8_vel9;
-        let link8_vel11 = link7_vel13 - link8_vel10;
-        let link8_vel12 = link8_rest1 - link8_vel11;
-        let link8_vel13 = link7_vel13 + link8_vel12;
+        let link8_vel10 = link8_vel8 + link8_vel9;
+        let link8_vel11 = link8_rest1 - link8_vel10;
+        let link8_vel12 = link7_vel11 - link8_vel11;
         // link9: velocity and joint rate (4.40)
-        let link9_vel0 = 0.25 * link8_vel13;
+        let link9_vel0 = 0.25 * link8_vel11;
         let link9_vel1 = link8_vel7 + link9_vel0;
-        let link9_vel2 = link9_cos0 * link8_vel4;
-        let link9_vel3 = link9_sin0 * link9_vel1;
+        let link9_vel2 = link9_pivot13 * link8_vel4;
+        let link9_vel3 = link9_pivot14 * link9_vel1;
         let link9_vel4 = link9_vel2 + link9_vel3;
-        let link9_vel5 = link9_cos0 * link9_vel1;
-        let link9_vel6 = link9_sin0 * link8_vel4;
-        let link9_vel7 = link9_vel5 - link9_vel6;
-        let link9_vel8 = link9_pivot1 * link9_vel4;
-        let link9_vel9 = link9_pivot2 * link9_vel7;
-        let link9_vel10 = link9_vel8 + link9_vel9;
-        let link9_vel11 = link8_vel13 + link9_vel10;
-        let link9_vel12 = link9_rest1 - link9_vel11;
-        let link9_vel13 = link8_vel13 + link9_vel12;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = 0.25 * link9_vel13;
-        let link10_vel1 = link9_vel7 + link10_vel0;
-        let link10_vel2 = link10_cos0 * link10_vel1;
-        let link10_vel3 = link10_sin0 * link9_vel4;
-        let link10_vel4 = link10_vel2 - link10_vel3;
-        let link10_vel5 = 5.9880239520958085 * link10_vel4;
-        let link10_vel6 = link9_vel13 + link10_vel5;
-        let link10_vel7 = link10_rest0 - link10_vel6;
-        v[0] = link1_rest1;
+        let link9_vel5 = link9_rest5 - link9_vel4;
+        let link9_vel6 = link8_vel11 + link9_vel5;
+        let link9_vel7 = link9_pivot0 * link8_vel4;
+        let link9_vel8 = link9_pivot1 * link9_vel1;
+        let link9_vel9 = link9_vel7 + link9_vel8;
+        let link9_vel10 = link9_pivot2 * link9_vel5;
+        let link9_vel11 = link9_vel9 + link9_vel10;
+        let link9_vel12 = link9_rest0 - link9_vel11;
+        v[0] = -link1_rest1;
         v[1] = link2_vel7;
         v[2] = link3_vel12;
         v[3] = link4_vel12;
@@ -1400,8 +1375,8 @@ impl Chain10Planar {
         v[5] = link6_vel12;
         v[6] = link7_vel12;
         v[7] = link8_vel12;
-        v[8] = link9_vel12;
-        v[9] = link10_vel7;
+        v[8] = link9_vel6;
+        v[9] = link9_vel12;
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -1676,7 +1651,7 @@ impl Chain10Planar {
     }
 
     /// Kinetic and potential energy, J.
-    /// 512 operations: 229 additions, 274 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 491 operations: 215 additions, 267 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -1719,63 +1694,67 @@ impl Chain10Planar {
         // link10: sine and cosine, rotation
         let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
         // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.29940119760479045 * link10_sin0;
-        let link10_inertia1 = link10_sin0 * link10_inertia0;
-        let link10_inertia2 = link10_cos0 * link10_inertia0;
-        let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
-        let link10_inertia4 = 0.05 * link10_sin0;
-        let link10_inertia5 = 0.05 * link10_cos0;
-        let link10_inertia6 = 0.25 * link10_inertia2;
-        let link10_inertia7 = 0.25 * link10_inertia3;
-        let link10_inertia8 = 0.25 * link10_inertia7;
-        let link10_inertia9 = link10_inertia5 + 0.15000000000000002;
-        let link10_inertia10 = link10_inertia7 + 0.15000000000000002;
-        let link10_inertia11 = link10_inertia8 + 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia11;
-        let link9_pivot1 = link10_inertia6 * link9_pivot0;
-        let link9_pivot2 = link10_inertia10 * link9_pivot0;
-        let link9_pivot3 = link10_inertia6 * link9_pivot1;
-        let link9_pivot4 = link10_inertia1 + link9_pivot3;
-        let link9_pivot5 = link10_inertia6 * link9_pivot2;
-        let link9_pivot6 = link10_inertia2 - link9_pivot5;
-        let link9_pivot7 = link10_inertia10 * link9_pivot2;
-        let link9_pivot8 = link10_inertia3 - link9_pivot7;
+        let link10_inertia0 = 0.05 * link10_sin0;
+        let link10_inertia1 = 0.05 * link10_cos0;
+        let link10_inertia2 = link10_inertia1 + link10_inertia1;
+        let link10_inertia3 = 0.25 * link10_inertia2;
+        let link10_inertia4 = link10_inertia3 + 0.00835;
+        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+        let link10_inertia7 = 0.25 * link10_inertia1;
+        let link10_inertia8 = link10_inertia7 + 0.00835;
         // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_pivot4 + link9_pivot8;
-        let link9_inertia1 = link9_sin0 * link9_inertia0;
-        let link9_inertia2 = link9_cos0 + link9_cos0;
-        let link9_inertia3 = link9_pivot6 * link9_inertia2;
-        let link9_inertia4 = link9_inertia1 - link9_inertia3;
-        let link9_inertia5 = link9_sin0 * link9_inertia4;
-        let link9_inertia6 = link9_cos0 * link9_inertia4;
-        let link9_inertia7 = link9_pivot6 + link9_inertia6;
-        let link9_inertia8 = link9_pivot4 - link9_inertia5;
-        let link9_inertia9 = link9_pivot8 - link9_inertia5;
-        let link9_inertia10 = link9_cos0 * link10_inertia4;
-        let link9_inertia11 = link9_sin0 * link10_inertia9;
-        let link9_inertia12 = link9_inertia10 + link9_inertia11;
-        let link9_inertia13 = link9_sin0 * link10_inertia4;
-        let link9_inertia14 = link9_cos0 * link10_inertia9;
-        let link9_inertia15 = link9_inertia13 - link9_inertia14;
-        let link9_inertia16 = 0.25 * link9_inertia7;
-        let link9_inertia17 = 0.25 * link9_inertia9;
-        let link9_inertia18 = 0.25 * link9_inertia17;
-        let link9_inertia19 = link9_inertia15 - 0.25;
-        let link9_inertia20 = link9_inertia17 + 0.25;
-        let link9_inertia21 = link9_inertia18 + 0.05835;
+        let link9_inertia0 = link9_cos0 * link10_inertia0;
+        let link9_inertia1 = link9_sin0 * link10_inertia5;
+        let link9_inertia2 = link9_inertia0 + link9_inertia1;
+        let link9_inertia3 = link9_sin0 * link10_inertia0;
+        let link9_inertia4 = link9_cos0 * link10_inertia5;
+        let link9_inertia5 = link9_inertia3 - link9_inertia4;
+        let link9_inertia6 = link9_sin0 * link10_inertia1;
+        let link9_inertia7 = link9_inertia0 + link9_inertia6;
+        let link9_inertia8 = link9_cos0 * link10_inertia1;
+        let link9_inertia9 = link9_inertia3 - link9_inertia8;
+        // link9: U, Mj, k and the reduced inertia M' (4.44)
+        let link9_pivot0 = 119.76047904191617 * link9_inertia7;
+        let link9_pivot1 = 119.76047904191617 * link9_inertia9;
+        let link9_pivot2 = 119.76047904191617 * link10_inertia8;
+        let link9_pivot3 = link9_inertia7 * link9_pivot0;
+        let link9_pivot4 = link9_inertia7 * link9_pivot1;
+        let link9_pivot5 = link9_inertia7 * link9_pivot2;
+        let link9_pivot6 = link9_inertia2 - link9_pivot5;
+        let link9_pivot7 = link9_inertia9 * link9_pivot1;
+        let link9_pivot8 = link9_inertia9 * link9_pivot2;
+        let link9_pivot9 = link9_inertia5 - link9_pivot8;
+        let link9_pivot10 = link10_inertia8 * link9_pivot2;
+        let link9_pivot11 = link10_inertia6 - link9_pivot10;
+        let link9_pivot12 = 1.0 / link9_pivot11;
+        let link9_pivot13 = link9_pivot6 * link9_pivot12;
+        let link9_pivot14 = link9_pivot9 * link9_pivot12;
+        let link9_pivot15 = link9_pivot6 * link9_pivot13;
+        let link9_pivot16 = link9_pivot3 + link9_pivot15;
+        let link9_pivot17 = link9_pivot6 * link9_pivot14;
+        let link9_pivot18 = link9_pivot4 + link9_pivot17;
+        let link9_pivot19 = link9_pivot9 * link9_pivot14;
+        let link9_pivot20 = link9_pivot7 + link9_pivot19;
+        // link9: inertia carried to the parent, M* (4.48)
+        let link9_inertia10 = 0.25 * link9_pivot18;
+        let link9_inertia11 = 0.25 * link9_pivot20;
+        let link9_inertia12 = 0.25 * link9_inertia11;
+        let link9_inertia13 = link9_inertia5 - 0.25;
+        let link9_inertia14 = link9_inertia11 - 0.25;
+        let link9_inertia15 = link9_inertia12 - 0.05835;
         // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia21;
-        let link8_pivot1 = link9_inertia16 * link8_pivot0;
-        let link8_pivot2 = link9_inertia20 * link8_pivot0;
-        let link8_pivot3 = link9_inertia16 * link8_pivot1;
-        let link8_pivot4 = link9_inertia8 + link8_pivot3;
-        let link8_pivot5 = link9_inertia16 * link8_pivot2;
-        let link8_pivot6 = link9_inertia7 - link8_pivot5;
-        let link8_pivot7 = link9_inertia20 * link8_pivot2;
-        let link8_pivot8 = link9_inertia9 - link8_pivot7;
+        let link8_pivot0 = 1.0 / link9_inertia15;
+        let link8_pivot1 = link9_inertia10 * link8_pivot0;
+        let link8_pivot2 = link9_inertia14 * link8_pivot0;
+        let link8_pivot3 = link9_inertia10 * link8_pivot1;
+        let link8_pivot4 = link9_pivot16 - link8_pivot3;
+        let link8_pivot5 = link9_inertia10 * link8_pivot2;
+        let link8_pivot6 = link9_pivot18 - link8_pivot5;
+        let link8_pivot7 = link9_inertia14 * link8_pivot2;
+        let link8_pivot8 = link9_pivot20 - link8_pivot7;
         // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pivot4 + link8_pivot8;
+        let link8_inertia0 = link8_pivot4 - link8_pivot8;
         let link8_inertia1 = link8_sin0 * link8_inertia0;
         let link8_inertia2 = link8_cos0 + link8_cos0;
         let link8_inertia3 = link8_pivot6 * link8_inertia2;
@@ -1784,31 +1763,31 @@ impl Chain10Planar {
         let link8_inertia6 = link8_cos0 * link8_inertia4;
         let link8_inertia7 = link8_pivot6 - link8_inertia6;
         let link8_inertia8 = link8_pivot4 - link8_inertia5;
-        let link8_inertia9 = link8_pivot8 - link8_inertia5;
-        let link8_inertia10 = link8_cos0 * link9_inertia12;
-        let link8_inertia11 = link8_sin0 * link9_inertia19;
+        let link8_inertia9 = link8_pivot8 + link8_inertia5;
+        let link8_inertia10 = link8_cos0 * link9_inertia2;
+        let link8_inertia11 = link8_sin0 * link9_inertia13;
         let link8_inertia12 = link8_inertia10 - link8_inertia11;
-        let link8_inertia13 = link8_sin0 * link9_inertia12;
-        let link8_inertia14 = link8_cos0 * link9_inertia19;
+        let link8_inertia13 = link8_sin0 * link9_inertia2;
+        let link8_inertia14 = link8_cos0 * link9_inertia13;
         let link8_inertia15 = link8_inertia13 + link8_inertia14;
         let link8_inertia16 = 0.25 * link8_inertia7;
         let link8_inertia17 = 0.25 * link8_inertia9;
         let link8_inertia18 = 0.25 * link8_inertia17;
         let link8_inertia19 = link8_inertia15 - 0.35000000000000003;
-        let link8_inertia20 = link8_inertia17 + 0.35000000000000003;
-        let link8_inertia21 = link8_inertia18 + 0.08335000000000001;
+        let link8_inertia20 = link8_inertia17 - 0.35000000000000003;
+        let link8_inertia21 = link8_inertia18 - 0.08335000000000001;
         // link7: U, Mj, k and the reduced inertia M' (4.44)
         let link7_pivot0 = 1.0 / link8_inertia21;
         let link7_pivot1 = link8_inertia16 * link7_pivot0;
         let link7_pivot2 = link8_inertia20 * link7_pivot0;
         let link7_pivot3 = link8_inertia16 * link7_pivot1;
-        let link7_pivot4 = link8_inertia8 + link7_pivot3;
+        let link7_pivot4 = link8_inertia8 - link7_pivot3;
         let link7_pivot5 = link8_inertia16 * link7_pivot2;
         let link7_pivot6 = link8_inertia7 - link7_pivot5;
         let link7_pivot7 = link8_inertia20 * link7_pivot2;
         let link7_pivot8 = link8_inertia9 - link7_pivot7;
         // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pivot4 + link7_pivot8;
+        let link7_inertia0 = link7_pivot4 - link7_pivot8;
         let link7_inertia1 = link7_sin0 * link7_inertia0;
         let link7_inertia2 = link7_cos0 + link7_cos0;
         let link7_inertia3 = link7_pivot6 * link7_inertia2;
@@ -1817,7 +1796,7 @@ impl Chain10Planar {
         let link7_inertia6 = link7_cos0 * link7_inertia4;
         let link7_inertia7 = link7_pivot6 + link7_inertia6;
         let link7_inertia8 = link7_pivot4 - link7_inertia5;
-        let link7_inertia9 = link7_pivot8 - link7_inertia5;
+        let link7_inertia9 = link7_pivot8 + link7_inertia5;
         let link7_inertia10 = link7_cos0 * link8_inertia12;
         let link7_inertia11 = link7_sin0 * link8_inertia19;
         let link7_inertia12 = link7_inertia10 - link7_inertia11;
@@ -1828,20 +1807,20 @@ impl Chain10Planar {
         let link7_inertia17 = 0.25 * link7_inertia9;
         let link7_inertia18 = 0.25 * link7_inertia17;
         let link7_inertia19 = link7_inertia15 - 0.45;
-        let link7_inertia20 = link7_inertia17 + 0.45;
-        let link7_inertia21 = link7_inertia18 + 0.10835;
+        let link7_inertia20 = link7_inertia17 - 0.45;
+        let link7_inertia21 = link7_inertia18 - 0.10835;
         // link6: U, Mj, k and the reduced inertia M' (4.44)
         let link6_pivot0 = 1.0 / link7_inertia21;
         let link6_pivot1 = link7_inertia16 * link6_pivot0;
         let link6_pivot2 = link7_inertia20 * link6_pivot0;
         let link6_pivot3 = link7_inertia16 * link6_pivot1;
-        let link6_pivot4 = link7_inertia8 + link6_pivot3;
+        let link6_pivot4 = link7_inertia8 - link6_pivot3;
         let link6_pivot5 = link7_inertia16 * link6_pivot2;
         let link6_pivot6 = link7_inertia7 - link6_pivot5;
         let link6_pivot7 = link7_inertia20 * link6_pivot2;
         let link6_pivot8 = link7_inertia9 - link6_pivot7;
         // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pivot4 + link6_pivot8;
+        let link6_inertia0 = link6_pivot4 - link6_pivot8;
         let link6_inertia1 = link6_sin0 * link6_inertia0;
         let link6_inertia2 = link6_cos0 + link6_cos0;
         let link6_inertia3 = link6_pivot6 * link6_inertia2;
@@ -1850,7 +1829,7 @@ impl Chain10Planar {
         let link6_inertia6 = link6_cos0 * link6_inertia4;
         let link6_inertia7 = link6_pivot6 - link6_inertia6;
         let link6_inertia8 = link6_pivot4 - link6_inertia5;
-        let link6_inertia9 = link6_pivot8 - link6_inertia5;
+        let link6_inertia9 = link6_pivot8 + link6_inertia5;
         let link6_inertia10 = link6_cos0 * link7_inertia12;
         let link6_inertia11 = link6_sin0 * link7_inertia19;
         let link6_inertia12 = link6_inertia10 - link6_inertia11;
@@ -1861,20 +1840,20 @@ impl Chain10Planar {
         let link6_inertia17 = 0.25 * link6_inertia9;
         let link6_inertia18 = 0.25 * link6_inertia17;
         let link6_inertia19 = link6_inertia15 - 0.55;
-        let link6_inertia20 = link6_inertia17 + 0.55;
-        let link6_inertia21 = link6_inertia18 + 0.13335;
+        let link6_inertia20 = link6_inertia17 - 0.55;
+        let link6_inertia21 = link6_inertia18 - 0.13335;
         // link5: U, Mj, k and the reduced inertia M' (4.44)
         let link5_pivot0 = 1.0 / link6_inertia21;
         let link5_pivot1 = link6_inertia16 * link5_pivot0;
         let link5_pivot2 = link6_inertia20 * link5_pivot0;
         let link5_pivot3 = link6_inertia16 * link5_pivot1;
-        let link5_pivot4 = link6_inertia8 + link5_pivot3;
+        let link5_pivot4 = link6_inertia8 - link5_pivot3;
         let link5_pivot5 = link6_inertia16 * link5_pivot2;
         let link5_pivot6 = link6_inertia7 - link5_pivot5;
         let link5_pivot7 = link6_inertia20 * link5_pivot2;
         let link5_pivot8 = link6_inertia9 - link5_pivot7;
         // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pivot4 + link5_pivot8;
+        let link5_inertia0 = link5_pivot4 - link5_pivot8;
         let link5_inertia1 = link5_sin0 * link5_inertia0;
         let link5_inertia2 = link5_cos0 + link5_cos0;
         let link5_inertia3 = link5_pivot6 * link5_inertia2;
@@ -1883,7 +1862,7 @@ impl Chain10Planar {
         let link5_inertia6 = link5_cos0 * link5_inertia4;
         let link5_inertia7 = link5_pivot6 + link5_inertia6;
         let link5_inertia8 = link5_pivot4 - link5_inertia5;
-        let link5_inertia9 = link5_pivot8 - link5_inertia5;
+        let link5_inertia9 = link5_pivot8 + link5_inertia5;
         let link5_inertia10 = link5_cos0 * link6_inertia12;
         let link5_inertia11 = link5_sin0 * link6_inertia19;
         let link5_inertia12 = link5_inertia10 - link5_inertia11;
@@ -1894,20 +1873,20 @@ impl Chain10Planar {
         let link5_inertia17 = 0.25 * link5_inertia9;
         let link5_inertia18 = 0.25 * link5_inertia17;
         let link5_inertia19 = link5_inertia15 - 0.65;
-        let link5_inertia20 = link5_inertia17 + 0.65;
-        let link5_inertia21 = link5_inertia18 + 0.15835;
+        let link5_inertia20 = link5_inertia17 - 0.65;
+        let link5_inertia21 = link5_inertia18 - 0.15835;
         // link4: U, Mj, k and the reduced inertia M' (4.44)
         let link4_pivot0 = 1.0 / link5_inertia21;
         let link4_pivot1 = link5_inertia16 * link4_pivot0;
         let link4_pivot2 = link5_inertia20 * link4_pivot0;
         let link4_pivot3 = link5_inertia16 * link4_pivot1;
-        let link4_pivot4 = link5_inertia8 + link4_pivot3;
+        let link4_pivot4 = link5_inertia8 - link4_pivot3;
         let link4_pivot5 = link5_inertia16 * link4_pivot2;
         let link4_pivot6 = link5_inertia7 - link4_pivot5;
         let link4_pivot7 = link5_inertia20 * link4_pivot2;
         let link4_pivot8 = link5_inertia9 - link4_pivot7;
         // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pivot4 + link4_pivot8;
+        let link4_inertia0 = link4_pivot4 - link4_pivot8;
         let link4_inertia1 = link4_sin0 * link4_inertia0;
         let link4_inertia2 = link4_cos0 + link4_cos0;
         let link4_inertia3 = link4_pivot6 * link4_inertia2;
@@ -1916,7 +1895,7 @@ impl Chain10Planar {
         let link4_inertia6 = link4_cos0 * link4_inertia4;
         let link4_inertia7 = link4_pivot6 - link4_inertia6;
         let link4_inertia8 = link4_pivot4 - link4_inertia5;
-        let link4_inertia9 = link4_pivot8 - link4_inertia5;
+        let link4_inertia9 = link4_pivot8 + link4_inertia5;
         let link4_inertia10 = link4_cos0 * link5_inertia12;
         let link4_inertia11 = link4_sin0 * link5_inertia19;
         let link4_inertia12 = link4_inertia10 - link4_inertia11;
@@ -1927,20 +1906,20 @@ impl Chain10Planar {
         let link4_inertia17 = 0.25 * link4_inertia9;
         let link4_inertia18 = 0.25 * link4_inertia17;
         let link4_inertia19 = link4_inertia15 - 0.75;
-        let link4_inertia20 = link4_inertia17 + 0.75;
-        let link4_inertia21 = link4_inertia18 + 0.18334999999999999;
+        let link4_inertia20 = link4_inertia17 - 0.75;
+        let link4_inertia21 = link4_inertia18 - 0.18334999999999999;
         // link3: U, Mj, k and the reduced inertia M' (4.44)
         let link3_pivot0 = 1.0 / link4_inertia21;
         let link3_pivot1 = link4_inertia16 * link3_pivot0;
         let link3_pivot2 = link4_inertia20 * link3_pivot0;
         let link3_pivot3 = link4_inertia16 * link3_pivot1;
-        let link3_pivot4 = link4_inertia8 + link3_pivot3;
+        let link3_pivot4 = link4_inertia8 - link3_pivot3;
         let link3_pivot5 = link4_inertia16 * link3_pivot2;
         let link3_pivot6 = link4_inertia7 - link3_pivot5;
         let link3_pivot7 = link4_inertia20 * link3_pivot2;
         let link3_pivot8 = link4_inertia9 - link3_pivot7;
         // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pivot4 + link3_pivot8;
+        let link3_inertia0 = link3_pivot4 - link3_pivot8;
         let link3_inertia1 = link3_sin0 * link3_inertia0;
         let link3_inertia2 = link3_cos0 + link3_cos0;
         let link3_inertia3 = link3_pivot6 * link3_inertia2;
@@ -1949,7 +1928,7 @@ impl Chain10Planar {
         let link3_inertia6 = link3_cos0 * link3_inertia4;
         let link3_inertia7 = link3_pivot6 + link3_inertia6;
         let link3_inertia8 = link3_pivot4 - link3_inertia5;
-        let link3_inertia9 = link3_pivot8 - link3_inertia5;
+        let link3_inertia9 = link3_pivot8 + link3_inertia5;
         let link3_inertia10 = link3_cos0 * link4_inertia12;
         let link3_inertia11 = link3_sin0 * link4_inertia19;
         let link3_inertia12 = link3_inertia10 - link3_inertia11;
@@ -1960,26 +1939,26 @@ impl Chain10Planar {
         let link3_inertia17 = 0.25 * link3_inertia9;
         let link3_inertia18 = 0.25 * link3_inertia17;
         let link3_inertia19 = link3_inertia15 - 0.85;
-        let link3_inertia20 = link3_inertia17 + 0.85;
-        let link3_inertia21 = link3_inertia18 + 0.20834999999999998;
+        let link3_inertia20 = link3_inertia17 - 0.85;
+        let link3_inertia21 = link3_inertia18 - 0.20834999999999998;
         // link2: U, Mj, k and the reduced inertia M' (4.44)
         let link2_pivot0 = 1.0 / link3_inertia21;
         let link2_pivot1 = link3_inertia16 * link2_pivot0;
         let link2_pivot2 = link3_inertia20 * link2_pivot0;
         let link2_pivot3 = link3_inertia16 * link2_pivot1;
-        let link2_pivot4 = link3_inertia8 + link2_pivot3;
+        let link2_pivot4 = link3_inertia8 - link2_pivot3;
         let link2_pivot5 = link3_inertia16 * link2_pivot2;
         let link2_pivot6 = link3_inertia7 - link2_pivot5;
         let link2_pivot7 = link3_inertia20 * link2_pivot2;
         let link2_pivot8 = link3_inertia9 - link2_pivot7;
         // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pivot4 + link2_pivot8;
+        let link2_inertia0 = link2_pivot4 - link2_pivot8;
         let link2_inertia1 = link2_sin0 * link2_inertia0;
         let link2_inertia2 = link2_cos0 + link2_cos0;
         let link2_inertia3 = link2_pivot6 * link2_inertia2;
         let link2_inertia4 = link2_inertia1 + link2_inertia3;
         let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link2_pivot8 - link2_inertia5;
+        let link2_inertia6 = link2_pivot8 + link2_inertia5;
         let link2_inertia7 = link2_cos0 * link3_inertia12;
         let link2_inertia8 = link2_sin0 * link3_inertia19;
         let link2_inertia9 = link2_inertia7 - link2_inertia8;
@@ -1989,38 +1968,29 @@ impl Chain10Planar {
         let link2_inertia13 = 0.25 * link2_inertia6;
         let link2_inertia14 = 0.25 * link2_inertia13;
         let link2_inertia15 = link2_inertia12 - 0.95;
-        let link2_inertia16 = link2_inertia14 + 0.23334999999999997;
+        let link2_inertia16 = link2_inertia14 - 0.23334999999999997;
         // link1: U, Mj, k and the reduced inertia M' (4.44)
         let link1_pivot0 = 1.0 / link2_inertia16;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = 0.05 * link10_rest0;
-        let link10_rest2 = link10_sin0 * link10_rest1;
-        let link10_rest3 = link10_cos0 * link10_rest1;
-        let link10_rest4 = 0.25 * link10_rest3;
-        let link10_rest5 = p_9 + link10_rest4;
         // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest5;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia6 * link9_rest1;
-        let link9_rest3 = link10_rest2 - link9_rest2;
-        let link9_rest4 = link10_inertia10 * link9_rest1;
-        let link9_rest5 = link10_rest3 + link9_rest4;
-        let link9_rest6 = link9_cos0 * link9_rest3;
-        let link9_rest7 = link9_sin0 * link9_rest5;
-        let link9_rest8 = link9_rest6 + link9_rest7;
-        let link9_rest9 = link9_sin0 * link9_rest3;
-        let link9_rest10 = link9_cos0 * link9_rest5;
-        let link9_rest11 = link9_rest9 - link9_rest10;
-        let link9_rest12 = 0.25 * link9_rest11;
-        let link9_rest13 = p_8 - link9_rest12;
+        let link9_rest0 = 119.76047904191617 * p_9;
+        let link9_rest1 = link9_inertia7 * link9_rest0;
+        let link9_rest2 = link9_inertia9 * link9_rest0;
+        let link9_rest3 = link10_inertia8 * link9_rest0;
+        let link9_rest4 = p_8 - link9_rest3;
+        let link9_rest5 = link9_pivot12 * link9_rest4;
+        let link9_rest6 = link9_pivot6 * link9_rest5;
+        let link9_rest7 = link9_rest1 + link9_rest6;
+        let link9_rest8 = link9_pivot9 * link9_rest5;
+        let link9_rest9 = link9_rest2 + link9_rest8;
+        let link9_rest10 = 0.25 * link9_rest9;
+        let link9_rest11 = p_8 - link9_rest10;
         // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest13;
+        let link8_rest0 = p_7 - link9_rest11;
         let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia16 * link8_rest1;
-        let link8_rest3 = link9_rest8 + link8_rest2;
-        let link8_rest4 = link9_inertia20 * link8_rest1;
-        let link8_rest5 = link9_rest11 - link8_rest4;
+        let link8_rest2 = link9_inertia10 * link8_rest1;
+        let link8_rest3 = link9_rest7 - link8_rest2;
+        let link8_rest4 = link9_inertia14 * link8_rest1;
+        let link8_rest5 = link9_rest9 - link8_rest4;
         let link8_rest6 = link8_cos0 * link8_rest3;
         let link8_rest7 = link8_sin0 * link8_rest5;
         let link8_rest8 = link8_rest6 - link8_rest7;
@@ -2033,7 +2003,7 @@ impl Chain10Planar {
         let link7_rest0 = p_6 - link8_rest13;
         let link7_rest1 = link7_pivot0 * link7_rest0;
         let link7_rest2 = link8_inertia16 * link7_rest1;
-        let link7_rest3 = link8_rest8 - link7_rest2;
+        let link7_rest3 = link8_rest8 + link7_rest2;
         let link7_rest4 = link8_inertia20 * link7_rest1;
         let link7_rest5 = link8_rest11 - link7_rest4;
         let link7_rest6 = link7_cos0 * link7_rest3;
@@ -2048,7 +2018,7 @@ impl Chain10Planar {
         let link6_rest0 = p_5 - link7_rest13;
         let link6_rest1 = link6_pivot0 * link6_rest0;
         let link6_rest2 = link7_inertia16 * link6_rest1;
-        let link6_rest3 = link7_rest8 + link6_rest2;
+        let link6_rest3 = link7_rest8 - link6_rest2;
         let link6_rest4 = link7_inertia20 * link6_rest1;
         let link6_rest5 = link7_rest11 - link6_rest4;
         let link6_rest6 = link6_cos0 * link6_rest3;
@@ -2063,7 +2033,7 @@ impl Chain10Planar {
         let link5_rest0 = p_4 - link6_rest13;
         let link5_rest1 = link5_pivot0 * link5_rest0;
         let link5_rest2 = link6_inertia16 * link5_rest1;
-        let link5_rest3 = link6_rest8 - link5_rest2;
+        let link5_rest3 = link6_rest8 + link5_rest2;
         let link5_rest4 = link6_inertia20 * link5_rest1;
         let link5_rest5 = link6_rest11 - link5_rest4;
         let link5_rest6 = link5_cos0 * link5_rest3;
@@ -2078,7 +2048,7 @@ impl Chain10Planar {
         let link4_rest0 = p_3 - link5_rest13;
         let link4_rest1 = link4_pivot0 * link4_rest0;
         let link4_rest2 = link5_inertia16 * link4_rest1;
-        let link4_rest3 = link5_rest8 + link4_rest2;
+        let link4_rest3 = link5_rest8 - link4_rest2;
         let link4_rest4 = link5_inertia20 * link4_rest1;
         let link4_rest5 = link5_rest11 - link4_rest4;
         let link4_rest6 = link4_cos0 * link4_rest3;
@@ -2093,7 +2063,7 @@ impl Chain10Planar {
         let link3_rest0 = p_2 - link4_rest13;
         let link3_rest1 = link3_pivot0 * link3_rest0;
         let link3_rest2 = link4_inertia16 * link3_rest1;
-        let link3_rest3 = link4_rest8 - link3_rest2;
+        let link3_rest3 = link4_rest8 + link3_rest2;
         let link3_rest4 = link4_inertia20 * link3_rest1;
         let link3_rest5 = link4_rest11 - link3_rest4;
         let link3_rest6 = link3_cos0 * link3_rest3;
@@ -2108,7 +2078,7 @@ impl Chain10Planar {
         let link2_rest0 = p_1 - link3_rest13;
         let link2_rest1 = link2_pivot0 * link2_rest0;
         let link2_rest2 = link3_inertia16 * link2_rest1;
-        let link2_rest3 = link3_rest8 + link2_rest2;
+        let link2_rest3 = link3_rest8 - link2_rest2;
         let link2_rest4 = link3_inertia20 * link2_rest1;
         let link2_rest5 = link3_rest11 - link2_rest4;
         let link2_rest6 = link2_sin0 * link2_rest3;
@@ -2125,12 +2095,11 @@ impl Chain10Planar {
         let link2_vel2 = link2_cos0 * link2_vel0;
         let link2_vel3 = link2_pivot1 * link2_vel1;
         let link2_vel4 = link2_pivot2 * link2_vel2;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link1_rest1 - link2_vel5;
-        let link2_vel7 = link2_rest1 - link2_vel6;
-        let link2_vel8 = link1_rest1 + link2_vel7;
+        let link2_vel5 = link2_vel3 + link2_vel4;
+        let link2_vel6 = link2_rest1 - link2_vel5;
+        let link2_vel7 = link1_rest1 - link2_vel6;
         // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel8;
+        let link3_vel0 = 0.25 * link2_vel6;
         let link3_vel1 = link2_vel2 + link3_vel0;
         let link3_vel2 = link3_cos0 * link2_vel1;
         let link3_vel3 = link3_sin0 * link3_vel1;
@@ -2140,12 +2109,11 @@ impl Chain10Planar {
         let link3_vel7 = link3_vel5 - link3_vel6;
         let link3_vel8 = link3_pivot1 * link3_vel4;
         let link3_vel9 = link3_pivot2 * link3_vel7;
-        let link3_vel10 = link3_vel8 + link3_vel9;
-        let link3_vel11 = link2_vel8 + link3_vel10;
-        let link3_vel12 = link3_rest1 - link3_vel11;
-        let link3_vel13 = link2_vel8 + link3_vel12;
+        let link3_vel10 = link3_vel8 - link3_vel9;
+        let link3_vel11 = link3_rest1 + link3_vel10;
+        let link3_vel12 = link2_vel6 - link3_vel11;
         // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel13;
+        let link4_vel0 = 0.25 * link3_vel11;
         let link4_vel1 = link3_vel7 + link4_vel0;
         let link4_vel2 = link4_cos0 * link3_vel4;
         let link4_vel3 = link4_sin0 * link4_vel1;
@@ -2155,12 +2123,11 @@ impl Chain10Planar {
         let link4_vel7 = link4_vel5 - link4_vel6;
         let link4_vel8 = link4_pivot1 * link4_vel4;
         let link4_vel9 = link4_pivot2 * link4_vel7;
-        let link4_vel10 = link4_vel8 - link4_vel9;
-        let link4_vel11 = link3_vel13 - link4_vel10;
-        let link4_vel12 = link4_rest1 - link4_vel11;
-        let link4_vel13 = link3_vel13 + link4_vel12;
+        let link4_vel10 = link4_vel8 + link4_vel9;
+        let link4_vel11 = link4_rest1 - link4_vel10;
+        let link4_vel12 = link3_vel11 - link4_vel11;
         // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel13;
+        let link5_vel0 = 0.25 * link4_vel11;
         let link5_vel1 = link4_vel7 + link5_vel0;
         let link5_vel2 = link5_cos0 * link4_vel4;
         let link5_vel3 = link5_sin0 * link5_vel1;
@@ -2170,12 +2137,11 @@ impl Chain10Planar {
         let link5_vel7 = link5_vel5 - link5_vel6;
         let link5_vel8 = link5_pivot1 * link5_vel4;
         let link5_vel9 = link5_pivot2 * link5_vel7;
-        let link5_vel10 = link5_vel8 + link5_vel9;
-        let link5_vel11 = link4_vel13 + link5_vel10;
-        let link5_vel12 = link5_rest1 - link5_vel11;
-        let link5_vel13 = link4_vel13 + link5_vel12;
+        let link5_vel10 = link5_vel8 - link5_vel9;
+        let link5_vel11 = link5_rest1 + link5_vel10;
+        let link5_vel12 = link4_vel11 - link5_vel11;
         // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel13;
+        let link6_vel0 = 0.25 * link5_vel11;
         let link6_vel1 = link5_vel7 + link6_vel0;
         let link6_vel2 = link6_cos0 * link5_vel4;
         let link6_vel3 = link6_sin0 * link6_vel1;
@@ -2185,12 +2151,11 @@ impl Chain10Planar {
         let link6_vel7 = link6_vel5 - link6_vel6;
         let link6_vel8 = link6_pivot1 * link6_vel4;
         let link6_vel9 = link6_pivot2 * link6_vel7;
-        let link6_vel10 = link6_vel8 - link6_vel9;
-        let link6_vel11 = link5_vel13 - link6_vel10;
-        let link6_vel12 = link6_rest1 - link6_vel11;
-        let link6_vel13 = link5_vel13 + link6_vel12;
+        let link6_vel10 = link6_vel8 + link6_vel9;
+        let link6_vel11 = link6_rest1 - link6_vel10;
+        let link6_vel12 = link5_vel11 - link6_vel11;
         // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel13;
+        let link7_vel0 = 0.25 * link6_vel11;
         let link7_vel1 = link6_vel7 + link7_vel0;
         let link7_vel2 = link7_cos0 * link6_vel4;
         let link7_vel3 = link7_sin0 * link7_vel1;
@@ -2200,12 +2165,11 @@ impl Chain10Planar {
         let link7_vel7 = link7_vel5 - link7_vel6;
         let link7_vel8 = link7_pivot1 * link7_vel4;
         let link7_vel9 = link7_pivot2 * link7_vel7;
-        let link7_vel10 = link7_vel8 + link7_vel9;
-        let link7_vel11 = link6_vel13 + link7_vel10;
-        let link7_vel12 = link7_rest1 - link7_vel11;
-        let link7_vel13 = link6_vel13 + link7_vel12;
+        let link7_vel10 = link7_vel8 - link7_vel9;
+        let link7_vel11 = link7_rest1 + link7_vel10;
+        let link7_vel12 = link6_vel11 - link7_vel11;
         // link8: velocity and joint rate (4.40)
-        let link8_vel0 = 0.25 * link7_vel13;
+        let link8_vel0 = 0.25 * link7_vel11;
         let link8_vel1 = link7_vel7 + link8_vel0;
         let link8_vel2 = link8_cos0 * link7_vel4;
         let link8_vel3 = link8_sin0 * link8_vel1;
@@ -2215,63 +2179,52 @@ impl Chain10Planar {
         let link8_vel7 = link8_vel5 - link8_vel6;
         let link8_vel8 = link8_pivot1 * link8_vel4;
         let link8_vel9 = link8_pivot2 * link8_vel7;
-        let link8_vel10 = link8_vel8 - link8_vel9;
-        let link8_vel11 = link7_vel13 - link8_vel10;
-        let link8_vel12 = link8_rest1 - link8_vel11;
-        let link8_vel13 = link7_vel13 + link8_vel12;
+        let link8_vel10 = link8_vel8 + link8_vel9;
+        let link8_vel11 = link8_rest1 - link8_vel10;
+        let link8_vel12 = link7_vel11 - link8_vel11;
         // link9: velocity and joint rate (4.40)
-        let link9_vel0 = 0.25 * link8_vel13;
+        let link9_vel0 = 0.25 * link8_vel11;
         let link9_vel1 = link8_vel7 + link9_vel0;
-        let link9_vel2 = link9_cos0 * link8_vel4;
-        let link9_vel3 = link9_sin0 * link9_vel1;
+        let link9_vel2 = link9_pivot13 * link8_vel4;
+        let link9_vel3 = link9_pivot14 * link9_vel1;
         let link9_vel4 = link9_vel2 + link9_vel3;
-        let link9_vel5 = link9_cos0 * link9_vel1;
-        let link9_vel6 = link9_sin0 * link8_vel4;
-        let link9_vel7 = link9_vel5 - link9_vel6;
-        let link9_vel8 = link9_pivot1 * link9_vel4;
-        let link9_vel9 = link9_pivot2 * link9_vel7;
-        let link9_vel10 = link9_vel8 + link9_vel9;
-        let link9_vel11 = link8_vel13 + link9_vel10;
-        let link9_vel12 = link9_rest1 - link9_vel11;
-        let link9_vel13 = link8_vel13 + link9_vel12;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = 0.25 * link9_vel13;
-        let link10_vel1 = link9_vel7 + link10_vel0;
-        let link10_vel2 = link10_cos0 * link10_vel1;
-        let link10_vel3 = link10_sin0 * link9_vel4;
-        let link10_vel4 = link10_vel2 - link10_vel3;
-        let link10_vel5 = 5.9880239520958085 * link10_vel4;
-        let link10_vel6 = link9_vel13 + link10_vel5;
-        let link10_vel7 = link10_rest0 - link10_vel6;
+        let link9_vel5 = link9_rest5 - link9_vel4;
+        let link9_vel6 = link8_vel11 + link9_vel5;
+        let link9_vel7 = link9_pivot0 * link8_vel4;
+        let link9_vel8 = link9_pivot1 * link9_vel1;
+        let link9_vel9 = link9_vel7 + link9_vel8;
+        let link9_vel10 = link9_pivot2 * link9_vel5;
+        let link9_vel11 = link9_vel9 + link9_vel10;
+        let link9_vel12 = link9_rest0 - link9_vel11;
         // link1: energy
         let link1_energy0 = p_0 * link1_rest1;
         // link2: energy
         let link2_energy0 = p_1 * link2_vel7;
-        let link2_energy1 = link1_energy0 + link2_energy0;
+        let link2_energy1 = link1_energy0 - link2_energy0;
         // link3: energy
         let link3_energy0 = p_2 * link3_vel12;
-        let link3_energy1 = link2_energy1 + link3_energy0;
+        let link3_energy1 = link2_energy1 - link3_energy0;
         // link4: energy
         let link4_energy0 = p_3 * link4_vel12;
-        let link4_energy1 = link3_energy1 + link4_energy0;
+        let link4_energy1 = link3_energy1 - link4_energy0;
         // link5: energy
         let link5_energy0 = p_4 * link5_vel12;
-        let link5_energy1 = link4_energy1 + link5_energy0;
+        let link5_energy1 = link4_energy1 - link5_energy0;
         // link6: energy
         let link6_energy0 = p_5 * link6_vel12;
-        let link6_energy1 = link5_energy1 + link6_energy0;
+        let link6_energy1 = link5_energy1 - link6_energy0;
         // link7: energy
         let link7_energy0 = p_6 * link7_vel12;
-        let link7_energy1 = link6_energy1 + link7_energy0;
+        let link7_energy1 = link6_energy1 - link7_energy0;
         // link8: energy
         let link8_energy0 = p_7 * link8_vel12;
-        let link8_energy1 = link7_energy1 + link8_energy0;
+        let link8_energy1 = link7_energy1 - link8_energy0;
         // link9: energy
-        let link9_energy0 = p_8 * link9_vel12;
-        let link9_energy1 = link8_energy1 + link9_energy0;
+        let link9_energy0 = p_8 * link9_vel6;
+        let link9_energy1 = link8_energy1 - link9_energy0;
         // link10: energy
-        let link10_energy0 = p_9 * link10_vel7;
-        let link10_energy1 = link9_energy1 + link10_energy0;
+        let link10_energy0 = p_9 * link9_vel12;
+        let link10_energy1 = link9_energy1 - link10_energy0;
         let link10_energy2 = 0.5 * link10_energy1;
         // link1: gravity and wrenches
         let link1_load0 = link1_cos0 * link2_inertia15;
@@ -2279,13 +2232,13 @@ impl Chain10Planar {
         let link1_load2 = link1_load0 + link1_load1;
         // ground: energy
         let ground_energy0 = 9.81 * link1_load2;
-        let kinetic = link10_energy2;
+        let kinetic = -link10_energy2;
         let potential = ground_energy0;
         [kinetic, potential]
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 666 operations: 302 additions, 355 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 665 operations: 295 additions, 361 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -2338,53 +2291,66 @@ impl Chain10Planar {
         // link10: sine and cosine, rotation
         let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
         // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.29940119760479045 * link10_sin0;
-        let link10_inertia1 = link10_sin0 * link10_inertia0;
-        let link10_inertia2 = link10_cos0 * link10_inertia0;
-        let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
-        let link10_inertia4 = 0.25 * link10_inertia2;
-        let link10_inertia5 = 0.25 * link10_inertia3;
-        let link10_inertia6 = 0.25 * link10_inertia5;
-        let link10_inertia7 = link10_inertia5 + 0.15000000000000002;
-        let link10_inertia8 = link10_inertia6 + 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia8;
-        let link9_pivot1 = link10_inertia4 * link9_pivot0;
-        let link9_pivot2 = link10_inertia7 * link9_pivot0;
-        let link9_pivot3 = link10_inertia4 * link9_pivot1;
-        let link9_pivot4 = link10_inertia1 + link9_pivot3;
-        let link9_pivot5 = link10_inertia4 * link9_pivot2;
-        let link9_pivot6 = link10_inertia2 - link9_pivot5;
-        let link9_pivot7 = link10_inertia7 * link9_pivot2;
-        let link9_pivot8 = link10_inertia3 - link9_pivot7;
+        let link10_inertia0 = 0.05 * link10_sin0;
+        let link10_inertia1 = 0.05 * link10_cos0;
+        let link10_inertia2 = link10_inertia1 + link10_inertia1;
+        let link10_inertia3 = 0.25 * link10_inertia2;
+        let link10_inertia4 = link10_inertia3 + 0.00835;
+        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+        let link10_inertia7 = 0.25 * link10_inertia1;
+        let link10_inertia8 = link10_inertia7 + 0.00835;
         // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_pivot4 + link9_pivot8;
-        let link9_inertia1 = link9_sin0 * link9_inertia0;
-        let link9_inertia2 = link9_cos0 + link9_cos0;
-        let link9_inertia3 = link9_pivot6 * link9_inertia2;
-        let link9_inertia4 = link9_inertia1 - link9_inertia3;
-        let link9_inertia5 = link9_sin0 * link9_inertia4;
-        let link9_inertia6 = link9_cos0 * link9_inertia4;
-        let link9_inertia7 = link9_pivot6 + link9_inertia6;
-        let link9_inertia8 = link9_pivot4 - link9_inertia5;
-        let link9_inertia9 = link9_pivot8 - link9_inertia5;
-        let link9_inertia10 = 0.25 * link9_inertia7;
-        let link9_inertia11 = 0.25 * link9_inertia9;
+        let link9_inertia0 = link9_cos0 * link10_inertia0;
+        let link9_inertia1 = link9_sin0 * link10_inertia5;
+        let link9_inertia2 = link9_inertia0 + link9_inertia1;
+        let link9_inertia3 = link9_sin0 * link10_inertia0;
+        let link9_inertia4 = link9_cos0 * link10_inertia5;
+        let link9_inertia5 = link9_inertia3 - link9_inertia4;
+        let link9_inertia6 = link9_sin0 * link10_inertia1;
+        let link9_inertia7 = link9_inertia0 + link9_inertia6;
+        let link9_inertia8 = link9_cos0 * link10_inertia1;
+        let link9_inertia9 = link9_inertia3 - link9_inertia8;
+        // link9: U, Mj, k and the reduced inertia M' (4.44)
+        let link9_pivot0 = 119.76047904191617 * link9_inertia7;
+        let link9_pivot1 = 119.76047904191617 * link9_inertia9;
+        let link9_pivot2 = 119.76047904191617 * link10_inertia8;
+        let link9_pivot3 = link9_inertia7 * link9_pivot0;
+        let link9_pivot4 = link9_inertia7 * link9_pivot1;
+        let link9_pivot5 = link9_inertia7 * link9_pivot2;
+        let link9_pivot6 = link9_inertia2 - link9_pivot5;
+        let link9_pivot7 = link9_inertia9 * link9_pivot1;
+        let link9_pivot8 = link9_inertia9 * link9_pivot2;
+        let link9_pivot9 = link9_inertia5 - link9_pivot8;
+        let link9_pivot10 = link10_inertia8 * link9_pivot2;
+        let link9_pivot11 = link10_inertia6 - link9_pivot10;
+        let link9_pivot12 = 1.0 / link9_pivot11;
+        let link9_pivot13 = link9_pivot6 * link9_pivot12;
+        let link9_pivot14 = link9_pivot9 * link9_pivot12;
+        let link9_pivot15 = link9_pivot6 * link9_pivot13;
+        let link9_pivot16 = link9_pivot3 + link9_pivot15;
+        let link9_pivot17 = link9_pivot6 * link9_pivot14;
+        let link9_pivot18 = link9_pivot4 + link9_pivot17;
+        let link9_pivot19 = link9_pivot9 * link9_pivot14;
+        let link9_pivot20 = link9_pivot7 + link9_pivot19;
+        // link9: inertia carried to the parent, M* (4.48)
+        let link9_inertia10 = 0.25 * link9_pivot18;
+        let link9_inertia11 = 0.25 * link9_pivot20;
         let link9_inertia12 = 0.25 * link9_inertia11;
-        let link9_inertia13 = link9_inertia11 + 0.25;
-        let link9_inertia14 = link9_inertia12 + 0.05835;
+        let link9_inertia13 = link9_inertia11 - 0.25;
+        let link9_inertia14 = link9_inertia12 - 0.05835;
         // link8: U, Mj, k and the reduced inertia M' (4.44)
         let link8_pivot0 = 1.0 / link9_inertia14;
         let link8_pivot1 = link9_inertia10 * link8_pivot0;
         let link8_pivot2 = link9_inertia13 * link8_pivot0;
         let link8_pivot3 = link9_inertia10 * link8_pivot1;
-        let link8_pivot4 = link9_inertia8 + link8_pivot3;
+        let link8_pivot4 = link9_pivot16 - link8_pivot3;
         let link8_pivot5 = link9_inertia10 * link8_pivot2;
-        let link8_pivot6 = link9_inertia7 - link8_pivot5;
+        let link8_pivot6 = link9_pivot18 - link8_pivot5;
         let link8_pivot7 = link9_inertia13 * link8_pivot2;
-        let link8_pivot8 = link9_inertia9 - link8_pivot7;
+        let link8_pivot8 = link9_pivot20 - link8_pivot7;
         // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pivot4 + link8_pivot8;
+        let link8_inertia0 = link8_pivot4 - link8_pivot8;
         let link8_inertia1 = link8_sin0 * link8_inertia0;
         let link8_inertia2 = link8_cos0 + link8_cos0;
         let link8_inertia3 = link8_pivot6 * link8_inertia2;
@@ -2393,24 +2359,24 @@ impl Chain10Planar {
         let link8_inertia6 = link8_cos0 * link8_inertia4;
         let link8_inertia7 = link8_pivot6 - link8_inertia6;
         let link8_inertia8 = link8_pivot4 - link8_inertia5;
-        let link8_inertia9 = link8_pivot8 - link8_inertia5;
+        let link8_inertia9 = link8_pivot8 + link8_inertia5;
         let link8_inertia10 = 0.25 * link8_inertia7;
         let link8_inertia11 = 0.25 * link8_inertia9;
         let link8_inertia12 = 0.25 * link8_inertia11;
-        let link8_inertia13 = link8_inertia11 + 0.35000000000000003;
-        let link8_inertia14 = link8_inertia12 + 0.08335000000000001;
+        let link8_inertia13 = link8_inertia11 - 0.35000000000000003;
+        let link8_inertia14 = link8_inertia12 - 0.08335000000000001;
         // link7: U, Mj, k and the reduced inertia M' (4.44)
         let link7_pivot0 = 1.0 / link8_inertia14;
         let link7_pivot1 = link8_inertia10 * link7_pivot0;
         let link7_pivot2 = link8_inertia13 * link7_pivot0;
         let link7_pivot3 = link8_inertia10 * link7_pivot1;
-        let link7_pivot4 = link8_inertia8 + link7_pivot3;
+        let link7_pivot4 = link8_inertia8 - link7_pivot3;
         let link7_pivot5 = link8_inertia10 * link7_pivot2;
         let link7_pivot6 = link8_inertia7 - link7_pivot5;
         let link7_pivot7 = link8_inertia13 * link7_pivot2;
         let link7_pivot8 = link8_inertia9 - link7_pivot7;
         // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pivot4 + link7_pivot8;
+        let link7_inertia0 = link7_pivot4 - link7_pivot8;
         let link7_inertia1 = link7_sin0 * link7_inertia0;
         let link7_inertia2 = link7_cos0 + link7_cos0;
         let link7_inertia3 = link7_pivot6 * link7_inertia2;
@@ -2419,24 +2385,24 @@ impl Chain10Planar {
         let link7_inertia6 = link7_cos0 * link7_inertia4;
         let link7_inertia7 = link7_pivot6 + link7_inertia6;
         let link7_inertia8 = link7_pivot4 - link7_inertia5;
-        let link7_inertia9 = link7_pivot8 - link7_inertia5;
+        let link7_inertia9 = link7_pivot8 + link7_inertia5;
         let link7_inertia10 = 0.25 * link7_inertia7;
         let link7_inertia11 = 0.25 * link7_inertia9;
         let link7_inertia12 = 0.25 * link7_inertia11;
-        let link7_inertia13 = link7_inertia11 + 0.45;
-        let link7_inertia14 = link7_inertia12 + 0.10835;
+        let link7_inertia13 = link7_inertia11 - 0.45;
+        let link7_inertia14 = link7_inertia12 - 0.10835;
         // link6: U, Mj, k and the reduced inertia M' (4.44)
         let link6_pivot0 = 1.0 / link7_inertia14;
         let link6_pivot1 = link7_inertia10 * link6_pivot0;
         let link6_pivot2 = link7_inertia13 * link6_pivot0;
         let link6_pivot3 = link7_inertia10 * link6_pivot1;
-        let link6_pivot4 = link7_inertia8 + link6_pivot3;
+        let link6_pivot4 = link7_inertia8 - link6_pivot3;
         let link6_pivot5 = link7_inertia10 * link6_pivot2;
         let link6_pivot6 = link7_inertia7 - link6_pivot5;
         let link6_pivot7 = link7_inertia13 * link6_pivot2;
         let link6_pivot8 = link7_inertia9 - link6_pivot7;
         // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pivot4 + link6_pivot8;
+        let link6_inertia0 = link6_pivot4 - link6_pivot8;
         let link6_inertia1 = link6_sin0 * link6_inertia0;
         let link6_inertia2 = link6_cos0 + link6_cos0;
         let link6_inertia3 = link6_pivot6 * link6_inertia2;
@@ -2445,24 +2411,24 @@ impl Chain10Planar {
         let link6_inertia6 = link6_cos0 * link6_inertia4;
         let link6_inertia7 = link6_pivot6 - link6_inertia6;
         let link6_inertia8 = link6_pivot4 - link6_inertia5;
-        let link6_inertia9 = link6_pivot8 - link6_inertia5;
+        let link6_inertia9 = link6_pivot8 + link6_inertia5;
         let link6_inertia10 = 0.25 * link6_inertia7;
         let link6_inertia11 = 0.25 * link6_inertia9;
         let link6_inertia12 = 0.25 * link6_inertia11;
-        let link6_inertia13 = link6_inertia11 + 0.55;
-        let link6_inertia14 = link6_inertia12 + 0.13335;
+        let link6_inertia13 = link6_inertia11 - 0.55;
+        let link6_inertia14 = link6_inertia12 - 0.13335;
         // link5: U, Mj, k and the reduced inertia M' (4.44)
         let link5_pivot0 = 1.0 / link6_inertia14;
         let link5_pivot1 = link6_inertia10 * link5_pivot0;
         let link5_pivot2 = link6_inertia13 * link5_pivot0;
         let link5_pivot3 = link6_inertia10 * link5_pivot1;
-        let link5_pivot4 = link6_inertia8 + link5_pivot3;
+        let link5_pivot4 = link6_inertia8 - link5_pivot3;
         let link5_pivot5 = link6_inertia10 * link5_pivot2;
         let link5_pivot6 = link6_inertia7 - link5_pivot5;
         let link5_pivot7 = link6_inertia13 * link5_pivot2;
         let link5_pivot8 = link6_inertia9 - link5_pivot7;
         // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pivot4 + link5_pivot8;
+        let link5_inertia0 = link5_pivot4 - link5_pivot8;
         let link5_inertia1 = link5_sin0 * link5_inertia0;
         let link5_inertia2 = link5_cos0 + link5_cos0;
         let link5_inertia3 = link5_pivot6 * link5_inertia2;
@@ -2471,24 +2437,24 @@ impl Chain10Planar {
         let link5_inertia6 = link5_cos0 * link5_inertia4;
         let link5_inertia7 = link5_pivot6 + link5_inertia6;
         let link5_inertia8 = link5_pivot4 - link5_inertia5;
-        let link5_inertia9 = link5_pivot8 - link5_inertia5;
+        let link5_inertia9 = link5_pivot8 + link5_inertia5;
         let link5_inertia10 = 0.25 * link5_inertia7;
         let link5_inertia11 = 0.25 * link5_inertia9;
         let link5_inertia12 = 0.25 * link5_inertia11;
-        let link5_inertia13 = link5_inertia11 + 0.65;
-        let link5_inertia14 = link5_inertia12 + 0.15835;
+        let link5_inertia13 = link5_inertia11 - 0.65;
+        let link5_inertia14 = link5_inertia12 - 0.15835;
         // link4: U, Mj, k and the reduced inertia M' (4.44)
         let link4_pivot0 = 1.0 / link5_inertia14;
         let link4_pivot1 = link5_inertia10 * link4_pivot0;
         let link4_pivot2 = link5_inertia13 * link4_pivot0;
         let link4_pivot3 = link5_inertia10 * link4_pivot1;
-        let link4_pivot4 = link5_inertia8 + link4_pivot3;
+        let link4_pivot4 = link5_inertia8 - link4_pivot3;
         let link4_pivot5 = link5_inertia10 * link4_pivot2;
         let link4_pivot6 = link5_inertia7 - link4_pivot5;
         let link4_pivot7 = link5_inertia13 * link4_pivot2;
         let link4_pivot8 = link5_inertia9 - link4_pivot7;
         // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pivot4 + link4_pivot8;
+        let link4_inertia0 = link4_pivot4 - link4_pivot8;
         let link4_inertia1 = link4_sin0 * link4_inertia0;
         let link4_inertia2 = link4_cos0 + link4_cos0;
         let link4_inertia3 = link4_pivot6 * link4_inertia2;
@@ -2497,24 +2463,24 @@ impl Chain10Planar {
         let link4_inertia6 = link4_cos0 * link4_inertia4;
         let link4_inertia7 = link4_pivot6 - link4_inertia6;
         let link4_inertia8 = link4_pivot4 - link4_inertia5;
-        let link4_inertia9 = link4_pivot8 - link4_inertia5;
+        let link4_inertia9 = link4_pivot8 + link4_inertia5;
         let link4_inertia10 = 0.25 * link4_inertia7;
         let link4_inertia11 = 0.25 * link4_inertia9;
         let link4_inertia12 = 0.25 * link4_inertia11;
-        let link4_inertia13 = link4_inertia11 + 0.75;
-        let link4_inertia14 = link4_inertia12 + 0.18334999999999999;
+        let link4_inertia13 = link4_inertia11 - 0.75;
+        let link4_inertia14 = link4_inertia12 - 0.18334999999999999;
         // link3: U, Mj, k and the reduced inertia M' (4.44)
         let link3_pivot0 = 1.0 / link4_inertia14;
         let link3_pivot1 = link4_inertia10 * link3_pivot0;
         let link3_pivot2 = link4_inertia13 * link3_pivot0;
         let link3_pivot3 = link4_inertia10 * link3_pivot1;
-        let link3_pivot4 = link4_inertia8 + link3_pivot3;
+        let link3_pivot4 = link4_inertia8 - link3_pivot3;
         let link3_pivot5 = link4_inertia10 * link3_pivot2;
         let link3_pivot6 = link4_inertia7 - link3_pivot5;
         let link3_pivot7 = link4_inertia13 * link3_pivot2;
         let link3_pivot8 = link4_inertia9 - link3_pivot7;
         // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pivot4 + link3_pivot8;
+        let link3_inertia0 = link3_pivot4 - link3_pivot8;
         let link3_inertia1 = link3_sin0 * link3_inertia0;
         let link3_inertia2 = link3_cos0 + link3_cos0;
         let link3_inertia3 = link3_pivot6 * link3_inertia2;
@@ -2523,24 +2489,24 @@ impl Chain10Planar {
         let link3_inertia6 = link3_cos0 * link3_inertia4;
         let link3_inertia7 = link3_pivot6 + link3_inertia6;
         let link3_inertia8 = link3_pivot4 - link3_inertia5;
-        let link3_inertia9 = link3_pivot8 - link3_inertia5;
+        let link3_inertia9 = link3_pivot8 + link3_inertia5;
         let link3_inertia10 = 0.25 * link3_inertia7;
         let link3_inertia11 = 0.25 * link3_inertia9;
         let link3_inertia12 = 0.25 * link3_inertia11;
-        let link3_inertia13 = link3_inertia11 + 0.85;
-        let link3_inertia14 = link3_inertia12 + 0.20834999999999998;
+        let link3_inertia13 = link3_inertia11 - 0.85;
+        let link3_inertia14 = link3_inertia12 - 0.20834999999999998;
         // link2: U, Mj, k and the reduced inertia M' (4.44)
         let link2_pivot0 = 1.0 / link3_inertia14;
         let link2_pivot1 = link3_inertia10 * link2_pivot0;
         let link2_pivot2 = link3_inertia13 * link2_pivot0;
         let link2_pivot3 = link3_inertia10 * link2_pivot1;
-        let link2_pivot4 = link3_inertia8 + link2_pivot3;
+        let link2_pivot4 = link3_inertia8 - link2_pivot3;
         let link2_pivot5 = link3_inertia10 * link2_pivot2;
         let link2_pivot6 = link3_inertia7 - link2_pivot5;
         let link2_pivot7 = link3_inertia13 * link2_pivot2;
         let link2_pivot8 = link3_inertia9 - link2_pivot7;
         // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pivot4 + link2_pivot8;
+        let link2_inertia0 = link2_pivot4 - link2_pivot8;
         let link2_inertia1 = link2_sin0 * link2_inertia0;
         let link2_inertia2 = link2_cos0 + link2_cos0;
         let link2_inertia3 = link2_pivot6 * link2_inertia2;
@@ -2548,12 +2514,12 @@ impl Chain10Planar {
         let link2_inertia5 = link2_sin0 * link2_inertia4;
         let link2_inertia6 = link2_cos0 * link2_inertia4;
         let link2_inertia7 = link2_pivot6 - link2_inertia6;
-        let link2_inertia8 = link2_pivot8 - link2_inertia5;
+        let link2_inertia8 = link2_pivot8 + link2_inertia5;
         let link2_inertia9 = 0.25 * link2_inertia7;
         let link2_inertia10 = 0.25 * link2_inertia8;
         let link2_inertia11 = 0.25 * link2_inertia10;
-        let link2_inertia12 = link2_inertia10 + 0.95;
-        let link2_inertia13 = link2_inertia11 + 0.23334999999999997;
+        let link2_inertia12 = link2_inertia10 - 0.95;
+        let link2_inertia13 = link2_inertia11 - 0.23334999999999997;
         // link1: U, Mj, k and the reduced inertia M' (4.44)
         let link1_pivot0 = 1.0 / link2_inertia13;
         let link1_pivot1 = link2_inertia9 * link1_pivot0;
@@ -2685,67 +2651,71 @@ impl Chain10Planar {
         let link9_load0 = 0.15000000000000002 * link9_vel8;
         let link9_load1 = link9_vel8 * link9_load0;
         let link9_load2 = link9_vel4 * link9_load0;
-        let link9_load3 = v_8 * link9_vel7;
-        let link9_load4 = v_8 * link9_vel4;
+        let link9_load3 = v_8 * link9_vel1;
+        let link9_load4 = v_8 * link8_vel4;
         // link10: gravity and wrenches
         let link10_load0 = 0.05 * link10_vel5;
         let link10_load1 = link10_vel5 * link10_load0;
         let link10_load2 = link10_vel4 * link10_load0;
-        let link10_load3 = v_9 * link10_vel4;
+        let link10_load3 = v_9 * link10_vel1;
+        let link10_load4 = v_9 * link9_vel4;
         // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = tau_9 - link10_load2;
-        let link10_rest1 = 119.76047904191617 * link10_rest0;
-        let link10_rest2 = 0.05 * link10_rest1;
-        let link10_rest3 = 0.29940119760479045 * link10_load3;
+        let link10_rest0 = link10_cos0 * link10_load1;
+        let link10_rest1 = link10_sin0 * link10_load1;
+        let link10_rest2 = link10_inertia0 * link10_load3;
+        let link10_rest3 = link10_inertia1 * link10_load4;
         let link10_rest4 = link10_rest2 + link10_rest3;
-        let link10_rest5 = link10_cos0 * link10_load1;
-        let link10_rest6 = link10_sin0 * link10_rest4;
-        let link10_rest7 = link10_rest5 + link10_rest6;
-        let link10_rest8 = link10_sin0 * link10_load1;
-        let link10_rest9 = link10_cos0 * link10_rest4;
-        let link10_rest10 = link10_rest8 - link10_rest9;
-        let link10_rest11 = 0.25 * link10_rest10;
-        let link10_rest12 = tau_9 - link10_rest11;
-        let link10_rest13 = link9_load1 + link10_rest7;
-        let link10_rest14 = link9_load2 + link10_rest12;
+        let link10_rest5 = link10_load2 - link10_rest4;
+        let link10_rest6 = 0.25 * link10_rest1;
+        let link10_rest7 = link10_rest5 - link10_rest6;
+        let link10_rest8 = link9_load1 + link10_rest0;
+        let link10_rest9 = link9_load2 + link10_rest7;
         // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = tau_8 - link10_rest14;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia4 * link9_rest1;
-        let link9_rest3 = link10_rest13 - link9_rest2;
-        let link9_rest4 = link10_inertia7 * link9_rest1;
-        let link9_rest5 = link10_rest10 - link9_rest4;
-        let link9_rest6 = link9_pivot4 * link9_load3;
-        let link9_rest7 = link9_pivot6 * link9_load4;
-        let link9_rest8 = link9_rest6 + link9_rest7;
-        let link9_rest9 = link9_pivot6 * link9_load3;
-        let link9_rest10 = link9_pivot8 * link9_load4;
-        let link9_rest11 = link9_rest9 - link9_rest10;
-        let link9_rest12 = link9_rest3 + link9_rest8;
-        let link9_rest13 = link9_rest5 - link9_rest11;
-        let link9_rest14 = link9_cos0 * link9_rest12;
-        let link9_rest15 = link9_sin0 * link9_rest13;
-        let link9_rest16 = link9_rest14 - link9_rest15;
-        let link9_rest17 = link9_sin0 * link9_rest12;
-        let link9_rest18 = link9_cos0 * link9_rest13;
-        let link9_rest19 = link9_rest17 + link9_rest18;
-        let link9_rest20 = 0.25 * link9_rest19;
-        let link9_rest21 = tau_8 - link9_rest20;
-        let link9_rest22 = link8_load0 + link9_rest16;
-        let link9_rest23 = link8_load1 + link9_rest21;
+        let link9_rest0 = link9_cos0 * link10_rest8;
+        let link9_rest1 = link9_sin0 * link10_rest1;
+        let link9_rest2 = link9_rest0 - link9_rest1;
+        let link9_rest3 = link9_sin0 * link10_rest8;
+        let link9_rest4 = link9_cos0 * link10_rest1;
+        let link9_rest5 = link9_rest3 + link9_rest4;
+        let link9_rest6 = tau_9 - link10_rest5;
+        let link9_rest7 = 119.76047904191617 * link9_rest6;
+        let link9_rest8 = link9_inertia7 * link9_rest7;
+        let link9_rest9 = link9_inertia9 * link9_rest7;
+        let link9_rest10 = link10_inertia8 * link9_rest7;
+        let link9_rest11 = link9_rest2 + link9_rest8;
+        let link9_rest12 = link9_rest5 + link9_rest9;
+        let link9_rest13 = link10_rest9 + link9_rest10;
+        let link9_rest14 = tau_8 - link9_rest13;
+        let link9_rest15 = link9_pivot12 * link9_rest14;
+        let link9_rest16 = link9_pivot6 * link9_rest15;
+        let link9_rest17 = link9_rest11 + link9_rest16;
+        let link9_rest18 = link9_pivot9 * link9_rest15;
+        let link9_rest19 = link9_rest12 + link9_rest18;
+        let link9_rest20 = link9_pivot16 * link9_load3;
+        let link9_rest21 = link9_pivot18 * link9_load4;
+        let link9_rest22 = link9_rest20 - link9_rest21;
+        let link9_rest23 = link9_pivot18 * link9_load3;
+        let link9_rest24 = link9_pivot20 * link9_load4;
+        let link9_rest25 = link9_rest23 - link9_rest24;
+        let link9_rest26 = link9_rest17 + link9_rest22;
+        let link9_rest27 = link9_rest19 + link9_rest25;
+        let link9_rest28 = 0.25 * link9_rest27;
+        let link9_rest29 = tau_8 - link9_rest28;
+        let link9_rest30 = link8_load0 + link9_rest26;
+        let link9_rest31 = link8_load1 + link9_rest29;
         // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = tau_7 - link9_rest23;
+        let link8_rest0 = tau_7 - link9_rest31;
         let link8_rest1 = link8_pivot0 * link8_rest0;
         let link8_rest2 = link9_inertia10 * link8_rest1;
-        let link8_rest3 = link9_rest22 + link8_rest2;
+        let link8_rest3 = link9_rest30 - link8_rest2;
         let link8_rest4 = link9_inertia13 * link8_rest1;
-        let link8_rest5 = link9_rest19 - link8_rest4;
+        let link8_rest5 = link9_rest27 - link8_rest4;
         let link8_rest6 = link8_pivot4 * link8_load2;
         let link8_rest7 = link8_pivot6 * link8_load3;
         let link8_rest8 = link8_rest6 - link8_rest7;
         let link8_rest9 = link8_pivot6 * link8_load2;
         let link8_rest10 = link8_pivot8 * link8_load3;
-        let link8_rest11 = link8_rest9 + link8_rest10;
+        let link8_rest11 = link8_rest9 - link8_rest10;
         let link8_rest12 = link8_rest3 + link8_rest8;
         let link8_rest13 = link8_rest5 + link8_rest11;
         let link8_rest14 = link8_cos0 * link8_rest12;
@@ -2762,7 +2732,7 @@ impl Chain10Planar {
         let link7_rest0 = tau_6 - link8_rest23;
         let link7_rest1 = link7_pivot0 * link7_rest0;
         let link7_rest2 = link8_inertia10 * link7_rest1;
-        let link7_rest3 = link8_rest22 - link7_rest2;
+        let link7_rest3 = link8_rest22 + link7_rest2;
         let link7_rest4 = link8_inertia13 * link7_rest1;
         let link7_rest5 = link8_rest19 - link7_rest4;
         let link7_rest6 = link7_pivot4 * link7_load3;
@@ -2770,7 +2740,7 @@ impl Chain10Planar {
         let link7_rest8 = link7_rest6 + link7_rest7;
         let link7_rest9 = link7_pivot6 * link7_load3;
         let link7_rest10 = link7_pivot8 * link7_load4;
-        let link7_rest11 = link7_rest9 - link7_rest10;
+        let link7_rest11 = link7_rest9 + link7_rest10;
         let link7_rest12 = link7_rest3 + link7_rest8;
         let link7_rest13 = link7_rest5 - link7_rest11;
         let link7_rest14 = link7_cos0 * link7_rest12;
@@ -2787,7 +2757,7 @@ impl Chain10Planar {
         let link6_rest0 = tau_5 - link7_rest23;
         let link6_rest1 = link6_pivot0 * link6_rest0;
         let link6_rest2 = link7_inertia10 * link6_rest1;
-        let link6_rest3 = link7_rest22 + link6_rest2;
+        let link6_rest3 = link7_rest22 - link6_rest2;
         let link6_rest4 = link7_inertia13 * link6_rest1;
         let link6_rest5 = link7_rest19 - link6_rest4;
         let link6_rest6 = link6_pivot4 * link6_load3;
@@ -2795,7 +2765,7 @@ impl Chain10Planar {
         let link6_rest8 = link6_rest6 - link6_rest7;
         let link6_rest9 = link6_pivot6 * link6_load3;
         let link6_rest10 = link6_pivot8 * link6_load4;
-        let link6_rest11 = link6_rest9 + link6_rest10;
+        let link6_rest11 = link6_rest9 - link6_rest10;
         let link6_rest12 = link6_rest3 + link6_rest8;
         let link6_rest13 = link6_rest5 + link6_rest11;
         let link6_rest14 = link6_cos0 * link6_rest12;
@@ -2812,7 +2782,7 @@ impl Chain10Planar {
         let link5_rest0 = tau_4 - link6_rest23;
         let link5_rest1 = link5_pivot0 * link5_rest0;
         let link5_rest2 = link6_inertia10 * link5_rest1;
-        let link5_rest3 = link6_rest22 - link5_rest2;
+        let link5_rest3 = link6_rest22 + link5_rest2;
         let link5_rest4 = link6_inertia13 * link5_rest1;
         let link5_rest5 = link6_rest19 - link5_rest4;
         let link5_rest6 = link5_pivot4 * link5_load3;
@@ -2820,7 +2790,7 @@ impl Chain10Planar {
         let link5_rest8 = link5_rest6 + link5_rest7;
         let link5_rest9 = link5_pivot6 * link5_load3;
         let link5_rest10 = link5_pivot8 * link5_load4;
-        let link5_rest11 = link5_rest9 - link5_rest10;
+        let link5_rest11 = link5_rest9 + link5_rest10;
         let link5_rest12 = link5_rest3 + link5_rest8;
         let link5_rest13 = link5_rest5 - link5_rest11;
         let link5_rest14 = link5_cos0 * link5_rest12;
@@ -2837,7 +2807,7 @@ impl Chain10Planar {
         let link4_rest0 = tau_3 - link5_rest23;
         let link4_rest1 = link4_pivot0 * link4_rest0;
         let link4_rest2 = link5_inertia10 * link4_rest1;
-        let link4_rest3 = link5_rest22 + link4_rest2;
+        let link4_rest3 = link5_rest22 - link4_rest2;
         let link4_rest4 = link5_inertia13 * link4_rest1;
         let link4_rest5 = link5_rest19 - link4_rest4;
         let link4_rest6 = link4_pivot4 * link4_load3;
@@ -2845,7 +2815,7 @@ impl Chain10Planar {
         let link4_rest8 = link4_rest6 - link4_rest7;
         let link4_rest9 = link4_pivot6 * link4_load3;
         let link4_rest10 = link4_pivot8 * link4_load4;
-        let link4_rest11 = link4_rest9 + link4_rest10;
+        let link4_rest11 = link4_rest9 - link4_rest10;
         let link4_rest12 = link4_rest3 + link4_rest8;
         let link4_rest13 = link4_rest5 + link4_rest11;
         let link4_rest14 = link4_cos0 * link4_rest12;
@@ -2862,7 +2832,7 @@ impl Chain10Planar {
         let link3_rest0 = tau_2 - link4_rest23;
         let link3_rest1 = link3_pivot0 * link3_rest0;
         let link3_rest2 = link4_inertia10 * link3_rest1;
-        let link3_rest3 = link4_rest22 - link3_rest2;
+        let link3_rest3 = link4_rest22 + link3_rest2;
         let link3_rest4 = link4_inertia13 * link3_rest1;
         let link3_rest5 = link4_rest19 - link3_rest4;
         let link3_rest6 = link3_pivot4 * link3_load3;
@@ -2870,7 +2840,7 @@ impl Chain10Planar {
         let link3_rest8 = link3_rest6 + link3_rest7;
         let link3_rest9 = link3_pivot6 * link3_load3;
         let link3_rest10 = link3_pivot8 * link3_load4;
-        let link3_rest11 = link3_rest9 - link3_rest10;
+        let link3_rest11 = link3_rest9 + link3_rest10;
         let link3_rest12 = link3_rest3 + link3_rest8;
         let link3_rest13 = link3_rest5 - link3_rest11;
         let link3_rest14 = link3_cos0 * link3_rest12;
@@ -2887,7 +2857,7 @@ impl Chain10Planar {
         let link2_rest0 = tau_1 - link3_rest23;
         let link2_rest1 = link2_pivot0 * link2_rest0;
         let link2_rest2 = link3_inertia10 * link2_rest1;
-        let link2_rest3 = link3_rest22 + link2_rest2;
+        let link2_rest3 = link3_rest22 - link2_rest2;
         let link2_rest4 = link3_inertia13 * link2_rest1;
         let link2_rest5 = link3_rest19 - link2_rest4;
         let link2_rest6 = link2_pivot4 * link2_load3;
@@ -2895,7 +2865,7 @@ impl Chain10Planar {
         let link2_rest8 = link2_rest6 - link2_rest7;
         let link2_rest9 = link2_pivot6 * link2_load3;
         let link2_rest10 = link2_pivot8 * link2_load4;
-        let link2_rest11 = link2_rest9 + link2_rest10;
+        let link2_rest11 = link2_rest9 - link2_rest10;
         let link2_rest12 = link2_rest3 + link2_rest8;
         let link2_rest13 = link2_rest5 + link2_rest11;
         let link2_rest14 = link2_sin0 * link2_rest12;
@@ -2911,11 +2881,11 @@ impl Chain10Planar {
         let link1_acc1 = 9.81 * link1_sin0;
         let link1_acc2 = link1_pivot1 * link1_acc0;
         let link1_acc3 = link1_pivot2 * link1_acc1;
-        let link1_acc4 = link1_acc2 - link1_acc3;
+        let link1_acc4 = link1_acc2 + link1_acc3;
         let link1_acc5 = link1_rest1 + link1_acc4;
         // link2: acceleration
         let link2_acc0 = 0.25 * link1_acc5;
-        let link2_acc1 = link1_acc1 + link2_acc0;
+        let link2_acc1 = link1_acc1 - link2_acc0;
         let link2_acc2 = link2_cos0 * link1_acc0;
         let link2_acc3 = link2_sin0 * link2_acc1;
         let link2_acc4 = link2_acc2 - link2_acc3;
@@ -2926,13 +2896,12 @@ impl Chain10Planar {
         let link2_acc9 = link2_load4 - link2_acc7;
         let link2_acc10 = link2_pivot1 * link2_acc8;
         let link2_acc11 = link2_pivot2 * link2_acc9;
-        let link2_acc12 = link2_acc10 + link2_acc11;
-        let link2_acc13 = link1_acc5 - link2_acc12;
-        let link2_acc14 = link2_rest1 - link2_acc13;
-        let link2_acc15 = link1_acc5 + link2_acc14;
+        let link2_acc12 = link2_acc10 - link2_acc11;
+        let link2_acc13 = link2_rest1 + link2_acc12;
+        let link2_acc14 = link1_acc5 - link2_acc13;
         // link3: acceleration
-        let link3_acc0 = 0.25 * link2_acc15;
-        let link3_acc1 = link2_acc9 - link3_acc0;
+        let link3_acc0 = 0.25 * link2_acc13;
+        let link3_acc1 = link2_acc9 + link3_acc0;
         let link3_acc2 = link3_cos0 * link2_acc8;
         let link3_acc3 = link3_sin0 * link3_acc1;
         let link3_acc4 = link3_acc2 - link3_acc3;
@@ -2943,13 +2912,12 @@ impl Chain10Planar {
         let link3_acc9 = link3_load4 + link3_acc7;
         let link3_acc10 = link3_pivot1 * link3_acc8;
         let link3_acc11 = link3_pivot2 * link3_acc9;
-        let link3_acc12 = link3_acc10 - link3_acc11;
-        let link3_acc13 = link2_acc15 + link3_acc12;
-        let link3_acc14 = link3_rest1 - link3_acc13;
-        let link3_acc15 = link2_acc15 + link3_acc14;
+        let link3_acc12 = link3_acc10 + link3_acc11;
+        let link3_acc13 = link3_rest1 - link3_acc12;
+        let link3_acc14 = link2_acc13 - link3_acc13;
         // link4: acceleration
-        let link4_acc0 = 0.25 * link3_acc15;
-        let link4_acc1 = link3_acc9 - link4_acc0;
+        let link4_acc0 = 0.25 * link3_acc13;
+        let link4_acc1 = link3_acc9 + link4_acc0;
         let link4_acc2 = link4_cos0 * link3_acc8;
         let link4_acc3 = link4_sin0 * link4_acc1;
         let link4_acc4 = link4_acc2 - link4_acc3;
@@ -2960,13 +2928,12 @@ impl Chain10Planar {
         let link4_acc9 = link4_load4 + link4_acc7;
         let link4_acc10 = link4_pivot1 * link4_acc8;
         let link4_acc11 = link4_pivot2 * link4_acc9;
-        let link4_acc12 = link4_acc10 + link4_acc11;
-        let link4_acc13 = link3_acc15 - link4_acc12;
-        let link4_acc14 = link4_rest1 - link4_acc13;
-        let link4_acc15 = link3_acc15 + link4_acc14;
+        let link4_acc12 = link4_acc10 - link4_acc11;
+        let link4_acc13 = link4_rest1 + link4_acc12;
+        let link4_acc14 = link3_acc13 - link4_acc13;
         // link5: acceleration
-        let link5_acc0 = 0.25 * link4_acc15;
-        let link5_acc1 = link4_acc9 - link5_acc0;
+        let link5_acc0 = 0.25 * link4_acc13;
+        let link5_acc1 = link4_acc9 + link5_acc0;
         let link5_acc2 = link5_cos0 * link4_acc8;
         let link5_acc3 = link5_sin0 * link5_acc1;
         let link5_acc4 = link5_acc2 - link5_acc3;
@@ -2977,13 +2944,12 @@ impl Chain10Planar {
         let link5_acc9 = link5_load4 + link5_acc7;
         let link5_acc10 = link5_pivot1 * link5_acc8;
         let link5_acc11 = link5_pivot2 * link5_acc9;
-        let link5_acc12 = link5_acc10 - link5_acc11;
-        let link5_acc13 = link4_acc15 + link5_acc12;
-        let link5_acc14 = link5_rest1 - link5_acc13;
-        let link5_acc15 = link4_acc15 + link5_acc14;
+        let link5_acc12 = link5_acc10 + link5_acc11;
+        let link5_acc13 = link5_rest1 - link5_acc12;
+        let link5_acc14 = link4_acc13 - link5_acc13;
         // link6: acceleration
-        let link6_acc0 = 0.25 * link5_acc15;
-        let link6_acc1 = link5_acc9 - link6_acc0;
+        let link6_acc0 = 0.25 * link5_acc13;
+        let link6_acc1 = link5_acc9 + link6_acc0;
         let link6_acc2 = link6_cos0 * link5_acc8;
         let link6_acc3 = link6_sin0 * link6_acc1;
         let link6_acc4 = link6_acc2 - link6_acc3;
@@ -2994,13 +2960,12 @@ impl Chain10Planar {
         let link6_acc9 = link6_load4 + link6_acc7;
         let link6_acc10 = link6_pivot1 * link6_acc8;
         let link6_acc11 = link6_pivot2 * link6_acc9;
-        let link6_acc12 = link6_acc10 + link6_acc11;
-        let link6_acc13 = link5_acc15 - link6_acc12;
-        let link6_acc14 = link6_rest1 - link6_acc13;
-        let link6_acc15 = link5_acc15 + link6_acc14;
+        let link6_acc12 = link6_acc10 - link6_acc11;
+        let link6_acc13 = link6_rest1 + link6_acc12;
+        let link6_acc14 = link5_acc13 - link6_acc13;
         // link7: acceleration
-        let link7_acc0 = 0.25 * link6_acc15;
-        let link7_acc1 = link6_acc9 - link7_acc0;
+        let link7_acc0 = 0.25 * link6_acc13;
+        let link7_acc1 = link6_acc9 + link7_acc0;
         let link7_acc2 = link7_cos0 * link6_acc8;
         let link7_acc3 = link7_sin0 * link7_acc1;
         let link7_acc4 = link7_acc2 - link7_acc3;
@@ -3011,13 +2976,12 @@ impl Chain10Planar {
         let link7_acc9 = link7_load4 + link7_acc7;
         let link7_acc10 = link7_pivot1 * link7_acc8;
         let link7_acc11 = link7_pivot2 * link7_acc9;
-        let link7_acc12 = link7_acc10 - link7_acc11;
-        let link7_acc13 = link6_acc15 + link7_acc12;
-        let link7_acc14 = link7_rest1 - link7_acc13;
-        let link7_acc15 = link6_acc15 + link7_acc14;
+        let link7_acc12 = link7_acc10 + link7_acc11;
+        let link7_acc13 = link7_rest1 - link7_acc12;
+        let link7_acc14 = link6_acc13 - link7_acc13;
         // link8: acceleration
-        let link8_acc0 = 0.25 * link7_acc15;
-        let link8_acc1 = link7_acc9 - link8_acc0;
+        let link8_acc0 = 0.25 * link7_acc13;
+        let link8_acc1 = link7_acc9 + link8_acc0;
         let link8_acc2 = link8_cos0 * link7_acc8;
         let link8_acc3 = link8_sin0 * link8_acc1;
         let link8_acc4 = link8_acc2 - link8_acc3;
@@ -3028,38 +2992,26 @@ impl Chain10Planar {
         let link8_acc9 = link8_load3 + link8_acc7;
         let link8_acc10 = link8_pivot1 * link8_acc8;
         let link8_acc11 = link8_pivot2 * link8_acc9;
-        let link8_acc12 = link8_acc10 + link8_acc11;
-        let link8_acc13 = link7_acc15 - link8_acc12;
-        let link8_acc14 = link8_rest1 - link8_acc13;
-        let link8_acc15 = link7_acc15 + link8_acc14;
+        let link8_acc12 = link8_acc10 - link8_acc11;
+        let link8_acc13 = link8_rest1 + link8_acc12;
+        let link8_acc14 = link7_acc13 - link8_acc13;
         // link9: acceleration
-        let link9_acc0 = 0.25 * link8_acc15;
-        let link9_acc1 = link8_acc9 - link9_acc0;
-        let link9_acc2 = link9_cos0 * link8_acc8;
-        let link9_acc3 = link9_sin0 * link9_acc1;
-        let link9_acc4 = link9_acc2 - link9_acc3;
-        let link9_acc5 = link9_cos0 * link9_acc1;
-        let link9_acc6 = link9_sin0 * link8_acc8;
-        let link9_acc7 = link9_acc5 + link9_acc6;
-        let link9_acc8 = link9_load3 + link9_acc4;
-        let link9_acc9 = link9_load4 + link9_acc7;
-        let link9_acc10 = link9_pivot1 * link9_acc8;
-        let link9_acc11 = link9_pivot2 * link9_acc9;
-        let link9_acc12 = link9_acc10 - link9_acc11;
-        let link9_acc13 = link8_acc15 + link9_acc12;
-        let link9_acc14 = link9_rest1 - link9_acc13;
-        let link9_acc15 = link8_acc15 + link9_acc14;
-        // link10: acceleration
-        let link10_acc0 = 0.25 * link9_acc15;
-        let link10_acc1 = link9_acc9 - link10_acc0;
-        let link10_acc2 = link10_cos0 * link10_acc1;
-        let link10_acc3 = link10_sin0 * link9_acc8;
-        let link10_acc4 = link10_acc2 + link10_acc3;
-        let link10_acc5 = link10_load3 + link10_acc4;
-        let link10_acc6 = 5.9880239520958085 * link10_acc5;
-        let link10_acc7 = link9_acc15 - link10_acc6;
-        let link10_acc8 = link10_rest1 - link10_acc7;
-        a[0] = link1_acc5;
+        let link9_acc0 = 0.25 * link8_acc13;
+        let link9_acc1 = link8_acc9 + link9_acc0;
+        let link9_acc2 = link9_load3 + link8_acc8;
+        let link9_acc3 = link9_load4 + link9_acc1;
+        let link9_acc4 = link9_pivot13 * link9_acc2;
+        let link9_acc5 = link9_pivot14 * link9_acc3;
+        let link9_acc6 = link9_acc4 - link9_acc5;
+        let link9_acc7 = link9_rest15 + link9_acc6;
+        let link9_acc8 = link8_acc13 + link9_acc7;
+        let link9_acc9 = link9_pivot0 * link9_acc2;
+        let link9_acc10 = link9_pivot1 * link9_acc3;
+        let link9_acc11 = link9_acc9 - link9_acc10;
+        let link9_acc12 = link9_pivot2 * link9_acc7;
+        let link9_acc13 = link9_acc11 - link9_acc12;
+        let link9_acc14 = link9_rest7 + link9_acc13;
+        a[0] = -link1_acc5;
         a[1] = link2_acc14;
         a[2] = link3_acc14;
         a[3] = link4_acc14;
@@ -3067,8 +3019,8 @@ impl Chain10Planar {
         a[5] = link6_acc14;
         a[6] = link7_acc14;
         a[7] = link8_acc14;
-        a[8] = link9_acc14;
-        a[9] = link10_acc8;
+        a[8] = link9_acc8;
+        a[9] = link9_acc14;
     }
 
     /// Mass matrix, by rows.

@@ -8,12 +8,12 @@
 //   q[1] v[1] elbow: pin, moves lower
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 14 + 18 + 1 = 33; 0, 2
+//   rates: 14 + 17 + 1 = 32; 0, 2
 //   velocities: 7 + 7 + 1 = 15; 0, 1
 //   momenta: 4 + 6 + 0 = 10; 0, 1
 //   energy: 10 + 14 + 1 = 25; 0, 2
-//   accelerations: 19 + 27 + 1 = 47; 0, 2
-//   reactions: 52 + 59 + 1 = 112; 0, 2
+//   accelerations: 18 + 23 + 1 = 42; 0, 2
+//   reactions: 53 + 64 + 1 = 118; 0, 2
 //   mass_matrix: 4 + 1 + 0 = 5; 0, 1
 //   frames: 6 + 6 + 0 = 12; 0, 2
 
@@ -61,7 +61,7 @@ impl DoublePendulum {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 33 operations: 14 additions, 18 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 32 operations: 14 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
         let q_0 = q[0];
@@ -96,8 +96,7 @@ impl DoublePendulum {
         let upper_vel0 = upper_pivot0 * upper_rest3;
         let upper_vel1 = upper_rest0 - upper_vel0;
         // lower: velocity and joint rate (4.40)
-        let lower_vel0 = lower_sin0 * upper_rest3;
-        let lower_vel1 = upper_rest3 + upper_vel1;
+        let lower_vel0 = upper_rest3 + upper_vel1;
         // upper: gravity and wrenches
         let upper_load0 = 9.81 * upper_cos0;
         let upper_load1 = 9.81 * upper_sin0;
@@ -110,8 +109,8 @@ impl DoublePendulum {
         let upper_pdot1 = lower_inertia0 * upper_load0;
         let upper_pdot2 = upper_pdot0 + upper_pdot1;
         // lower: momentum rate (4.36)
-        let lower_pdot0 = 0.5 * lower_vel1;
-        let lower_pdot1 = lower_vel0 * lower_pdot0;
+        let lower_pdot0 = lower_inertia0 * lower_vel0;
+        let lower_pdot1 = upper_rest3 * lower_pdot0;
         let lower_pdot2 = 0.5 * lower_load2;
         let lower_pdot3 = lower_pdot1 + lower_pdot2;
         let lower_pdot4 = tau_0 - upper_pdot2;
@@ -200,6 +199,10 @@ impl DoublePendulum {
         let lower_inertia4 = lower_inertia1 + 1.5;
         let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
         let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+        // upper: inertia carried to the parent, M* (4.48)
+        let upper_inertia0 = upper_sin0 * lower_inertia0;
+        let upper_inertia1 = upper_cos0 * lower_inertia4;
+        let upper_inertia2 = upper_inertia0 - upper_inertia1;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
         let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
         let upper_pivot1 = lower_inertia6 * upper_pivot0;
@@ -219,19 +222,15 @@ impl DoublePendulum {
         let lower_energy0 = p_1 * upper_vel1;
         let lower_energy1 = upper_energy0 + lower_energy0;
         let lower_energy2 = 0.5 * lower_energy1;
-        // upper: gravity and wrenches
-        let upper_load0 = upper_cos0 * lower_inertia4;
-        let upper_load1 = upper_sin0 * lower_inertia0;
-        let upper_load2 = upper_load0 - upper_load1;
         // ground: energy
-        let ground_energy0 = 9.81 * upper_load2;
+        let ground_energy0 = 9.81 * upper_inertia2;
         let kinetic = lower_energy2;
-        let potential = -ground_energy0;
+        let potential = ground_energy0;
         [kinetic, potential]
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 47 operations: 19 additions, 27 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 42 operations: 18 additions, 23 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         let q_0 = q[0];
@@ -252,19 +251,21 @@ impl DoublePendulum {
         let lower_inertia4 = lower_inertia1 + 1.5;
         let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
         let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+        // upper: inertia carried to the parent, M* (4.48)
+        let upper_inertia0 = upper_cos0 * lower_inertia0;
+        let upper_inertia1 = upper_sin0 * lower_inertia4;
+        let upper_inertia2 = upper_inertia0 + upper_inertia1;
+        let upper_inertia3 = upper_sin0 * lower_inertia1;
+        let upper_inertia4 = upper_inertia0 + upper_inertia3;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * lower_inertia0;
-        let upper_pivot1 = 2.9994001199760048 * lower_inertia1;
-        let upper_pivot2 = 2.9994001199760048 * lower_inertia6;
-        let upper_pivot3 = lower_inertia0 * upper_pivot2;
-        let upper_pivot4 = lower_inertia0 - upper_pivot3;
-        let upper_pivot5 = lower_inertia1 * upper_pivot2;
-        let upper_pivot6 = lower_inertia4 - upper_pivot5;
-        let upper_pivot7 = lower_inertia6 * upper_pivot2;
-        let upper_pivot8 = lower_inertia5 - upper_pivot7;
-        let upper_pivot9 = 1.0 / upper_pivot8;
-        let upper_pivot10 = upper_pivot4 * upper_pivot9;
-        let upper_pivot11 = upper_pivot6 * upper_pivot9;
+        let upper_pivot0 = 2.9994001199760048 * upper_inertia4;
+        let upper_pivot1 = 2.9994001199760048 * lower_inertia6;
+        let upper_pivot2 = upper_inertia4 * upper_pivot1;
+        let upper_pivot3 = upper_inertia2 - upper_pivot2;
+        let upper_pivot4 = lower_inertia6 * upper_pivot1;
+        let upper_pivot5 = lower_inertia5 - upper_pivot4;
+        let upper_pivot6 = 1.0 / upper_pivot5;
+        let upper_pivot7 = upper_pivot3 * upper_pivot6;
         // lower: velocity and joint rate (4.40)
         let lower_vel0 = v_0 * lower_sin0;
         let lower_vel1 = v_0 + v_1;
@@ -272,38 +273,32 @@ impl DoublePendulum {
         let lower_load0 = 0.5 * lower_vel1;
         let lower_load1 = lower_vel1 * lower_load0;
         let lower_load2 = lower_vel0 * lower_load0;
-        let lower_load3 = v_1 * lower_vel0;
+        let lower_load3 = v_0 * v_1;
         // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = 0.5 * lower_load3;
-        let lower_rest1 = lower_load2 - lower_rest0;
-        let lower_rest2 = lower_sin0 * lower_load1;
-        let lower_rest3 = lower_rest1 - lower_rest2;
+        let lower_rest0 = lower_sin0 * lower_load1;
+        let lower_rest1 = lower_inertia0 * lower_load3;
+        let lower_rest2 = lower_load2 - lower_rest1;
+        let lower_rest3 = lower_rest0 - lower_rest2;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_1 - lower_rest1;
+        let upper_rest0 = tau_1 - lower_rest2;
         let upper_rest1 = 2.9994001199760048 * upper_rest0;
         let upper_rest2 = lower_inertia6 * upper_rest1;
-        let upper_rest3 = lower_rest3 + upper_rest2;
-        let upper_rest4 = tau_0 - upper_rest3;
-        let upper_rest5 = upper_pivot9 * upper_rest4;
+        let upper_rest3 = lower_rest3 - upper_rest2;
+        let upper_rest4 = tau_0 + upper_rest3;
+        let upper_rest5 = upper_pivot6 * upper_rest4;
         // upper: acceleration
-        let upper_acc0 = 9.81 * upper_cos0;
-        let upper_acc1 = 9.81 * upper_sin0;
-        let upper_acc2 = upper_pivot10 * upper_acc0;
-        let upper_acc3 = upper_pivot11 * upper_acc1;
+        let upper_acc0 = 9.81 * upper_pivot7;
+        let upper_acc1 = upper_rest5 - upper_acc0;
+        let upper_acc2 = 9.81 * upper_pivot0;
+        let upper_acc3 = upper_pivot1 * upper_acc1;
         let upper_acc4 = upper_acc2 + upper_acc3;
-        let upper_acc5 = upper_rest5 - upper_acc4;
-        let upper_acc6 = upper_pivot0 * upper_acc0;
-        let upper_acc7 = upper_pivot1 * upper_acc1;
-        let upper_acc8 = upper_acc6 + upper_acc7;
-        let upper_acc9 = upper_pivot2 * upper_acc5;
-        let upper_acc10 = upper_acc8 + upper_acc9;
-        let upper_acc11 = upper_rest1 - upper_acc10;
-        a[0] = upper_acc5;
-        a[1] = upper_acc11;
+        let upper_acc5 = upper_rest1 - upper_acc4;
+        a[0] = upper_acc1;
+        a[1] = upper_acc5;
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
-    /// 112 operations: 52 additions, 59 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 118 operations: 53 additions, 64 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
         let q_0 = q[0];
@@ -325,30 +320,35 @@ impl DoublePendulum {
         let lower_inertia5 = lower_inertia2 + 0.5;
         let lower_inertia6 = lower_inertia4 + 0.33340000000000003;
         let lower_inertia7 = lower_inertia1 + 0.33340000000000003;
+        // upper: inertia carried to the parent, M* (4.48)
+        let upper_inertia0 = upper_sin0 * lower_inertia0;
+        let upper_inertia1 = upper_cos0 * lower_inertia5;
+        let upper_inertia2 = upper_inertia0 - upper_inertia1;
+        let upper_inertia3 = upper_cos0 * lower_inertia0;
+        let upper_inertia4 = upper_sin0 * lower_inertia5;
+        let upper_inertia5 = upper_inertia3 + upper_inertia4;
+        let upper_inertia6 = upper_cos0 * lower_inertia1;
+        let upper_inertia7 = upper_inertia0 - upper_inertia6;
+        let upper_inertia8 = upper_sin0 * lower_inertia1;
+        let upper_inertia9 = upper_inertia3 + upper_inertia8;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * lower_inertia0;
-        let upper_pivot1 = 2.9994001199760048 * lower_inertia1;
-        let upper_pivot2 = 2.9994001199760048 * lower_inertia7;
-        let upper_pivot3 = lower_inertia0 * upper_pivot0;
-        let upper_pivot4 = upper_pivot3 - 2.0;
-        let upper_pivot5 = lower_inertia0 * upper_pivot1;
-        let upper_pivot6 = lower_inertia0 * upper_pivot2;
-        let upper_pivot7 = lower_inertia0 - upper_pivot6;
-        let upper_pivot8 = lower_inertia1 * upper_pivot1;
-        let upper_pivot9 = upper_pivot8 - 2.0;
-        let upper_pivot10 = lower_inertia1 * upper_pivot2;
-        let upper_pivot11 = lower_inertia5 - upper_pivot10;
-        let upper_pivot12 = lower_inertia7 * upper_pivot2;
-        let upper_pivot13 = lower_inertia6 - upper_pivot12;
-        let upper_pivot14 = 1.0 / upper_pivot13;
-        let upper_pivot15 = upper_pivot7 * upper_pivot14;
-        let upper_pivot16 = upper_pivot11 * upper_pivot14;
-        let upper_pivot17 = upper_pivot7 * upper_pivot15;
-        let upper_pivot18 = upper_pivot4 + upper_pivot17;
-        let upper_pivot19 = upper_pivot7 * upper_pivot16;
-        let upper_pivot20 = upper_pivot5 + upper_pivot19;
-        let upper_pivot21 = upper_pivot11 * upper_pivot16;
-        let upper_pivot22 = upper_pivot9 + upper_pivot21;
+        let upper_pivot0 = 2.9994001199760048 * upper_inertia9;
+        let upper_pivot1 = 2.9994001199760048 * lower_inertia7;
+        let upper_pivot2 = upper_inertia7 * upper_pivot0;
+        let upper_pivot3 = upper_inertia7 * upper_pivot1;
+        let upper_pivot4 = upper_inertia2 - upper_pivot3;
+        let upper_pivot5 = upper_inertia9 * upper_pivot0;
+        let upper_pivot6 = upper_pivot5 - 2.0;
+        let upper_pivot7 = upper_inertia9 * upper_pivot1;
+        let upper_pivot8 = upper_inertia5 - upper_pivot7;
+        let upper_pivot9 = lower_inertia7 * upper_pivot1;
+        let upper_pivot10 = lower_inertia6 - upper_pivot9;
+        let upper_pivot11 = 1.0 / upper_pivot10;
+        let upper_pivot12 = upper_pivot8 * upper_pivot11;
+        let upper_pivot13 = upper_pivot4 * upper_pivot12;
+        let upper_pivot14 = upper_pivot2 + upper_pivot13;
+        let upper_pivot15 = upper_pivot8 * upper_pivot12;
+        let upper_pivot16 = upper_pivot6 + upper_pivot15;
         // lower: velocity and joint rate (4.40)
         let lower_vel0 = v_0 * lower_sin0;
         let lower_vel1 = v_0 * lower_cos0;
@@ -364,90 +364,92 @@ impl DoublePendulum {
         let lower_load4 = lower_vel0 * lower_load1;
         let lower_load5 = lower_vel0 * lower_vel1;
         let lower_load6 = lower_load4 - lower_load5;
-        let lower_load7 = v_1 * lower_vel1;
-        let lower_load8 = v_1 * lower_vel0;
+        let lower_load7 = v_0 * v_1;
         // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = 0.5 * lower_load8;
-        let lower_rest1 = lower_load6 - lower_rest0;
-        let lower_rest2 = lower_load2 - lower_load7;
-        let lower_rest3 = lower_load3 - lower_load8;
-        let lower_rest4 = lower_cos0 * lower_rest2;
-        let lower_rest5 = lower_sin0 * lower_rest3;
-        let lower_rest6 = lower_rest4 + lower_rest5;
-        let lower_rest7 = lower_sin0 * lower_rest2;
-        let lower_rest8 = lower_cos0 * lower_rest3;
-        let lower_rest9 = lower_rest7 - lower_rest8;
-        let lower_rest10 = lower_rest1 - lower_rest9;
-        let lower_rest11 = upper_load1 + lower_rest6;
+        let lower_rest0 = lower_cos0 * lower_load2;
+        let lower_rest1 = lower_sin0 * lower_load3;
+        let lower_rest2 = lower_rest0 + lower_rest1;
+        let lower_rest3 = lower_sin0 * lower_load2;
+        let lower_rest4 = lower_cos0 * lower_load3;
+        let lower_rest5 = lower_rest3 - lower_rest4;
+        let lower_rest6 = lower_inertia0 * lower_load7;
+        let lower_rest7 = lower_load6 - lower_rest6;
+        let lower_rest8 = lower_load7 - lower_rest2;
+        let lower_rest9 = lower_rest5 - lower_rest7;
+        let lower_rest10 = upper_load1 - lower_rest8;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_1 - lower_rest1;
-        let upper_rest1 = 2.9994001199760048 * upper_rest0;
-        let upper_rest2 = lower_inertia0 * upper_rest1;
-        let upper_rest3 = lower_inertia1 * upper_rest1;
-        let upper_rest4 = lower_inertia7 * upper_rest1;
-        let upper_rest5 = lower_rest11 + upper_rest2;
-        let upper_rest6 = lower_rest9 - upper_rest3;
-        let upper_rest7 = lower_rest10 + upper_rest4;
-        let upper_rest8 = tau_0 - upper_rest7;
-        let upper_rest9 = upper_pivot14 * upper_rest8;
-        let upper_rest10 = upper_pivot7 * upper_rest9;
-        let upper_rest11 = upper_rest5 + upper_rest10;
-        let upper_rest12 = upper_pivot11 * upper_rest9;
-        let upper_rest13 = upper_rest6 - upper_rest12;
+        let upper_rest0 = upper_sin0 * lower_rest10;
+        let upper_rest1 = upper_cos0 * lower_rest5;
+        let upper_rest2 = upper_rest0 + upper_rest1;
+        let upper_rest3 = upper_cos0 * lower_rest10;
+        let upper_rest4 = upper_sin0 * lower_rest5;
+        let upper_rest5 = upper_rest3 - upper_rest4;
+        let upper_rest6 = tau_1 - lower_rest7;
+        let upper_rest7 = 2.9994001199760048 * upper_rest6;
+        let upper_rest8 = upper_inertia7 * upper_rest7;
+        let upper_rest9 = upper_inertia9 * upper_rest7;
+        let upper_rest10 = lower_inertia7 * upper_rest7;
+        let upper_rest11 = upper_rest2 + upper_rest8;
+        let upper_rest12 = upper_rest5 + upper_rest9;
+        let upper_rest13 = lower_rest9 - upper_rest10;
+        let upper_rest14 = tau_0 + upper_rest13;
+        let upper_rest15 = upper_pivot11 * upper_rest14;
+        let upper_rest16 = upper_pivot4 * upper_rest15;
+        let upper_rest17 = upper_rest11 + upper_rest16;
+        let upper_rest18 = upper_pivot8 * upper_rest15;
+        let upper_rest19 = upper_rest12 + upper_rest18;
         // upper: acceleration
-        let upper_acc0 = 9.81 * upper_cos0;
-        let upper_acc1 = 9.81 * upper_sin0;
-        let upper_acc2 = upper_pivot15 * upper_acc0;
-        let upper_acc3 = upper_pivot16 * upper_acc1;
+        let upper_acc0 = 9.81 * upper_pivot12;
+        let upper_acc1 = upper_rest15 - upper_acc0;
+        let upper_acc2 = 9.81 * upper_pivot0;
+        let upper_acc3 = upper_pivot1 * upper_acc1;
         let upper_acc4 = upper_acc2 + upper_acc3;
-        let upper_acc5 = upper_rest9 - upper_acc4;
-        let upper_acc6 = upper_pivot0 * upper_acc0;
-        let upper_acc7 = upper_pivot1 * upper_acc1;
-        let upper_acc8 = upper_acc6 + upper_acc7;
-        let upper_acc9 = upper_pivot2 * upper_acc5;
-        let upper_acc10 = upper_acc8 + upper_acc9;
-        let upper_acc11 = upper_rest1 - upper_acc10;
+        let upper_acc5 = upper_rest7 - upper_acc4;
+        let upper_acc6 = 9.81 * upper_cos0;
+        let upper_acc7 = 9.81 * upper_sin0;
         // lower: acceleration
-        let lower_acc0 = upper_acc1 + upper_acc5;
-        let lower_acc1 = lower_cos0 * upper_acc0;
-        let lower_acc2 = lower_sin0 * lower_acc0;
-        let lower_acc3 = lower_acc1 - lower_acc2;
-        let lower_acc4 = lower_cos0 * lower_acc0;
-        let lower_acc5 = lower_sin0 * upper_acc0;
-        let lower_acc6 = lower_acc4 + lower_acc5;
-        let lower_acc7 = lower_load7 - lower_acc3;
-        let lower_acc8 = lower_load8 - lower_acc6;
+        let lower_acc0 = upper_acc1 + upper_acc7;
+        let lower_acc1 = lower_load7 - upper_acc6;
+        let lower_acc2 = upper_acc1 + upper_acc5;
         // upper: reaction wrench (4.66)
-        let upper_react0 = upper_pivot18 * upper_acc0;
-        let upper_react1 = upper_pivot20 * upper_acc1;
-        let upper_react2 = upper_react0 + upper_react1;
-        let upper_react3 = upper_pivot20 * upper_acc0;
-        let upper_react4 = upper_pivot22 * upper_acc1;
-        let upper_react5 = upper_react3 + upper_react4;
-        let upper_react6 = upper_rest11 - upper_react2;
-        let upper_react7 = upper_rest13 + upper_react5;
+        let upper_react0 = 9.81 * upper_pivot14;
+        let upper_react1 = 9.81 * upper_pivot16;
+        let upper_react2 = upper_rest17 - upper_react0;
+        let upper_react3 = upper_rest19 - upper_react1;
+        let upper_react4 = upper_sin0 * upper_react2;
+        let upper_react5 = upper_cos0 * upper_react3;
+        let upper_react6 = upper_react4 + upper_react5;
+        let upper_react7 = upper_sin0 * upper_react3;
+        let upper_react8 = upper_cos0 * upper_react2;
+        let upper_react9 = upper_react8 - upper_react7;
         // lower: reaction wrench (4.66)
-        let lower_react0 = 0.5 * upper_acc5;
-        let lower_react1 = lower_acc8 - lower_react0;
-        let lower_react2 = 0.5 * lower_acc8;
-        let lower_react3 = 0.33340000000000003 * upper_acc5;
-        let lower_react4 = lower_react2 - lower_react3;
-        let lower_react5 = 0.5 * upper_acc11;
-        let lower_react6 = 0.33340000000000003 * upper_acc11;
-        let lower_react7 = lower_load3 + lower_react5;
-        let lower_react8 = lower_load6 + lower_react6;
-        let lower_react9 = lower_load2 - lower_acc7;
-        let lower_react10 = lower_react1 - lower_react7;
-        let lower_react11 = lower_react8 - lower_react4;
-        reactions[0][0] = upper_react7;
+        let lower_react0 = lower_inertia0 * lower_acc2;
+        let lower_react1 = lower_acc1 - lower_react0;
+        let lower_react2 = lower_inertia1 * lower_acc2;
+        let lower_react3 = lower_acc0 + lower_react2;
+        let lower_react4 = lower_inertia0 * lower_acc1;
+        let lower_react5 = lower_inertia1 * lower_acc0;
+        let lower_react6 = lower_react4 - lower_react5;
+        let lower_react7 = 0.33340000000000003 * lower_acc2;
+        let lower_react8 = lower_react6 - lower_react7;
+        let lower_react9 = lower_rest2 - lower_react1;
+        let lower_react10 = lower_rest5 - lower_react3;
+        let lower_react11 = lower_load6 - lower_react8;
+        let lower_react12 = lower_cos0 * lower_react9;
+        let lower_react13 = lower_sin0 * lower_react10;
+        let lower_react14 = lower_react12 + lower_react13;
+        let lower_react15 = lower_cos0 * lower_react10;
+        let lower_react16 = lower_sin0 * lower_react9;
+        let lower_react17 = lower_react15 - lower_react16;
+        reactions[0][0] = upper_react9;
         reactions[0][1] = 0.0;
         reactions[0][2] = upper_react6;
         reactions[0][3] = 0.0;
         reactions[0][4] = tau_0;
         reactions[0][5] = 0.0;
-        reactions[1][0] = lower_react10;
+        reactions[1][0] = lower_react17;
         reactions[1][1] = 0.0;
-        reactions[1][2] = lower_react9;
+        reactions[1][2] = lower_react14;
         reactions[1][3] = 0.0;
         reactions[1][4] = lower_react11;
         reactions[1][5] = 0.0;

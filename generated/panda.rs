@@ -15,11 +15,11 @@
 //   panda_finger_joint2: slider, follows another joint, moves panda_rightfinger
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 535 + 553 + 7 = 1095; 0, 6
-//   velocities: 384 + 398 + 7 = 789; 0, 6
+//   rates: 530 + 553 + 7 = 1090; 0, 6
+//   velocities: 380 + 398 + 7 = 785; 0, 6
 //   momenta: 164 + 205 + 0 = 369; 0, 6
-//   energy: 415 + 424 + 7 = 846; 0, 6
-//   accelerations: 760 + 830 + 7 = 1597; 0, 6
+//   energy: 411 + 424 + 7 = 842; 0, 6
+//   accelerations: 756 + 830 + 7 = 1593; 0, 6
 
 /// Dynamics of `panda` in canonical form: rates, velocities, momenta, energy, accelerations. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
@@ -79,31 +79,31 @@ impl Panda {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 1095 operations: 535 additions, 553 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
+    /// 1090 operations: 530 additions, 553 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
-        let mut kept = [0.0; 90];
+        let mut kept = [0.0; 87];
         self.rates_part1(q, p, &mut kept);
         self.rates_part2(q, p, &mut kept);
-        qd[0] = kept[39];
-        qd[1] = -kept[40];
-        qd[2] = -kept[41];
-        qd[3] = kept[42];
-        qd[4] = -kept[48];
-        qd[5] = -kept[53];
-        qd[6] = kept[59];
-        qd[7] = kept[28];
-        pd[0] = kept[82];
-        pd[1] = kept[83];
-        pd[2] = kept[84];
-        pd[3] = kept[85];
-        pd[4] = kept[86];
-        pd[5] = kept[87];
-        pd[6] = kept[88];
-        pd[7] = kept[89];
+        qd[0] = kept[36];
+        qd[1] = -kept[37];
+        qd[2] = -kept[38];
+        qd[3] = -kept[39];
+        qd[4] = kept[45];
+        qd[5] = -kept[50];
+        qd[6] = -kept[57];
+        qd[7] = kept[26];
+        pd[0] = kept[79];
+        pd[1] = kept[80];
+        pd[2] = kept[81];
+        pd[3] = kept[82];
+        pd[4] = kept[83];
+        pd[5] = kept[84];
+        pd[6] = kept[85];
+        pd[7] = kept[86];
     }
 
     #[inline(never)]
-    fn rates_part1(&self, q: &[f64; 8], p: &[f64; 8], kept: &mut [f64; 90]) {
+    fn rates_part1(&self, q: &[f64; 8], p: &[f64; 8], kept: &mut [f64; 87]) {
         let q_1 = q[1];
         let q_2 = q[2];
         let q_3 = q[3];
@@ -838,13 +838,12 @@ impl Panda {
         let panda_link3_vel17 = panda_link3_pivot3 * panda_link3_vel10;
         let panda_link3_vel18 = panda_link3_pivot4 * panda_link3_vel13;
         let panda_link3_vel19 = panda_link3_vel17 - panda_link3_vel18;
-        let panda_link3_vel20 = panda_link2_vel1 - panda_link3_vel19;
-        let panda_link3_vel21 = panda_link3_vel16 + panda_link3_vel20;
-        let panda_link3_vel22 = panda_link3_rest1 + panda_link3_vel21;
-        let panda_link3_vel23 = panda_link2_vel1 - panda_link3_vel22;
+        let panda_link3_vel20 = panda_link3_vel16 - panda_link3_vel19;
+        let panda_link3_vel21 = panda_link3_rest1 + panda_link3_vel20;
+        let panda_link3_vel22 = panda_link2_vel1 + panda_link3_vel21;
         // panda_link4: velocity and joint rate (4.40)
-        let panda_link4_vel0 = 0.0825 * panda_link3_vel23;
-        let panda_link4_vel1 = panda_link3_vel7 + panda_link4_vel0;
+        let panda_link4_vel0 = 0.0825 * panda_link3_vel21;
+        let panda_link4_vel1 = panda_link3_vel7 - panda_link4_vel0;
         let panda_link4_vel2 = 0.0825 * panda_link3_vel13;
         let panda_link4_vel3 = panda_link4_cos0 * panda_link3_vel4;
         let panda_link4_vel4 = panda_link4_sin0 * panda_link4_vel2;
@@ -853,11 +852,11 @@ impl Panda {
         let panda_link4_vel7 = panda_link4_sin0 * panda_link3_vel4;
         let panda_link4_vel8 = panda_link4_vel6 + panda_link4_vel7;
         let panda_link4_vel9 = panda_link4_cos0 * panda_link3_vel10;
-        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel23;
-        let panda_link4_vel11 = panda_link4_vel9 - panda_link4_vel10;
-        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel23;
+        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel21;
+        let panda_link4_vel11 = panda_link4_vel9 + panda_link4_vel10;
+        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel21;
         let panda_link4_vel13 = panda_link4_sin0 * panda_link3_vel10;
-        let panda_link4_vel14 = panda_link4_vel12 + panda_link4_vel13;
+        let panda_link4_vel14 = panda_link4_vel12 - panda_link4_vel13;
         let panda_link4_vel15 = panda_link4_pivot1 * panda_link4_vel5;
         let panda_link4_vel16 = panda_link4_pivot2 * panda_link4_vel8;
         let panda_link4_vel17 = panda_link4_vel15 + panda_link4_vel16;
@@ -865,17 +864,16 @@ impl Panda {
         let panda_link4_vel19 = panda_link4_vel17 + panda_link4_vel18;
         let panda_link4_vel20 = panda_link4_pivot4 * panda_link4_vel11;
         let panda_link4_vel21 = panda_link4_pivot5 * panda_link4_vel14;
-        let panda_link4_vel22 = panda_link4_vel20 + panda_link4_vel21;
-        let panda_link4_vel23 = panda_link3_vel13 - panda_link4_vel22;
-        let panda_link4_vel24 = panda_link4_vel19 + panda_link4_vel23;
-        let panda_link4_vel25 = panda_link4_rest1 - panda_link4_vel24;
-        let panda_link4_vel26 = panda_link3_vel13 + panda_link4_vel25;
+        let panda_link4_vel22 = panda_link4_vel20 - panda_link4_vel21;
+        let panda_link4_vel23 = panda_link4_vel19 - panda_link4_vel22;
+        let panda_link4_vel24 = panda_link4_rest1 - panda_link4_vel23;
+        let panda_link4_vel25 = panda_link3_vel13 - panda_link4_vel24;
         // panda_link5: velocity and joint rate (4.40)
-        let panda_link5_vel0 = 0.0825 * panda_link4_vel26;
+        let panda_link5_vel0 = 0.0825 * panda_link4_vel24;
         let panda_link5_vel1 = panda_link4_vel8 - panda_link5_vel0;
         let panda_link5_vel2 = 0.0825 * panda_link4_vel14;
-        let panda_link5_vel3 = panda_link4_vel1 - panda_link5_vel2;
-        let panda_link5_vel4 = 0.384 * panda_link4_vel26;
+        let panda_link5_vel3 = panda_link4_vel1 + panda_link5_vel2;
+        let panda_link5_vel4 = 0.384 * panda_link4_vel24;
         let panda_link5_vel5 = panda_link4_vel5 + panda_link5_vel4;
         let panda_link5_vel6 = 0.384 * panda_link4_vel11;
         let panda_link5_vel7 = panda_link5_vel3 + panda_link5_vel6;
@@ -886,9 +884,9 @@ impl Panda {
         let panda_link5_vel12 = panda_link5_sin0 * panda_link5_vel5;
         let panda_link5_vel13 = panda_link5_vel11 + panda_link5_vel12;
         let panda_link5_vel14 = panda_link5_cos0 * panda_link4_vel11;
-        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel26;
+        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel24;
         let panda_link5_vel16 = panda_link5_vel14 + panda_link5_vel15;
-        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel26;
+        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel24;
         let panda_link5_vel18 = panda_link5_sin0 * panda_link4_vel11;
         let panda_link5_vel19 = panda_link5_vel17 - panda_link5_vel18;
         let panda_link5_vel20 = panda_link5_pivot1 * panda_link5_vel10;
@@ -899,10 +897,9 @@ impl Panda {
         let panda_link5_vel25 = panda_link5_pivot4 * panda_link5_vel16;
         let panda_link5_vel26 = panda_link5_pivot5 * panda_link5_vel19;
         let panda_link5_vel27 = panda_link5_vel25 + panda_link5_vel26;
-        let panda_link5_vel28 = panda_link4_vel14 + panda_link5_vel27;
-        let panda_link5_vel29 = panda_link5_vel24 + panda_link5_vel28;
-        let panda_link5_vel30 = panda_link5_rest1 + panda_link5_vel29;
-        let panda_link5_vel31 = panda_link4_vel14 - panda_link5_vel30;
+        let panda_link5_vel28 = panda_link5_vel24 + panda_link5_vel27;
+        let panda_link5_vel29 = panda_link5_rest1 + panda_link5_vel28;
+        let panda_link5_vel30 = panda_link4_vel14 - panda_link5_vel29;
         // panda_link6: velocity and joint rate (4.40)
         let panda_link6_vel0 = panda_link6_cos0 * panda_link5_vel10;
         let panda_link6_vel1 = panda_link6_sin0 * panda_link5_vel1;
@@ -911,11 +908,11 @@ impl Panda {
         let panda_link6_vel4 = panda_link6_sin0 * panda_link5_vel10;
         let panda_link6_vel5 = panda_link6_vel3 + panda_link6_vel4;
         let panda_link6_vel6 = panda_link6_cos0 * panda_link5_vel16;
-        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel31;
-        let panda_link6_vel8 = panda_link6_vel6 - panda_link6_vel7;
-        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel31;
+        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel29;
+        let panda_link6_vel8 = panda_link6_vel6 + panda_link6_vel7;
+        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel29;
         let panda_link6_vel10 = panda_link6_sin0 * panda_link5_vel16;
-        let panda_link6_vel11 = panda_link6_vel9 + panda_link6_vel10;
+        let panda_link6_vel11 = panda_link6_vel9 - panda_link6_vel10;
         let panda_link6_vel12 = panda_link6_pivot1 * panda_link6_vel2;
         let panda_link6_vel13 = panda_link6_pivot2 * panda_link6_vel5;
         let panda_link6_vel14 = panda_link6_vel12 + panda_link6_vel13;
@@ -923,18 +920,17 @@ impl Panda {
         let panda_link6_vel16 = panda_link6_vel14 + panda_link6_vel15;
         let panda_link6_vel17 = panda_link6_pivot4 * panda_link6_vel8;
         let panda_link6_vel18 = panda_link6_pivot5 * panda_link6_vel11;
-        let panda_link6_vel19 = panda_link6_vel17 - panda_link6_vel18;
-        let panda_link6_vel20 = panda_link5_vel19 - panda_link6_vel19;
-        let panda_link6_vel21 = panda_link6_vel16 + panda_link6_vel20;
-        let panda_link6_vel22 = panda_link6_rest1 + panda_link6_vel21;
-        let panda_link6_vel23 = panda_link5_vel19 - panda_link6_vel22;
+        let panda_link6_vel19 = panda_link6_vel17 + panda_link6_vel18;
+        let panda_link6_vel20 = panda_link6_vel16 - panda_link6_vel19;
+        let panda_link6_vel21 = panda_link6_rest1 + panda_link6_vel20;
+        let panda_link6_vel22 = panda_link5_vel19 + panda_link6_vel21;
         // panda_link7: velocity and joint rate (4.40)
-        let panda_link7_vel0 = 0.088 * panda_link6_vel23;
-        let panda_link7_vel1 = panda_link6_vel5 + panda_link7_vel0;
+        let panda_link7_vel0 = 0.088 * panda_link6_vel21;
+        let panda_link7_vel1 = panda_link6_vel5 - panda_link7_vel0;
         let panda_link7_vel2 = 0.088 * panda_link6_vel11;
-        let panda_link7_vel3 = panda_link5_vel13 + panda_link7_vel2;
-        let panda_link7_vel4 = 0.1654 * panda_link6_vel23;
-        let panda_link7_vel5 = panda_link6_vel2 - panda_link7_vel4;
+        let panda_link7_vel3 = panda_link5_vel13 - panda_link7_vel2;
+        let panda_link7_vel4 = 0.1654 * panda_link6_vel21;
+        let panda_link7_vel5 = panda_link6_vel2 + panda_link7_vel4;
         let panda_link7_vel6 = 0.1654 * panda_link6_vel8;
         let panda_link7_vel7 = panda_link7_vel3 - panda_link7_vel6;
         let panda_link7_vel8 = panda_link7_cos0 * panda_link7_vel5;
@@ -944,28 +940,27 @@ impl Panda {
         let panda_link7_vel12 = panda_link7_sin0 * panda_link7_vel5;
         let panda_link7_vel13 = panda_link7_vel11 - panda_link7_vel12;
         let panda_link7_vel14 = panda_link7_cos0 * panda_link6_vel8;
-        let panda_link7_vel15 = panda_link7_sin0 * panda_link6_vel23;
-        let panda_link7_vel16 = panda_link7_vel14 - panda_link7_vel15;
-        let panda_link7_vel17 = panda_link7_cos0 * panda_link6_vel23;
+        let panda_link7_vel15 = panda_link7_sin0 * panda_link6_vel21;
+        let panda_link7_vel16 = panda_link7_vel14 + panda_link7_vel15;
+        let panda_link7_vel17 = panda_link7_cos0 * panda_link6_vel21;
         let panda_link7_vel18 = panda_link7_sin0 * panda_link6_vel8;
-        let panda_link7_vel19 = panda_link7_vel17 + panda_link7_vel18;
+        let panda_link7_vel19 = panda_link7_vel17 - panda_link7_vel18;
         let panda_link7_vel20 = panda_link7_pivot1 * panda_link7_vel10;
         let panda_link7_vel21 = panda_link7_pivot2 * panda_link7_vel13;
         let panda_link7_vel22 = panda_link7_vel20 - panda_link7_vel21;
         let panda_link7_vel23 = panda_link7_pivot3 * panda_link7_vel16;
         let panda_link7_vel24 = panda_link7_pivot4 * panda_link7_vel19;
-        let panda_link7_vel25 = panda_link7_vel23 + panda_link7_vel24;
-        let panda_link7_vel26 = panda_link6_vel11 + panda_link7_vel25;
-        let panda_link7_vel27 = panda_link7_vel22 - panda_link7_vel26;
-        let panda_link7_vel28 = panda_link7_rest1 - panda_link7_vel27;
-        let panda_link7_vel29 = panda_link6_vel11 - panda_link7_vel28;
+        let panda_link7_vel25 = panda_link7_vel23 - panda_link7_vel24;
+        let panda_link7_vel26 = panda_link7_vel22 - panda_link7_vel25;
+        let panda_link7_vel27 = panda_link7_rest1 - panda_link7_vel26;
+        let panda_link7_vel28 = panda_link6_vel11 - panda_link7_vel27;
         // panda_leftfinger: velocity and joint rate (4.40)
-        let panda_leftfinger_vel0 = q_7 * panda_link7_vel29;
-        let panda_leftfinger_vel1 = panda_link7_vel10 - panda_leftfinger_vel0;
+        let panda_leftfinger_vel0 = q_7 * panda_link7_vel27;
+        let panda_leftfinger_vel1 = panda_link7_vel10 + panda_leftfinger_vel0;
         let panda_leftfinger_vel2 = q_7 * panda_link7_vel16;
         let panda_leftfinger_vel3 = panda_link7_vel1 + panda_leftfinger_vel2;
         // panda_rightfinger: velocity and joint rate (4.40)
-        let panda_rightfinger_vel0 = panda_link7_vel10 + panda_leftfinger_vel0;
+        let panda_rightfinger_vel0 = panda_link7_vel10 - panda_leftfinger_vel0;
         let panda_rightfinger_vel1 = panda_link7_vel1 - panda_leftfinger_vel2;
         // panda_link7: gravity and wrenches
         let panda_link7_load0 = panda_link7_inertia26 - 0.0026399999999999996;
@@ -1100,13 +1095,13 @@ impl Panda {
         let panda_link4_pdot3 = panda_link4_inertia18 * panda_link4_vel11;
         let panda_link4_pdot4 = panda_link4_pdot2 + panda_link4_pdot3;
         let panda_link4_pdot5 = panda_link4_inertia16 * panda_link4_vel14;
-        let panda_link4_pdot6 = panda_link4_pdot4 + panda_link4_pdot5;
+        let panda_link4_pdot6 = panda_link4_pdot4 - panda_link4_pdot5;
         let panda_link4_pdot7 = panda_link4_pivot19 * panda_link4_vel1;
         let panda_link4_pdot8 = panda_link4_pdot6 - panda_link4_pdot7;
         let panda_link4_pdot9 = panda_link4_rest5 + panda_link4_pdot8;
         let panda_link4_pdot10 = panda_link4_pivot9 * panda_link4_vel8;
         let panda_link4_pdot11 = panda_link4_inertia18 * panda_link4_vel14;
-        let panda_link4_pdot12 = panda_link4_pdot10 + panda_link4_pdot11;
+        let panda_link4_pdot12 = panda_link4_pdot10 - panda_link4_pdot11;
         let panda_link4_pdot13 = panda_link4_inertia16 * panda_link4_vel11;
         let panda_link4_pdot14 = panda_link4_pdot12 - panda_link4_pdot13;
         let panda_link4_pdot15 = panda_link4_pivot11 * panda_link4_vel1;
@@ -1114,27 +1109,27 @@ impl Panda {
         let panda_link4_pdot17 = panda_link4_rest3 - panda_link4_pdot16;
         let panda_link4_pdot18 = panda_link4_pivot33 * panda_link4_vel11;
         let panda_link4_pdot19 = panda_link4_inertia33 * panda_link4_vel14;
-        let panda_link4_pdot20 = panda_link4_pdot18 + panda_link4_pdot19;
+        let panda_link4_pdot20 = panda_link4_pdot18 - panda_link4_pdot19;
         let panda_link4_pdot21 = panda_link4_pivot29 * panda_link4_vel1;
         let panda_link4_pdot22 = panda_link4_pdot20 - panda_link4_pdot21;
         let panda_link4_pdot23 = panda_link4_rest11 - panda_link4_pdot22;
         let panda_link4_pdot24 = panda_link4_pivot33 * panda_link4_vel14;
         let panda_link4_pdot25 = panda_link4_pivot27 * panda_link4_vel1;
-        let panda_link4_pdot26 = panda_link4_pdot24 - panda_link4_pdot25;
-        let panda_link4_pdot27 = panda_link4_rest9 + panda_link4_pdot26;
+        let panda_link4_pdot26 = panda_link4_pdot24 + panda_link4_pdot25;
+        let panda_link4_pdot27 = panda_link4_rest9 - panda_link4_pdot26;
         let panda_link4_pdot28 = panda_link4_vel5 * panda_link4_pdot9;
         let panda_link4_pdot29 = panda_link4_vel8 * panda_link4_pdot17;
         let panda_link4_pdot30 = panda_link4_pdot28 + panda_link4_pdot29;
         let panda_link4_pdot31 = panda_link4_vel11 * panda_link4_pdot23;
         let panda_link4_pdot32 = panda_link4_pdot30 - panda_link4_pdot31;
         let panda_link4_pdot33 = panda_link4_vel14 * panda_link4_pdot27;
-        let panda_link4_pdot34 = panda_link4_pdot32 - panda_link4_pdot33;
+        let panda_link4_pdot34 = panda_link4_pdot32 + panda_link4_pdot33;
         let panda_link4_pdot35 = panda_link5_load8 * panda_link4_load14;
         let panda_link4_pdot36 = panda_link5_load9 * panda_link4_load11;
         let panda_link4_pdot37 = panda_link4_pdot35 + panda_link4_pdot36;
         let panda_link4_pdot38 = panda_link4_pdot34 - panda_link4_pdot37;
         let panda_link4_pdot39 = 0.003 * panda_link4_vel25;
-        let panda_link4_pdot40 = panda_link4_pdot38 + panda_link4_pdot39;
+        let panda_link4_pdot40 = panda_link4_pdot38 - panda_link4_pdot39;
         // panda_link5: momentum rate (4.36)
         let panda_link5_pdot0 = panda_link5_pivot9 * panda_link5_vel10;
         let panda_link5_pdot1 = panda_link5_inertia0 * panda_link5_vel13;
@@ -1156,6 +1151,11 @@ impl Panda {
         let panda_link5_pdot17 = panda_link5_rest3 - panda_link5_pdot16;
         let panda_link5_pdot18 = panda_link5_pivot31 * panda_link5_vel16;
         let panda_link5_pdot19 = panda_link5_inertia33 * panda_link5_vel19;
+        let panda_link5_pdot20 = panda_link5_pdot18 - panda_link5_pdot19;
+        let panda_link5_pdot21 = panda_link5_pivot27 * panda_link5_vel1;
+        let panda_link5_pdot22 = panda_link5_pdot20 - panda_link5_pdot21;
+        let panda_link5_pdot23 = panda_link5_rest11 + panda_link5_pdot22;
+        let panda_link5_pdot24 = panda_link5_pivot31 * panda_link5_vel19;
         kept[0] = tau_0;
         kept[1] = tau_1;
         kept[2] = tau_2;
@@ -1182,66 +1182,63 @@ impl Panda {
         kept[23] = panda_link6_inertia18;
         kept[24] = panda_link6_inertia33;
         kept[25] = panda_link5_pivot25;
-        kept[26] = panda_link5_pivot27;
-        kept[27] = panda_link5_pivot31;
-        kept[28] = panda_link7_rest0;
-        kept[29] = panda_link7_rest2;
-        kept[30] = panda_link7_rest3;
-        kept[31] = panda_link7_rest4;
-        kept[32] = panda_link7_rest5;
-        kept[33] = panda_link6_rest3;
-        kept[34] = panda_link6_rest4;
-        kept[35] = panda_link6_rest8;
-        kept[36] = panda_link6_rest10;
-        kept[37] = panda_link5_rest9;
-        kept[38] = panda_link5_rest11;
-        kept[39] = panda_link1_rest1;
-        kept[40] = panda_link2_vel5;
-        kept[41] = panda_link3_vel22;
-        kept[42] = panda_link4_vel25;
-        kept[43] = panda_link5_vel1;
-        kept[44] = panda_link5_vel10;
-        kept[45] = panda_link5_vel13;
-        kept[46] = panda_link5_vel16;
-        kept[47] = panda_link5_vel19;
-        kept[48] = panda_link5_vel30;
-        kept[49] = panda_link6_vel2;
-        kept[50] = panda_link6_vel5;
-        kept[51] = panda_link6_vel8;
-        kept[52] = panda_link6_vel11;
-        kept[53] = panda_link6_vel22;
-        kept[54] = panda_link7_vel1;
-        kept[55] = panda_link7_vel10;
-        kept[56] = panda_link7_vel13;
-        kept[57] = panda_link7_vel16;
-        kept[58] = panda_link7_vel19;
-        kept[59] = panda_link7_vel28;
-        kept[60] = panda_link7_vel29;
-        kept[61] = panda_leftfinger_vel1;
-        kept[62] = panda_leftfinger_vel3;
-        kept[63] = panda_rightfinger_vel0;
-        kept[64] = panda_rightfinger_vel1;
-        kept[65] = panda_link7_load1;
-        kept[66] = panda_link6_load6;
-        kept[67] = panda_link6_load7;
-        kept[68] = panda_link5_load12;
-        kept[69] = panda_link5_load15;
-        kept[70] = panda_link6_load10;
-        kept[71] = panda_link6_load13;
-        kept[72] = panda_link7_load4;
-        kept[73] = panda_link7_load7;
-        kept[74] = panda_link1_pdot0;
-        kept[75] = panda_link2_pdot14;
-        kept[76] = panda_link3_pdot32;
-        kept[77] = panda_link4_pdot40;
-        kept[78] = panda_link5_pdot9;
-        kept[79] = panda_link5_pdot17;
-        kept[80] = panda_link5_pdot18;
-        kept[81] = panda_link5_pdot19;
+        kept[26] = panda_link7_rest0;
+        kept[27] = panda_link7_rest2;
+        kept[28] = panda_link7_rest3;
+        kept[29] = panda_link7_rest4;
+        kept[30] = panda_link7_rest5;
+        kept[31] = panda_link6_rest3;
+        kept[32] = panda_link6_rest4;
+        kept[33] = panda_link6_rest8;
+        kept[34] = panda_link6_rest10;
+        kept[35] = panda_link5_rest9;
+        kept[36] = panda_link1_rest1;
+        kept[37] = panda_link2_vel5;
+        kept[38] = panda_link3_vel22;
+        kept[39] = panda_link4_vel25;
+        kept[40] = panda_link5_vel1;
+        kept[41] = panda_link5_vel10;
+        kept[42] = panda_link5_vel13;
+        kept[43] = panda_link5_vel16;
+        kept[44] = panda_link5_vel19;
+        kept[45] = panda_link5_vel30;
+        kept[46] = panda_link6_vel2;
+        kept[47] = panda_link6_vel5;
+        kept[48] = panda_link6_vel8;
+        kept[49] = panda_link6_vel11;
+        kept[50] = panda_link6_vel22;
+        kept[51] = panda_link7_vel1;
+        kept[52] = panda_link7_vel10;
+        kept[53] = panda_link7_vel13;
+        kept[54] = panda_link7_vel16;
+        kept[55] = panda_link7_vel19;
+        kept[56] = panda_link7_vel27;
+        kept[57] = panda_link7_vel28;
+        kept[58] = panda_leftfinger_vel1;
+        kept[59] = panda_leftfinger_vel3;
+        kept[60] = panda_rightfinger_vel0;
+        kept[61] = panda_rightfinger_vel1;
+        kept[62] = panda_link7_load1;
+        kept[63] = panda_link6_load6;
+        kept[64] = panda_link6_load7;
+        kept[65] = panda_link5_load12;
+        kept[66] = panda_link5_load15;
+        kept[67] = panda_link6_load10;
+        kept[68] = panda_link6_load13;
+        kept[69] = panda_link7_load4;
+        kept[70] = panda_link7_load7;
+        kept[71] = panda_link1_pdot0;
+        kept[72] = panda_link2_pdot14;
+        kept[73] = panda_link3_pdot32;
+        kept[74] = panda_link4_pdot40;
+        kept[75] = panda_link5_pdot9;
+        kept[76] = panda_link5_pdot17;
+        kept[77] = panda_link5_pdot23;
+        kept[78] = panda_link5_pdot24;
     }
 
     #[inline(never)]
-    fn rates_part2(&self, q: &[f64; 8], p: &[f64; 8], kept: &mut [f64; 90]) {
+    fn rates_part2(&self, q: &[f64; 8], p: &[f64; 8], kept: &mut [f64; 87]) {
         let tau_0 = kept[0];
         let tau_1 = kept[1];
         let tau_2 = kept[2];
@@ -1268,64 +1265,56 @@ impl Panda {
         let panda_link6_inertia18 = kept[23];
         let panda_link6_inertia33 = kept[24];
         let panda_link5_pivot25 = kept[25];
-        let panda_link5_pivot27 = kept[26];
-        let panda_link5_pivot31 = kept[27];
-        let panda_link7_rest0 = kept[28];
-        let panda_link7_rest2 = kept[29];
-        let panda_link7_rest3 = kept[30];
-        let panda_link7_rest4 = kept[31];
-        let panda_link7_rest5 = kept[32];
-        let panda_link6_rest3 = kept[33];
-        let panda_link6_rest4 = kept[34];
-        let panda_link6_rest8 = kept[35];
-        let panda_link6_rest10 = kept[36];
-        let panda_link5_rest9 = kept[37];
-        let panda_link5_rest11 = kept[38];
-        let panda_link5_vel1 = kept[43];
-        let panda_link5_vel10 = kept[44];
-        let panda_link5_vel13 = kept[45];
-        let panda_link5_vel16 = kept[46];
-        let panda_link5_vel19 = kept[47];
-        let panda_link5_vel30 = kept[48];
-        let panda_link6_vel2 = kept[49];
-        let panda_link6_vel5 = kept[50];
-        let panda_link6_vel8 = kept[51];
-        let panda_link6_vel11 = kept[52];
-        let panda_link6_vel22 = kept[53];
-        let panda_link7_vel1 = kept[54];
-        let panda_link7_vel10 = kept[55];
-        let panda_link7_vel13 = kept[56];
-        let panda_link7_vel16 = kept[57];
-        let panda_link7_vel19 = kept[58];
-        let panda_link7_vel28 = kept[59];
-        let panda_link7_vel29 = kept[60];
-        let panda_leftfinger_vel1 = kept[61];
-        let panda_leftfinger_vel3 = kept[62];
-        let panda_rightfinger_vel0 = kept[63];
-        let panda_rightfinger_vel1 = kept[64];
-        let panda_link7_load1 = kept[65];
-        let panda_link6_load6 = kept[66];
-        let panda_link6_load7 = kept[67];
-        let panda_link5_load12 = kept[68];
-        let panda_link5_load15 = kept[69];
-        let panda_link6_load10 = kept[70];
-        let panda_link6_load13 = kept[71];
-        let panda_link7_load4 = kept[72];
-        let panda_link7_load7 = kept[73];
-        let panda_link1_pdot0 = kept[74];
-        let panda_link2_pdot14 = kept[75];
-        let panda_link3_pdot32 = kept[76];
-        let panda_link4_pdot40 = kept[77];
-        let panda_link5_pdot9 = kept[78];
-        let panda_link5_pdot17 = kept[79];
-        let panda_link5_pdot18 = kept[80];
-        let panda_link5_pdot19 = kept[81];
+        let panda_link7_rest0 = kept[26];
+        let panda_link7_rest2 = kept[27];
+        let panda_link7_rest3 = kept[28];
+        let panda_link7_rest4 = kept[29];
+        let panda_link7_rest5 = kept[30];
+        let panda_link6_rest3 = kept[31];
+        let panda_link6_rest4 = kept[32];
+        let panda_link6_rest8 = kept[33];
+        let panda_link6_rest10 = kept[34];
+        let panda_link5_rest9 = kept[35];
+        let panda_link5_vel1 = kept[40];
+        let panda_link5_vel10 = kept[41];
+        let panda_link5_vel13 = kept[42];
+        let panda_link5_vel16 = kept[43];
+        let panda_link5_vel19 = kept[44];
+        let panda_link5_vel30 = kept[45];
+        let panda_link6_vel2 = kept[46];
+        let panda_link6_vel5 = kept[47];
+        let panda_link6_vel8 = kept[48];
+        let panda_link6_vel11 = kept[49];
+        let panda_link6_vel22 = kept[50];
+        let panda_link7_vel1 = kept[51];
+        let panda_link7_vel10 = kept[52];
+        let panda_link7_vel13 = kept[53];
+        let panda_link7_vel16 = kept[54];
+        let panda_link7_vel19 = kept[55];
+        let panda_link7_vel27 = kept[56];
+        let panda_link7_vel28 = kept[57];
+        let panda_leftfinger_vel1 = kept[58];
+        let panda_leftfinger_vel3 = kept[59];
+        let panda_rightfinger_vel0 = kept[60];
+        let panda_rightfinger_vel1 = kept[61];
+        let panda_link7_load1 = kept[62];
+        let panda_link6_load6 = kept[63];
+        let panda_link6_load7 = kept[64];
+        let panda_link5_load12 = kept[65];
+        let panda_link5_load15 = kept[66];
+        let panda_link6_load10 = kept[67];
+        let panda_link6_load13 = kept[68];
+        let panda_link7_load4 = kept[69];
+        let panda_link7_load7 = kept[70];
+        let panda_link1_pdot0 = kept[71];
+        let panda_link2_pdot14 = kept[72];
+        let panda_link3_pdot32 = kept[73];
+        let panda_link4_pdot40 = kept[74];
+        let panda_link5_pdot9 = kept[75];
+        let panda_link5_pdot17 = kept[76];
+        let panda_link5_pdot23 = kept[77];
+        let panda_link5_pdot24 = kept[78];
         // panda_link5: momentum rate (4.36)
-        let panda_link5_pdot20 = panda_link5_pdot18 - panda_link5_pdot19;
-        let panda_link5_pdot21 = panda_link5_pivot27 * panda_link5_vel1;
-        let panda_link5_pdot22 = panda_link5_pdot20 - panda_link5_pdot21;
-        let panda_link5_pdot23 = panda_link5_rest11 + panda_link5_pdot22;
-        let panda_link5_pdot24 = panda_link5_pivot31 * panda_link5_vel19;
         let panda_link5_pdot25 = panda_link5_pivot25 * panda_link5_vel1;
         let panda_link5_pdot26 = panda_link5_pdot24 + panda_link5_pdot25;
         let panda_link5_pdot27 = panda_link5_rest9 - panda_link5_pdot26;
@@ -1341,7 +1330,7 @@ impl Panda {
         let panda_link5_pdot37 = panda_link5_pdot35 + panda_link5_pdot36;
         let panda_link5_pdot38 = panda_link5_pdot34 + panda_link5_pdot37;
         let panda_link5_pdot39 = 0.003 * panda_link5_vel30;
-        let panda_link5_pdot40 = panda_link5_pdot38 + panda_link5_pdot39;
+        let panda_link5_pdot40 = panda_link5_pdot38 - panda_link5_pdot39;
         // panda_link6: momentum rate (4.36)
         let panda_link6_pdot0 = panda_link6_pivot8 * panda_link6_vel2;
         let panda_link6_pdot1 = panda_link6_inertia0 * panda_link6_vel5;
@@ -1349,13 +1338,13 @@ impl Panda {
         let panda_link6_pdot3 = panda_link6_inertia18 * panda_link6_vel8;
         let panda_link6_pdot4 = panda_link6_pdot2 - panda_link6_pdot3;
         let panda_link6_pdot5 = panda_link6_inertia16 * panda_link6_vel11;
-        let panda_link6_pdot6 = panda_link6_pdot4 - panda_link6_pdot5;
+        let panda_link6_pdot6 = panda_link6_pdot4 + panda_link6_pdot5;
         let panda_link6_pdot7 = panda_link6_pivot17 * panda_link5_vel13;
         let panda_link6_pdot8 = panda_link6_pdot6 + panda_link6_pdot7;
         let panda_link6_pdot9 = panda_link6_rest4 + panda_link6_pdot8;
         let panda_link6_pdot10 = panda_link6_pivot8 * panda_link6_vel5;
         let panda_link6_pdot11 = panda_link6_inertia18 * panda_link6_vel11;
-        let panda_link6_pdot12 = panda_link6_pdot10 - panda_link6_pdot11;
+        let panda_link6_pdot12 = panda_link6_pdot10 + panda_link6_pdot11;
         let panda_link6_pdot13 = panda_link6_inertia16 * panda_link6_vel8;
         let panda_link6_pdot14 = panda_link6_pdot12 + panda_link6_pdot13;
         let panda_link6_pdot15 = panda_link6_pivot10 * panda_link5_vel13;
@@ -1363,21 +1352,21 @@ impl Panda {
         let panda_link6_pdot17 = panda_link6_rest3 + panda_link6_pdot16;
         let panda_link6_pdot18 = panda_link6_pivot30 * panda_link6_vel8;
         let panda_link6_pdot19 = panda_link6_inertia33 * panda_link6_vel11;
-        let panda_link6_pdot20 = panda_link6_pdot18 - panda_link6_pdot19;
+        let panda_link6_pdot20 = panda_link6_pdot18 + panda_link6_pdot19;
         let panda_link6_pdot21 = panda_link6_pivot26 * panda_link5_vel13;
         let panda_link6_pdot22 = panda_link6_pdot20 - panda_link6_pdot21;
         let panda_link6_pdot23 = panda_link6_rest10 - panda_link6_pdot22;
         let panda_link6_pdot24 = panda_link6_pivot30 * panda_link6_vel11;
         let panda_link6_pdot25 = panda_link6_pivot24 * panda_link5_vel13;
-        let panda_link6_pdot26 = panda_link6_pdot24 + panda_link6_pdot25;
-        let panda_link6_pdot27 = panda_link6_rest8 - panda_link6_pdot26;
+        let panda_link6_pdot26 = panda_link6_pdot24 - panda_link6_pdot25;
+        let panda_link6_pdot27 = panda_link6_rest8 + panda_link6_pdot26;
         let panda_link6_pdot28 = panda_link6_vel2 * panda_link6_pdot9;
         let panda_link6_pdot29 = panda_link6_vel5 * panda_link6_pdot17;
         let panda_link6_pdot30 = panda_link6_pdot28 - panda_link6_pdot29;
         let panda_link6_pdot31 = panda_link6_vel8 * panda_link6_pdot23;
         let panda_link6_pdot32 = panda_link6_pdot30 - panda_link6_pdot31;
         let panda_link6_pdot33 = panda_link6_vel11 * panda_link6_pdot27;
-        let panda_link6_pdot34 = panda_link6_pdot32 + panda_link6_pdot33;
+        let panda_link6_pdot34 = panda_link6_pdot32 - panda_link6_pdot33;
         let panda_link6_pdot35 = panda_link7_load1 * panda_link6_load13;
         let panda_link6_pdot36 = 0.173804705569 * panda_link6_load10;
         let panda_link6_pdot37 = panda_link6_pdot35 + panda_link6_pdot36;
@@ -1391,43 +1380,43 @@ impl Panda {
         let panda_link7_pdot3 = panda_link7_inertia12 * panda_link7_vel16;
         let panda_link7_pdot4 = panda_link7_pdot2 - panda_link7_pdot3;
         let panda_link7_pdot5 = panda_link7_inertia10 * panda_link7_vel19;
-        let panda_link7_pdot6 = panda_link7_pdot4 + panda_link7_pdot5;
+        let panda_link7_pdot6 = panda_link7_pdot4 - panda_link7_pdot5;
         let panda_link7_pdot7 = panda_link7_rest3 - panda_link7_pdot6;
         let panda_link7_pdot8 = panda_link7_pivot7 * panda_link7_vel13;
         let panda_link7_pdot9 = panda_link7_inertia12 * panda_link7_vel19;
-        let panda_link7_pdot10 = panda_link7_pdot8 + panda_link7_pdot9;
+        let panda_link7_pdot10 = panda_link7_pdot8 - panda_link7_pdot9;
         let panda_link7_pdot11 = panda_link7_inertia10 * panda_link7_vel16;
         let panda_link7_pdot12 = panda_link7_pdot10 + panda_link7_pdot11;
         let panda_link7_pdot13 = panda_link7_rest2 + panda_link7_pdot12;
         let panda_link7_pdot14 = panda_link7_pivot17 * panda_link7_vel16;
         let panda_link7_pdot15 = panda_link7_inertia27 * panda_link7_vel19;
-        let panda_link7_pdot16 = panda_link7_pdot14 + panda_link7_pdot15;
+        let panda_link7_pdot16 = panda_link7_pdot14 - panda_link7_pdot15;
         let panda_link7_pdot17 = 0.00038124751948473076 * panda_link7_vel1;
         let panda_link7_pdot18 = panda_link7_pdot16 - panda_link7_pdot17;
         let panda_link7_pdot19 = panda_link7_rest5 + panda_link7_pdot18;
         let panda_link7_pdot20 = panda_link7_pivot17 * panda_link7_vel19;
         let panda_link7_pdot21 = panda_leftfinger_inertia0 * panda_link7_vel1;
-        let panda_link7_pdot22 = panda_link7_pdot20 - panda_link7_pdot21;
-        let panda_link7_pdot23 = panda_link7_rest4 + panda_link7_pdot22;
+        let panda_link7_pdot22 = panda_link7_pdot20 + panda_link7_pdot21;
+        let panda_link7_pdot23 = panda_link7_rest4 - panda_link7_pdot22;
         let panda_link7_pdot24 = panda_link7_vel10 * panda_link7_pdot7;
         let panda_link7_pdot25 = panda_link7_vel13 * panda_link7_pdot13;
         let panda_link7_pdot26 = panda_link7_pdot24 + panda_link7_pdot25;
         let panda_link7_pdot27 = panda_link7_vel16 * panda_link7_pdot19;
         let panda_link7_pdot28 = panda_link7_pdot26 - panda_link7_pdot27;
         let panda_link7_pdot29 = panda_link7_vel19 * panda_link7_pdot23;
-        let panda_link7_pdot30 = panda_link7_pdot28 + panda_link7_pdot29;
+        let panda_link7_pdot30 = panda_link7_pdot28 - panda_link7_pdot29;
         let panda_link7_pdot31 = 0.00038124751948473076 * panda_link7_load7;
         let panda_link7_pdot32 = panda_leftfinger_inertia0 * panda_link7_load4;
         let panda_link7_pdot33 = panda_link7_pdot31 - panda_link7_pdot32;
         let panda_link7_pdot34 = panda_link7_pdot30 + panda_link7_pdot33;
         let panda_link7_pdot35 = 0.003 * panda_link7_vel28;
-        let panda_link7_pdot36 = panda_link7_pdot34 - panda_link7_pdot35;
+        let panda_link7_pdot36 = panda_link7_pdot34 + panda_link7_pdot35;
         // panda_leftfinger: momentum rate (4.36)
         let panda_leftfinger_pdot0 = 0.015 * panda_leftfinger_vel3;
         let panda_leftfinger_pdot1 = 0.015 * panda_leftfinger_vel1;
         let panda_leftfinger_pdot2 = panda_link7_vel16 * panda_leftfinger_pdot0;
-        let panda_leftfinger_pdot3 = panda_link7_vel29 * panda_leftfinger_pdot1;
-        let panda_leftfinger_pdot4 = panda_leftfinger_pdot2 - panda_leftfinger_pdot3;
+        let panda_leftfinger_pdot3 = panda_link7_vel27 * panda_leftfinger_pdot1;
+        let panda_leftfinger_pdot4 = panda_leftfinger_pdot2 + panda_leftfinger_pdot3;
         let panda_leftfinger_pdot5 = 0.015 * panda_link7_load7;
         let panda_leftfinger_pdot6 = panda_leftfinger_pdot4 + panda_leftfinger_pdot5;
         let panda_leftfinger_pdot7 = 0.3 * panda_link7_rest0;
@@ -1436,8 +1425,8 @@ impl Panda {
         let panda_rightfinger_pdot0 = 0.015 * panda_rightfinger_vel1;
         let panda_rightfinger_pdot1 = 0.015 * panda_rightfinger_vel0;
         let panda_rightfinger_pdot2 = panda_link7_vel16 * panda_rightfinger_pdot0;
-        let panda_rightfinger_pdot3 = panda_link7_vel29 * panda_rightfinger_pdot1;
-        let panda_rightfinger_pdot4 = panda_rightfinger_pdot2 - panda_rightfinger_pdot3;
+        let panda_rightfinger_pdot3 = panda_link7_vel27 * panda_rightfinger_pdot1;
+        let panda_rightfinger_pdot4 = panda_rightfinger_pdot2 + panda_rightfinger_pdot3;
         let panda_rightfinger_pdot5 = panda_leftfinger_pdot5 + panda_rightfinger_pdot4;
         let panda_rightfinger_pdot6 = panda_leftfinger_pdot7 + panda_rightfinger_pdot5;
         let panda_rightfinger_pdot7 = panda_leftfinger_pdot8 - panda_rightfinger_pdot6;
@@ -1449,18 +1438,18 @@ impl Panda {
         let panda_rightfinger_pdot13 = tau_5 + panda_link6_pdot40;
         let panda_rightfinger_pdot14 = tau_6 + panda_link7_pdot36;
         let panda_rightfinger_pdot15 = tau_7 + panda_rightfinger_pdot7;
-        kept[82] = panda_rightfinger_pdot8;
-        kept[83] = panda_rightfinger_pdot9;
-        kept[84] = panda_rightfinger_pdot10;
-        kept[85] = panda_rightfinger_pdot11;
-        kept[86] = panda_rightfinger_pdot12;
-        kept[87] = panda_rightfinger_pdot13;
-        kept[88] = panda_rightfinger_pdot14;
-        kept[89] = panda_rightfinger_pdot15;
+        kept[79] = panda_rightfinger_pdot8;
+        kept[80] = panda_rightfinger_pdot9;
+        kept[81] = panda_rightfinger_pdot10;
+        kept[82] = panda_rightfinger_pdot11;
+        kept[83] = panda_rightfinger_pdot12;
+        kept[84] = panda_rightfinger_pdot13;
+        kept[85] = panda_rightfinger_pdot14;
+        kept[86] = panda_rightfinger_pdot15;
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 789 operations: 384 additions, 398 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
+    /// 785 operations: 380 additions, 398 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 8], p: &[f64; 8], v: &mut [f64; 8]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -2188,13 +2177,12 @@ impl Panda {
         let panda_link3_vel17 = panda_link3_pivot3 * panda_link3_vel10;
         let panda_link3_vel18 = panda_link3_pivot4 * panda_link3_vel13;
         let panda_link3_vel19 = panda_link3_vel17 - panda_link3_vel18;
-        let panda_link3_vel20 = panda_link2_vel1 - panda_link3_vel19;
-        let panda_link3_vel21 = panda_link3_vel16 + panda_link3_vel20;
-        let panda_link3_vel22 = panda_link3_rest1 + panda_link3_vel21;
-        let panda_link3_vel23 = panda_link2_vel1 - panda_link3_vel22;
+        let panda_link3_vel20 = panda_link3_vel16 - panda_link3_vel19;
+        let panda_link3_vel21 = panda_link3_rest1 + panda_link3_vel20;
+        let panda_link3_vel22 = panda_link2_vel1 + panda_link3_vel21;
         // panda_link4: velocity and joint rate (4.40)
-        let panda_link4_vel0 = 0.0825 * panda_link3_vel23;
-        let panda_link4_vel1 = panda_link3_vel7 + panda_link4_vel0;
+        let panda_link4_vel0 = 0.0825 * panda_link3_vel21;
+        let panda_link4_vel1 = panda_link3_vel7 - panda_link4_vel0;
         let panda_link4_vel2 = 0.0825 * panda_link3_vel13;
         let panda_link4_vel3 = panda_link4_cos0 * panda_link3_vel4;
         let panda_link4_vel4 = panda_link4_sin0 * panda_link4_vel2;
@@ -2203,11 +2191,11 @@ impl Panda {
         let panda_link4_vel7 = panda_link4_sin0 * panda_link3_vel4;
         let panda_link4_vel8 = panda_link4_vel6 + panda_link4_vel7;
         let panda_link4_vel9 = panda_link4_cos0 * panda_link3_vel10;
-        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel23;
-        let panda_link4_vel11 = panda_link4_vel9 - panda_link4_vel10;
-        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel23;
+        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel21;
+        let panda_link4_vel11 = panda_link4_vel9 + panda_link4_vel10;
+        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel21;
         let panda_link4_vel13 = panda_link4_sin0 * panda_link3_vel10;
-        let panda_link4_vel14 = panda_link4_vel12 + panda_link4_vel13;
+        let panda_link4_vel14 = panda_link4_vel12 - panda_link4_vel13;
         let panda_link4_vel15 = panda_link4_pivot1 * panda_link4_vel5;
         let panda_link4_vel16 = panda_link4_pivot2 * panda_link4_vel8;
         let panda_link4_vel17 = panda_link4_vel15 + panda_link4_vel16;
@@ -2215,17 +2203,16 @@ impl Panda {
         let panda_link4_vel19 = panda_link4_vel17 + panda_link4_vel18;
         let panda_link4_vel20 = panda_link4_pivot4 * panda_link4_vel11;
         let panda_link4_vel21 = panda_link4_pivot5 * panda_link4_vel14;
-        let panda_link4_vel22 = panda_link4_vel20 + panda_link4_vel21;
-        let panda_link4_vel23 = panda_link3_vel13 - panda_link4_vel22;
-        let panda_link4_vel24 = panda_link4_vel19 + panda_link4_vel23;
-        let panda_link4_vel25 = panda_link4_rest1 - panda_link4_vel24;
-        let panda_link4_vel26 = panda_link3_vel13 + panda_link4_vel25;
+        let panda_link4_vel22 = panda_link4_vel20 - panda_link4_vel21;
+        let panda_link4_vel23 = panda_link4_vel19 - panda_link4_vel22;
+        let panda_link4_vel24 = panda_link4_rest1 - panda_link4_vel23;
+        let panda_link4_vel25 = panda_link4_vel24 - panda_link3_vel13;
         // panda_link5: velocity and joint rate (4.40)
-        let panda_link5_vel0 = 0.0825 * panda_link4_vel26;
+        let panda_link5_vel0 = 0.0825 * panda_link4_vel24;
         let panda_link5_vel1 = panda_link4_vel8 - panda_link5_vel0;
         let panda_link5_vel2 = 0.0825 * panda_link4_vel14;
-        let panda_link5_vel3 = panda_link4_vel1 - panda_link5_vel2;
-        let panda_link5_vel4 = 0.384 * panda_link4_vel26;
+        let panda_link5_vel3 = panda_link4_vel1 + panda_link5_vel2;
+        let panda_link5_vel4 = 0.384 * panda_link4_vel24;
         let panda_link5_vel5 = panda_link4_vel5 + panda_link5_vel4;
         let panda_link5_vel6 = 0.384 * panda_link4_vel11;
         let panda_link5_vel7 = panda_link5_vel3 + panda_link5_vel6;
@@ -2236,9 +2223,9 @@ impl Panda {
         let panda_link5_vel12 = panda_link5_sin0 * panda_link5_vel5;
         let panda_link5_vel13 = panda_link5_vel11 + panda_link5_vel12;
         let panda_link5_vel14 = panda_link5_cos0 * panda_link4_vel11;
-        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel26;
+        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel24;
         let panda_link5_vel16 = panda_link5_vel14 + panda_link5_vel15;
-        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel26;
+        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel24;
         let panda_link5_vel18 = panda_link5_sin0 * panda_link4_vel11;
         let panda_link5_vel19 = panda_link5_vel17 - panda_link5_vel18;
         let panda_link5_vel20 = panda_link5_pivot1 * panda_link5_vel10;
@@ -2249,10 +2236,9 @@ impl Panda {
         let panda_link5_vel25 = panda_link5_pivot4 * panda_link5_vel16;
         let panda_link5_vel26 = panda_link5_pivot5 * panda_link5_vel19;
         let panda_link5_vel27 = panda_link5_vel25 + panda_link5_vel26;
-        let panda_link5_vel28 = panda_link4_vel14 + panda_link5_vel27;
-        let panda_link5_vel29 = panda_link5_vel24 + panda_link5_vel28;
-        let panda_link5_vel30 = panda_link5_rest1 + panda_link5_vel29;
-        let panda_link5_vel31 = panda_link4_vel14 - panda_link5_vel30;
+        let panda_link5_vel28 = panda_link5_vel24 + panda_link5_vel27;
+        let panda_link5_vel29 = panda_link5_rest1 + panda_link5_vel28;
+        let panda_link5_vel30 = panda_link4_vel14 - panda_link5_vel29;
         // panda_link6: velocity and joint rate (4.40)
         let panda_link6_vel0 = panda_link6_cos0 * panda_link5_vel10;
         let panda_link6_vel1 = panda_link6_sin0 * panda_link5_vel1;
@@ -2261,11 +2247,11 @@ impl Panda {
         let panda_link6_vel4 = panda_link6_sin0 * panda_link5_vel10;
         let panda_link6_vel5 = panda_link6_vel3 + panda_link6_vel4;
         let panda_link6_vel6 = panda_link6_cos0 * panda_link5_vel16;
-        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel31;
-        let panda_link6_vel8 = panda_link6_vel6 - panda_link6_vel7;
-        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel31;
+        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel29;
+        let panda_link6_vel8 = panda_link6_vel6 + panda_link6_vel7;
+        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel29;
         let panda_link6_vel10 = panda_link6_sin0 * panda_link5_vel16;
-        let panda_link6_vel11 = panda_link6_vel9 + panda_link6_vel10;
+        let panda_link6_vel11 = panda_link6_vel9 - panda_link6_vel10;
         let panda_link6_vel12 = panda_link6_pivot1 * panda_link6_vel2;
         let panda_link6_vel13 = panda_link6_pivot2 * panda_link6_vel5;
         let panda_link6_vel14 = panda_link6_vel12 + panda_link6_vel13;
@@ -2273,16 +2259,15 @@ impl Panda {
         let panda_link6_vel16 = panda_link6_vel14 + panda_link6_vel15;
         let panda_link6_vel17 = panda_link6_pivot4 * panda_link6_vel8;
         let panda_link6_vel18 = panda_link6_pivot5 * panda_link6_vel11;
-        let panda_link6_vel19 = panda_link6_vel17 - panda_link6_vel18;
-        let panda_link6_vel20 = panda_link5_vel19 - panda_link6_vel19;
-        let panda_link6_vel21 = panda_link6_vel16 + panda_link6_vel20;
-        let panda_link6_vel22 = panda_link6_rest1 + panda_link6_vel21;
-        let panda_link6_vel23 = panda_link5_vel19 - panda_link6_vel22;
+        let panda_link6_vel19 = panda_link6_vel17 + panda_link6_vel18;
+        let panda_link6_vel20 = panda_link6_vel16 - panda_link6_vel19;
+        let panda_link6_vel21 = panda_link6_rest1 + panda_link6_vel20;
+        let panda_link6_vel22 = panda_link5_vel19 + panda_link6_vel21;
         // panda_link7: velocity and joint rate (4.40)
         let panda_link7_vel0 = 0.088 * panda_link6_vel11;
-        let panda_link7_vel1 = panda_link5_vel13 + panda_link7_vel0;
-        let panda_link7_vel2 = 0.1654 * panda_link6_vel23;
-        let panda_link7_vel3 = panda_link6_vel2 - panda_link7_vel2;
+        let panda_link7_vel1 = panda_link5_vel13 - panda_link7_vel0;
+        let panda_link7_vel2 = 0.1654 * panda_link6_vel21;
+        let panda_link7_vel3 = panda_link6_vel2 + panda_link7_vel2;
         let panda_link7_vel4 = 0.1654 * panda_link6_vel8;
         let panda_link7_vel5 = panda_link7_vel1 - panda_link7_vel4;
         let panda_link7_vel6 = panda_link7_cos0 * panda_link7_vel3;
@@ -2292,25 +2277,25 @@ impl Panda {
         let panda_link7_vel10 = panda_link7_sin0 * panda_link7_vel3;
         let panda_link7_vel11 = panda_link7_vel9 - panda_link7_vel10;
         let panda_link7_vel12 = panda_link7_cos0 * panda_link6_vel8;
-        let panda_link7_vel13 = panda_link7_sin0 * panda_link6_vel23;
-        let panda_link7_vel14 = panda_link7_vel12 - panda_link7_vel13;
-        let panda_link7_vel15 = panda_link7_cos0 * panda_link6_vel23;
+        let panda_link7_vel13 = panda_link7_sin0 * panda_link6_vel21;
+        let panda_link7_vel14 = panda_link7_vel12 + panda_link7_vel13;
+        let panda_link7_vel15 = panda_link7_cos0 * panda_link6_vel21;
         let panda_link7_vel16 = panda_link7_sin0 * panda_link6_vel8;
-        let panda_link7_vel17 = panda_link7_vel15 + panda_link7_vel16;
+        let panda_link7_vel17 = panda_link7_vel15 - panda_link7_vel16;
         let panda_link7_vel18 = panda_link7_pivot1 * panda_link7_vel8;
         let panda_link7_vel19 = panda_link7_pivot2 * panda_link7_vel11;
         let panda_link7_vel20 = panda_link7_vel18 - panda_link7_vel19;
         let panda_link7_vel21 = panda_link7_pivot3 * panda_link7_vel14;
         let panda_link7_vel22 = panda_link7_pivot4 * panda_link7_vel17;
-        let panda_link7_vel23 = panda_link7_vel21 + panda_link7_vel22;
-        let panda_link7_vel24 = panda_link6_vel11 + panda_link7_vel23;
-        let panda_link7_vel25 = panda_link7_vel20 - panda_link7_vel24;
-        let panda_link7_vel26 = panda_link7_rest1 - panda_link7_vel25;
+        let panda_link7_vel23 = panda_link7_vel21 - panda_link7_vel22;
+        let panda_link7_vel24 = panda_link7_vel20 - panda_link7_vel23;
+        let panda_link7_vel25 = panda_link7_rest1 - panda_link7_vel24;
+        let panda_link7_vel26 = panda_link7_vel25 - panda_link6_vel11;
         v[0] = panda_link1_rest1;
         v[1] = -panda_link2_vel5;
         v[2] = -panda_link3_vel22;
         v[3] = panda_link4_vel25;
-        v[4] = -panda_link5_vel30;
+        v[4] = panda_link5_vel30;
         v[5] = -panda_link6_vel22;
         v[6] = panda_link7_vel26;
         v[7] = panda_link7_rest0;
@@ -2750,7 +2735,7 @@ impl Panda {
     }
 
     /// Kinetic and potential energy, J.
-    /// 846 operations: 415 additions, 424 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
+    /// 842 operations: 411 additions, 424 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 8], p: &[f64; 8]) -> [f64; 2] {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -3478,13 +3463,12 @@ impl Panda {
         let panda_link3_vel17 = panda_link3_pivot3 * panda_link3_vel10;
         let panda_link3_vel18 = panda_link3_pivot4 * panda_link3_vel13;
         let panda_link3_vel19 = panda_link3_vel17 - panda_link3_vel18;
-        let panda_link3_vel20 = panda_link2_vel1 - panda_link3_vel19;
-        let panda_link3_vel21 = panda_link3_vel16 + panda_link3_vel20;
-        let panda_link3_vel22 = panda_link3_rest1 + panda_link3_vel21;
-        let panda_link3_vel23 = panda_link2_vel1 - panda_link3_vel22;
+        let panda_link3_vel20 = panda_link3_vel16 - panda_link3_vel19;
+        let panda_link3_vel21 = panda_link3_rest1 + panda_link3_vel20;
+        let panda_link3_vel22 = panda_link2_vel1 + panda_link3_vel21;
         // panda_link4: velocity and joint rate (4.40)
-        let panda_link4_vel0 = 0.0825 * panda_link3_vel23;
-        let panda_link4_vel1 = panda_link3_vel7 + panda_link4_vel0;
+        let panda_link4_vel0 = 0.0825 * panda_link3_vel21;
+        let panda_link4_vel1 = panda_link3_vel7 - panda_link4_vel0;
         let panda_link4_vel2 = 0.0825 * panda_link3_vel13;
         let panda_link4_vel3 = panda_link4_cos0 * panda_link3_vel4;
         let panda_link4_vel4 = panda_link4_sin0 * panda_link4_vel2;
@@ -3493,11 +3477,11 @@ impl Panda {
         let panda_link4_vel7 = panda_link4_sin0 * panda_link3_vel4;
         let panda_link4_vel8 = panda_link4_vel6 + panda_link4_vel7;
         let panda_link4_vel9 = panda_link4_cos0 * panda_link3_vel10;
-        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel23;
-        let panda_link4_vel11 = panda_link4_vel9 - panda_link4_vel10;
-        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel23;
+        let panda_link4_vel10 = panda_link4_sin0 * panda_link3_vel21;
+        let panda_link4_vel11 = panda_link4_vel9 + panda_link4_vel10;
+        let panda_link4_vel12 = panda_link4_cos0 * panda_link3_vel21;
         let panda_link4_vel13 = panda_link4_sin0 * panda_link3_vel10;
-        let panda_link4_vel14 = panda_link4_vel12 + panda_link4_vel13;
+        let panda_link4_vel14 = panda_link4_vel12 - panda_link4_vel13;
         let panda_link4_vel15 = panda_link4_pivot1 * panda_link4_vel5;
         let panda_link4_vel16 = panda_link4_pivot2 * panda_link4_vel8;
         let panda_link4_vel17 = panda_link4_vel15 + panda_link4_vel16;
@@ -3505,17 +3489,16 @@ impl Panda {
         let panda_link4_vel19 = panda_link4_vel17 + panda_link4_vel18;
         let panda_link4_vel20 = panda_link4_pivot4 * panda_link4_vel11;
         let panda_link4_vel21 = panda_link4_pivot5 * panda_link4_vel14;
-        let panda_link4_vel22 = panda_link4_vel20 + panda_link4_vel21;
-        let panda_link4_vel23 = panda_link3_vel13 - panda_link4_vel22;
-        let panda_link4_vel24 = panda_link4_vel19 + panda_link4_vel23;
-        let panda_link4_vel25 = panda_link4_rest1 - panda_link4_vel24;
-        let panda_link4_vel26 = panda_link3_vel13 + panda_link4_vel25;
+        let panda_link4_vel22 = panda_link4_vel20 - panda_link4_vel21;
+        let panda_link4_vel23 = panda_link4_vel19 - panda_link4_vel22;
+        let panda_link4_vel24 = panda_link4_rest1 - panda_link4_vel23;
+        let panda_link4_vel25 = panda_link3_vel13 - panda_link4_vel24;
         // panda_link5: velocity and joint rate (4.40)
-        let panda_link5_vel0 = 0.0825 * panda_link4_vel26;
+        let panda_link5_vel0 = 0.0825 * panda_link4_vel24;
         let panda_link5_vel1 = panda_link4_vel8 - panda_link5_vel0;
         let panda_link5_vel2 = 0.0825 * panda_link4_vel14;
-        let panda_link5_vel3 = panda_link4_vel1 - panda_link5_vel2;
-        let panda_link5_vel4 = 0.384 * panda_link4_vel26;
+        let panda_link5_vel3 = panda_link4_vel1 + panda_link5_vel2;
+        let panda_link5_vel4 = 0.384 * panda_link4_vel24;
         let panda_link5_vel5 = panda_link4_vel5 + panda_link5_vel4;
         let panda_link5_vel6 = 0.384 * panda_link4_vel11;
         let panda_link5_vel7 = panda_link5_vel3 + panda_link5_vel6;
@@ -3526,9 +3509,9 @@ impl Panda {
         let panda_link5_vel12 = panda_link5_sin0 * panda_link5_vel5;
         let panda_link5_vel13 = panda_link5_vel11 + panda_link5_vel12;
         let panda_link5_vel14 = panda_link5_cos0 * panda_link4_vel11;
-        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel26;
+        let panda_link5_vel15 = panda_link5_sin0 * panda_link4_vel24;
         let panda_link5_vel16 = panda_link5_vel14 + panda_link5_vel15;
-        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel26;
+        let panda_link5_vel17 = panda_link5_cos0 * panda_link4_vel24;
         let panda_link5_vel18 = panda_link5_sin0 * panda_link4_vel11;
         let panda_link5_vel19 = panda_link5_vel17 - panda_link5_vel18;
         let panda_link5_vel20 = panda_link5_pivot1 * panda_link5_vel10;
@@ -3539,10 +3522,9 @@ impl Panda {
         let panda_link5_vel25 = panda_link5_pivot4 * panda_link5_vel16;
         let panda_link5_vel26 = panda_link5_pivot5 * panda_link5_vel19;
         let panda_link5_vel27 = panda_link5_vel25 + panda_link5_vel26;
-        let panda_link5_vel28 = panda_link4_vel14 + panda_link5_vel27;
-        let panda_link5_vel29 = panda_link5_vel24 + panda_link5_vel28;
-        let panda_link5_vel30 = panda_link5_rest1 + panda_link5_vel29;
-        let panda_link5_vel31 = panda_link4_vel14 - panda_link5_vel30;
+        let panda_link5_vel28 = panda_link5_vel24 + panda_link5_vel27;
+        let panda_link5_vel29 = panda_link5_rest1 + panda_link5_vel28;
+        let panda_link5_vel30 = panda_link4_vel14 - panda_link5_vel29;
         // panda_link6: velocity and joint rate (4.40)
         let panda_link6_vel0 = panda_link6_cos0 * panda_link5_vel10;
         let panda_link6_vel1 = panda_link6_sin0 * panda_link5_vel1;
@@ -3551,11 +3533,11 @@ impl Panda {
         let panda_link6_vel4 = panda_link6_sin0 * panda_link5_vel10;
         let panda_link6_vel5 = panda_link6_vel3 + panda_link6_vel4;
         let panda_link6_vel6 = panda_link6_cos0 * panda_link5_vel16;
-        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel31;
-        let panda_link6_vel8 = panda_link6_vel6 - panda_link6_vel7;
-        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel31;
+        let panda_link6_vel7 = panda_link6_sin0 * panda_link5_vel29;
+        let panda_link6_vel8 = panda_link6_vel6 + panda_link6_vel7;
+        let panda_link6_vel9 = panda_link6_cos0 * panda_link5_vel29;
         let panda_link6_vel10 = panda_link6_sin0 * panda_link5_vel16;
-        let panda_link6_vel11 = panda_link6_vel9 + panda_link6_vel10;
+        let panda_link6_vel11 = panda_link6_vel9 - panda_link6_vel10;
         let panda_link6_vel12 = panda_link6_pivot1 * panda_link6_vel2;
         let panda_link6_vel13 = panda_link6_pivot2 * panda_link6_vel5;
         let panda_link6_vel14 = panda_link6_vel12 + panda_link6_vel13;
@@ -3563,16 +3545,15 @@ impl Panda {
         let panda_link6_vel16 = panda_link6_vel14 + panda_link6_vel15;
         let panda_link6_vel17 = panda_link6_pivot4 * panda_link6_vel8;
         let panda_link6_vel18 = panda_link6_pivot5 * panda_link6_vel11;
-        let panda_link6_vel19 = panda_link6_vel17 - panda_link6_vel18;
-        let panda_link6_vel20 = panda_link5_vel19 - panda_link6_vel19;
-        let panda_link6_vel21 = panda_link6_vel16 + panda_link6_vel20;
-        let panda_link6_vel22 = panda_link6_rest1 + panda_link6_vel21;
-        let panda_link6_vel23 = panda_link5_vel19 - panda_link6_vel22;
+        let panda_link6_vel19 = panda_link6_vel17 + panda_link6_vel18;
+        let panda_link6_vel20 = panda_link6_vel16 - panda_link6_vel19;
+        let panda_link6_vel21 = panda_link6_rest1 + panda_link6_vel20;
+        let panda_link6_vel22 = panda_link5_vel19 + panda_link6_vel21;
         // panda_link7: velocity and joint rate (4.40)
         let panda_link7_vel0 = 0.088 * panda_link6_vel11;
-        let panda_link7_vel1 = panda_link5_vel13 + panda_link7_vel0;
-        let panda_link7_vel2 = 0.1654 * panda_link6_vel23;
-        let panda_link7_vel3 = panda_link6_vel2 - panda_link7_vel2;
+        let panda_link7_vel1 = panda_link5_vel13 - panda_link7_vel0;
+        let panda_link7_vel2 = 0.1654 * panda_link6_vel21;
+        let panda_link7_vel3 = panda_link6_vel2 + panda_link7_vel2;
         let panda_link7_vel4 = 0.1654 * panda_link6_vel8;
         let panda_link7_vel5 = panda_link7_vel1 - panda_link7_vel4;
         let panda_link7_vel6 = panda_link7_cos0 * panda_link7_vel3;
@@ -3582,20 +3563,20 @@ impl Panda {
         let panda_link7_vel10 = panda_link7_sin0 * panda_link7_vel3;
         let panda_link7_vel11 = panda_link7_vel9 - panda_link7_vel10;
         let panda_link7_vel12 = panda_link7_cos0 * panda_link6_vel8;
-        let panda_link7_vel13 = panda_link7_sin0 * panda_link6_vel23;
-        let panda_link7_vel14 = panda_link7_vel12 - panda_link7_vel13;
-        let panda_link7_vel15 = panda_link7_cos0 * panda_link6_vel23;
+        let panda_link7_vel13 = panda_link7_sin0 * panda_link6_vel21;
+        let panda_link7_vel14 = panda_link7_vel12 + panda_link7_vel13;
+        let panda_link7_vel15 = panda_link7_cos0 * panda_link6_vel21;
         let panda_link7_vel16 = panda_link7_sin0 * panda_link6_vel8;
-        let panda_link7_vel17 = panda_link7_vel15 + panda_link7_vel16;
+        let panda_link7_vel17 = panda_link7_vel15 - panda_link7_vel16;
         let panda_link7_vel18 = panda_link7_pivot1 * panda_link7_vel8;
         let panda_link7_vel19 = panda_link7_pivot2 * panda_link7_vel11;
         let panda_link7_vel20 = panda_link7_vel18 - panda_link7_vel19;
         let panda_link7_vel21 = panda_link7_pivot3 * panda_link7_vel14;
         let panda_link7_vel22 = panda_link7_pivot4 * panda_link7_vel17;
-        let panda_link7_vel23 = panda_link7_vel21 + panda_link7_vel22;
-        let panda_link7_vel24 = panda_link6_vel11 + panda_link7_vel23;
-        let panda_link7_vel25 = panda_link7_vel20 - panda_link7_vel24;
-        let panda_link7_vel26 = panda_link7_rest1 - panda_link7_vel25;
+        let panda_link7_vel23 = panda_link7_vel21 - panda_link7_vel22;
+        let panda_link7_vel24 = panda_link7_vel20 - panda_link7_vel23;
+        let panda_link7_vel25 = panda_link7_rest1 - panda_link7_vel24;
+        let panda_link7_vel26 = panda_link6_vel11 - panda_link7_vel25;
         // panda_link1: energy
         let panda_link1_energy0 = p_0 * panda_link1_rest1;
         // panda_link2: energy
@@ -3606,16 +3587,16 @@ impl Panda {
         let panda_link3_energy1 = panda_link2_energy1 - panda_link3_energy0;
         // panda_link4: energy
         let panda_link4_energy0 = p_3 * panda_link4_vel25;
-        let panda_link4_energy1 = panda_link3_energy1 + panda_link4_energy0;
+        let panda_link4_energy1 = panda_link3_energy1 - panda_link4_energy0;
         // panda_link5: energy
         let panda_link5_energy0 = p_4 * panda_link5_vel30;
-        let panda_link5_energy1 = panda_link4_energy1 - panda_link5_energy0;
+        let panda_link5_energy1 = panda_link4_energy1 + panda_link5_energy0;
         // panda_link6: energy
         let panda_link6_energy0 = p_5 * panda_link6_vel22;
         let panda_link6_energy1 = panda_link5_energy1 - panda_link6_energy0;
         // panda_link7: energy
         let panda_link7_energy0 = p_6 * panda_link7_vel26;
-        let panda_link7_energy1 = panda_link6_energy1 + panda_link7_energy0;
+        let panda_link7_energy1 = panda_link6_energy1 - panda_link7_energy0;
         // panda_rightfinger: energy
         let panda_rightfinger_energy0 = p_7 * panda_link7_rest0;
         let panda_rightfinger_energy1 = panda_link7_energy1 + panda_rightfinger_energy0;
@@ -3675,17 +3656,17 @@ impl Panda {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 1597 operations: 760 additions, 830 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
+    /// 1593 operations: 756 additions, 830 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
         let mut kept = [0.0; 225];
         self.accelerations_part1(q, v, &mut kept);
         self.accelerations_part2(q, v, &mut kept);
         a[0] = kept[218];
         a[1] = -kept[219];
-        a[2] = -kept[220];
+        a[2] = kept[220];
         a[3] = kept[221];
         a[4] = -kept[222];
-        a[5] = -kept[223];
+        a[5] = kept[223];
         a[6] = kept[224];
         a[7] = kept[217];
     }
@@ -5676,12 +5657,11 @@ impl Panda {
         let panda_link3_acc24 = panda_link3_pivot4 * panda_link3_acc17;
         let panda_link3_acc25 = panda_link3_pivot5 * panda_link3_acc18;
         let panda_link3_acc26 = panda_link3_acc24 - panda_link3_acc25;
-        let panda_link3_acc27 = panda_link2_acc5 - panda_link3_acc26;
-        let panda_link3_acc28 = panda_link3_acc23 + panda_link3_acc27;
-        let panda_link3_acc29 = panda_link3_rest1 - panda_link3_acc28;
-        let panda_link3_acc30 = panda_link2_acc5 + panda_link3_acc29;
+        let panda_link3_acc27 = panda_link3_acc23 - panda_link3_acc26;
+        let panda_link3_acc28 = panda_link3_rest1 - panda_link3_acc27;
+        let panda_link3_acc29 = panda_link2_acc5 - panda_link3_acc28;
         // panda_link4: acceleration
-        let panda_link4_acc0 = 0.0825 * panda_link3_acc30;
+        let panda_link4_acc0 = 0.0825 * panda_link3_acc28;
         let panda_link4_acc1 = panda_link3_acc16 + panda_link4_acc0;
         let panda_link4_acc2 = 0.0825 * panda_link3_acc18;
         let panda_link4_acc3 = panda_link2_acc1 - panda_link4_acc2;
@@ -5692,9 +5672,9 @@ impl Panda {
         let panda_link4_acc8 = panda_link4_sin0 * panda_link3_acc15;
         let panda_link4_acc9 = panda_link4_acc7 - panda_link4_acc8;
         let panda_link4_acc10 = panda_link4_cos0 * panda_link3_acc17;
-        let panda_link4_acc11 = panda_link4_sin0 * panda_link3_acc30;
+        let panda_link4_acc11 = panda_link4_sin0 * panda_link3_acc28;
         let panda_link4_acc12 = panda_link4_acc10 - panda_link4_acc11;
-        let panda_link4_acc13 = panda_link4_cos0 * panda_link3_acc30;
+        let panda_link4_acc13 = panda_link4_cos0 * panda_link3_acc28;
         let panda_link4_acc14 = panda_link4_sin0 * panda_link3_acc17;
         let panda_link4_acc15 = panda_link4_acc13 + panda_link4_acc14;
         let panda_link4_acc16 = panda_link4_load57 - panda_link4_acc6;
@@ -5709,17 +5689,16 @@ impl Panda {
         let panda_link4_acc25 = panda_link4_pivot4 * panda_link4_acc18;
         let panda_link4_acc26 = panda_link4_pivot5 * panda_link4_acc19;
         let panda_link4_acc27 = panda_link4_acc25 - panda_link4_acc26;
-        let panda_link4_acc28 = panda_link3_acc18 - panda_link4_acc27;
-        let panda_link4_acc29 = panda_link4_acc24 - panda_link4_acc28;
-        let panda_link4_acc30 = panda_link4_rest1 - panda_link4_acc29;
-        let panda_link4_acc31 = panda_link3_acc18 - panda_link4_acc30;
+        let panda_link4_acc28 = panda_link4_acc24 + panda_link4_acc27;
+        let panda_link4_acc29 = panda_link4_rest1 - panda_link4_acc28;
+        let panda_link4_acc30 = panda_link3_acc18 + panda_link4_acc29;
         // panda_link5: acceleration
-        let panda_link5_acc0 = 0.0825 * panda_link4_acc31;
-        let panda_link5_acc1 = panda_link4_acc17 - panda_link5_acc0;
+        let panda_link5_acc0 = 0.0825 * panda_link4_acc29;
+        let panda_link5_acc1 = panda_link4_acc17 + panda_link5_acc0;
         let panda_link5_acc2 = 0.0825 * panda_link4_acc19;
         let panda_link5_acc3 = panda_link4_acc1 + panda_link5_acc2;
-        let panda_link5_acc4 = 0.384 * panda_link4_acc31;
-        let panda_link5_acc5 = panda_link4_acc16 - panda_link5_acc4;
+        let panda_link5_acc4 = 0.384 * panda_link4_acc29;
+        let panda_link5_acc5 = panda_link4_acc16 + panda_link5_acc4;
         let panda_link5_acc6 = 0.384 * panda_link4_acc18;
         let panda_link5_acc7 = panda_link5_acc3 + panda_link5_acc6;
         let panda_link5_acc8 = panda_link5_cos0 * panda_link5_acc5;
@@ -5729,15 +5708,15 @@ impl Panda {
         let panda_link5_acc12 = panda_link5_sin0 * panda_link5_acc5;
         let panda_link5_acc13 = panda_link5_acc11 - panda_link5_acc12;
         let panda_link5_acc14 = panda_link5_cos0 * panda_link4_acc18;
-        let panda_link5_acc15 = panda_link5_sin0 * panda_link4_acc31;
-        let panda_link5_acc16 = panda_link5_acc14 + panda_link5_acc15;
-        let panda_link5_acc17 = panda_link5_cos0 * panda_link4_acc31;
+        let panda_link5_acc15 = panda_link5_sin0 * panda_link4_acc29;
+        let panda_link5_acc16 = panda_link5_acc14 - panda_link5_acc15;
+        let panda_link5_acc17 = panda_link5_cos0 * panda_link4_acc29;
         let panda_link5_acc18 = panda_link5_sin0 * panda_link4_acc18;
-        let panda_link5_acc19 = panda_link5_acc17 - panda_link5_acc18;
+        let panda_link5_acc19 = panda_link5_acc17 + panda_link5_acc18;
         let panda_link5_acc20 = panda_link5_load57 - panda_link5_acc10;
         let panda_link5_acc21 = panda_link5_load58 + panda_link5_acc13;
         let panda_link5_acc22 = panda_link5_load59 - panda_link5_acc16;
-        let panda_link5_acc23 = panda_link5_load60 + panda_link5_acc19;
+        let panda_link5_acc23 = panda_link5_load60 - panda_link5_acc19;
         let panda_link5_acc24 = panda_link5_pivot1 * panda_link5_acc20;
         let panda_link5_acc25 = panda_link5_pivot2 * panda_link5_acc21;
         let panda_link5_acc26 = panda_link5_acc24 + panda_link5_acc25;
@@ -5746,10 +5725,9 @@ impl Panda {
         let panda_link5_acc29 = panda_link5_pivot4 * panda_link5_acc22;
         let panda_link5_acc30 = panda_link5_pivot5 * panda_link5_acc23;
         let panda_link5_acc31 = panda_link5_acc29 - panda_link5_acc30;
-        let panda_link5_acc32 = panda_link4_acc19 + panda_link5_acc31;
-        let panda_link5_acc33 = panda_link5_acc28 - panda_link5_acc32;
-        let panda_link5_acc34 = panda_link5_rest1 - panda_link5_acc33;
-        let panda_link5_acc35 = panda_link4_acc19 - panda_link5_acc34;
+        let panda_link5_acc32 = panda_link5_acc28 - panda_link5_acc31;
+        let panda_link5_acc33 = panda_link5_rest1 - panda_link5_acc32;
+        let panda_link5_acc34 = panda_link4_acc19 + panda_link5_acc33;
         // panda_link6: acceleration
         let panda_link6_acc0 = panda_link6_cos0 * panda_link5_acc20;
         let panda_link6_acc1 = panda_link6_sin0 * panda_link5_acc1;
@@ -5758,15 +5736,15 @@ impl Panda {
         let panda_link6_acc4 = panda_link6_sin0 * panda_link5_acc20;
         let panda_link6_acc5 = panda_link6_acc3 + panda_link6_acc4;
         let panda_link6_acc6 = panda_link6_cos0 * panda_link5_acc22;
-        let panda_link6_acc7 = panda_link6_sin0 * panda_link5_acc35;
-        let panda_link6_acc8 = panda_link6_acc6 - panda_link6_acc7;
-        let panda_link6_acc9 = panda_link6_cos0 * panda_link5_acc35;
+        let panda_link6_acc7 = panda_link6_sin0 * panda_link5_acc33;
+        let panda_link6_acc8 = panda_link6_acc6 + panda_link6_acc7;
+        let panda_link6_acc9 = panda_link6_cos0 * panda_link5_acc33;
         let panda_link6_acc10 = panda_link6_sin0 * panda_link5_acc22;
-        let panda_link6_acc11 = panda_link6_acc9 + panda_link6_acc10;
+        let panda_link6_acc11 = panda_link6_acc9 - panda_link6_acc10;
         let panda_link6_acc12 = panda_link6_load57 - panda_link6_acc2;
         let panda_link6_acc13 = panda_link6_load58 + panda_link6_acc5;
         let panda_link6_acc14 = panda_link6_load59 - panda_link6_acc8;
-        let panda_link6_acc15 = panda_link6_load60 + panda_link6_acc11;
+        let panda_link6_acc15 = panda_link6_load60 - panda_link6_acc11;
         let panda_link6_acc16 = panda_link6_pivot1 * panda_link6_acc12;
         let panda_link6_acc17 = panda_link6_pivot2 * panda_link6_acc13;
         let panda_link6_acc18 = panda_link6_acc16 - panda_link6_acc17;
@@ -5775,14 +5753,13 @@ impl Panda {
         let panda_link6_acc21 = panda_link6_pivot4 * panda_link6_acc14;
         let panda_link6_acc22 = panda_link6_pivot5 * panda_link6_acc15;
         let panda_link6_acc23 = panda_link6_acc21 + panda_link6_acc22;
-        let panda_link6_acc24 = panda_link5_acc23 - panda_link6_acc23;
-        let panda_link6_acc25 = panda_link6_acc20 - panda_link6_acc24;
-        let panda_link6_acc26 = panda_link6_rest1 + panda_link6_acc25;
-        let panda_link6_acc27 = panda_link5_acc23 + panda_link6_acc26;
+        let panda_link6_acc24 = panda_link6_acc20 + panda_link6_acc23;
+        let panda_link6_acc25 = panda_link6_rest1 + panda_link6_acc24;
+        let panda_link6_acc26 = panda_link5_acc23 - panda_link6_acc25;
         // panda_link7: acceleration
         let panda_link7_acc0 = 0.088 * panda_link6_acc15;
         let panda_link7_acc1 = panda_link5_acc21 - panda_link7_acc0;
-        let panda_link7_acc2 = 0.1654 * panda_link6_acc27;
+        let panda_link7_acc2 = 0.1654 * panda_link6_acc25;
         let panda_link7_acc3 = panda_link6_acc12 + panda_link7_acc2;
         let panda_link7_acc4 = 0.1654 * panda_link6_acc14;
         let panda_link7_acc5 = panda_link7_acc1 - panda_link7_acc4;
@@ -5793,9 +5770,9 @@ impl Panda {
         let panda_link7_acc10 = panda_link7_sin0 * panda_link7_acc3;
         let panda_link7_acc11 = panda_link7_acc9 + panda_link7_acc10;
         let panda_link7_acc12 = panda_link7_cos0 * panda_link6_acc14;
-        let panda_link7_acc13 = panda_link7_sin0 * panda_link6_acc27;
+        let panda_link7_acc13 = panda_link7_sin0 * panda_link6_acc25;
         let panda_link7_acc14 = panda_link7_acc12 - panda_link7_acc13;
-        let panda_link7_acc15 = panda_link7_cos0 * panda_link6_acc27;
+        let panda_link7_acc15 = panda_link7_cos0 * panda_link6_acc25;
         let panda_link7_acc16 = panda_link7_sin0 * panda_link6_acc14;
         let panda_link7_acc17 = panda_link7_acc15 + panda_link7_acc16;
         let panda_link7_acc18 = panda_link7_load57 + panda_link7_acc8;
@@ -5808,9 +5785,9 @@ impl Panda {
         let panda_link7_acc25 = panda_link7_pivot3 * panda_link7_acc20;
         let panda_link7_acc26 = panda_link7_pivot4 * panda_link7_acc21;
         let panda_link7_acc27 = panda_link7_acc25 - panda_link7_acc26;
-        let panda_link7_acc28 = panda_link6_acc15 - panda_link7_acc27;
-        let panda_link7_acc29 = panda_link7_acc24 - panda_link7_acc28;
-        let panda_link7_acc30 = panda_link7_rest3 - panda_link7_acc29;
+        let panda_link7_acc28 = panda_link7_acc24 + panda_link7_acc27;
+        let panda_link7_acc29 = panda_link7_rest3 - panda_link7_acc28;
+        let panda_link7_acc30 = panda_link6_acc15 + panda_link7_acc29;
         kept[217] = panda_link7_rest1;
         kept[218] = panda_link1_acc1;
         kept[219] = panda_link2_acc13;

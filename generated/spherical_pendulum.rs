@@ -8,12 +8,12 @@
 //   q[4] v[3] hinge: pin, moves tail
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 54 + 78 + 3 = 135; 0, 1
-//   velocities: 18 + 26 + 3 = 47; 0, 1
+//   rates: 54 + 75 + 3 = 132; 0, 1
+//   velocities: 18 + 24 + 3 = 45; 0, 1
 //   momenta: 14 + 25 + 0 = 39; 0, 1
-//   energy: 30 + 38 + 3 = 71; 0, 1
-//   accelerations: 68 + 100 + 3 = 171; 0, 1
-//   reactions: 124 + 157 + 3 = 284; 0, 1
+//   energy: 30 + 36 + 3 = 69; 0, 1
+//   accelerations: 70 + 102 + 3 = 175; 0, 1
+//   reactions: 129 + 164 + 3 = 296; 0, 1
 //   mass_matrix: 16 + 9 + 0 = 25; 0, 1
 //   frames: 36 + 52 + 0 = 88; 0, 1
 
@@ -59,7 +59,7 @@ impl SphericalPendulum {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 135 operations: 54 additions, 78 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    /// 132 operations: 54 additions, 75 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
         let q_0 = q[0];
@@ -93,45 +93,49 @@ impl SphericalPendulum {
         let tail_pose0 = q_4 + 1.4711276743037347;
         let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
         // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = 0.3646209386281588 * tail_sin0;
-        let tail_inertia1 = tail_cos0 + tail_cos0;
-        let tail_inertia2 = tail_sin0 * tail_inertia0;
-        let tail_inertia3 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia4 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia5 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia6 = 0.0003792079207920793 * tail_inertia1;
-        let tail_inertia7 = tail_inertia5 + tail_inertia6;
-        let tail_inertia8 = tail_sin0 * tail_inertia7;
-        let tail_inertia9 = tail_cos0 * tail_inertia7;
-        let tail_inertia10 = tail_inertia9 - 0.0003792079207920793;
-        let tail_inertia11 = tail_inertia8 - 0.026984158415841585;
-        let tail_inertia12 = 0.8 * tail_inertia2;
-        let tail_inertia13 = 0.8 * tail_inertia4;
-        let tail_inertia14 = tail_inertia10 + tail_inertia13;
-        let tail_inertia15 = tail_inertia3 + tail_inertia3;
-        let tail_inertia16 = 0.8 * tail_inertia15;
-        let tail_inertia17 = tail_inertia11 + tail_inertia16;
-        let tail_inertia18 = 0.8 * tail_inertia12;
-        let tail_inertia19 = tail_inertia3 + 0.88;
-        let tail_inertia20 = tail_inertia17 + 0.6101920792079208;
-        let tail_inertia21 = tail_inertia18 - 0.5770000000000001;
-        let tail_inertia22 = tail_inertia8 - 0.0401920792079208;
+        let tail_inertia0 = tail_cos0 + tail_cos0;
+        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+        let tail_inertia5 = tail_inertia3 + tail_inertia4;
+        let tail_inertia6 = tail_sin0 * tail_inertia5;
+        let tail_inertia7 = tail_cos0 * tail_inertia5;
+        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+        // tail: U, Mj, k and the reduced inertia M' (4.44)
+        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+        let tail_pivot1 = 36.10108303249097 * tail_inertia2;
+        let tail_pivot2 = tail_inertia1 * tail_pivot0;
+        let tail_pivot3 = tail_inertia1 * tail_pivot1;
+        // tail: inertia carried to the parent, M* (4.48)
+        let tail_inertia10 = 0.8 * tail_pivot2;
+        let tail_inertia11 = 0.8 * tail_inertia2;
+        let tail_inertia12 = tail_inertia8 + tail_inertia11;
+        let tail_inertia13 = tail_inertia1 + tail_inertia1;
+        let tail_inertia14 = 0.8 * tail_inertia13;
+        let tail_inertia15 = tail_inertia9 + tail_inertia14;
+        let tail_inertia16 = 0.8 * tail_inertia10;
+        let tail_inertia17 = tail_inertia1 + 0.88;
+        let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
+        let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
+        let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
         // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia20;
-        let bob_pivot1 = tail_inertia14 * bob_pivot0;
-        let bob_pivot2 = tail_inertia14 * bob_pivot1;
-        let bob_pivot3 = tail_inertia22 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia21;
+        let bob_pivot0 = 1.0 / tail_inertia18;
+        let bob_pivot1 = tail_inertia12 * bob_pivot0;
+        let bob_pivot2 = tail_inertia12 * bob_pivot1;
+        let bob_pivot3 = tail_inertia20 + bob_pivot2;
+        let bob_pivot4 = 1.0 / tail_inertia19;
         let bob_pivot5 = 1.0 / bob_pivot3;
         // tail: momentum remainder D, D' (4.45, 4.49)
         let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = 0.1004987562112089 * tail_rest0;
-        let tail_rest2 = tail_sin0 * tail_rest1;
-        let tail_rest3 = 0.8 * tail_rest2;
+        let tail_rest1 = tail_inertia1 * tail_rest0;
+        let tail_rest2 = tail_inertia2 * tail_rest0;
+        let tail_rest3 = 0.8 * tail_rest1;
         let tail_rest4 = p_3 + tail_rest3;
         // bob: momentum remainder D, D' (4.45, 4.49)
         let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia14 * bob_rest0;
+        let bob_rest1 = tail_inertia12 * bob_rest0;
         let bob_rest2 = p_1 - tail_rest4;
         let bob_rest3 = bob_pivot4 * bob_rest2;
         let bob_rest4 = p_2 - bob_rest1;
@@ -142,17 +146,9 @@ impl SphericalPendulum {
         // tail: velocity and joint rate (4.40)
         let tail_vel0 = 0.8 * bob_rest3;
         let tail_vel1 = 0.8 * bob_vel1;
-        let tail_vel2 = tail_cos0 * tail_vel0;
-        let tail_vel3 = tail_sin0 * tail_vel0;
-        let tail_vel4 = tail_cos0 * bob_vel1;
-        let tail_vel5 = tail_sin0 * bob_rest5;
-        let tail_vel6 = tail_vel4 + tail_vel5;
-        let tail_vel7 = tail_cos0 * bob_rest5;
-        let tail_vel8 = tail_sin0 * bob_vel1;
-        let tail_vel9 = tail_vel7 - tail_vel8;
-        let tail_vel10 = 3.62811394264292 * tail_vel3;
-        let tail_vel11 = bob_rest3 + tail_vel10;
-        let tail_vel12 = tail_rest0 + tail_vel11;
+        let tail_vel2 = tail_pivot0 * tail_vel0;
+        let tail_vel3 = tail_rest0 + tail_vel2;
+        let tail_vel4 = bob_rest3 + tail_vel3;
         // bob: coordinate rates
         let bob_rate0 = q_1 * bob_rest5;
         let bob_rate1 = q_2 * bob_rest3;
@@ -196,47 +192,50 @@ impl SphericalPendulum {
         let bob_pdot6 = p_1 * bob_vel1;
         let bob_pdot7 = p_0 * bob_rest3;
         let bob_pdot8 = bob_pdot6 + bob_pdot7;
-        let bob_pdot9 = tail_inertia19 * bob_load1;
-        let bob_pdot10 = tail_inertia19 * bob_load0;
-        let bob_pdot11 = tail_inertia4 * bob_load2;
+        let bob_pdot9 = tail_inertia17 * bob_load1;
+        let bob_pdot10 = tail_inertia17 * bob_load0;
+        let bob_pdot11 = tail_inertia2 * bob_load2;
         let bob_pdot12 = bob_pdot10 - bob_pdot11;
-        let bob_pdot13 = tail_inertia4 * bob_load1;
+        let bob_pdot13 = tail_inertia2 * bob_load1;
         let bob_pdot14 = bob_pdot2 - bob_pdot9;
         let bob_pdot15 = bob_pdot5 + bob_pdot12;
         let bob_pdot16 = bob_pdot8 + bob_pdot13;
         // tail: momentum rate (4.36)
-        let tail_pdot0 = 0.3646209386281588 * tail_vel3;
-        let tail_pdot1 = tail_rest1 + tail_pdot0;
-        let tail_pdot2 = 0.0003792079207920793 * tail_vel6;
-        let tail_pdot3 = 0.026984158415841585 * tail_vel9;
-        let tail_pdot4 = tail_pdot2 - tail_pdot3;
-        let tail_pdot5 = 0.1004987562112089 * tail_vel1;
-        let tail_pdot6 = tail_pdot4 + tail_pdot5;
-        let tail_pdot7 = 0.0003792079207920793 * tail_vel9;
-        let tail_pdot8 = tail_vel2 * tail_pdot1;
-        let tail_pdot9 = tail_vel6 * tail_pdot6;
+        let tail_pdot0 = tail_inertia6 + tail_inertia9;
+        let tail_pdot1 = tail_pivot3 * tail_vel0;
+        let tail_pdot2 = tail_rest2 + tail_pdot1;
+        let tail_pdot3 = tail_inertia8 * bob_vel1;
+        let tail_pdot4 = bob_rest5 * tail_pdot0;
+        let tail_pdot5 = tail_pdot3 + tail_pdot4;
+        let tail_pdot6 = tail_inertia2 * tail_vel1;
+        let tail_pdot7 = tail_pdot5 + tail_pdot6;
+        let tail_pdot8 = tail_inertia8 * bob_rest5;
+        let tail_pdot9 = tail_inertia1 * tail_vel1;
         let tail_pdot10 = tail_pdot8 - tail_pdot9;
-        let tail_pdot11 = tail_vel9 * tail_pdot7;
-        let tail_pdot12 = tail_pdot10 + tail_pdot11;
-        let tail_pdot13 = 0.1004987562112089 * tail_load2;
-        let tail_pdot14 = tail_pdot12 + tail_pdot13;
-        let tail_pdot15 = tau_0 + bob_pdot14;
-        let tail_pdot16 = tau_1 + bob_pdot15;
-        let tail_pdot17 = tau_2 - bob_pdot16;
-        let tail_pdot18 = tau_3 - tail_pdot14;
+        let tail_pdot11 = tail_vel0 * tail_pdot2;
+        let tail_pdot12 = bob_vel1 * tail_pdot7;
+        let tail_pdot13 = tail_pdot11 - tail_pdot12;
+        let tail_pdot14 = bob_rest5 * tail_pdot10;
+        let tail_pdot15 = tail_pdot13 + tail_pdot14;
+        let tail_pdot16 = 0.1004987562112089 * tail_load2;
+        let tail_pdot17 = tail_pdot15 + tail_pdot16;
+        let tail_pdot18 = tau_0 + bob_pdot14;
+        let tail_pdot19 = tau_1 + bob_pdot15;
+        let tail_pdot20 = tau_2 - bob_pdot16;
+        let tail_pdot21 = tau_3 - tail_pdot17;
         qd[0] = -bob_rate11;
         qd[1] = bob_rate14;
         qd[2] = -bob_rate17;
         qd[3] = -bob_rate23;
-        qd[4] = tail_vel12;
-        pd[0] = tail_pdot15;
-        pd[1] = tail_pdot16;
-        pd[2] = tail_pdot17;
-        pd[3] = tail_pdot18;
+        qd[4] = tail_vel4;
+        pd[0] = tail_pdot18;
+        pd[1] = tail_pdot19;
+        pd[2] = tail_pdot20;
+        pd[3] = tail_pdot21;
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 47 operations: 18 additions, 26 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    /// 45 operations: 18 additions, 24 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 5], p: &[f64; 4], v: &mut [f64; 4]) {
         let q_4 = q[4];
@@ -248,45 +247,46 @@ impl SphericalPendulum {
         let tail_pose0 = q_4 + 1.4711276743037347;
         let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
         // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = 0.3646209386281588 * tail_sin0;
-        let tail_inertia1 = tail_cos0 + tail_cos0;
-        let tail_inertia2 = tail_sin0 * tail_inertia0;
-        let tail_inertia3 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia4 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia5 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia6 = 0.0003792079207920793 * tail_inertia1;
-        let tail_inertia7 = tail_inertia5 + tail_inertia6;
-        let tail_inertia8 = tail_sin0 * tail_inertia7;
-        let tail_inertia9 = tail_cos0 * tail_inertia7;
-        let tail_inertia10 = tail_inertia9 - 0.0003792079207920793;
-        let tail_inertia11 = tail_inertia8 - 0.026984158415841585;
-        let tail_inertia12 = 0.8 * tail_inertia2;
-        let tail_inertia13 = 0.8 * tail_inertia4;
-        let tail_inertia14 = tail_inertia10 + tail_inertia13;
-        let tail_inertia15 = tail_inertia3 + tail_inertia3;
-        let tail_inertia16 = 0.8 * tail_inertia15;
-        let tail_inertia17 = tail_inertia11 + tail_inertia16;
-        let tail_inertia18 = 0.8 * tail_inertia12;
-        let tail_inertia19 = tail_inertia17 + 0.6101920792079208;
-        let tail_inertia20 = tail_inertia18 - 0.5770000000000001;
-        let tail_inertia21 = tail_inertia8 - 0.0401920792079208;
+        let tail_inertia0 = tail_cos0 + tail_cos0;
+        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+        let tail_inertia5 = tail_inertia3 + tail_inertia4;
+        let tail_inertia6 = tail_sin0 * tail_inertia5;
+        let tail_inertia7 = tail_cos0 * tail_inertia5;
+        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+        // tail: U, Mj, k and the reduced inertia M' (4.44)
+        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+        let tail_pivot1 = tail_inertia1 * tail_pivot0;
+        // tail: inertia carried to the parent, M* (4.48)
+        let tail_inertia10 = 0.8 * tail_pivot1;
+        let tail_inertia11 = 0.8 * tail_inertia2;
+        let tail_inertia12 = tail_inertia8 + tail_inertia11;
+        let tail_inertia13 = tail_inertia1 + tail_inertia1;
+        let tail_inertia14 = 0.8 * tail_inertia13;
+        let tail_inertia15 = tail_inertia9 + tail_inertia14;
+        let tail_inertia16 = 0.8 * tail_inertia10;
+        let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
+        let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
+        let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
         // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia19;
-        let bob_pivot1 = tail_inertia14 * bob_pivot0;
-        let bob_pivot2 = tail_inertia14 * bob_pivot1;
-        let bob_pivot3 = tail_inertia21 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia20;
+        let bob_pivot0 = 1.0 / tail_inertia17;
+        let bob_pivot1 = tail_inertia12 * bob_pivot0;
+        let bob_pivot2 = tail_inertia12 * bob_pivot1;
+        let bob_pivot3 = tail_inertia19 + bob_pivot2;
+        let bob_pivot4 = 1.0 / tail_inertia18;
         let bob_pivot5 = 1.0 / bob_pivot3;
         // tail: momentum remainder D, D' (4.45, 4.49)
         let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = 0.1004987562112089 * tail_rest0;
-        let tail_rest2 = tail_sin0 * tail_rest1;
-        let tail_rest3 = 0.8 * tail_rest2;
-        let tail_rest4 = p_3 + tail_rest3;
+        let tail_rest1 = tail_inertia1 * tail_rest0;
+        let tail_rest2 = 0.8 * tail_rest1;
+        let tail_rest3 = p_3 + tail_rest2;
         // bob: momentum remainder D, D' (4.45, 4.49)
         let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia14 * bob_rest0;
-        let bob_rest2 = p_1 - tail_rest4;
+        let bob_rest1 = tail_inertia12 * bob_rest0;
+        let bob_rest2 = p_1 - tail_rest3;
         let bob_rest3 = bob_pivot4 * bob_rest2;
         let bob_rest4 = p_2 - bob_rest1;
         let bob_rest5 = bob_pivot5 * bob_rest4;
@@ -295,14 +295,13 @@ impl SphericalPendulum {
         let bob_vel1 = bob_rest0 + bob_vel0;
         // tail: velocity and joint rate (4.40)
         let tail_vel0 = 0.8 * bob_rest3;
-        let tail_vel1 = tail_sin0 * tail_vel0;
-        let tail_vel2 = 3.62811394264292 * tail_vel1;
+        let tail_vel1 = tail_pivot0 * tail_vel0;
+        let tail_vel2 = tail_rest0 + tail_vel1;
         let tail_vel3 = bob_rest3 + tail_vel2;
-        let tail_vel4 = tail_rest0 + tail_vel3;
         v[0] = bob_vel1;
         v[1] = -bob_rest3;
         v[2] = -bob_rest5;
-        v[3] = tail_vel4;
+        v[3] = tail_vel3;
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -365,7 +364,7 @@ impl SphericalPendulum {
     }
 
     /// Kinetic and potential energy, J.
-    /// 71 operations: 30 additions, 38 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    /// 69 operations: 30 additions, 36 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 5], p: &[f64; 4]) -> [f64; 2] {
         let q_0 = q[0];
@@ -392,46 +391,47 @@ impl SphericalPendulum {
         let tail_pose0 = q_4 + 1.4711276743037347;
         let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
         // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = 0.3646209386281588 * tail_sin0;
-        let tail_inertia1 = tail_cos0 + tail_cos0;
-        let tail_inertia2 = tail_sin0 * tail_inertia0;
-        let tail_inertia3 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia4 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia5 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia6 = 0.0003792079207920793 * tail_inertia1;
-        let tail_inertia7 = tail_inertia5 + tail_inertia6;
-        let tail_inertia8 = tail_sin0 * tail_inertia7;
-        let tail_inertia9 = tail_cos0 * tail_inertia7;
-        let tail_inertia10 = tail_inertia9 - 0.0003792079207920793;
-        let tail_inertia11 = tail_inertia8 - 0.026984158415841585;
-        let tail_inertia12 = 0.8 * tail_inertia2;
-        let tail_inertia13 = 0.8 * tail_inertia4;
-        let tail_inertia14 = tail_inertia10 + tail_inertia13;
-        let tail_inertia15 = tail_inertia3 + tail_inertia3;
-        let tail_inertia16 = 0.8 * tail_inertia15;
-        let tail_inertia17 = tail_inertia11 + tail_inertia16;
-        let tail_inertia18 = 0.8 * tail_inertia12;
-        let tail_inertia19 = tail_inertia3 + 0.88;
-        let tail_inertia20 = tail_inertia17 + 0.6101920792079208;
-        let tail_inertia21 = tail_inertia18 - 0.5770000000000001;
-        let tail_inertia22 = tail_inertia8 - 0.0401920792079208;
+        let tail_inertia0 = tail_cos0 + tail_cos0;
+        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+        let tail_inertia5 = tail_inertia3 + tail_inertia4;
+        let tail_inertia6 = tail_sin0 * tail_inertia5;
+        let tail_inertia7 = tail_cos0 * tail_inertia5;
+        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+        // tail: U, Mj, k and the reduced inertia M' (4.44)
+        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+        let tail_pivot1 = tail_inertia1 * tail_pivot0;
+        // tail: inertia carried to the parent, M* (4.48)
+        let tail_inertia10 = 0.8 * tail_pivot1;
+        let tail_inertia11 = 0.8 * tail_inertia2;
+        let tail_inertia12 = tail_inertia8 + tail_inertia11;
+        let tail_inertia13 = tail_inertia1 + tail_inertia1;
+        let tail_inertia14 = 0.8 * tail_inertia13;
+        let tail_inertia15 = tail_inertia9 + tail_inertia14;
+        let tail_inertia16 = 0.8 * tail_inertia10;
+        let tail_inertia17 = tail_inertia1 + 0.88;
+        let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
+        let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
+        let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
         // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia20;
-        let bob_pivot1 = tail_inertia14 * bob_pivot0;
-        let bob_pivot2 = tail_inertia14 * bob_pivot1;
-        let bob_pivot3 = tail_inertia22 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia21;
+        let bob_pivot0 = 1.0 / tail_inertia18;
+        let bob_pivot1 = tail_inertia12 * bob_pivot0;
+        let bob_pivot2 = tail_inertia12 * bob_pivot1;
+        let bob_pivot3 = tail_inertia20 + bob_pivot2;
+        let bob_pivot4 = 1.0 / tail_inertia19;
         let bob_pivot5 = 1.0 / bob_pivot3;
         // tail: momentum remainder D, D' (4.45, 4.49)
         let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = 0.1004987562112089 * tail_rest0;
-        let tail_rest2 = tail_sin0 * tail_rest1;
-        let tail_rest3 = 0.8 * tail_rest2;
-        let tail_rest4 = p_3 + tail_rest3;
+        let tail_rest1 = tail_inertia1 * tail_rest0;
+        let tail_rest2 = 0.8 * tail_rest1;
+        let tail_rest3 = p_3 + tail_rest2;
         // bob: momentum remainder D, D' (4.45, 4.49)
         let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia14 * bob_rest0;
-        let bob_rest2 = p_1 - tail_rest4;
+        let bob_rest1 = tail_inertia12 * bob_rest0;
+        let bob_rest2 = p_1 - tail_rest3;
         let bob_rest3 = bob_pivot4 * bob_rest2;
         let bob_rest4 = p_2 - bob_rest1;
         let bob_rest5 = bob_pivot5 * bob_rest4;
@@ -440,10 +440,9 @@ impl SphericalPendulum {
         let bob_vel1 = bob_rest0 + bob_vel0;
         // tail: velocity and joint rate (4.40)
         let tail_vel0 = 0.8 * bob_rest3;
-        let tail_vel1 = tail_sin0 * tail_vel0;
-        let tail_vel2 = 3.62811394264292 * tail_vel1;
+        let tail_vel1 = tail_pivot0 * tail_vel0;
+        let tail_vel2 = tail_rest0 + tail_vel1;
         let tail_vel3 = bob_rest3 + tail_vel2;
-        let tail_vel4 = tail_rest0 + tail_vel3;
         // bob: energy
         let bob_energy0 = p_0 * bob_vel1;
         let bob_energy1 = p_1 * bob_rest3;
@@ -451,12 +450,12 @@ impl SphericalPendulum {
         let bob_energy3 = p_2 * bob_rest5;
         let bob_energy4 = bob_energy2 - bob_energy3;
         // tail: energy
-        let tail_energy0 = p_3 * tail_vel4;
+        let tail_energy0 = p_3 * tail_vel3;
         let tail_energy1 = bob_energy4 + tail_energy0;
         let tail_energy2 = 0.5 * tail_energy1;
         // bob: gravity and wrenches
-        let bob_load0 = bob_pose7 * tail_inertia4;
-        let bob_load1 = bob_pose9 * tail_inertia19;
+        let bob_load0 = bob_pose7 * tail_inertia2;
+        let bob_load1 = bob_pose9 * tail_inertia17;
         let bob_load2 = bob_load0 + bob_load1;
         let bob_load3 = bob_load2 + 3.4;
         // ground: energy
@@ -467,7 +466,7 @@ impl SphericalPendulum {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 171 operations: 68 additions, 100 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    /// 175 operations: 70 additions, 102 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
         let q_0 = q[0];
@@ -501,43 +500,46 @@ impl SphericalPendulum {
         let tail_pose0 = q_4 + 1.4711276743037347;
         let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
         // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = 0.3646209386281588 * tail_sin0;
-        let tail_inertia1 = tail_cos0 + tail_cos0;
-        let tail_inertia2 = tail_sin0 * tail_inertia0;
-        let tail_inertia3 = tail_cos0 * tail_inertia0;
-        let tail_inertia4 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia5 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia6 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia7 = 0.0003792079207920793 * tail_inertia1;
-        let tail_inertia8 = tail_inertia6 + tail_inertia7;
-        let tail_inertia9 = tail_sin0 * tail_inertia8;
-        let tail_inertia10 = tail_cos0 * tail_inertia8;
-        let tail_inertia11 = tail_inertia10 - 0.0003792079207920793;
-        let tail_inertia12 = tail_inertia9 - 0.026984158415841585;
-        let tail_inertia13 = 0.8 * tail_inertia2;
-        let tail_inertia14 = 0.8 * tail_inertia3;
-        let tail_inertia15 = 0.8 * tail_inertia5;
-        let tail_inertia16 = tail_inertia11 + tail_inertia15;
-        let tail_inertia17 = tail_inertia4 + tail_inertia4;
-        let tail_inertia18 = 0.8 * tail_inertia17;
-        let tail_inertia19 = tail_inertia12 + tail_inertia18;
-        let tail_inertia20 = 0.8 * tail_inertia13;
-        let tail_inertia21 = tail_inertia4 + 0.88;
-        let tail_inertia22 = tail_inertia13 - 0.88;
-        let tail_inertia23 = tail_inertia19 + 0.6101920792079208;
-        let tail_inertia24 = tail_inertia20 - 0.5770000000000001;
-        let tail_inertia25 = tail_inertia9 - 0.0401920792079208;
+        let tail_inertia0 = tail_cos0 + tail_cos0;
+        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+        let tail_inertia5 = tail_inertia3 + tail_inertia4;
+        let tail_inertia6 = tail_sin0 * tail_inertia5;
+        let tail_inertia7 = tail_cos0 * tail_inertia5;
+        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+        // tail: U, Mj, k and the reduced inertia M' (4.44)
+        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+        let tail_pivot1 = 36.10108303249097 * tail_inertia2;
+        let tail_pivot2 = tail_inertia1 * tail_pivot0;
+        let tail_pivot3 = tail_inertia1 * tail_pivot1;
+        // tail: inertia carried to the parent, M* (4.48)
+        let tail_inertia10 = 0.8 * tail_pivot2;
+        let tail_inertia11 = 0.8 * tail_pivot3;
+        let tail_inertia12 = 0.8 * tail_inertia2;
+        let tail_inertia13 = tail_inertia8 + tail_inertia12;
+        let tail_inertia14 = tail_inertia1 + tail_inertia1;
+        let tail_inertia15 = 0.8 * tail_inertia14;
+        let tail_inertia16 = tail_inertia9 + tail_inertia15;
+        let tail_inertia17 = 0.8 * tail_inertia10;
+        let tail_inertia18 = tail_inertia1 + 0.88;
+        let tail_inertia19 = tail_inertia10 - 0.88;
+        let tail_inertia20 = tail_inertia16 + 0.6101920792079208;
+        let tail_inertia21 = tail_inertia17 - 0.5770000000000001;
+        let tail_inertia22 = tail_inertia6 - 0.0401920792079208;
         // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia23;
-        let bob_pivot1 = tail_inertia21 * bob_pivot0;
-        let bob_pivot2 = tail_inertia16 * bob_pivot0;
-        let bob_pivot3 = tail_inertia21 * bob_pivot2;
-        let bob_pivot4 = tail_inertia5 - bob_pivot3;
-        let bob_pivot5 = tail_inertia16 * bob_pivot2;
-        let bob_pivot6 = tail_inertia25 + bob_pivot5;
-        let bob_pivot7 = 1.0 / tail_inertia24;
-        let bob_pivot8 = tail_inertia22 * bob_pivot7;
-        let bob_pivot9 = tail_inertia14 * bob_pivot7;
+        let bob_pivot0 = 1.0 / tail_inertia20;
+        let bob_pivot1 = tail_inertia18 * bob_pivot0;
+        let bob_pivot2 = tail_inertia13 * bob_pivot0;
+        let bob_pivot3 = tail_inertia18 * bob_pivot2;
+        let bob_pivot4 = tail_inertia2 - bob_pivot3;
+        let bob_pivot5 = tail_inertia13 * bob_pivot2;
+        let bob_pivot6 = tail_inertia22 + bob_pivot5;
+        let bob_pivot7 = 1.0 / tail_inertia21;
+        let bob_pivot8 = tail_inertia19 * bob_pivot7;
+        let bob_pivot9 = tail_inertia11 * bob_pivot7;
         let bob_pivot10 = 1.0 / bob_pivot6;
         let bob_pivot11 = bob_pivot4 * bob_pivot10;
         // tail: velocity and joint rate (4.40)
@@ -599,46 +601,50 @@ impl SphericalPendulum {
         let tail_load30 = tail_load18 - tail_load23;
         let tail_load31 = tail_load19 - tail_load26;
         let tail_load32 = tail_load20 + tail_load29;
-        let tail_load33 = v_3 * tail_vel2;
-        let tail_load34 = v_3 * tail_vel9;
-        let tail_load35 = v_3 * tail_vel6;
+        let tail_load33 = v_3 * tail_vel0;
+        let tail_load34 = v_2 * v_3;
+        let tail_load35 = v_0 * v_3;
         // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = tau_3 + tail_load32;
-        let tail_rest1 = 36.10108303249097 * tail_rest0;
-        let tail_rest2 = 0.1004987562112089 * tail_rest1;
-        let tail_rest3 = tail_load14 - tail_rest2;
-        let tail_rest4 = 0.3646209386281588 * tail_load33;
-        let tail_rest5 = 0.1004987562112089 * tail_load35;
-        let tail_rest6 = 0.026984158415841585 * tail_load34;
-        let tail_rest7 = 0.0003792079207920793 * tail_load35;
+        let tail_rest0 = tail_cos0 * tail_load13;
+        let tail_rest1 = tail_sin0 * tail_load14;
+        let tail_rest2 = tail_rest0 - tail_rest1;
+        let tail_rest3 = tail_cos0 * tail_load30;
+        let tail_rest4 = tail_sin0 * tail_load31;
+        let tail_rest5 = tail_rest3 - tail_rest4;
+        let tail_rest6 = tail_sin0 * tail_load30;
+        let tail_rest7 = tail_cos0 * tail_load31;
         let tail_rest8 = tail_rest6 + tail_rest7;
-        let tail_rest9 = 0.0003792079207920793 * tail_load34;
-        let tail_rest10 = tail_rest3 + tail_rest4;
-        let tail_rest11 = tail_load15 + tail_rest5;
-        let tail_rest12 = tail_load30 + tail_rest8;
-        let tail_rest13 = tail_load31 + tail_rest9;
-        let tail_rest14 = tail_cos0 * tail_load13;
-        let tail_rest15 = tail_sin0 * tail_rest10;
+        let tail_rest9 = tau_3 + tail_load32;
+        let tail_rest10 = 36.10108303249097 * tail_rest9;
+        let tail_rest11 = tail_inertia1 * tail_rest10;
+        let tail_rest12 = tail_rest2 + tail_rest11;
+        let tail_rest13 = tail_pivot3 * tail_load33;
+        let tail_rest14 = tail_inertia1 * tail_load34;
+        let tail_rest15 = tail_inertia2 * tail_load35;
         let tail_rest16 = tail_rest14 - tail_rest15;
-        let tail_rest17 = tail_cos0 * tail_rest12;
-        let tail_rest18 = tail_sin0 * tail_rest13;
+        let tail_rest17 = tail_inertia9 * tail_load34;
+        let tail_rest18 = tail_inertia8 * tail_load35;
         let tail_rest19 = tail_rest17 - tail_rest18;
-        let tail_rest20 = tail_sin0 * tail_rest12;
-        let tail_rest21 = tail_cos0 * tail_rest13;
+        let tail_rest20 = tail_inertia8 * tail_load34;
+        let tail_rest21 = tail_inertia6 * tail_load35;
         let tail_rest22 = tail_rest20 + tail_rest21;
-        let tail_rest23 = 0.8 * tail_rest11;
-        let tail_rest24 = tail_rest19 + tail_rest23;
-        let tail_rest25 = 0.8 * tail_rest16;
-        let tail_rest26 = tau_3 + tail_rest25;
-        let tail_rest27 = bob_load5 + tail_rest24;
-        let tail_rest28 = bob_load8 + tail_rest26;
-        let tail_rest29 = bob_load11 - tail_rest22;
+        let tail_rest23 = tail_rest12 - tail_rest13;
+        let tail_rest24 = tail_load15 - tail_rest16;
+        let tail_rest25 = tail_rest5 - tail_rest19;
+        let tail_rest26 = tail_rest8 + tail_rest22;
+        let tail_rest27 = 0.8 * tail_rest24;
+        let tail_rest28 = tail_rest25 + tail_rest27;
+        let tail_rest29 = 0.8 * tail_rest23;
+        let tail_rest30 = tau_3 + tail_rest29;
+        let tail_rest31 = bob_load5 + tail_rest28;
+        let tail_rest32 = bob_load8 + tail_rest30;
+        let tail_rest33 = bob_load11 - tail_rest26;
         // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = tau_0 - tail_rest27;
+        let bob_rest0 = tau_0 - tail_rest31;
         let bob_rest1 = bob_pivot0 * bob_rest0;
-        let bob_rest2 = tail_inertia16 * bob_rest1;
-        let bob_rest3 = tail_rest29 + bob_rest2;
-        let bob_rest4 = tau_1 - tail_rest28;
+        let bob_rest2 = tail_inertia13 * bob_rest1;
+        let bob_rest3 = tail_rest33 + bob_rest2;
+        let bob_rest4 = tau_1 - tail_rest32;
         let bob_rest5 = bob_pivot7 * bob_rest4;
         let bob_rest6 = tau_2 - bob_rest3;
         let bob_rest7 = bob_pivot10 * bob_rest6;
@@ -659,22 +665,20 @@ impl SphericalPendulum {
         // tail: acceleration
         let tail_acc0 = 0.8 * bob_acc8;
         let tail_acc1 = bob_acc0 + tail_acc0;
-        let tail_acc2 = tail_cos0 * bob_acc2;
-        let tail_acc3 = tail_sin0 * tail_acc1;
-        let tail_acc4 = tail_acc2 - tail_acc3;
-        let tail_acc5 = tail_load33 + tail_acc4;
-        let tail_acc6 = 3.62811394264292 * tail_acc5;
-        let tail_acc7 = bob_acc8 - tail_acc6;
-        let tail_acc8 = tail_rest1 + tail_acc7;
+        let tail_acc2 = tail_load33 + bob_acc2;
+        let tail_acc3 = tail_pivot0 * tail_acc1;
+        let tail_acc4 = tail_pivot1 * tail_acc2;
+        let tail_acc5 = tail_acc3 - tail_acc4;
+        let tail_acc6 = tail_rest10 + tail_acc5;
+        let tail_acc7 = bob_acc8 + tail_acc6;
         a[0] = bob_acc12;
         a[1] = -bob_acc8;
         a[2] = -bob_acc4;
-        a[3] = tail_acc8;
+        a[3] = tail_acc7;
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
-    /// 284 operations: 124 additions, 157 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
-    #[inline]
+    /// 296 operations: 129 additions, 164 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     pub fn reactions(&self, q: &[f64; 5], v: &[f64; 4], reactions: &mut [[f64; 6]; 2]) {
         let q_0 = q[0];
         let q_1 = q[1];
@@ -707,66 +711,70 @@ impl SphericalPendulum {
         let tail_pose0 = q_4 + 1.4711276743037347;
         let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
         // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = 0.3646209386281588 * tail_sin0;
-        let tail_inertia1 = tail_cos0 + tail_cos0;
-        let tail_inertia2 = tail_sin0 * tail_inertia0;
-        let tail_inertia3 = tail_cos0 * tail_inertia0;
-        let tail_inertia4 = tail_inertia2 - 0.5;
-        let tail_inertia5 = tail_inertia2 + 0.1353790613718412;
-        let tail_inertia6 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia7 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia8 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia9 = 0.0003792079207920793 * tail_inertia1;
-        let tail_inertia10 = tail_inertia8 + tail_inertia9;
-        let tail_inertia11 = tail_sin0 * tail_inertia10;
-        let tail_inertia12 = tail_cos0 * tail_inertia10;
-        let tail_inertia13 = tail_inertia12 - 0.0003792079207920793;
-        let tail_inertia14 = tail_inertia11 + 0.001207920792079208;
-        let tail_inertia15 = tail_inertia11 - 0.028192079207920794;
-        let tail_inertia16 = tail_inertia5 - 0.5;
-        let tail_inertia17 = tail_inertia5 - tail_inertia16;
-        let tail_inertia18 = tail_inertia16 + 0.5;
-        let tail_inertia19 = 0.8 * tail_inertia4;
-        let tail_inertia20 = 0.8 * tail_inertia17;
-        let tail_inertia21 = tail_inertia6 + tail_inertia20;
-        let tail_inertia22 = 0.8 * tail_inertia3;
-        let tail_inertia23 = 0.8 * tail_inertia7;
-        let tail_inertia24 = tail_inertia13 + tail_inertia23;
-        let tail_inertia25 = tail_inertia6 + tail_inertia21;
-        let tail_inertia26 = 0.8 * tail_inertia25;
-        let tail_inertia27 = tail_inertia14 + tail_inertia26;
-        let tail_inertia28 = 0.8 * tail_inertia19;
-        let tail_inertia29 = tail_inertia4 - 1.2;
-        let tail_inertia30 = tail_inertia17 + 1.2;
-        let tail_inertia31 = tail_inertia18 + 1.2;
-        let tail_inertia32 = tail_inertia21 + 0.48;
-        let tail_inertia33 = tail_inertia19 - 0.48;
-        let tail_inertia34 = tail_inertia27 + 0.262;
-        let tail_inertia35 = tail_inertia28 - 0.257;
-        let tail_inertia36 = tail_inertia15 - 0.012;
+        let tail_inertia0 = tail_cos0 + tail_cos0;
+        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+        let tail_inertia5 = tail_inertia3 + tail_inertia4;
+        let tail_inertia6 = tail_sin0 * tail_inertia5;
+        let tail_inertia7 = tail_cos0 * tail_inertia5;
+        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+        let tail_inertia9 = tail_inertia6 + 0.001207920792079208;
+        let tail_inertia10 = tail_inertia6 - 0.028192079207920794;
+        // tail: U, Mj, k and the reduced inertia M' (4.44)
+        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+        let tail_pivot1 = 36.10108303249097 * tail_inertia2;
+        let tail_pivot2 = tail_inertia1 * tail_pivot0;
+        let tail_pivot3 = tail_pivot2 - 0.5;
+        let tail_pivot4 = tail_inertia1 * tail_pivot1;
+        let tail_pivot5 = tail_inertia2 * tail_pivot1;
+        let tail_pivot6 = tail_pivot5 - 0.5;
+        // tail: inertia carried to the parent, M* (4.48)
+        let tail_inertia11 = tail_pivot6 + 0.5;
+        let tail_inertia12 = tail_pivot6 - tail_inertia11;
+        let tail_inertia13 = tail_inertia11 - 0.5;
+        let tail_inertia14 = 0.8 * tail_pivot3;
+        let tail_inertia15 = 0.8 * tail_inertia12;
+        let tail_inertia16 = tail_inertia1 - tail_inertia15;
+        let tail_inertia17 = 0.8 * tail_pivot4;
+        let tail_inertia18 = 0.8 * tail_inertia2;
+        let tail_inertia19 = tail_inertia8 + tail_inertia18;
+        let tail_inertia20 = tail_inertia1 + tail_inertia16;
+        let tail_inertia21 = 0.8 * tail_inertia20;
+        let tail_inertia22 = tail_inertia9 + tail_inertia21;
+        let tail_inertia23 = 0.8 * tail_inertia14;
+        let tail_inertia24 = tail_pivot3 - 1.2;
+        let tail_inertia25 = tail_inertia12 - 1.2;
+        let tail_inertia26 = tail_inertia13 - 1.2;
+        let tail_inertia27 = tail_inertia16 + 0.48;
+        let tail_inertia28 = tail_inertia14 - 0.48;
+        let tail_inertia29 = tail_inertia22 + 0.262;
+        let tail_inertia30 = tail_inertia23 - 0.257;
+        let tail_inertia31 = tail_inertia10 - 0.012;
         // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia34;
-        let bob_pivot1 = tail_inertia32 * bob_pivot0;
-        let bob_pivot2 = tail_inertia24 * bob_pivot0;
-        let bob_pivot3 = tail_inertia32 * bob_pivot1;
-        let bob_pivot4 = tail_inertia30 - bob_pivot3;
-        let bob_pivot5 = tail_inertia32 * bob_pivot2;
-        let bob_pivot6 = tail_inertia7 - bob_pivot5;
-        let bob_pivot7 = tail_inertia24 * bob_pivot2;
-        let bob_pivot8 = tail_inertia36 + bob_pivot7;
-        let bob_pivot9 = 1.0 / tail_inertia35;
-        let bob_pivot10 = tail_inertia33 * bob_pivot9;
-        let bob_pivot11 = tail_inertia22 * bob_pivot9;
-        let bob_pivot12 = tail_inertia33 * bob_pivot10;
-        let bob_pivot13 = tail_inertia29 - bob_pivot12;
-        let bob_pivot14 = tail_inertia33 * bob_pivot11;
-        let bob_pivot15 = tail_inertia3 - bob_pivot14;
-        let bob_pivot16 = tail_inertia22 * bob_pivot11;
-        let bob_pivot17 = tail_inertia31 + bob_pivot16;
+        let bob_pivot0 = 1.0 / tail_inertia29;
+        let bob_pivot1 = tail_inertia27 * bob_pivot0;
+        let bob_pivot2 = tail_inertia19 * bob_pivot0;
+        let bob_pivot3 = tail_inertia27 * bob_pivot1;
+        let bob_pivot4 = tail_inertia25 + bob_pivot3;
+        let bob_pivot5 = tail_inertia27 * bob_pivot2;
+        let bob_pivot6 = tail_inertia2 - bob_pivot5;
+        let bob_pivot7 = tail_inertia19 * bob_pivot2;
+        let bob_pivot8 = tail_inertia31 + bob_pivot7;
+        let bob_pivot9 = 1.0 / tail_inertia30;
+        let bob_pivot10 = tail_inertia28 * bob_pivot9;
+        let bob_pivot11 = tail_inertia17 * bob_pivot9;
+        let bob_pivot12 = tail_inertia28 * bob_pivot10;
+        let bob_pivot13 = tail_inertia24 - bob_pivot12;
+        let bob_pivot14 = tail_inertia28 * bob_pivot11;
+        let bob_pivot15 = tail_pivot4 - bob_pivot14;
+        let bob_pivot16 = tail_inertia17 * bob_pivot11;
+        let bob_pivot17 = tail_inertia26 - bob_pivot16;
         let bob_pivot18 = 1.0 / bob_pivot8;
         let bob_pivot19 = bob_pivot6 * bob_pivot18;
         let bob_pivot20 = bob_pivot6 * bob_pivot19;
-        let bob_pivot21 = bob_pivot4 + bob_pivot20;
+        let bob_pivot21 = bob_pivot4 - bob_pivot20;
         // tail: velocity and joint rate (4.40)
         let tail_vel0 = 0.8 * v_1;
         let tail_vel1 = 0.8 * v_0;
@@ -848,64 +856,67 @@ impl SphericalPendulum {
         let tail_load45 = tail_load29 - tail_load38;
         let tail_load46 = tail_load32 - tail_load41;
         let tail_load47 = tail_load35 + tail_load44;
-        let tail_load48 = v_3 * tail_vel3;
-        let tail_load49 = v_3 * tail_vel2;
-        let tail_load50 = v_3 * tail_vel9;
-        let tail_load51 = v_3 * tail_vel6;
+        let tail_load48 = v_3 * tail_vel0;
+        let tail_load49 = v_2 * v_3;
+        let tail_load50 = v_0 * v_3;
         // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = tau_3 + tail_load47;
-        let tail_rest1 = 36.10108303249097 * tail_rest0;
-        let tail_rest2 = 0.1004987562112089 * tail_rest1;
-        let tail_rest3 = tail_load23 - tail_rest2;
-        let tail_rest4 = 0.5 * tail_load48;
-        let tail_rest5 = 0.1353790613718412 * tail_load49;
-        let tail_rest6 = 0.1004987562112089 * tail_load51;
-        let tail_rest7 = 0.001207920792079208 * tail_load50;
-        let tail_rest8 = 0.0003792079207920793 * tail_load51;
-        let tail_rest9 = tail_rest7 - tail_rest8;
-        let tail_rest10 = 0.0003792079207920793 * tail_load50;
-        let tail_rest11 = 0.028192079207920794 * tail_load51;
-        let tail_rest12 = tail_rest10 - tail_rest11;
-        let tail_rest13 = tail_load20 - tail_rest4;
-        let tail_rest14 = tail_rest3 - tail_rest5;
-        let tail_rest15 = tail_load26 + tail_rest6;
-        let tail_rest16 = tail_load45 - tail_rest9;
-        let tail_rest17 = tail_load46 - tail_rest12;
-        let tail_rest18 = tail_cos0 * tail_rest13;
-        let tail_rest19 = tail_sin0 * tail_rest14;
-        let tail_rest20 = tail_rest18 - tail_rest19;
-        let tail_rest21 = tail_sin0 * tail_rest13;
-        let tail_rest22 = tail_cos0 * tail_rest14;
-        let tail_rest23 = tail_rest21 + tail_rest22;
-        let tail_rest24 = tail_cos0 * tail_rest16;
-        let tail_rest25 = tail_sin0 * tail_rest17;
-        let tail_rest26 = tail_rest24 + tail_rest25;
-        let tail_rest27 = tail_sin0 * tail_rest16;
-        let tail_rest28 = tail_cos0 * tail_rest17;
-        let tail_rest29 = tail_rest27 - tail_rest28;
-        let tail_rest30 = 0.8 * tail_rest15;
-        let tail_rest31 = tail_rest26 + tail_rest30;
-        let tail_rest32 = 0.8 * tail_rest20;
-        let tail_rest33 = tau_3 + tail_rest32;
-        let tail_rest34 = bob_load5 + tail_rest20;
-        let tail_rest35 = bob_load6 - tail_rest15;
-        let tail_rest36 = bob_load9 + tail_rest23;
-        let tail_rest37 = bob_load12 + tail_rest31;
-        let tail_rest38 = bob_load15 + tail_rest33;
-        let tail_rest39 = bob_load18 - tail_rest29;
+        let tail_rest0 = tail_cos0 * tail_load20;
+        let tail_rest1 = tail_sin0 * tail_load23;
+        let tail_rest2 = tail_rest0 - tail_rest1;
+        let tail_rest3 = tail_sin0 * tail_load20;
+        let tail_rest4 = tail_cos0 * tail_load23;
+        let tail_rest5 = tail_rest3 + tail_rest4;
+        let tail_rest6 = tail_cos0 * tail_load45;
+        let tail_rest7 = tail_sin0 * tail_load46;
+        let tail_rest8 = tail_rest6 + tail_rest7;
+        let tail_rest9 = tail_sin0 * tail_load45;
+        let tail_rest10 = tail_cos0 * tail_load46;
+        let tail_rest11 = tail_rest9 - tail_rest10;
+        let tail_rest12 = tau_3 + tail_load47;
+        let tail_rest13 = 36.10108303249097 * tail_rest12;
+        let tail_rest14 = tail_inertia1 * tail_rest13;
+        let tail_rest15 = tail_rest2 + tail_rest14;
+        let tail_rest16 = tail_inertia2 * tail_rest13;
+        let tail_rest17 = tail_rest5 - tail_rest16;
+        let tail_rest18 = tail_pivot4 * tail_load48;
+        let tail_rest19 = tail_pivot6 * tail_load48;
+        let tail_rest20 = tail_inertia1 * tail_load49;
+        let tail_rest21 = tail_inertia2 * tail_load50;
+        let tail_rest22 = tail_rest20 - tail_rest21;
+        let tail_rest23 = tail_inertia9 * tail_load49;
+        let tail_rest24 = tail_inertia8 * tail_load50;
+        let tail_rest25 = tail_rest23 - tail_rest24;
+        let tail_rest26 = tail_inertia8 * tail_load49;
+        let tail_rest27 = tail_inertia10 * tail_load50;
+        let tail_rest28 = tail_rest26 + tail_rest27;
+        let tail_rest29 = tail_rest15 - tail_rest18;
+        let tail_rest30 = tail_rest17 + tail_rest19;
+        let tail_rest31 = tail_load26 - tail_rest22;
+        let tail_rest32 = tail_rest8 - tail_rest25;
+        let tail_rest33 = tail_rest11 + tail_rest28;
+        let tail_rest34 = 0.8 * tail_rest31;
+        let tail_rest35 = tail_rest32 + tail_rest34;
+        let tail_rest36 = 0.8 * tail_rest29;
+        let tail_rest37 = tau_3 + tail_rest36;
+        let tail_rest38 = bob_load5 + tail_rest29;
+        let tail_rest39 = bob_load6 - tail_rest31;
+        let tail_rest40 = bob_load9 + tail_rest30;
+        let tail_rest41 = bob_load12 + tail_rest35;
+        let tail_rest42 = bob_load15 + tail_rest37;
+        let tail_rest43 = bob_load18 - tail_rest33;
         // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = tau_0 - tail_rest37;
+        let bob_rest0 = tau_0 - tail_rest41;
         let bob_rest1 = bob_pivot0 * bob_rest0;
-        let bob_rest2 = tail_inertia32 * bob_rest1;
-        let bob_rest3 = tail_rest35 - bob_rest2;
-        let bob_rest4 = tail_inertia24 * bob_rest1;
-        let bob_rest5 = tail_rest39 + bob_rest4;
-        let bob_rest6 = tau_1 - tail_rest38;
+        let bob_rest2 = tail_inertia27 * bob_rest1;
+        let bob_rest3 = tail_rest39 - bob_rest2;
+        let bob_rest4 = tail_inertia19 * bob_rest1;
+        let bob_rest5 = tail_rest43 + bob_rest4;
+        let bob_rest6 = tau_1 - tail_rest42;
         let bob_rest7 = bob_pivot9 * bob_rest6;
-        let bob_rest8 = tail_inertia33 * bob_rest7;
-        let bob_rest9 = tail_rest34 + bob_rest8;
-        let bob_rest10 = tail_inertia22 * bob_rest7;
-        let bob_rest11 = tail_rest36 - bob_rest10;
+        let bob_rest8 = tail_inertia28 * bob_rest7;
+        let bob_rest9 = tail_rest38 + bob_rest8;
+        let bob_rest10 = tail_inertia17 * bob_rest7;
+        let bob_rest11 = tail_rest40 - bob_rest10;
         let bob_rest12 = tau_2 - bob_rest5;
         let bob_rest13 = bob_pivot18 * bob_rest12;
         let bob_rest14 = bob_pivot6 * bob_rest13;
@@ -929,22 +940,9 @@ impl SphericalPendulum {
         let tail_acc1 = bob_acc0 + tail_acc0;
         let tail_acc2 = 0.8 * bob_acc12;
         let tail_acc3 = bob_acc1 + tail_acc2;
-        let tail_acc4 = tail_cos0 * tail_acc1;
-        let tail_acc5 = tail_sin0 * bob_acc2;
-        let tail_acc6 = tail_acc4 + tail_acc5;
-        let tail_acc7 = tail_cos0 * bob_acc2;
-        let tail_acc8 = tail_sin0 * tail_acc1;
-        let tail_acc9 = tail_acc7 - tail_acc8;
-        let tail_acc10 = tail_cos0 * bob_acc12;
-        let tail_acc11 = tail_sin0 * bob_acc4;
-        let tail_acc12 = tail_acc10 + tail_acc11;
-        let tail_acc13 = tail_cos0 * bob_acc4;
-        let tail_acc14 = tail_sin0 * bob_acc12;
-        let tail_acc15 = tail_acc13 - tail_acc14;
-        let tail_acc16 = tail_load48 + tail_acc6;
-        let tail_acc17 = tail_load49 + tail_acc9;
-        let tail_acc18 = tail_load50 - tail_acc12;
-        let tail_acc19 = tail_load51 - tail_acc15;
+        let tail_acc4 = tail_load48 + bob_acc2;
+        let tail_acc5 = tail_load49 - bob_acc12;
+        let tail_acc6 = tail_load50 - bob_acc4;
         // bob: reaction wrench (4.66)
         let bob_react0 = bob_pivot13 * bob_acc0;
         let bob_react1 = bob_pivot15 * bob_acc2;
@@ -952,53 +950,73 @@ impl SphericalPendulum {
         let bob_react3 = bob_pivot21 * bob_acc1;
         let bob_react4 = bob_pivot15 * bob_acc0;
         let bob_react5 = bob_pivot17 * bob_acc2;
-        let bob_react6 = bob_react4 + bob_react5;
+        let bob_react6 = bob_react4 - bob_react5;
         let bob_react7 = bob_rest9 + bob_react2;
-        let bob_react8 = bob_react3 - bob_rest15;
+        let bob_react8 = bob_rest15 + bob_react3;
         let bob_react9 = bob_rest11 - bob_react6;
         // tail: reaction wrench (4.66)
-        let tail_react0 = 0.5 * tail_acc16;
-        let tail_react1 = 0.1353790613718412 * tail_acc17;
-        let tail_react2 = 0.5 * tail_acc3;
-        let tail_react3 = 0.1004987562112089 * tail_acc19;
-        let tail_react4 = tail_react2 + tail_react3;
-        let tail_react5 = 0.001207920792079208 * tail_acc18;
-        let tail_react6 = 0.0003792079207920793 * tail_acc19;
-        let tail_react7 = tail_react5 - tail_react6;
-        let tail_react8 = 0.1004987562112089 * tail_acc3;
-        let tail_react9 = 0.0003792079207920793 * tail_acc18;
-        let tail_react10 = tail_react8 - tail_react9;
-        let tail_react11 = 0.028192079207920794 * tail_acc19;
-        let tail_react12 = tail_react10 + tail_react11;
-        let tail_react13 = tail_load20 - tail_react0;
-        let tail_react14 = tail_rest3 - tail_react1;
-        let tail_react15 = tail_load26 + tail_react4;
-        let tail_react16 = tail_load45 - tail_react7;
-        let tail_react17 = tail_load46 + tail_react12;
-        let tail_react18 = 0.09950371902099892 * tail_react13;
-        let tail_react19 = 0.9950371902099892 * tail_react14;
-        let tail_react20 = tail_react19 - tail_react18;
-        let tail_react21 = 0.9950371902099892 * tail_react13;
-        let tail_react22 = 0.09950371902099892 * tail_react14;
-        let tail_react23 = tail_react21 + tail_react22;
-        let tail_react24 = 0.09950371902099892 * tail_react16;
-        let tail_react25 = 0.9950371902099892 * tail_react17;
-        let tail_react26 = tail_react24 + tail_react25;
-        let tail_react27 = 0.9950371902099892 * tail_react16;
-        let tail_react28 = 0.09950371902099892 * tail_react17;
-        let tail_react29 = tail_react28 - tail_react27;
+        let tail_react0 = tail_pivot3 * tail_acc1;
+        let tail_react1 = tail_pivot4 * tail_acc4;
+        let tail_react2 = tail_react0 - tail_react1;
+        let tail_react3 = tail_pivot4 * tail_acc1;
+        let tail_react4 = tail_pivot6 * tail_acc4;
+        let tail_react5 = tail_react3 - tail_react4;
+        let tail_react6 = 0.5 * tail_acc3;
+        let tail_react7 = tail_inertia1 * tail_acc5;
+        let tail_react8 = tail_react6 - tail_react7;
+        let tail_react9 = tail_inertia2 * tail_acc6;
+        let tail_react10 = tail_react8 + tail_react9;
+        let tail_react11 = tail_inertia1 * tail_acc3;
+        let tail_react12 = tail_inertia9 * tail_acc5;
+        let tail_react13 = tail_react11 - tail_react12;
+        let tail_react14 = tail_inertia8 * tail_acc6;
+        let tail_react15 = tail_react13 + tail_react14;
+        let tail_react16 = tail_inertia2 * tail_acc3;
+        let tail_react17 = tail_inertia8 * tail_acc5;
+        let tail_react18 = tail_react16 - tail_react17;
+        let tail_react19 = tail_inertia10 * tail_acc6;
+        let tail_react20 = tail_react18 - tail_react19;
+        let tail_react21 = tail_rest15 + tail_react2;
+        let tail_react22 = tail_rest17 - tail_react5;
+        let tail_react23 = tail_load26 + tail_react10;
+        let tail_react24 = tail_rest8 + tail_react15;
+        let tail_react25 = tail_rest11 - tail_react20;
+        let tail_react26 = tail_cos0 * tail_react21;
+        let tail_react27 = tail_sin0 * tail_react22;
+        let tail_react28 = tail_react26 + tail_react27;
+        let tail_react29 = tail_cos0 * tail_react22;
+        let tail_react30 = tail_sin0 * tail_react21;
+        let tail_react31 = tail_react29 - tail_react30;
+        let tail_react32 = tail_cos0 * tail_react24;
+        let tail_react33 = tail_sin0 * tail_react25;
+        let tail_react34 = tail_react32 + tail_react33;
+        let tail_react35 = tail_cos0 * tail_react25;
+        let tail_react36 = tail_sin0 * tail_react24;
+        let tail_react37 = tail_react35 - tail_react36;
+        let tail_react38 = 0.09950371902099892 * tail_react28;
+        let tail_react39 = 0.9950371902099892 * tail_react31;
+        let tail_react40 = tail_react39 - tail_react38;
+        let tail_react41 = 0.9950371902099892 * tail_react28;
+        let tail_react42 = 0.09950371902099892 * tail_react31;
+        let tail_react43 = tail_react41 + tail_react42;
+        let tail_react44 = 0.09950371902099892 * tail_react34;
+        let tail_react45 = 0.9950371902099892 * tail_react37;
+        let tail_react46 = tail_react44 - tail_react45;
+        let tail_react47 = 0.9950371902099892 * tail_react34;
+        let tail_react48 = 0.09950371902099892 * tail_react37;
+        let tail_react49 = tail_react47 + tail_react48;
         reactions[0][0] = -bob_react7;
-        reactions[0][1] = bob_react8;
+        reactions[0][1] = -bob_react8;
         reactions[0][2] = bob_react9;
         reactions[0][3] = tau_0;
         reactions[0][4] = tau_1;
         reactions[0][5] = tau_2;
-        reactions[1][0] = tail_react20;
-        reactions[1][1] = tail_react15;
-        reactions[1][2] = tail_react23;
-        reactions[1][3] = tail_react26;
+        reactions[1][0] = tail_react40;
+        reactions[1][1] = tail_react23;
+        reactions[1][2] = tail_react43;
+        reactions[1][3] = tail_react46;
         reactions[1][4] = tau_3;
-        reactions[1][5] = tail_react29;
+        reactions[1][5] = -tail_react49;
     }
 
     /// Mass matrix, by rows.

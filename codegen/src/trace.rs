@@ -93,7 +93,11 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let inputs =
         Inputs { tau: &tau, drive_q: &drive_q, drive_v: &drive_v, drive_a: &drive_a, wrenches: &wrenches, gravity };
     let physical: Tree<Expr> = plan.tree(&params);
-    let tree = if group == Group::Reactions { physical } else { physical.regrouped() };
+    let tree = match group {
+        Group::Reactions => physical.with_columns_carried(),
+        Group::Accelerations => physical.regrouped().with_columns_carried(),
+        _ => physical.regrouped(),
+    };
     let frames = chosen_frames(plan, options)?;
     let outputs = run(&graph, &tree, group, &q, &second, &inputs, &frames);
     let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);

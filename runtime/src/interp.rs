@@ -49,6 +49,8 @@ impl<S: Scalar> InputValues<S> {
 pub struct Interpreter<S> {
     /// Regrouped: everything but reactions.
     tree: Tree<S>,
+    /// The same for accelerations.
+    carried: Tree<S>,
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
@@ -63,6 +65,7 @@ impl<S: Scalar> Interpreter<S> {
     /// An interpreter of a tree as it was described (not regrouped), with zero inputs and the given gravity.
     pub fn new(physical: Tree<S>, gravity: [S; 3]) -> Self {
         let tree = physical.regrouped();
+        let physical = physical.with_columns_carried();
         let dims = tree.dims;
         let o = S::zero();
         let (mut quaternions, mut drive_q) = (Vec::new(), vec![o; dims.drive_q]);
@@ -89,7 +92,16 @@ impl<S: Scalar> Interpreter<S> {
             wrenches: vec![[o; 6]; dims.wrenches],
             gravity,
         };
-        Interpreter { work: Workspace::new(&tree), v: vec![o; dims.nv], tree, physical, inputs, quaternions, neutral }
+        Interpreter {
+            work: Workspace::new(&tree),
+            v: vec![o; dims.nv],
+            carried: tree.with_columns_carried(),
+            tree,
+            physical,
+            inputs,
+            quaternions,
+            neutral,
+        }
     }
 
     /// The tree that is run.
@@ -123,7 +135,7 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, v) → v̇`.
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        let sweeps = Sweeps { tree: &self.carried, trace: &() };
         sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
     }
 

@@ -174,6 +174,16 @@ pub struct Node<S> {
     pub shared: Option<usize>,
     /// The coordinate is this node's alone, only solved further inboard (with others, as a block).
     pub deferred: bool,
+    /// Eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is divided by does not
+    /// wait for the turn. Joints about or along z only.
+    pub parent_side: bool,
+    /// Momentum rate from the accumulated momentum `P*` instead of a quadratic form of the velocity.
+    pub gather: bool,
+    /// Shared coordinates whose columns are not carried further inward, because the screws of all freedoms inboard that
+    /// they meet are carried out to this node.
+    pub ends: Vec<usize>,
+    /// Those screws, by the coordinates they belong to (each of a deferred freedom).
+    pub screws: Vec<usize>,
     /// Shared coordinates with members in the subtree of this node that are not solved below it.
     pub open: Vec<usize>,
     /// Those solved at this node, before its own freedoms (its subtrees hold all members).
@@ -285,6 +295,24 @@ impl<S: Scalar> Tree<S> {
             match tree.nodes[i].parent {
                 Some(p) => tree.nodes[p].inertia = tree.nodes[p].inertia.plus(&at_parent),
                 None => tree.ground_moment = crate::spatial::add3(tree.ground_moment, at_parent.moment),
+            }
+        }
+        tree
+    }
+}
+
+impl<S: Scalar> Tree<S> {
+    /// The same mechanism with every open column carried inward to where it is solved, instead of ending where it meets
+    /// screws: imposed motions need the columns on their whole way.
+    pub fn with_columns_carried(&self) -> Tree<S> {
+        let mut tree = self.clone();
+        for i in (0..tree.nodes.len()).rev() {
+            let ending = core::mem::take(&mut tree.nodes[i].ends);
+            tree.nodes[i].screws.clear();
+            let mut at = Some(i);
+            while let Some(k) = at {
+                tree.nodes[k].open.extend(&ending);
+                at = tree.nodes[k].parent;
             }
         }
         tree

@@ -78,6 +78,9 @@ pub struct Factor<S> {
     pub shared: Vec<Pivot<S>>,
     /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
     pub columns: Vec<Force<S>>,
+    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Node::screws`] asks for it, at
+    /// `g · nodes + i`.
+    pub screws: Vec<Motion<S>>,
     /// Inertia between shared coordinates, while they are open.
     pub gram: Vec<S>,
     /// `E · F_h` of every freedom with every open coordinate, at `freedom · shared + h`.
@@ -180,6 +183,7 @@ impl<S: Scalar> Workspace<S> {
                 pivots: vec![pivot; f],
                 shared: vec![pivot; g],
                 columns: vec![Force::zero(); g * n],
+                screws: vec![Motion::zero(); g * n],
                 gram: vec![o; g * g],
                 cross: vec![o; f * g],
                 shared_cross: vec![o; g * g],

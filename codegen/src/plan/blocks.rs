@@ -26,31 +26,102 @@ pub enum Blocks {
     None,
 }
 
-/// Chooses a block for every branch, outermost branches by themselves.
+/// How the freedoms of a chain are eliminated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Form {
+    /// Joints before this one (of a chain that starts at the ground) keep their screws, which are carried outward; they
+    /// are solved together at the ground.
+    split: usize,
+    /// Joints from this one on are solved together: at `base`, or with those before `split` where the two meet. The last
+    /// joint stands for no block.
+    base: usize,
+    /// Joints eliminated on the parent's side of their own motion.
+    turned: Vec<bool>,
+    /// Joints before this one get their momentum rates from accumulated momenta.
+    gather: usize,
+}
+
+/// Chooses a form for every chain that ends at a tip, one after the other.
 pub fn choose(plan: &mut Plan) {
     if plan.nodes.len() > LARGEST {
         return;
     }
-    let chains = tip_chains(plan);
-    let mut best = cost(plan);
-    for chain in chains {
-        let mut chosen = None;
-        for base in 0..chain.len().saturating_sub(1) {
-            if chain.len() - base > LONGEST {
-                continue;
-            }
-            let mut candidate = plan.clone();
-            solve_together(&mut candidate, &chain[base..]);
-            let operations = cost(&candidate);
-            if operations < best {
-                best = operations;
-                chosen = Some(candidate);
-            }
+    for chain in tip_chains(plan) {
+        let mut search = Search { plan, chain: &chain, best: cost(plan), chosen: None };
+        for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
+            search.consider(form);
         }
-        if let Some(chosen) = chosen {
+        while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
+        if let Some((_, chosen)) = search.chosen {
             *plan = chosen;
         }
     }
+}
+
+struct Search<'a> {
+    plan: &'a Plan,
+    chain: &'a [usize],
+    best: usize,
+    chosen: Option<(Form, Plan)>,
+}
+
+impl Search<'_> {
+    /// Takes a form if it is better than all before.
+    fn consider(&mut self, form: Form) -> bool {
+        let mut candidate = self.plan.clone();
+        apply(&mut candidate, self.chain, &form);
+        let operations = cost(&candidate);
+        let better = operations < self.best;
+        if better {
+            self.best = operations;
+            self.chosen = Some((form, candidate));
+        }
+        better
+    }
+
+    /// Tries forms that differ a little from the best; says whether one of them is better.
+    fn neighbours(&mut self, from_ground: bool) -> bool {
+        let Some((form, _)) = self.chosen.clone() else { return false };
+        let len = self.chain.len();
+        let mut near = Vec::new();
+        if form.gather < len {
+            near.push(Form { gather: form.gather + 1, ..form.clone() });
+        }
+        if from_ground && form.split < form.base {
+            near.push(Form { split: form.split + 1, gather: form.gather.max(form.split + 1), ..form.clone() });
+        }
+        for k in 0..len.min(LONGEST) {
+            let mut turned = form.turned.clone();
+            turned[len - 1 - k] ^= true;
+            near.push(Form { turned, ..form.clone() });
+        }
+        near.into_iter().fold(false, |better, form| self.consider(form) || better)
+    }
+}
+
+/// The forms to begin with.
+fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
+    let mut forms = Vec::new();
+    let mut add = |split: usize, base: usize, from: usize, gather: usize| {
+        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), gather };
+        if !forms.contains(&form) {
+            forms.push(form);
+        }
+    };
+    for base in (0..len).filter(|base| len - base <= LONGEST) {
+        for from in [0, base, len] {
+            add(0, base, from, 0);
+            if from_ground && base > 0 && base <= LONGEST {
+                add(base, base, from, base);
+            }
+        }
+    }
+    for split in (1..len.min(LONGEST)).filter(|_| from_ground) {
+        for gather in [split, len] {
+            add(split, len - 1, 0, gather);
+        }
+    }
+    forms
 }
 
 /// Operations of the rates.
@@ -79,18 +150,44 @@ fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
     .collect()
 }
 
-/// Marks all joints of a chain but the first to be solved at the first.
-fn solve_together(plan: &mut Plan, chain: &[usize]) {
-    let base = chain[0];
-    for (k, &i) in chain.iter().enumerate().skip(1).rev() {
-        let g = plan.shared.len();
-        let Source::State { v, .. } = plan.nodes[i].source else { continue };
-        plan.shared.push(v);
-        plan.nodes[i].shared = Some(g);
-        plan.nodes[i].deferred = true;
-        for &j in &chain[1..=k] {
+fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
+    for (&i, &turned) in chain.iter().zip(&form.turned) {
+        plan.nodes[i].parent_side = turned;
+    }
+    for &i in &chain[..form.gather] {
+        plan.nodes[i].gather = true;
+    }
+    let met = form.split == form.base && form.split > 0;
+    let first = if met { form.base } else { form.base + 1 };
+    for k in (first..chain.len()).rev() {
+        let Some(g) = defer(plan, chain[k]) else { continue };
+        for &j in &chain[first.max(form.base + 1)..=k] {
             plan.nodes[j].open.push(g);
         }
-        plan.nodes[base].solve_before.push(g);
+        if met {
+            plan.nodes[chain[form.base]].ends.push(g);
+            plan.solve_at_ground.push(g);
+        } else {
+            plan.nodes[chain[form.base]].solve_before.push(g);
+        }
     }
+    for k in (0..form.split).rev() {
+        let Some(g) = defer(plan, chain[k]) else { continue };
+        plan.nodes[chain[k]].ends.push(g);
+        plan.solve_at_ground.push(g);
+        let last = if met { form.split } else { form.split - 1 };
+        for &j in &chain[k + 1..=last] {
+            plan.nodes[j].screws.push(g);
+        }
+    }
+}
+
+/// Makes a freedom one that is solved further inboard; gives its number among the shared coordinates.
+fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
+    let Source::State { v, .. } = plan.nodes[i].source else { return None };
+    let g = plan.shared.len();
+    plan.shared.push(v);
+    plan.nodes[i].shared = Some(g);
+    plan.nodes[i].deferred = true;
+    Some(g)
 }

@@ -115,6 +115,14 @@ pub struct PlanNode {
     /// See [`mbd_runtime::tree::Node`].
     pub deferred: bool,
     /// See [`mbd_runtime::tree::Node`].
+    pub parent_side: bool,
+    /// See [`mbd_runtime::tree::Node`].
+    pub gather: bool,
+    /// See [`mbd_runtime::tree::Node`].
+    pub ends: Vec<usize>,
+    /// See [`mbd_runtime::tree::Node`].
+    pub screws: Vec<usize>,
+    /// See [`mbd_runtime::tree::Node`].
     pub open: Vec<usize>,
     /// See [`mbd_runtime::tree::Node`].
     pub solve_before: Vec<usize>,

@@ -10,7 +10,7 @@ use crate::Scalar;
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `M*`, `U`, `Mj`, `M'` of every node (4.48, 4.44).
     pub fn factor(&self, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
-        self.factor_begin(f);
+        self.factor_begin(poses, f);
         for i in (0..self.tree.nodes.len()).rev() {
             self.factor_node(i, poses, first, f);
         }
@@ -18,20 +18,46 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Before the first [`Sweeps::factor_node`]: every body by itself.
-    pub fn factor_begin(&self, f: &mut Factor<S>) {
+    pub fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             f.m[i] = node.inertia.articulated();
         }
         f.columns.fill(Force::zero());
         f.gram.fill(S::zero());
+        for i in 0..self.tree.nodes.len() {
+            self.screws_node(i, poses, f);
+        }
+    }
+
+    /// Screws that node `i` is to have, from its parent.
+    fn screws_node(&self, i: usize, poses: &Poses<S>, f: &mut Factor<S>) {
+        let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
+        let Some(p) = node.parent else { return };
+        let inner = &self.tree.nodes[p];
+        for &g in &node.screws {
+            self.trace.at(Some(i), Quantity::Inertia);
+            let at_parent = match inner.shared == Some(g) {
+                true => inner.kind.axis(0).motion(S::one()),
+                false => self.leaving(poses, p).fold(f.screws[g * n + p], |m, step| step.motion(&m)),
+            };
+            f.screws[g * n + i] = self.entering(poses, i).fold(at_parent, |m, step| step.motion(&m));
+        }
     }
 
     /// [`Sweeps::factor`] for node `i` alone, all nodes behind it being done.
     pub fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
-        self.trace.at(Some(i), Quantity::Pivot);
         let mut m = f.m[i]; // M*_i (4.48)
+        if node.parent_side {
+            self.trace.at(Some(i), Quantity::Inertia);
+            m = self.leaving(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+            for g in Self::open_before(node, 0) {
+                let column = f.columns[g * n + i];
+                f.columns[g * n + i] = self.leaving(poses, i).rev().fold(column, |f, step| step.force(&f));
+            }
+        }
+        self.trace.at(Some(i), Quantity::Pivot);
         for (k, &g) in node.solve_before.iter().enumerate() {
             self.solve_shared(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
         }
@@ -42,12 +68,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.solve_shared(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
         }
         f.m[i] = m; // M'_i (4.44)
+        let ng = self.tree.shared.len();
+        for (&h, &g) in node.ends.iter().flat_map(|h| node.screws.iter().map(move |g| (h, g))) {
+            let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
+            f.gram[g * ng + h] = x;
+            f.gram[h * ng + g] = x;
+        }
         let Some(parent) = node.parent else { return };
         self.trace.at(Some(i), Quantity::Inertia);
-        let carried = self.steps(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+        let carried = self.entering(poses, i).rev().fold(m, |m, step| step.inertia(&m));
         f.m[parent] = f.m[parent].plus(&carried);
         for &g in &node.open {
-            let column = self.force_out(poses, i, &f.columns[g * n + i]);
+            let column = self.entering(poses, i).rev().fold(f.columns[g * n + i], |f, step| step.force(&f));
             f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
         }
     }

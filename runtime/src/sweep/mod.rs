@@ -110,14 +110,35 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.tree.nodes[i].place.iter().chain(w.joint[i].get())
     }
 
+    /// The part of [`Sweeps::steps`] ahead of the frame that node `i` is eliminated in.
+    fn entering<'b>(
+        &'b self,
+        w: &'b crate::workspace::Poses<S>,
+        i: usize,
+    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+        let node = &self.tree.nodes[i];
+        let own: &[Step<S>] = if node.parent_side { &[] } else { w.joint[i].get() };
+        node.place.iter().chain(own)
+    }
+
+    /// The rest: from there to the node frame.
+    fn leaving<'b>(
+        &'b self,
+        w: &'b crate::workspace::Poses<S>,
+        i: usize,
+    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+        let own: &[Step<S>] = if self.tree.nodes[i].parent_side { w.joint[i].get() } else { &[] };
+        own.iter()
+    }
+
     /// Shared coordinates still open after position `k` of `solve_before`.
     fn open_before(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
-        node.solve_before[k..].iter().chain(&node.solve_after).chain(&node.open).copied()
+        node.solve_before[k..].iter().chain(&node.solve_after).chain(&node.open).chain(&node.ends).copied()
     }
 
     /// Shared coordinates still open after position `k` of `solve_after`.
     fn open_after(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
-        node.solve_after[k..].iter().chain(&node.open).copied()
+        node.solve_after[k..].iter().chain(&node.open).chain(&node.ends).copied()
     }
 
     /// Momenta from velocities, `p = M(q) v`, without forming `M`. `p` has one entry for each velocity.
@@ -149,6 +170,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.velocities(q, p, u, w, v);
         self.coordinate_rates(q, v, qd);
         self.loads(u, w);
+        self.gather_momenta(p, w);
         self.momentum_rates(u, w, pd);
     }
 
@@ -176,7 +198,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
     pub fn reactions(&self, w: &Workspace<S>, out: &mut [[S; 6]]) {
         for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
             self.trace.at(Some(i), Quantity::Reaction);
-            let f = self.transmitted(&w.factor, &w.acceleration, i);
+            let f = self.transmitted(&w.poses, &w.first, &w.factor, &w.acceleration, i);
             let f = self.tree.frames[k].place.iter().fold(f, |f, step| step.force_back(&f));
             *out = core::array::from_fn(|c| f.get(c));
         }

@@ -65,7 +65,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
             Source::State { .. } => {}
             Source::Drive { .. } => {
-                let momentum = self.transmitted(&w.factor, &w.velocity, i);
+                let momentum = self.transmitted(&w.poses, &w.first, &w.factor, &w.velocity, i);
                 for (k, passive) in node.passive.iter().enumerate() {
                     let along = node.kind.axis(k).dot(&momentum) + passive.armature * rate(k);
                     twice = twice + along * rate(k);

@@ -20,24 +20,58 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
+    /// node's own axis is known: `EᵀP* = p − armature · rate`.
+    pub(super) fn gather_momenta(&self, p: &[S], w: &mut Workspace<S>) {
+        for (i, node) in self.tree.nodes.iter().enumerate().filter(|(_, node)| node.gather) {
+            self.trace.at(Some(i), Quantity::Momentum);
+            w.force[i] = node.inertia.momentum(&w.velocity.omega[i]);
+        }
+        for i in (0..self.tree.nodes.len()).rev() {
+            let node = &self.tree.nodes[i];
+            self.trace.at(Some(i), Quantity::Momentum);
+            if node.gather {
+                w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
+            }
+            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].gather) else { continue };
+            let mut total = match node.gather {
+                true => w.force[i],
+                false => {
+                    let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
+                    w.factor.m[i].times(&motion).plus(&d)
+                }
+            };
+            if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
+                if node.shared.is_none() || node.deferred {
+                    *total.get_mut(z) = p[v] - node.passive[0].armature * w.velocity.rate[w.first[i]];
+                }
+            }
+            let out = self.entering(&w.poses, i).rev().fold(total, |f, step| step.force(&f));
+            w.force[parent] = w.force[parent].plus(&out);
+        }
+    }
+
     /// [`Sweeps::momentum_rates`] for node `i` alone, without `τ`; added to `pd`.
     pub fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::MomentumRate);
+        if node.gather {
+            let mut motion = w.velocity.hat[i];
+            node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
+            let axis = node.kind.axis(0);
+            let sum = self.applied(w, i, &axis) - axis.dot(&motion.cross_force(&w.force[i]));
+            pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+            return;
+        }
         let m = &w.factor.m[i];
-        // A freedom that is solved further inboard leaves M* whole here: then Ω takes the place of Ω̂, and its own
-        // column, M* E, is in M* already.
-        let (d, hat) = match node.deferred {
-            false => (self.remainder_with_open(&w.factor, &w.velocity, i, None), &w.velocity.hat[i]),
-            true => (self.remainder_with_open(&w.factor, &w.velocity, i, node.shared), &w.velocity.omega[i]),
-        };
+        let (hat, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
         let gyro = match node.kind {
-            Kind::Pin => gyro_turn(m, hat, &d),
-            Kind::Slider => gyro_slide(m, hat, &d),
-            Kind::Helical { pitch } => gyro_turn(m, hat, &d) + pitch * gyro_slide(m, hat, &d),
+            Kind::Pin => gyro_turn(m, &hat, &d),
+            Kind::Slider => gyro_slide(m, &hat, &d),
+            Kind::Helical { pitch } => gyro_turn(m, &hat, &d) + pitch * gyro_slide(m, &hat, &d),
             Kind::Planar | Kind::Spherical | Kind::Floating => {
-                let force = w.velocity.omega[i].cross_force(&m.times(hat).plus(&d));
+                let force = w.velocity.omega[i].cross_force(&m.times(&hat).plus(&d));
                 for k in 0..node.kind.nv() {
                     let axis = node.kind.axis(k);
                     let sum = self.applied(w, i, &axis) - axis.dot(&force);
@@ -96,7 +130,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub fn acceleration_seed_node(&self, i: usize, w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Load);
-        let omega = w.velocity.omega[i];
+        let mut omega = w.velocity.omega[i];
         let mut seed = omega.cross_force(&node.inertia.momentum(&omega));
         if !self.tree.wrenches.is_empty() {
             seed = seed.minus(&w.loads.own[i]);
@@ -108,6 +142,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             if let Source::State { v, .. } = node.source {
                 w.generalized[v + k] = w.generalized[v + k] + node.ratio * self.passive(node, w, i, k);
             }
+        }
+        if node.parent_side {
+            let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
+            omega = self.entering(&w.poses, i).fold(outer, |m, step| step.motion(&m)).plus(&joint);
         }
         w.imposed[i] = omega.cross_motion(&joint);
     }

@@ -86,7 +86,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Remainder);
-        let mut d = sol.d[i]; // D_i (4.49)
+        let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
         for (k, &g) in node.solve_before.iter().enumerate() {
             let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
             d = d.plus(&f.shared[g].u.times(e));
@@ -109,12 +109,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         match node.parent {
             Some(parent) => {
-                let carried = self.force_out(poses, i, &d);
+                let carried = self.entering(poses, i).rev().fold(d, |d, step| step.force(&d));
                 sol.d[parent] = sol.d[parent].plus(&carried);
             }
             // Coordinates solved at the ground feel its motion through the columns that end here.
             None if !node.open.is_empty() => {
-                let outer = self.motion_in(poses, i, &load.ground);
+                let outer = self.entering(poses, i).fold(load.ground, |m, step| step.motion(&m));
                 let n = self.tree.nodes.len();
                 for &h in &node.open {
                     sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&outer);
@@ -211,7 +211,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), load.what);
         let outer = node.parent.map_or(load.ground, |p| sol.omega[p]);
-        let mut hat = self.motion_in(poses, i, &outer);
+        let mut hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
         if let Some(imposed) = load.imposed {
             hat = hat.plus(&imposed[i]);
         }
@@ -222,23 +222,35 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let mut omega = hat;
         for k in (0..node.kind.nv()).rev() {
             let freedom = first[i] + k;
+            let axis = node.kind.axis(k);
             let rate = match (node.shared, node.source) {
                 (Some(g), _) => node.ratio * sol.shared_rate[g],
                 (None, Source::Drive { .. }) => sol.e[freedom],
                 (None, Source::State { .. }) => {
                     let pivot = &f.pivots[freedom];
+                    let open = |rate: S, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h];
+                    if let Freedom::Unit(z) = axis {
+                        // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
+                        let mut row = pivot.k;
+                        *row.get_mut(z) = -(pivot.armature * pivot.rho);
+                        let total = sol.e[freedom] - row.dot(&omega);
+                        let total = Self::open_after(node, 0).fold(total, open);
+                        sol.rate[freedom] = total - omega.get(z); // (4.40)
+                        *omega.get_mut(z) = total;
+                        continue;
+                    }
                     let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
-                    Self::open_after(node, 0)
-                        .fold(rate, |rate, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h])
+                    Self::open_after(node, 0).fold(rate, open)
                 }
             };
             sol.rate[freedom] = rate;
-            node.kind.axis(k).add_to(&mut omega, rate);
+            axis.add_to(&mut omega, rate);
         }
         for (k, &g) in node.solve_before.iter().enumerate().rev() {
             self.shared_motion(g, f, &omega, Self::open_before(node, k + 1), sol);
         }
-        sol.omega[i] = omega; // Ω_i
+        sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m));
+        // Ω_i
     }
 
     fn shared_motion(
@@ -261,22 +273,31 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.solve(&w.poses, &w.first, &w.factor, &Load::velocities(p, u), &mut w.velocity);
     }
 
-    /// Wrench (or momentum) that node `i` receives from its parent, in its own frame: `M'Ω̂ + D'` (4.43).
-    pub(super) fn transmitted(&self, f: &Factor<S>, sol: &Solution<S>, i: usize) -> Force<S> {
-        f.m[i].times(&sol.hat[i]).plus(&self.remainder_with_open(f, sol, i, None))
-    }
-
-    /// `D'` and what open coordinates, all but one, add to it.
-    pub(super) fn remainder_with_open(
+    /// Wrench (or momentum) that node `i` receives from its parent, in the node frame: `M'Ω̂ + D'` (4.43).
+    pub(super) fn transmitted(
         &self,
+        poses: &Poses<S>,
+        first: &[usize],
         f: &Factor<S>,
         sol: &Solution<S>,
         i: usize,
-        except: Option<usize>,
     ) -> Force<S> {
-        let n = self.tree.nodes.len();
-        let open = self.tree.nodes[i].open.iter().filter(|&&g| Some(g) != except);
-        open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.shared_rate[g])))
+        let (motion, d) = self.acting(first, f, sol, i);
+        self.leaving(poses, i).fold(f.m[i].times(&motion).plus(&d), |f, step| step.force_back(&f))
+    }
+
+    /// The motion that `M'` of node `i` acts on and what is to be added to it, in the frame it is eliminated in: `Ω̂` and
+    /// `D'` with what the open coordinates add. A freedom that is solved further inboard leaves `M*` whole: then `Ω`
+    /// takes the place of `Ω̂`, and the freedom's own column, `M* E`, is in `M*` already.
+    pub(super) fn acting(&self, first: &[usize], f: &Factor<S>, sol: &Solution<S>, i: usize) -> (Motion<S>, Force<S>) {
+        let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
+        let (mut motion, mut own) = (sol.hat[i], None);
+        if node.deferred {
+            node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
+            own = node.shared;
+        }
+        let open = node.open.iter().chain(&node.ends).filter(|&&g| Some(g) != own);
+        (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.shared_rate[g]))))
     }
 
     /// Rates of the state's velocities out of the nodes.
