@@ -60,11 +60,19 @@ pub enum Group {
     MassMatrix,
     /// `(q, v) →` placements and velocities of frames.
     Frames,
+    /// `(q, v, v̇) → τ`.
+    InverseDynamics,
+    /// `(q, v) → h` with `M v̇ + h = τ`.
+    Bias,
+    /// `q →` Jacobians of frames.
+    Jacobians,
+    /// `(q, v) →` accelerations of frames at `v̇ = 0`.
+    Drifts,
 }
 
 impl Group {
     /// All of them.
-    pub const ALL: [Group; 8] = [
+    pub const ALL: [Group; 12] = [
         Group::Rates,
         Group::Velocities,
         Group::Momenta,
@@ -73,6 +81,10 @@ impl Group {
         Group::Reactions,
         Group::MassMatrix,
         Group::Frames,
+        Group::InverseDynamics,
+        Group::Bias,
+        Group::Jacobians,
+        Group::Drifts,
     ];
 
     /// Name of the generated function, and of the output in options.
@@ -86,7 +98,16 @@ impl Group {
             Group::Reactions => "reactions",
             Group::MassMatrix => "mass_matrix",
             Group::Frames => "frames",
+            Group::InverseDynamics => "inverse_dynamics",
+            Group::Bias => "bias",
+            Group::Jacobians => "jacobians",
+            Group::Drifts => "drifts",
         }
+    }
+
+    /// Whether it has one result for each chosen frame.
+    pub fn of_frames(self) -> bool {
+        matches!(self, Group::Frames | Group::Jacobians | Group::Drifts)
     }
 
     /// The group of a name.
@@ -106,7 +127,7 @@ pub struct Options {
     pub precision: Precision,
     /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
     pub efforts: bool,
-    /// Names of the frames of [`Group::Frames`]; empty means all.
+    /// Names of the frames of [`Group::Frames`], [`Group::Jacobians`] and [`Group::Drifts`]; empty means all.
     pub frames: Vec<String>,
     /// How the structure is chosen.
     pub plan: PlanOptions,

@@ -70,9 +70,10 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let q = symbols.array("q", dims.nq);
     let second = match group {
         Group::Rates | Group::Velocities | Group::Energy => symbols.array("p", dims.nv),
-        Group::Momenta | Group::Accelerations | Group::Reactions | Group::Frames => symbols.array("v", dims.nv),
-        Group::MassMatrix => Vec::new(),
+        Group::MassMatrix | Group::Jacobians => Vec::new(),
+        _ => symbols.array("v", dims.nv),
     };
+    let third = if group == Group::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
     let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
     let drive_q = symbols.array("self.drive_q", dims.drive_q);
     let drive_v = symbols.array("self.drive_v", dims.drive_v);
@@ -93,23 +94,18 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let inputs =
         Inputs { tau: &tau, drive_q: &drive_q, drive_v: &drive_v, drive_a: &drive_a, wrenches: &wrenches, gravity };
     let physical: Tree<Expr> = plan.tree(&params);
-    let tree = match group {
-        Group::Reactions => physical.with_columns_carried(),
-        Group::Accelerations => physical.regrouped().with_columns_carried(),
-        _ => physical.regrouped(),
-    };
+    let tree = physical.regrouped();
     let frames = chosen_frames(plan, options)?;
-    let outputs = run(&graph, &tree, group, &q, &second, &inputs, &frames);
+    let outputs = run(&graph, [&tree, &physical], group, [&q, &second, &third], &inputs, &frames);
     let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);
     Ok(GroupProgram { group, inputs: symbols.arrays, program })
 }
 
 fn run<'g>(
     graph: &'g Graph,
-    tree: &Tree<Expr<'g>>,
+    [tree, physical]: [&Tree<Expr<'g>>; 2],
     group: Group,
-    q: &[Expr<'g>],
-    second: &[Expr<'g>],
+    [q, second, third]: [&[Expr<'g>]; 3],
     inputs: &Inputs<Expr<'g>>,
     frames: &[usize],
 ) -> Vec<Expr<'g>> {
@@ -144,7 +140,26 @@ fn run<'g>(
         Group::Reactions => {
             sweeps.accelerations(q, second, inputs, &mut w, &mut v);
             let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
-            sweeps.reactions(&w, &mut out);
+            Sweeps { tree: physical, trace: graph }.reactions(q, second, &v, inputs, &mut w, &mut out);
+            out.concat()
+        }
+        Group::InverseDynamics => {
+            sweeps.inverse_dynamics(q, second, third, inputs, &mut w, &mut v);
+            v
+        }
+        Group::Bias => {
+            sweeps.bias(q, second, inputs, &mut w, &mut v);
+            v
+        }
+        Group::Jacobians => {
+            let mut out = zeros(6 * dims.nv * frames.len());
+            sweeps.jacobians(q, inputs, &mut w, frames.iter().map(|&k| &tree.frames[k]), &mut out);
+            out
+        }
+        Group::Drifts => {
+            let mut out = vec![[Expr::zero(); 6]; frames.len()];
+            let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut out);
+            sweeps.drifts(q, second, inputs, &mut w, pairs);
             out.concat()
         }
         Group::MassMatrix => {

@@ -171,7 +171,7 @@ fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut
         errors.push(Message::new(text.place, message, help));
     }
     // Whoever names frames wants them.
-    if !args.frames.is_empty() && !args.options.outputs.contains(&Group::Frames) {
+    if !args.frames.is_empty() && !args.options.outputs.iter().any(|g| g.of_frames()) {
         args.options.outputs.push(Group::Frames);
     }
     let Some(model) = model else { return };

@@ -33,6 +33,10 @@ pub fn source(options: &Options) -> String {
         ("reactions", "q v reactions"),
         ("mass_matrix", "q m"),
         ("frames", "q v rotation position velocity"),
+        ("inverse_dynamics", "q v a tau"),
+        ("bias", "q v h"),
+        ("jacobians", "q jacobian"),
+        ("drifts", "q v drift"),
     ]
     .into_iter()
     .map(|(f, arguments)| {

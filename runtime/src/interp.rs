@@ -47,10 +47,8 @@ impl<S: Scalar> InputValues<S> {
 /// error and panics.
 #[derive(Clone, Debug)]
 pub struct Interpreter<S> {
-    /// Regrouped: everything but reactions.
+    /// Regrouped: everything but the wrenches of reactions.
     tree: Tree<S>,
-    /// The same for accelerations.
-    carried: Tree<S>,
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
@@ -65,7 +63,6 @@ impl<S: Scalar> Interpreter<S> {
     /// An interpreter of a tree as it was described (not regrouped), with zero inputs and the given gravity.
     pub fn new(physical: Tree<S>, gravity: [S; 3]) -> Self {
         let tree = physical.regrouped();
-        let physical = physical.with_columns_carried();
         let dims = tree.dims;
         let o = S::zero();
         let (mut quaternions, mut drive_q) = (Vec::new(), vec![o; dims.drive_q]);
@@ -95,7 +92,6 @@ impl<S: Scalar> Interpreter<S> {
         Interpreter {
             work: Workspace::new(&tree),
             v: vec![o; dims.nv],
-            carried: tree.with_columns_carried(),
             tree,
             physical,
             inputs,
@@ -135,16 +131,46 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, v) → v̇`.
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
-        let sweeps = Sweeps { tree: &self.carried, trace: &() };
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
     }
 
     /// `(q, v) → (v̇, reaction wrenches)`: `[force; moment]` transmitted by every joint to its child, in the child's
     /// body frame, one for each entry of [`Tree::joint_nodes`].
     pub fn reactions(&mut self, q: &[S], v: &[S], a: &mut [S], wrenches: &mut [[S; 6]]) {
+        self.accelerations(q, v, a);
         let sweeps = Sweeps { tree: &self.physical, trace: &() };
-        sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
-        sweeps.reactions(&self.work, wrenches);
+        sweeps.reactions(q, v, a, &self.inputs.view(), &mut self.work, wrenches);
+    }
+
+    /// `(q, v, v̇) → τ = M v̇ + h`. The joint forces of the inputs are not read.
+    pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], tau: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.inverse_dynamics(q, v, a, &self.inputs.view(), &mut self.work, tau);
+    }
+
+    /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`: products of velocities, prescribed accelerations and gravity, less
+    /// springs, dampers and external wrenches.
+    pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.bias(q, v, &self.inputs.view(), &mut self.work, h);
+    }
+
+    /// `q →` Jacobian of every frame of [`Tree::frames`], `6 × nv` each, row by row: `J v` is the frame's velocity
+    /// `[linear; angular]` in its own axes, at its origin, as far as it comes from `v`. In ground axes it is `R J`, with
+    /// the rotation of [`Interpreter::frames`] on both halves.
+    pub fn jacobians(&mut self, q: &[S], out: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.jacobians(q, &self.inputs.view(), &mut self.work, self.tree.frames.iter(), out);
+    }
+
+    /// `(q, v) →` acceleration `[linear; angular]` of every frame of [`Tree::frames`] at `v̇ = 0`, in its own axes: that of
+    /// the origin as the ground sees it, and angular; the frame accelerates by `J v̇` more. In ground axes, with the
+    /// rotation on both halves, it is `J̇ v` of the Jacobian in ground axes. Prescribed motions are included.
+    pub fn drifts(&mut self, q: &[S], v: &[S], out: &mut [[S; 6]]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        let frames = self.tree.frames.iter().zip(out);
+        sweeps.drifts(q, v, &self.inputs.view(), &mut self.work, frames);
     }
 
     /// `q → M`, `nv × nv`, row by row.

@@ -301,24 +301,6 @@ impl<S: Scalar> Tree<S> {
     }
 }
 
-impl<S: Scalar> Tree<S> {
-    /// The same mechanism with every open column carried inward to where it is solved, instead of ending where it meets
-    /// screws: imposed motions need the columns on their whole way.
-    pub fn with_columns_carried(&self) -> Tree<S> {
-        let mut tree = self.clone();
-        for i in (0..tree.nodes.len()).rev() {
-            let ending = core::mem::take(&mut tree.nodes[i].ends);
-            tree.nodes[i].screws.clear();
-            let mut at = Some(i);
-            while let Some(k) = at {
-                tree.nodes[k].open.extend(&ending);
-                at = tree.nodes[k].parent;
-            }
-        }
-        tree
-    }
-}
-
 /// The constant turn of a slider about its axis.
 fn phase_step<S: Scalar>(node: &Node<S>) -> Step<S> {
     let (s, c) = quarter_turn(node.phase.sin_cos(), node.quarter);

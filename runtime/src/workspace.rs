@@ -125,6 +125,19 @@ pub struct Loads<S> {
     pub ground_moment: Vec3<S>,
 }
 
+/// Motion of every node with accelerations of its origin, in its own axes.
+#[derive(Clone, Debug)]
+pub struct Newton<S> {
+    /// Angular velocity.
+    pub spin: Vec<Vec3<S>>,
+    /// Angular acceleration.
+    pub alpha: Vec<Vec3<S>>,
+    /// Acceleration of the origin, gravity taken off.
+    pub accel: Vec<Vec3<S>>,
+    /// Accelerations of the freedoms that were chosen on the way, zero where they were given.
+    pub reference: Vec<S>,
+}
+
 /// All of it.
 #[derive(Clone, Debug)]
 pub struct Workspace<S> {
@@ -144,8 +157,10 @@ pub struct Workspace<S> {
     pub force: Vec<Force<S>>,
     /// Joint forces, one for each velocity.
     pub generalized: Vec<S>,
-    /// Imposed accelerations, one for each node.
-    pub imposed: Vec<Motion<S>>,
+    /// Prescribed accelerations that are still to be added: zero.
+    pub drive: Vec<S>,
+    /// Motion with accelerations.
+    pub newton: Newton<S>,
     /// Pose of every node in the ground.
     pub rotation: Vec<Mat3<S>>,
     /// Origin of every node in the ground, m.
@@ -200,7 +215,13 @@ impl<S: Scalar> Workspace<S> {
             },
             force: vec![Force::zero(); n],
             generalized: vec![o; tree.dims.nv],
-            imposed: vec![Motion::zero(); n],
+            drive: vec![o; tree.dims.drive_v],
+            newton: Newton {
+                spin: vec![[o; 3]; n],
+                alpha: vec![[o; 3]; n],
+                accel: vec![[o; 3]; n],
+                reference: vec![o; f],
+            },
             rotation: vec![[[o; 3]; 3]; n],
             position: vec![[o; 3]; n],
         }

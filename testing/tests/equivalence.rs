@@ -105,8 +105,7 @@ fn regrouped_trees_move_as_described_ones() {
         sweeps.momenta(&s.q, &s.v, &u, &mut w, &mut p);
         sweeps.rates(&s.q, &p, &u, &mut w, &mut v, &mut qd, &mut pd);
         let (kinetic, potential) = sweeps.energy(&s.q, &p, &u, &mut w, &mut v);
-        let carried = tree.with_columns_carried();
-        Sweeps { tree: &carried, ..sweeps }.accelerations(&s.q, &s.v, &u, &mut w, &mut a);
+        sweeps.accelerations(&s.q, &s.v, &u, &mut w, &mut a);
         sweeps.mass_matrix(&s.q, &u, &mut w, &mut m);
         for (what, described) in [
             ("p", p),

@@ -256,7 +256,7 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options) {
     for (k, param) in plan.model.params.iter().enumerate() {
         index("PARAM", "parameter", &param.name, k);
     }
-    if options.outputs.contains(&Group::Frames) {
+    if options.outputs.iter().any(|g| g.of_frames()) {
         for (k, &frame) in chosen_frames(plan, options).unwrap_or_default().iter().enumerate() {
             index("FRAME", "frame", &plan.frames[frame].name, k);
         }
@@ -312,6 +312,10 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
         Group::Reactions => ("v", "Wrench `[force; moment]` each joint transmits to its child, in the child's body frame."),
         Group::MassMatrix => ("", "Mass matrix, by rows."),
         Group::Frames => ("v", "Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes."),
+        Group::InverseDynamics => ("v", "Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read."),
+        Group::Bias => ("v", "Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches."),
+        Group::Jacobians => ("", "Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin."),
+        Group::Drifts => ("v", "Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration."),
     };
     let (outputs, returns, tail, results) = match group {
         Group::Rates => (
@@ -341,6 +345,20 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
             String::new(),
             (0..nv).flat_map(|k| places(&format!("m[{k}]"), nv)).collect(),
         ),
+        Group::InverseDynamics => (format!("tau: &mut [{t}; {nv}]"), String::new(), String::new(), places("tau", nv)),
+        Group::Bias => (format!("h: &mut [{t}; {nv}]"), String::new(), String::new(), places("h", nv)),
+        Group::Jacobians => (
+            format!("jacobian: &mut [[[{t}; {nv}]; 6]; {frames}]"),
+            String::new(),
+            String::new(),
+            (0..6 * frames).flat_map(|k| places(&format!("jacobian[{}][{}]", k / 6, k % 6), nv)).collect(),
+        ),
+        Group::Drifts => (
+            format!("drift: &mut [[{t}; 6]; {frames}]"),
+            String::new(),
+            String::new(),
+            (0..frames).flat_map(|k| places(&format!("drift[{k}]"), 6)).collect(),
+        ),
         Group::Frames => {
             let rotations =
                 (0..frames).flat_map(|k| (0..3).flat_map(move |i| places(&format!("rotation[{k}][{i}]"), 3)));
@@ -354,6 +372,9 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
     let mut inputs = vec![("q".to_string(), format!("q: &[{t}; {nq}]"))];
     if !second.is_empty() {
         inputs.push((second.to_string(), format!("{second}: &[{t}; {nv}]")));
+    }
+    if group == Group::InverseDynamics {
+        inputs.push(("a".to_string(), format!("a: &[{t}; {nv}]")));
     }
     let mut arguments: Vec<String> = inputs.iter().map(|(_, d)| d.clone()).collect();
     arguments.extend(Some(outputs).filter(|o| !o.is_empty()));

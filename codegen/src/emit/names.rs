@@ -34,5 +34,7 @@ pub fn quantity(q: Quantity) -> (&'static str, &'static str) {
         Quantity::MassMatrix => ("mass", "mass matrix by composite inertias"),
         Quantity::Placement => ("place", "placement"),
         Quantity::Reaction => ("react", "reaction wrench (4.66)"),
+        Quantity::Effort => ("effort", "joint force"),
+        Quantity::Jacobian => ("jac", "Jacobian"),
     }
 }

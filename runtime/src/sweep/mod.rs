@@ -6,16 +6,21 @@
 //! A coordinate shared by several joints (a mimic) keeps its column `F = M* E` open while the sweep goes on inward, and
 //! is eliminated where all its joints have met: exact, and still one pass.
 
+mod acceleration;
 mod articulate;
 mod factor;
+mod inverse;
+mod jacobian;
 mod kinematics;
 mod loads;
 mod matrix;
 mod momentum;
+mod newton;
 mod rates;
 mod solve;
 
 pub use kinematics::FrameState;
+pub use newton::Accelerations;
 pub use solve::Load;
 
 use crate::spatial::{Force, Motion, Step};
@@ -54,6 +59,10 @@ pub enum Quantity {
     Placement,
     /// Reaction wrenches.
     Reaction,
+    /// `τ` or bias forces.
+    Effort,
+    /// Jacobians.
+    Jacobian,
 }
 
 /// Is told where the sweep stands. `()` listens to nothing.
@@ -181,26 +190,5 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         let kinetic = self.kinetic(p, w);
         self.gravity_moments(w);
         (kinetic, self.potential(u, w))
-    }
-
-    /// Accelerations from velocities: `(q, v, τ) → v̇`.
-    pub fn accelerations(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S]) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.factor(&w.poses, &w.first, &mut w.factor);
-        self.velocity_kinematics(v, u.drive_v, w);
-        self.wrench_loads(u, w);
-        self.solve_accelerations(u, w);
-        self.collect_rates(&w.acceleration, &w.first, a);
-    }
-
-    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, after
-    /// [`Sweeps::accelerations`] on a tree that was not regrouped (4.66).
-    pub fn reactions(&self, w: &Workspace<S>, out: &mut [[S; 6]]) {
-        for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
-            self.trace.at(Some(i), Quantity::Reaction);
-            let f = self.transmitted(&w.poses, &w.first, &w.factor, &w.acceleration, i);
-            let f = self.tree.frames[k].place.iter().fold(f, |f, step| step.force_back(&f));
-            *out = core::array::from_fn(|c| f.get(c));
-        }
     }
 }

@@ -1,6 +1,5 @@
-//! Momentum rates `ṗ` (4.36) and accelerations (4.7).
+//! Momentum rates `ṗ` (4.36).
 
-use super::solve::Load;
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force, Motion};
 use crate::tree::{Freedom, Kind, Node, Source};
@@ -94,7 +93,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Damping and spring on freedom `k` of node `i`.
-    fn passive(&self, node: &Node<S>, w: &Workspace<S>, i: usize, k: usize) -> S {
+    pub(super) fn passive(&self, node: &Node<S>, w: &Workspace<S>, i: usize, k: usize) -> S {
         let passive = &node.passive[k];
         let damper = -(passive.damping * w.velocity.rate[w.first[i] + k]);
         let pull = |k: usize| node.passive[k].stiffness * (w.poses.coordinate(i, k) - node.passive[k].rest);
@@ -104,50 +103,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Kind::Planar if k < 2 => damper - w.poses.joint[i].get()[2].vector([pull(0), pull(1), S::zero()])[k],
             _ => damper - pull(k),
         }
-    }
-
-    /// Accelerations, after the velocity kinematics and the wrenches on the bodies: the same linear problem with joint
-    /// forces on the right, `Ω × P − T` on the bodies, `Ω × E v` imposed, and a ground that accelerates against gravity.
-    pub(super) fn solve_accelerations(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
-        let nv = self.tree.dims.nv;
-        w.generalized[..nv].fill(S::zero());
-        for i in 0..self.tree.nodes.len() {
-            self.acceleration_seed_node(i, w);
-        }
-        for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
-            *f = *f + *tau;
-        }
-        self.solve(
-            &w.poses,
-            &w.first,
-            &w.factor,
-            &Load::accelerations(u, &w.generalized, &w.force, &w.imposed),
-            &mut w.acceleration,
-        );
-    }
-
-    /// `Ω × P − T`, `Ω × E v` and the passive forces of node `i` for [`Sweeps::solve_accelerations`].
-    pub fn acceleration_seed_node(&self, i: usize, w: &mut Workspace<S>) {
-        let node = &self.tree.nodes[i];
-        self.trace.at(Some(i), Quantity::Load);
-        let mut omega = w.velocity.omega[i];
-        let mut seed = omega.cross_force(&node.inertia.momentum(&omega));
-        if !self.tree.wrenches.is_empty() {
-            seed = seed.minus(&w.loads.own[i]);
-        }
-        w.force[i] = seed;
-        let mut joint = Motion::zero();
-        for k in 0..node.kind.nv() {
-            joint = joint.plus(&node.kind.axis(k).motion(w.velocity.rate[w.first[i] + k]));
-            if let Source::State { v, .. } = node.source {
-                w.generalized[v + k] = w.generalized[v + k] + node.ratio * self.passive(node, w, i, k);
-            }
-        }
-        if node.parent_side {
-            let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
-            omega = self.entering(&w.poses, i).fold(outer, |m, step| step.motion(&m)).plus(&joint);
-        }
-        w.imposed[i] = omega.cross_motion(&joint);
     }
 }
 

@@ -1,8 +1,8 @@
 //! The linear problem behind both levels: momenta to velocities, forces to accelerations.
 //!
 //! With `M'`, `U`, `Mj` known, right-hand sides travel back (`D`, 4.49, 4.45) and motions forth (4.40). On the velocity
-//! level the right-hand side is `p` and nothing else; on the acceleration level it is the joint force, every body starts
-//! with `D = Ω × P − T`, and `Ω × E v` is imposed on every node.
+//! level the right-hand side is `p` and nothing else; on the acceleration level it is the joint force, and every body
+//! starts with the wrench it needs for a reference motion (`acceleration.rs`).
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
@@ -19,10 +19,6 @@ pub struct Load<'a, S> {
     pub drive: &'a [S],
     /// `D` of every body by itself.
     pub seeds: Option<&'a [Force<S>]>,
-    /// Motion imposed on every node beside its freedoms, `Ω_t`.
-    pub imposed: Option<&'a [Motion<S>]>,
-    /// Motion of the ground.
-    pub ground: Motion<S>,
     /// What the motion is, for the listener.
     pub what: Quantity,
 }
@@ -30,16 +26,12 @@ pub struct Load<'a, S> {
 impl<'a, S: Scalar> Load<'a, S> {
     /// Velocity level: momenta `p` and prescribed rates.
     pub fn velocities(p: &'a [S], u: &Inputs<'a, S>) -> Self {
-        Load { p, drive: u.drive_v, seeds: None, imposed: None, ground: Motion::zero(), what: Quantity::Velocity }
+        Load { p, drive: u.drive_v, seeds: None, what: Quantity::Velocity }
     }
 
-    /// Acceleration level: joint forces `p`, `D` and imposed motion of every node, a ground that accelerates against
-    /// gravity.
-    pub fn accelerations(u: &Inputs<'a, S>, p: &'a [S], seeds: &'a [Force<S>], imposed: &'a [Motion<S>]) -> Self {
-        let [x, y, z] = u.gravity;
-        let ground = Motion { lin: [-x, -y, -z], ang: [S::zero(); 3] };
-        let (seeds, imposed) = (Some(seeds), Some(imposed));
-        Load { p, drive: u.drive_a, seeds, imposed, ground, what: Quantity::Acceleration }
+    /// Acceleration level: joint forces `p`, prescribed accelerations and `D` of every body.
+    pub fn accelerations(p: &'a [S], drive: &'a [S], seeds: &'a [Force<S>]) -> Self {
+        Load { p, drive, seeds: Some(seeds), what: Quantity::Acceleration }
     }
 }
 
@@ -99,28 +91,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             d = d.plus(&f.shared[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
-        if let Some(imposed) = load.imposed {
-            let through = f.m[i].times(&imposed[i]);
-            let n = self.tree.nodes.len();
-            for &h in &node.open {
-                sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&imposed[i]);
-            }
-            d = d.plus(&through);
-        }
-        match node.parent {
-            Some(parent) => {
-                let carried = self.entering(poses, i).rev().fold(d, |d, step| step.force(&d));
-                sol.d[parent] = sol.d[parent].plus(&carried);
-            }
-            // Coordinates solved at the ground feel its motion through the columns that end here.
-            None if !node.open.is_empty() => {
-                let outer = self.entering(poses, i).fold(load.ground, |m, step| step.motion(&m));
-                let n = self.tree.nodes.len();
-                for &h in &node.open {
-                    sol.shared_rate[h] = sol.shared_rate[h] + f.columns[h * n + i].dot(&outer);
-                }
-            }
-            None => {}
+        if let Some(parent) = node.parent {
+            let carried = self.entering(poses, i).rev().fold(d, |d, step| step.force(&d));
+            sol.d[parent] = sol.d[parent].plus(&carried);
         }
     }
 
@@ -210,11 +183,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ng = self.tree.shared.len();
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), load.what);
-        let outer = node.parent.map_or(load.ground, |p| sol.omega[p]);
-        let mut hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
-        if let Some(imposed) = load.imposed {
-            hat = hat.plus(&imposed[i]);
-        }
+        let outer = node.parent.map_or(Motion::zero(), |p| sol.omega[p]);
+        let hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
         sol.hat[i] = hat; // Ω̂_i
         for (k, &g) in node.solve_after.iter().enumerate().rev() {
             self.shared_motion(g, f, &hat, Self::open_after(node, k + 1), sol);

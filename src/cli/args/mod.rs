@@ -111,7 +111,11 @@ const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
   accelerations  (q, v) -> v'
   reactions      (q, v) -> wrench transmitted by every joint
   mass_matrix    q -> M
-  frames         (q, v) -> placements and velocities of bodies and frames";
+  frames         (q, v) -> placements and velocities of bodies and frames
+  inverse_dynamics (q, v, v') -> tau
+  bias           (q, v) -> h, with M v' + h = tau
+  jacobians      q -> Jacobians of bodies and frames
+  drifts         (q, v) -> accelerations of bodies and frames at v' = 0";
 
 /// What code is generated.
 #[derive(Args)]
@@ -134,7 +138,7 @@ pub struct CodeArgs {
     /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Each change is told
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
     pub snap: f64,
-    /// Frames and bodies of the output `frames`, with commas between [default: all]
+    /// Frames and bodies of the outputs `frames`, `jacobians`, `drifts`, with commas between [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
     /// Longer functions are split into parts of this many statements
@@ -296,7 +300,7 @@ pub struct EvalArgs {
     /// Order and form of the numbers, in and out
     #[arg(long, value_enum, default_value_t = LayoutArg::Mbd)]
     pub layout: LayoutArg,
-    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M [default: all]
+    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau [default: all]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Angles this close to right angles are taken as exact, rad
@@ -335,6 +339,10 @@ pub enum Quantity {
     Potential,
     #[value(name = "M")]
     MassMatrix,
+    #[value(name = "h")]
+    Bias,
+    #[value(name = "tau")]
+    InverseDynamics,
 }
 
 /// `mbd simulate`.

@@ -22,6 +22,8 @@ pub struct State {
     pub q: Vec<f64>,
     /// Velocities.
     pub v: Vec<f64>,
+    /// Accelerations for inverse dynamics, as the file has them.
+    pub a: Vec<f64>,
     tau: Vec<f64>,
     drive_q: Option<Vec<f64>>,
     drive_v: Vec<f64>,
@@ -143,7 +145,7 @@ impl Reader<'_> {
             self.error(&place, "not an object".into(), SHAPE);
             return None;
         };
-        let known = ["q", "v", "tau", "wrenches", "drive_q", "drive_v", "drive_a", "gravity"];
+        let known = ["q", "v", "a", "tau", "wrenches", "drive_q", "drive_v", "drive_a", "gravity"];
         self.keys(&place, object, &known);
         let before = self.findings.len();
         let (plan, outer) = (self.plan, self.outer);
@@ -154,6 +156,7 @@ impl Reader<'_> {
         };
         let q = list("q", &outer.q_names, true);
         let v = list("v", &outer.v_names, true);
+        let a = list("a", &outer.v_names, false);
         let tau = list("tau", &outer.v_names, false);
         let drive_q = list("drive_q", &drive_q_names, false);
         let drive_v = list("drive_v", &drive_v_names, false);
@@ -173,6 +176,7 @@ impl Reader<'_> {
         let zeros = |n: usize| vec![0.0; n];
         Some(State {
             v: outer.v_from(&q, &v?),
+            a: a.unwrap_or_else(|| zeros(plan.dims.nv)),
             tau: outer.v_from(&q, &tau.unwrap_or_else(|| zeros(plan.dims.nv))),
             drive_q,
             drive_v: drive_v.unwrap_or_else(|| zeros(plan.dims.drive_v)),

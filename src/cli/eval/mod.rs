@@ -34,6 +34,10 @@ struct Results {
     potential: Option<f64>,
     #[serde(rename = "M", skip_serializing_if = "Option::is_none")]
     m: Option<Vec<Vec<f64>>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    h: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    tau: Option<Vec<f64>>,
 }
 
 impl Results {
@@ -48,6 +52,8 @@ impl Results {
             ("qdd", bad(&self.qdd)),
             ("kinetic", bad_number(self.kinetic)),
             ("potential", bad_number(self.potential)),
+            ("h", bad(&self.h)),
+            ("tau", bad(&self.tau)),
             ("M", self.m.iter().flatten().flatten().any(|x| !x.is_finite())),
         ];
         checks.into_iter().find(|(_, bad)| *bad).map(|(key, _)| key)
@@ -94,8 +100,11 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
     // Parameters of the file, not the defaults of the model.
     let params = &inputs.params;
     let mut interpreter = Interpreter::new(plan.tree(params), plan.gravity(params));
-    // Momenta and the mass matrix exist without inertia; nothing else does.
-    let needs_rank = wanted.iter().any(|w| !matches!(w, Quantity::Momenta | Quantity::MassMatrix));
+    // What is not solved for exists without inertia; nothing else does.
+    let unsolved = |w: &Quantity| {
+        matches!(w, Quantity::Momenta | Quantity::MassMatrix | Quantity::Bias | Quantity::InverseDynamics)
+    };
+    let needs_rank = !wanted.iter().all(unsolved);
     let mut lines = Vec::new();
     for (k, state) in inputs.states.iter().enumerate() {
         state.apply(&mut interpreter);
@@ -146,6 +155,15 @@ fn results(
         let mut m = vec![0.0; nv * nv];
         interpreter.mass_matrix(q, &mut m);
         out.m = Some(outer.matrix(q, &m));
+    }
+    for (what, a, to) in
+        [(Quantity::Bias, &vec![0.0; nv], &mut out.h), (Quantity::InverseDynamics, &state.a, &mut out.tau)]
+    {
+        if has(what) {
+            let mut tau = vec![0.0; nv];
+            interpreter.inverse_dynamics(q, v, &outer.derivative_from(q, v, v, a), &mut tau);
+            *to = Some(outer.velocities(q, &tau));
+        }
     }
     out.p = has(Quantity::Momenta).then(|| outer.velocities(q, &p));
     out

@@ -112,6 +112,20 @@ impl Outer {
         self.velocities(q, &turned)
     }
 
+    /// Time derivative of velocities or momenta from there to here: the inverse of [`Outer::derivative`].
+    pub fn derivative_from(&self, q: &[f64], v: &[f64], x: &[f64], there: &[f64]) -> Vec<f64> {
+        let mut here = self.v_from(q, there);
+        for part in self.layout.parts.iter().filter(|p| p.form == Form::FloatingWorld) {
+            let at = part.v.0;
+            let (w, x) = (&v[at + 3..at + 6], &x[at..at + 3]);
+            for k in 0..3 {
+                let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+                here[at + k] -= w[i] * x[j] - w[j] * x[i];
+            }
+        }
+        here
+    }
+
     /// Mass matrix from here (row by row) to there: `T M Tᵀ`, with `T` the map of velocities, which is orthogonal.
     pub fn matrix(&self, q: &[f64], m: &[f64]) -> Vec<Vec<f64>> {
         let n = self.v_names.len();

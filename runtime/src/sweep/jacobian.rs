@@ -1,0 +1,113 @@
+//! Jacobians of frames, and what their rates do: the acceleration that is there without `v̇`.
+
+use super::newton::{Accelerations, ClassicMotion};
+use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::{add3, scale3, Mat3, Step, Vec3};
+use crate::tree::{Freedom, Source, TreeFrame};
+use crate::workspace::Workspace;
+use crate::Scalar;
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Jacobians of frames, `q → J`: for each of `frames` one block of `out`, `6 × nv`, row by row. `J v` is the frame's
+    /// velocity `[linear; angular]` in its own axes, at its origin, as far as it comes from `v` (prescribed rates add
+    /// theirs).
+    pub fn jacobians<'b>(
+        &self,
+        q: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        frames: impl Iterator<Item = &'b TreeFrame<S>>,
+        out: &mut [S],
+    ) where
+        S: 'b,
+    {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        let size = 6 * self.tree.dims.nv;
+        for (frame, out) in frames.zip(out.chunks_mut(size.max(1))) {
+            self.jacobian(frame, w, out);
+        }
+    }
+
+    /// One of [`Sweeps::jacobians`], after the articulation. The frame's pose is carried inward from node to node: only
+    /// its ancestors are met, and each turns three axes and one arm.
+    pub fn jacobian(&self, frame: &TreeFrame<S>, w: &Workspace<S>, out: &mut [S]) {
+        out.fill(S::zero());
+        let (o, one) = (S::zero(), S::one());
+        self.trace.at(frame.node, Quantity::Jacobian);
+        let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
+        frame.place.iter().for_each(|step| step.pose(&mut rot, &mut pos));
+        let mut at = frame.node;
+        while let Some(i) = at {
+            self.trace.at(Some(i), Quantity::Jacobian);
+            let node = &self.tree.nodes[i];
+            if let Source::State { v, .. } = node.source {
+                for k in 0..node.kind.nv() {
+                    let column = column(&node.kind.axis(k), &rot, pos);
+                    for (c, x) in column.into_iter().enumerate() {
+                        let entry = &mut out[c * self.tree.dims.nv + v + k];
+                        *entry = *entry + node.ratio * x;
+                    }
+                }
+            }
+            self.steps(&w.poses, i).rev().for_each(|step| before(step, &mut rot, &mut pos));
+            at = node.parent;
+        }
+    }
+
+    /// `J̇ v` and its like for each of `frames`: acceleration `[linear; angular]` at `v̇ = 0`, prescribed accelerations
+    /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in ground
+    /// axes the frame accelerates by `R (J v̇ + drift)`.
+    pub fn drifts<'b>(
+        &self,
+        q: &[S],
+        v: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        frames: impl Iterator<Item = (&'b TreeFrame<S>, &'b mut [S; 6])>,
+    ) where
+        S: 'b,
+    {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        self.newton(v, Accelerations::Zero, &Inputs { gravity: [S::zero(); 3], ..*u }, w);
+        for (frame, out) in frames {
+            let Some(i) = frame.node else {
+                out.fill(S::zero());
+                continue;
+            };
+            self.trace.at(Some(i), Quantity::Acceleration);
+            let mut m = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
+            frame.place.iter().for_each(|step| m.carry(step));
+            let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);
+            *out = [ax, ay, az, bx, by, bz];
+        }
+    }
+}
+
+/// Velocity of a frame that stands at `(rot, pos)` in a node, in the frame's axes, per rate of a freedom of the node.
+fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
+    // Rᵀ e × r, row a of R being Rᵀ e_a.
+    let turned = |k: usize| {
+        let (a, b) = ((k + 1) % 3, (k + 2) % 3);
+        core::array::from_fn(|c| pos[a] * rot[b][c] - pos[b] * rot[a][c])
+    };
+    let (lin, ang): (Vec3<S>, Vec3<S>) = match *axis {
+        Freedom::Unit(k) if k < 3 => (rot[k], [S::zero(); 3]),
+        Freedom::Unit(k) => (turned(k - 3), rot[k - 3]),
+        Freedom::Screw(h) => (add3(turned(2), scale3(h, rot[2])), rot[2]),
+    };
+    [lin[0], lin[1], lin[2], ang[0], ang[1], ang[2]]
+}
+
+/// Puts a step before the pose `(rot, pos)`.
+fn before<S: Scalar>(step: &Step<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
+    if let Step::Shift { axis, r } = step {
+        let (_, _, n) = axis.cyclic();
+        pos[n] = pos[n] + *r;
+        return;
+    }
+    *pos = step.vector_back(*pos);
+    for c in 0..3 {
+        let turned = step.vector_back([rot[0][c], rot[1][c], rot[2][c]]);
+        (rot[0][c], rot[1][c], rot[2][c]) = (turned[0], turned[1], turned[2]);
+    }
+}
