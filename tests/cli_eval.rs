@@ -20,7 +20,7 @@ fn compare_with_reference(name: &str) {
     let states = data["states"].as_array().expect("states");
     let given = |s: &Value| {
         let wrenches = s.get("wrenches").cloned().unwrap_or(json!([]));
-        json!({ "q": s["q"], "v": s["v"], "tau": s["tau"], "wrenches": wrenches })
+        json!({ "q": s["q"], "v": s["v"], "a": s["qdd"], "tau": s["tau"], "wrenches": wrenches })
     };
     let links: Vec<&str> =
         data["wrenches"].as_array().expect("wrenches").iter().map(|w| w["link"].as_str().expect("a link")).collect();
@@ -37,7 +37,7 @@ fn compare_with_reference(name: &str) {
     let results = json_of(&output);
     let results = results["states"].as_array().expect("states");
     assert_eq!(results.len(), states.len());
-    for key in ["p", "qd", "pd", "qdd", "kinetic", "potential", "M"] {
+    for key in ["p", "qd", "pd", "qdd", "kinetic", "potential", "M", "tau"] {
         for (ours, theirs) in results.iter().zip(states) {
             let (ours, theirs) = (numbers(&ours[key]), numbers(&theirs[key]));
             assert_eq!(ours.len(), theirs.len(), "{key}");

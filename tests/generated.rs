@@ -153,6 +153,32 @@ macro_rules! output {
         $interpreter.mass_matrix(&$given.q, &mut theirs);
         same("mass matrix", $given.state, &ours.concat(), &theirs);
     };
+    (inverse_dynamics, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
+        let (mut ours, mut theirs) = ([0.0; NV], [0.0; NV]);
+        $system.inverse_dynamics(&$given.q, &$given.v, &$given.p, &mut ours);
+        $interpreter.inverse_dynamics(&$given.q, &$given.v, &$given.p, &mut theirs);
+        same("inverse dynamics", $given.state, &ours, &theirs);
+    };
+    (bias, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
+        let (mut ours, mut theirs) = ([0.0; NV], [0.0; NV]);
+        $system.bias(&$given.q, &$given.v, &mut ours);
+        $interpreter.bias(&$given.q, &$given.v, &mut theirs);
+        same("bias", $given.state, &ours, &theirs);
+    };
+    (jacobians, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
+        let count = $interpreter.tree().frames.len();
+        let (mut ours, mut theirs) = ([[[0.0; NV]; 6]; 3], vec![0.0; 6 * NV * count]);
+        $system.jacobians(&$given.q, (&mut ours[..count]).try_into().expect("at most three frames"));
+        $interpreter.jacobians(&$given.q, &mut theirs);
+        same("jacobians", $given.state, &ours[..count].concat().concat(), &theirs);
+    };
+    (drifts, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
+        let count = $interpreter.tree().frames.len();
+        let (mut ours, mut theirs) = ([[0.0; 6]; 3], vec![[0.0; 6]; count]);
+        $system.drifts(&$given.q, &$given.v, (&mut ours[..count]).try_into().expect("at most three frames"));
+        $interpreter.drifts(&$given.q, &$given.v, &mut theirs);
+        same("drifts", $given.state, &ours[..count].concat(), &theirs.concat());
+    };
     (frames, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
         let count = $interpreter.tree().frames.len();
         let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; 3], [[0.0; 3]; 3], [[0.0; 6]; 3]);
@@ -179,7 +205,10 @@ check!(
     "models/double_pendulum.toml",
     Base::Fixed,
     inputs: [tau],
-    outputs: [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames]
+    outputs: [
+        rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
+        drifts
+    ]
 );
 check!(
     spherical_pendulum,
@@ -187,7 +216,10 @@ check!(
     "models/spherical_pendulum.toml",
     Base::Fixed,
     inputs: [tau],
-    outputs: [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames]
+    outputs: [
+        rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
+        drifts
+    ]
 );
 check!(
     satellite,
@@ -195,7 +227,10 @@ check!(
     "models/satellite.toml",
     Base::Fixed,
     inputs: [tau, drive_q, drive_v, drive_a, wrenches],
-    outputs: [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames]
+    outputs: [
+        rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
+        drifts
+    ]
 );
 check!(
     chain6,
@@ -211,7 +246,7 @@ check!(
     "models/chain10_planar.toml",
     Base::Fixed,
     inputs: [tau],
-    outputs: [rates, velocities, momenta, energy, accelerations, mass_matrix]
+    outputs: [rates, velocities, momenta, energy, accelerations, mass_matrix, inverse_dynamics, bias]
 );
 check!(
     ur5,
@@ -219,7 +254,7 @@ check!(
     "models/ur5.urdf",
     Base::Fixed,
     inputs: [tau],
-    outputs: [rates, velocities, momenta, energy, accelerations, mass_matrix]
+    outputs: [rates, velocities, momenta, energy, accelerations, mass_matrix, inverse_dynamics, bias]
 );
 check!(
     panda,

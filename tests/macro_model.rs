@@ -17,7 +17,7 @@ pub mod made {
         path = r"models/double_pendulum.toml",
         name = #[doc = "With a fine copy."] #[derive(Copy)] pub Single,
         scalar = f32,
-        outputs = [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames],
+        outputs = [rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, drifts],
         gravity = [0, -1.62, 0.0],
         frames = [tip, "upper"],
         snap = 0,
@@ -48,7 +48,7 @@ pub mod made {
                 iyy='1' iyz='0' izz='1'/></inertial></link></robot>",
         name = Sled,
         base = planar,
-        outputs = [mass_matrix, frames],
+        outputs = [mass_matrix, frames, jacobians],
     }
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = Bare, outputs = [] }
 

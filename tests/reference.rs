@@ -1,4 +1,4 @@
-//! Against Pinocchio: p, q̇, ṗ, q̈, energies, M, frames and reactions of nineteen mechanisms (`tests/reference/README.md`).
+//! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames and reactions of nineteen mechanisms (`tests/reference/README.md`).
 
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::layout;
@@ -131,6 +131,11 @@ fn check(name: &str) {
         let mut a = vec![0.0; nv];
         interpreter.accelerations(&q, &v, &mut a);
         worst.compare("qdd", &ours(&a), &numbers(&state["qdd"]));
+        // Its accelerations in, its joint forces out.
+        layout.v_from(&q, &numbers(&state["qdd"]), &mut a);
+        let mut inverse = vec![0.0; nv];
+        interpreter.inverse_dynamics(&q, &v, &a, &mut inverse);
+        worst.compare("tau", &ours(&inverse), &numbers(&state["tau"]));
         let (kinetic, potential) = interpreter.energy(&q, &p);
         worst.compare("kinetic", &[kinetic], &numbers(&state["kinetic"]));
         worst.compare("potential", &[potential], &numbers(&state["potential"]));

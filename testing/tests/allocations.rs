@@ -23,6 +23,8 @@ fn nothing_is_allocated_after_construction() {
         let (mut a, mut m) = (vec![0.0; nv], vec![0.0; nv * nv]);
         let mut reactions = vec![[0.0; 6]; plan.joint_nodes.len()];
         let mut frames = vec![FrameState::ground(); plan.frames.len()];
+        let (mut tau, mut jacobians) = (vec![0.0; nv], vec![0.0; 6 * nv * plan.frames.len()]);
+        let mut drifts = vec![[0.0; 6]; plan.frames.len()];
         let mut energy = (0.0, 0.0);
         let (mut q, mut p_stepped) = (s.q.clone(), p.clone());
         let mut rk4 = Rk4::new(&i);
@@ -36,6 +38,10 @@ fn nothing_is_allocated_after_construction() {
             i.reactions(&s.q, &s.v, &mut a, &mut reactions);
             i.mass_matrix(&s.q, &mut m);
             i.frames(&s.q, &s.v, &mut frames);
+            i.inverse_dynamics(&s.q, &s.v, &a, &mut tau);
+            i.bias(&s.q, &s.v, &mut tau);
+            i.jacobians(&s.q, &mut jacobians);
+            i.drifts(&s.q, &s.v, &mut drifts);
             rank = i.check_rank(&s.q);
             p_stepped.copy_from_slice(&p);
             step = rk4.step(&mut i, 0.0, 1e-4, &mut q, &mut p_stepped);

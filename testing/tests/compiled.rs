@@ -66,6 +66,16 @@ mod batch {
                 results.push(("rotations", numbers(&rotation.concat().concat())));
                 results.push(("positions", numbers(&position.concat())));
                 results.push(("frame velocities", numbers(&velocity.concat())));
+                let mut out = [0.0; NV];
+                tree.inverse_dynamics(&q, &v, &p, &mut out);
+                results.push(("tau", numbers(&out)));
+                tree.bias(&q, &v, &mut out);
+                results.push(("h", numbers(&out)));
+                let (mut jacobian, mut drift) = ([[[0.0; NV]; 6]; $frames], [[0.0; 6]; $frames]);
+                tree.jacobians(&q, &mut jacobian);
+                results.push(("jacobians", numbers(&jacobian.concat().concat())));
+                tree.drifts(&q, &v, &mut drift);
+                results.push(("drifts", numbers(&drift.concat())));
                 results
             }
         };
@@ -123,6 +133,16 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     results.push(("rotations", all(&|f| f.rotation.concat())));
     results.push(("positions", all(&|f| f.position.to_vec())));
     results.push(("frame velocities", all(&|f| [f.velocity.lin, f.velocity.ang].concat())));
+    i.inverse_dynamics(&q, &v, &p, &mut out);
+    results.push(("tau", back(&out)));
+    i.bias(&q, &v, &mut out);
+    results.push(("h", back(&out)));
+    let n = plan.frames.len();
+    let (mut jacobians, mut drifts) = (of(&vec![0.0; 6 * n * v.len()]), vec![[S::zero(); 6]; n]);
+    i.jacobians(&q, &mut jacobians);
+    results.push(("jacobians", back(&jacobians)));
+    i.drifts(&q, &v, &mut drifts);
+    results.push(("drifts", back(&drifts.concat())));
     results
 }
 

@@ -94,7 +94,8 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
     for seed in 0..100 {
         let mut model = random_model(seed, &Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6) });
         let all = |model: &Model, groups: &[Group]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
-        let kinematic = [Group::Velocities, Group::Momenta, Group::MassMatrix, Group::Frames];
+        let kinematic =
+            [Group::Velocities, Group::Momenta, Group::MassMatrix, Group::Frames, Group::Jacobians, Group::Drifts];
         let before = (all(&model, &kinematic), counts(&model, Group::Energy));
         model.wrenches.push(Wrench { name: "w".to_string(), body: 0, axes: WrenchAxes::World });
         assert_eq!(before, (all(&model, &kinematic), counts(&model, Group::Energy)), "seed {seed}: a wrench");

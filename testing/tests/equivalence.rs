@@ -29,6 +29,8 @@ fn results(plan: &Plan, s: &State) -> Results {
     let mut reactions = vec![[0.0; 6]; plan.joint_nodes.len()];
     i.reactions(&s.q, &s.v, &mut a, &mut reactions);
     i.accelerations(&s.q, &s.v, &mut a);
+    let mut tau = vec![0.0; nv];
+    i.inverse_dynamics(&s.q, &s.v, &p, &mut tau);
     let mut m = vec![0.0; nv * nv];
     i.mass_matrix(&s.q, &mut m);
     let mut frames = vec![FrameState::ground(); plan.frames.len()];
@@ -45,6 +47,7 @@ fn results(plan: &Plan, s: &State) -> Results {
         ("T", vec![kinetic]),
         ("V", vec![potential]),
         ("a", a),
+        ("tau", tau),
         ("reactions", reactions.concat()),
         ("M", m),
         ("frames", frames),
@@ -106,6 +109,8 @@ fn regrouped_trees_move_as_described_ones() {
         sweeps.rates(&s.q, &p, &u, &mut w, &mut v, &mut qd, &mut pd);
         let (kinetic, potential) = sweeps.energy(&s.q, &p, &u, &mut w, &mut v);
         sweeps.accelerations(&s.q, &s.v, &u, &mut w, &mut a);
+        let mut tau = vec![0.0; nv];
+        sweeps.inverse_dynamics(&s.q, &s.v, &p, &u, &mut w, &mut tau);
         sweeps.mass_matrix(&s.q, &u, &mut w, &mut m);
         for (what, described) in [
             ("p", p),
@@ -115,6 +120,7 @@ fn regrouped_trees_move_as_described_ones() {
             ("T", vec![kinetic]),
             ("V", vec![potential]),
             ("a", a),
+            ("tau", tau),
             ("M", m),
         ] {
             let (_, ours) = regrouped.iter().find(|(name, _)| *name == what).expect("it is there");
