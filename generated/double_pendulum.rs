@@ -12,12 +12,16 @@
 //   velocities: 7 + 7 + 1 = 15; 0, 1
 //   momenta: 4 + 6 + 0 = 10; 0, 1
 //   energy: 10 + 14 + 1 = 25; 0, 2
-//   accelerations: 18 + 23 + 1 = 42; 0, 2
-//   reactions: 53 + 64 + 1 = 118; 0, 2
+//   accelerations: 14 + 17 + 1 = 32; 0, 2
+//   reactions: 30 + 31 + 1 = 62; 0, 2
 //   mass_matrix: 4 + 1 + 0 = 5; 0, 1
 //   frames: 6 + 6 + 0 = 12; 0, 2
+//   inverse_dynamics: 10 + 14 + 0 = 24; 0, 2
+//   bias: 5 + 10 + 0 = 15; 0, 2
+//   jacobians: 3 + 4 + 0 = 7; 0, 1
+//   drifts: 2 + 4 + 0 = 6; 0, 1
 
-/// Dynamics of `double_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames. Set the fields between calls.
+/// Dynamics of `double_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, drifts. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
 #[rustfmt::skip]
 pub struct DoublePendulum {
@@ -230,7 +234,7 @@ impl DoublePendulum {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 42 operations: 18 additions, 23 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 32 operations: 14 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         let q_0 = q[0];
@@ -244,61 +248,52 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_sin0;
-        let lower_inertia1 = 0.5 * lower_cos0;
-        let lower_inertia2 = lower_inertia1 + lower_inertia1;
-        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
-        let lower_inertia4 = lower_inertia1 + 1.5;
-        let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
-        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
-        // upper: inertia carried to the parent, M* (4.48)
-        let upper_inertia0 = upper_cos0 * lower_inertia0;
-        let upper_inertia1 = upper_sin0 * lower_inertia4;
-        let upper_inertia2 = upper_inertia0 + upper_inertia1;
-        let upper_inertia3 = upper_sin0 * lower_inertia1;
-        let upper_inertia4 = upper_inertia0 + upper_inertia3;
+        let lower_inertia0 = 0.5 * lower_cos0;
+        let lower_inertia1 = lower_inertia0 + lower_inertia0;
+        let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
+        let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
+        let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * upper_inertia4;
-        let upper_pivot1 = 2.9994001199760048 * lower_inertia6;
-        let upper_pivot2 = upper_inertia4 * upper_pivot1;
-        let upper_pivot3 = upper_inertia2 - upper_pivot2;
-        let upper_pivot4 = lower_inertia6 * upper_pivot1;
-        let upper_pivot5 = lower_inertia5 - upper_pivot4;
-        let upper_pivot6 = 1.0 / upper_pivot5;
-        let upper_pivot7 = upper_pivot3 * upper_pivot6;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
+        let upper_pivot1 = lower_inertia4 * upper_pivot0;
+        let upper_pivot2 = lower_inertia3 - upper_pivot1;
+        let upper_pivot3 = 1.0 / upper_pivot2;
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = 9.81 * upper_cos0;
+        let upper_vel1 = 9.81 * upper_sin0;
         // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * lower_sin0;
-        let lower_vel1 = v_0 + v_1;
+        let lower_vel0 = v_0 * v_0;
+        let lower_vel1 = upper_vel0 + lower_vel0;
+        let lower_vel2 = lower_cos0 * upper_vel1;
+        let lower_vel3 = lower_sin0 * lower_vel1;
+        let lower_vel4 = lower_vel2 + lower_vel3;
+        let lower_vel5 = v_0 + v_1;
+        // upper: gravity and wrenches
+        let upper_load0 = 1.5 * upper_vel1;
         // lower: gravity and wrenches
-        let lower_load0 = 0.5 * lower_vel1;
-        let lower_load1 = lower_vel1 * lower_load0;
-        let lower_load2 = lower_vel0 * lower_load0;
-        let lower_load3 = v_0 * v_1;
+        let lower_load0 = lower_vel5 * lower_vel5;
+        let lower_load1 = 0.5 * lower_load0;
+        let lower_load2 = 0.5 * lower_vel4;
         // lower: momentum remainder D, D' (4.45, 4.49)
         let lower_rest0 = lower_sin0 * lower_load1;
-        let lower_rest1 = lower_inertia0 * lower_load3;
-        let lower_rest2 = lower_load2 - lower_rest1;
-        let lower_rest3 = lower_rest0 - lower_rest2;
+        let lower_rest1 = lower_load2 - lower_rest0;
+        let lower_rest2 = upper_load0 + lower_rest1;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_1 - lower_rest2;
+        let upper_rest0 = tau_1 - lower_load2;
         let upper_rest1 = 2.9994001199760048 * upper_rest0;
-        let upper_rest2 = lower_inertia6 * upper_rest1;
-        let upper_rest3 = lower_rest3 - upper_rest2;
-        let upper_rest4 = tau_0 + upper_rest3;
-        let upper_rest5 = upper_pivot6 * upper_rest4;
+        let upper_rest2 = lower_inertia4 * upper_rest1;
+        let upper_rest3 = lower_rest2 + upper_rest2;
+        let upper_rest4 = tau_0 - upper_rest3;
+        let upper_rest5 = upper_pivot3 * upper_rest4;
         // upper: acceleration
-        let upper_acc0 = 9.81 * upper_pivot7;
-        let upper_acc1 = upper_rest5 - upper_acc0;
-        let upper_acc2 = 9.81 * upper_pivot0;
-        let upper_acc3 = upper_pivot1 * upper_acc1;
-        let upper_acc4 = upper_acc2 + upper_acc3;
-        let upper_acc5 = upper_rest1 - upper_acc4;
-        a[0] = upper_acc1;
-        a[1] = upper_acc5;
+        let upper_acc0 = upper_pivot0 * upper_rest5;
+        let upper_acc1 = upper_rest1 - upper_acc0;
+        a[0] = upper_rest5;
+        a[1] = upper_acc1;
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
-    /// 118 operations: 53 additions, 64 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 62 operations: 30 additions, 31 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
         let q_0 = q[0];
@@ -312,146 +307,91 @@ impl DoublePendulum {
         // lower: sine and cosine, rotation
         let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
         // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_sin0;
-        let lower_inertia1 = 0.5 * lower_cos0;
-        let lower_inertia2 = lower_inertia1 + 1.0;
-        let lower_inertia3 = lower_inertia1 + lower_inertia2;
-        let lower_inertia4 = lower_inertia3 + 0.33340000000000003;
-        let lower_inertia5 = lower_inertia2 + 0.5;
-        let lower_inertia6 = lower_inertia4 + 0.33340000000000003;
-        let lower_inertia7 = lower_inertia1 + 0.33340000000000003;
-        // upper: inertia carried to the parent, M* (4.48)
-        let upper_inertia0 = upper_sin0 * lower_inertia0;
-        let upper_inertia1 = upper_cos0 * lower_inertia5;
-        let upper_inertia2 = upper_inertia0 - upper_inertia1;
-        let upper_inertia3 = upper_cos0 * lower_inertia0;
-        let upper_inertia4 = upper_sin0 * lower_inertia5;
-        let upper_inertia5 = upper_inertia3 + upper_inertia4;
-        let upper_inertia6 = upper_cos0 * lower_inertia1;
-        let upper_inertia7 = upper_inertia0 - upper_inertia6;
-        let upper_inertia8 = upper_sin0 * lower_inertia1;
-        let upper_inertia9 = upper_inertia3 + upper_inertia8;
+        let lower_inertia0 = 0.5 * lower_cos0;
+        let lower_inertia1 = lower_inertia0 + lower_inertia0;
+        let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
+        let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
+        let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
         // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * upper_inertia9;
-        let upper_pivot1 = 2.9994001199760048 * lower_inertia7;
-        let upper_pivot2 = upper_inertia7 * upper_pivot0;
-        let upper_pivot3 = upper_inertia7 * upper_pivot1;
-        let upper_pivot4 = upper_inertia2 - upper_pivot3;
-        let upper_pivot5 = upper_inertia9 * upper_pivot0;
-        let upper_pivot6 = upper_pivot5 - 2.0;
-        let upper_pivot7 = upper_inertia9 * upper_pivot1;
-        let upper_pivot8 = upper_inertia5 - upper_pivot7;
-        let upper_pivot9 = lower_inertia7 * upper_pivot1;
-        let upper_pivot10 = lower_inertia6 - upper_pivot9;
-        let upper_pivot11 = 1.0 / upper_pivot10;
-        let upper_pivot12 = upper_pivot8 * upper_pivot11;
-        let upper_pivot13 = upper_pivot4 * upper_pivot12;
-        let upper_pivot14 = upper_pivot2 + upper_pivot13;
-        let upper_pivot15 = upper_pivot8 * upper_pivot12;
-        let upper_pivot16 = upper_pivot6 + upper_pivot15;
+        let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
+        let upper_pivot1 = lower_inertia4 * upper_pivot0;
+        let upper_pivot2 = lower_inertia3 - upper_pivot1;
+        let upper_pivot3 = 1.0 / upper_pivot2;
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = 9.81 * upper_cos0;
+        let upper_vel1 = 9.81 * upper_sin0;
         // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * lower_sin0;
-        let lower_vel1 = v_0 * lower_cos0;
-        let lower_vel2 = v_0 + v_1;
+        let lower_vel0 = v_0 * v_0;
+        let lower_vel1 = upper_vel0 + lower_vel0;
+        let lower_vel2 = lower_cos0 * lower_vel1;
+        let lower_vel3 = lower_cos0 * upper_vel1;
+        let lower_vel4 = lower_sin0 * lower_vel1;
+        let lower_vel5 = lower_vel3 + lower_vel4;
+        let lower_vel6 = v_0 + v_1;
         // upper: gravity and wrenches
-        let upper_load0 = 0.5 * v_0;
-        let upper_load1 = v_0 * upper_load0;
+        let upper_load0 = 1.5 * upper_vel1;
         // lower: gravity and wrenches
-        let lower_load0 = 0.5 * lower_vel2;
-        let lower_load1 = lower_vel1 + lower_load0;
-        let lower_load2 = lower_vel2 * lower_load1;
-        let lower_load3 = lower_vel0 * lower_vel2;
-        let lower_load4 = lower_vel0 * lower_load1;
-        let lower_load5 = lower_vel0 * lower_vel1;
-        let lower_load6 = lower_load4 - lower_load5;
-        let lower_load7 = v_0 * v_1;
+        let lower_load0 = lower_vel6 * lower_vel6;
+        let lower_load1 = 0.5 * lower_load0;
+        let lower_load2 = 0.5 * lower_vel5;
         // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = lower_cos0 * lower_load2;
-        let lower_rest1 = lower_sin0 * lower_load3;
-        let lower_rest2 = lower_rest0 + lower_rest1;
-        let lower_rest3 = lower_sin0 * lower_load2;
-        let lower_rest4 = lower_cos0 * lower_load3;
-        let lower_rest5 = lower_rest3 - lower_rest4;
-        let lower_rest6 = lower_inertia0 * lower_load7;
-        let lower_rest7 = lower_load6 - lower_rest6;
-        let lower_rest8 = lower_load7 - lower_rest2;
-        let lower_rest9 = lower_rest5 - lower_rest7;
-        let lower_rest10 = upper_load1 - lower_rest8;
+        let lower_rest0 = lower_sin0 * lower_load1;
+        let lower_rest1 = lower_load2 - lower_rest0;
+        let lower_rest2 = upper_load0 + lower_rest1;
         // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = upper_sin0 * lower_rest10;
-        let upper_rest1 = upper_cos0 * lower_rest5;
-        let upper_rest2 = upper_rest0 + upper_rest1;
-        let upper_rest3 = upper_cos0 * lower_rest10;
-        let upper_rest4 = upper_sin0 * lower_rest5;
-        let upper_rest5 = upper_rest3 - upper_rest4;
-        let upper_rest6 = tau_1 - lower_rest7;
-        let upper_rest7 = 2.9994001199760048 * upper_rest6;
-        let upper_rest8 = upper_inertia7 * upper_rest7;
-        let upper_rest9 = upper_inertia9 * upper_rest7;
-        let upper_rest10 = lower_inertia7 * upper_rest7;
-        let upper_rest11 = upper_rest2 + upper_rest8;
-        let upper_rest12 = upper_rest5 + upper_rest9;
-        let upper_rest13 = lower_rest9 - upper_rest10;
-        let upper_rest14 = tau_0 + upper_rest13;
-        let upper_rest15 = upper_pivot11 * upper_rest14;
-        let upper_rest16 = upper_pivot4 * upper_rest15;
-        let upper_rest17 = upper_rest11 + upper_rest16;
-        let upper_rest18 = upper_pivot8 * upper_rest15;
-        let upper_rest19 = upper_rest12 + upper_rest18;
+        let upper_rest0 = tau_1 - lower_load2;
+        let upper_rest1 = 2.9994001199760048 * upper_rest0;
+        let upper_rest2 = lower_inertia4 * upper_rest1;
+        let upper_rest3 = lower_rest2 + upper_rest2;
+        let upper_rest4 = tau_0 - upper_rest3;
+        let upper_rest5 = upper_pivot3 * upper_rest4;
         // upper: acceleration
-        let upper_acc0 = 9.81 * upper_pivot12;
-        let upper_acc1 = upper_rest15 - upper_acc0;
-        let upper_acc2 = 9.81 * upper_pivot0;
-        let upper_acc3 = upper_pivot1 * upper_acc1;
-        let upper_acc4 = upper_acc2 + upper_acc3;
-        let upper_acc5 = upper_rest7 - upper_acc4;
-        let upper_acc6 = 9.81 * upper_cos0;
-        let upper_acc7 = 9.81 * upper_sin0;
+        let upper_acc0 = upper_pivot0 * upper_rest5;
+        let upper_acc1 = upper_rest1 - upper_acc0;
         // lower: acceleration
-        let lower_acc0 = upper_acc1 + upper_acc7;
-        let lower_acc1 = lower_load7 - upper_acc6;
-        let lower_acc2 = upper_acc1 + upper_acc5;
-        // upper: reaction wrench (4.66)
-        let upper_react0 = 9.81 * upper_pivot14;
-        let upper_react1 = 9.81 * upper_pivot16;
-        let upper_react2 = upper_rest17 - upper_react0;
-        let upper_react3 = upper_rest19 - upper_react1;
-        let upper_react4 = upper_sin0 * upper_react2;
-        let upper_react5 = upper_cos0 * upper_react3;
-        let upper_react6 = upper_react4 + upper_react5;
-        let upper_react7 = upper_sin0 * upper_react3;
-        let upper_react8 = upper_cos0 * upper_react2;
-        let upper_react9 = upper_react8 - upper_react7;
-        // lower: reaction wrench (4.66)
-        let lower_react0 = lower_inertia0 * lower_acc2;
-        let lower_react1 = lower_acc1 - lower_react0;
-        let lower_react2 = lower_inertia1 * lower_acc2;
-        let lower_react3 = lower_acc0 + lower_react2;
-        let lower_react4 = lower_inertia0 * lower_acc1;
-        let lower_react5 = lower_inertia1 * lower_acc0;
-        let lower_react6 = lower_react4 - lower_react5;
-        let lower_react7 = 0.33340000000000003 * lower_acc2;
-        let lower_react8 = lower_react6 - lower_react7;
-        let lower_react9 = lower_rest2 - lower_react1;
-        let lower_react10 = lower_rest5 - lower_react3;
-        let lower_react11 = lower_load6 - lower_react8;
-        let lower_react12 = lower_cos0 * lower_react9;
-        let lower_react13 = lower_sin0 * lower_react10;
-        let lower_react14 = lower_react12 + lower_react13;
-        let lower_react15 = lower_cos0 * lower_react10;
-        let lower_react16 = lower_sin0 * lower_react9;
-        let lower_react17 = lower_react15 - lower_react16;
-        reactions[0][0] = upper_react9;
+        let lower_acc0 = upper_rest5 + upper_acc1;
+        // lower: velocity and joint rate (4.40)
+        let lower_vel7 = upper_vel1 + upper_rest5;
+        let lower_vel8 = lower_sin0 * lower_vel7;
+        let lower_vel9 = lower_vel2 - lower_vel8;
+        let lower_vel10 = lower_cos0 * lower_vel7;
+        let lower_vel11 = lower_vel4 + lower_vel10;
+        // upper: gravity and wrenches
+        let upper_load1 = 0.5 * lower_vel0;
+        let upper_load2 = upper_vel0 + upper_load1;
+        let upper_load3 = 0.5 * upper_rest5;
+        let upper_load4 = upper_vel1 + upper_load3;
+        let upper_load5 = 0.33340000000000003 * upper_rest5;
+        let upper_load6 = 0.5 * upper_vel1;
+        let upper_load7 = upper_load5 + upper_load6;
+        // lower: gravity and wrenches
+        let lower_load3 = lower_load1 + lower_vel9;
+        let lower_load4 = 0.5 * lower_acc0;
+        let lower_load5 = lower_vel11 + lower_load4;
+        let lower_load6 = 0.33340000000000003 * lower_acc0;
+        let lower_load7 = 0.5 * lower_vel11;
+        let lower_load8 = lower_load6 + lower_load7;
+        let lower_load9 = lower_cos0 * lower_load3;
+        let lower_load10 = lower_sin0 * lower_load5;
+        let lower_load11 = lower_load9 + lower_load10;
+        let lower_load12 = lower_sin0 * lower_load3;
+        let lower_load13 = lower_cos0 * lower_load5;
+        let lower_load14 = lower_load12 - lower_load13;
+        let lower_load15 = lower_load8 - lower_load14;
+        let lower_load16 = upper_load2 + lower_load11;
+        let lower_load17 = lower_load14 - upper_load4;
+        let lower_load18 = upper_load7 + lower_load15;
+        reactions[0][0] = lower_load17;
         reactions[0][1] = 0.0;
-        reactions[0][2] = upper_react6;
+        reactions[0][2] = lower_load16;
         reactions[0][3] = 0.0;
-        reactions[0][4] = tau_0;
+        reactions[0][4] = lower_load18;
         reactions[0][5] = 0.0;
-        reactions[1][0] = lower_react17;
+        reactions[1][0] = -lower_load5;
         reactions[1][1] = 0.0;
-        reactions[1][2] = lower_react14;
+        reactions[1][2] = lower_load3;
         reactions[1][3] = 0.0;
-        reactions[1][4] = lower_react11;
+        reactions[1][4] = lower_load8;
         reactions[1][5] = 0.0;
     }
 
@@ -554,6 +494,179 @@ impl DoublePendulum {
         velocity[2][3] = 0.0;
         velocity[2][4] = lower_vel2;
         velocity[2][5] = 0.0;
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// 24 operations: 10 additions, 14 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[f64; 2], v: &[f64; 2], a: &[f64; 2], tau: &mut [f64; 2]) {
+        let q_0 = q[0];
+        let q_1 = q[1];
+        let v_0 = v[0];
+        let v_1 = v[1];
+        let a_0 = a[0];
+        let a_1 = a[1];
+        // upper: sine and cosine, rotation
+        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
+        // lower: sine and cosine, rotation
+        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = 9.81 * upper_cos0;
+        let upper_vel1 = 9.81 * upper_sin0;
+        // lower: velocity and joint rate (4.40)
+        let lower_vel0 = v_0 * v_0;
+        let lower_vel1 = a_0 + upper_vel1;
+        let lower_vel2 = upper_vel0 + lower_vel0;
+        let lower_vel3 = lower_cos0 * lower_vel1;
+        let lower_vel4 = lower_sin0 * lower_vel2;
+        let lower_vel5 = lower_vel3 + lower_vel4;
+        let lower_vel6 = v_0 + v_1;
+        // lower: acceleration
+        let lower_acc0 = a_0 + a_1;
+        // upper: gravity and wrenches
+        let upper_load0 = 1.3334000000000001 * a_0;
+        let upper_load1 = 1.5 * upper_vel1;
+        let upper_load2 = upper_load0 + upper_load1;
+        // lower: gravity and wrenches
+        let lower_load0 = lower_vel6 * lower_vel6;
+        let lower_load1 = 0.5 * lower_load0;
+        let lower_load2 = 0.5 * lower_acc0;
+        let lower_load3 = 0.33340000000000003 * lower_acc0;
+        let lower_load4 = 0.5 * lower_vel5;
+        let lower_load5 = lower_load3 + lower_load4;
+        let lower_load6 = lower_sin0 * lower_load1;
+        let lower_load7 = lower_cos0 * lower_load2;
+        let lower_load8 = lower_load6 - lower_load7;
+        let lower_load9 = lower_load5 - lower_load8;
+        let lower_load10 = upper_load2 + lower_load9;
+        tau[0] = lower_load10;
+        tau[1] = lower_load5;
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// 15 operations: 5 additions, 10 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    #[inline]
+    pub fn bias(&self, q: &[f64; 2], v: &[f64; 2], h: &mut [f64; 2]) {
+        let q_0 = q[0];
+        let q_1 = q[1];
+        let v_0 = v[0];
+        let v_1 = v[1];
+        // upper: sine and cosine, rotation
+        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
+        // lower: sine and cosine, rotation
+        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
+        // upper: velocity and joint rate (4.40)
+        let upper_vel0 = 9.81 * upper_cos0;
+        let upper_vel1 = 9.81 * upper_sin0;
+        // lower: velocity and joint rate (4.40)
+        let lower_vel0 = v_0 * v_0;
+        let lower_vel1 = upper_vel0 + lower_vel0;
+        let lower_vel2 = lower_cos0 * upper_vel1;
+        let lower_vel3 = lower_sin0 * lower_vel1;
+        let lower_vel4 = lower_vel2 + lower_vel3;
+        let lower_vel5 = v_0 + v_1;
+        // upper: gravity and wrenches
+        let upper_load0 = 1.5 * upper_vel1;
+        // lower: gravity and wrenches
+        let lower_load0 = lower_vel5 * lower_vel5;
+        let lower_load1 = 0.5 * lower_load0;
+        let lower_load2 = 0.5 * lower_vel4;
+        let lower_load3 = lower_sin0 * lower_load1;
+        let lower_load4 = lower_load2 - lower_load3;
+        let lower_load5 = upper_load0 + lower_load4;
+        h[0] = lower_load5;
+        h[1] = lower_load2;
+    }
+
+    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    /// 7 operations: 3 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    #[inline]
+    pub fn jacobians(&self, q: &[f64; 2], jacobian: &mut [[[f64; 2]; 6]; 3]) {
+        let q_1 = q[1];
+        // lower: sine and cosine, rotation
+        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
+        // lower: Jacobian
+        let lower_jac0 = lower_cos0 + 1.0;
+        // upper: Jacobian
+        let upper_jac0 = lower_cos0 * lower_jac0;
+        let upper_jac1 = lower_sin0 * lower_sin0;
+        let upper_jac2 = upper_jac0 + upper_jac1;
+        let upper_jac3 = lower_sin0 * lower_jac0;
+        let upper_jac4 = lower_sin0 * lower_cos0;
+        let upper_jac5 = upper_jac4 - upper_jac3;
+        jacobian[0][0][0] = 0.0;
+        jacobian[0][0][1] = 0.0;
+        jacobian[0][1][0] = 0.0;
+        jacobian[0][1][1] = 0.0;
+        jacobian[0][2][0] = 0.0;
+        jacobian[0][2][1] = 0.0;
+        jacobian[0][3][0] = 0.0;
+        jacobian[0][3][1] = 0.0;
+        jacobian[0][4][0] = 1.0;
+        jacobian[0][4][1] = 0.0;
+        jacobian[0][5][0] = 0.0;
+        jacobian[0][5][1] = 0.0;
+        jacobian[1][0][0] = -lower_cos0;
+        jacobian[1][0][1] = 0.0;
+        jacobian[1][1][0] = 0.0;
+        jacobian[1][1][1] = 0.0;
+        jacobian[1][2][0] = -lower_sin0;
+        jacobian[1][2][1] = 0.0;
+        jacobian[1][3][0] = 0.0;
+        jacobian[1][3][1] = 0.0;
+        jacobian[1][4][0] = 1.0;
+        jacobian[1][4][1] = 1.0;
+        jacobian[1][5][0] = 0.0;
+        jacobian[1][5][1] = 0.0;
+        jacobian[2][0][0] = -upper_jac2;
+        jacobian[2][0][1] = -1.0;
+        jacobian[2][1][0] = 0.0;
+        jacobian[2][1][1] = 0.0;
+        jacobian[2][2][0] = upper_jac5;
+        jacobian[2][2][1] = 0.0;
+        jacobian[2][3][0] = 0.0;
+        jacobian[2][3][1] = 0.0;
+        jacobian[2][4][0] = 1.0;
+        jacobian[2][4][1] = 1.0;
+        jacobian[2][5][0] = 0.0;
+        jacobian[2][5][1] = 0.0;
+    }
+
+    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    /// 6 operations: 2 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
+    #[inline]
+    pub fn drifts(&self, q: &[f64; 2], v: &[f64; 2], drift: &mut [[f64; 6]; 3]) {
+        let q_1 = q[1];
+        let v_0 = v[0];
+        let v_1 = v[1];
+        // lower: sine and cosine, rotation
+        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
+        // lower: velocity and joint rate (4.40)
+        let lower_vel0 = v_0 * v_0;
+        let lower_vel1 = lower_cos0 * lower_vel0;
+        let lower_vel2 = lower_sin0 * lower_vel0;
+        let lower_vel3 = v_0 + v_1;
+        // lower: acceleration
+        let lower_acc0 = lower_vel3 * lower_vel3;
+        let lower_acc1 = lower_vel1 + lower_acc0;
+        drift[0][0] = 0.0;
+        drift[0][1] = 0.0;
+        drift[0][2] = 0.0;
+        drift[0][3] = 0.0;
+        drift[0][4] = 0.0;
+        drift[0][5] = 0.0;
+        drift[1][0] = -lower_vel2;
+        drift[1][1] = 0.0;
+        drift[1][2] = lower_vel1;
+        drift[1][3] = 0.0;
+        drift[1][4] = 0.0;
+        drift[1][5] = 0.0;
+        drift[2][0] = -lower_vel2;
+        drift[2][1] = 0.0;
+        drift[2][2] = lower_acc1;
+        drift[2][3] = 0.0;
+        drift[2][4] = 0.0;
+        drift[2][5] = 0.0;
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.

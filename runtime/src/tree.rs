@@ -177,6 +177,9 @@ pub struct Node<S> {
     /// Eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is divided by does not
     /// wait for the turn. Joints about or along z only.
     pub parent_side: bool,
+    /// The node frame does not turn with the joint: a pin whose children are all pins about parallel axes, placed by
+    /// shifts alone. The body turns in it, by the sum of the angles since the last frame that turned.
+    pub unturned: bool,
     /// Momentum rate from the accumulated momentum `P*` instead of a quadratic form of the velocity.
     pub gather: bool,
     /// Shared coordinates whose columns are not carried further inward, because the screws of all freedoms inboard that

@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, Step, Vec3};
+use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, RigidInertia, Step, Vec3};
 use crate::tree::Tree;
 use crate::Scalar;
 
@@ -14,6 +14,23 @@ pub struct Poses<S> {
     pub joint: Vec<JointSteps<S>>,
     /// Joint coordinates of nodes a spring can act on, three slots each: `ratio · source + offset`.
     pub coordinates: Vec<[S; 3]>,
+    /// Of nodes whose frames do not turn: how the body stands in its frame, and its inertia there.
+    pub body: Vec<TurnedBody<S>>,
+}
+
+/// A body in a frame that does not turn with it.
+#[derive(Clone, Copy, Debug)]
+pub struct TurnedBody<S> {
+    /// Angle about z, rad, less the right angles.
+    pub angle: S,
+    /// Right angles to be added.
+    pub quarter: u8,
+    /// Cosine of both together.
+    pub c: S,
+    /// Sine of both together.
+    pub s: S,
+    /// Inertia in the frame.
+    pub inertia: RigidInertia<S>,
 }
 
 impl<S: Scalar> Poses<S> {
@@ -23,21 +40,35 @@ impl<S: Scalar> Poses<S> {
     }
 }
 
+impl<S: Scalar> TurnedBody<S> {
+    /// From the frame to the body's axes.
+    pub fn step(&self) -> Step<S> {
+        Step::Turn { axis: crate::spatial::Axis::Z, c: self.c, s: self.s }
+    }
+}
+
 /// At most four steps, kept in place.
 #[derive(Clone, Copy, Debug)]
 pub struct JointSteps<S> {
     steps: [Step<S>; 4],
     len: usize,
+    placing: usize,
 }
 
 impl<S: Scalar> JointSteps<S> {
     /// No steps.
     pub fn new() -> Self {
-        JointSteps { steps: [Step::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0 }
+        JointSteps { steps: [Step::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0, placing: 0 }
     }
 
     /// Replaces the steps; those beyond four are dropped.
     pub fn set(&mut self, steps: &[Step<S>]) {
+        self.set_with(0, steps);
+    }
+
+    /// The same where the first `placing` steps stand for the constant placement.
+    pub fn set_with(&mut self, placing: usize, steps: &[Step<S>]) {
+        self.placing = placing;
         self.len = steps.len().min(4);
         self.steps[..self.len].copy_from_slice(&steps[..self.len]);
     }
@@ -45,6 +76,16 @@ impl<S: Scalar> JointSteps<S> {
     /// The steps, parent to child.
     pub fn get(&self) -> &[Step<S>] {
         &self.steps[..self.len]
+    }
+
+    /// Those that stand for the constant placement.
+    pub fn placing(&self) -> &[Step<S>] {
+        &self.steps[..self.placing.min(self.len)]
+    }
+
+    /// The joint's own.
+    pub fn own(&self) -> &[Step<S>] {
+        &self.steps[self.placing.min(self.len)..self.len]
     }
 }
 
@@ -180,6 +221,7 @@ impl<S: Scalar> Workspace<S> {
         }
         first.push(f);
         let o = S::zero();
+        let upright = TurnedBody { angle: o, quarter: 0, c: S::one(), s: o, inertia: RigidInertia::zero() };
         let pivot = Pivot { u: Force::zero(), k: Force::zero(), rho: o, armature: o };
         let solution = Solution {
             d: vec![Force::zero(); n],
@@ -192,7 +234,7 @@ impl<S: Scalar> Workspace<S> {
         };
         Workspace {
             first,
-            poses: Poses { joint: vec![JointSteps::new(); n], coordinates: vec![[o; 3]; n] },
+            poses: Poses { joint: vec![JointSteps::new(); n], coordinates: vec![[o; 3]; n], body: vec![upright; n] },
             factor: Factor {
                 m: vec![ArticulatedInertia::zero(); n],
                 pivots: vec![pivot; f],

@@ -6,7 +6,7 @@
 
 use mbd_runtime::tree::Source;
 
-use super::{NodeKind, Plan};
+use super::{NodeKind, Plan, PoseStep};
 use crate::options::{Group, Options};
 use crate::trace::trace;
 
@@ -46,6 +46,8 @@ pub fn choose(plan: &mut Plan) {
     if plan.nodes.len() > LARGEST {
         return;
     }
+    let runs = parallel_runs(plan);
+    toggle_unturned(plan, &runs);
     for chain in tip_chains(plan) {
         let mut search = Search { plan, chain: &chain, best: cost(plan), chosen: None };
         for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
@@ -54,6 +56,41 @@ pub fn choose(plan: &mut Plan) {
         while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
         if let Some((_, chosen)) = search.chosen {
             *plan = chosen;
+        }
+    }
+    toggle_unturned(plan, &runs);
+}
+
+/// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
+/// the same axis.
+fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
+    let swings = |i: usize| {
+        let node = &plan.nodes[i];
+        node.kind == NodeKind::Pin && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
+    };
+    let mut runs: Vec<Vec<usize>> = Vec::new();
+    for (i, node) in plan.nodes.iter().enumerate() {
+        let mut children = plan.nodes.iter().enumerate().filter(|(_, n)| n.parent == Some(i)).peekable();
+        if node.kind != NodeKind::Pin || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
+            continue;
+        }
+        match runs.iter_mut().find(|run| node.parent.is_some_and(|p| run.contains(&p)) && swings(i)) {
+            Some(run) => run.push(i),
+            None => runs.push(vec![i]),
+        }
+    }
+    runs
+}
+
+/// Turns or does not turn the frames of every run, whichever is cheaper.
+fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>]) {
+    let mut best = cost(plan);
+    for run in runs {
+        let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
+        flip(plan);
+        match cost(plan) {
+            operations if operations < best => best = operations,
+            _ => flip(plan),
         }
     }
 }

@@ -123,6 +123,7 @@ impl Plan {
             shared: node.shared,
             deferred: node.deferred,
             parent_side: node.parent_side,
+            unturned: node.unturned,
             gather: node.gather,
             ends: node.ends.clone(),
             screws: node.screws.clone(),

@@ -117,6 +117,8 @@ pub struct PlanNode {
     /// See [`mbd_runtime::tree::Node`].
     pub parent_side: bool,
     /// See [`mbd_runtime::tree::Node`].
+    pub unturned: bool,
+    /// See [`mbd_runtime::tree::Node`].
     pub gather: bool,
     /// See [`mbd_runtime::tree::Node`].
     pub ends: Vec<usize>,

@@ -1,9 +1,9 @@
 //! Joint coordinates to joint transforms.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, Step};
+use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, RigidInertia, Step};
 use crate::tree::{quarter_turn, Kind, Source};
-use crate::workspace::Poses;
+use crate::workspace::{Poses, TurnedBody};
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
@@ -33,7 +33,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             w.coordinates[i].copy_from_slice(&q[..3]);
         }
         match node.kind {
-            Kind::Pin => w.joint[i].set(&[shift(Axis::Z, node.slide), turn(x)]),
+            Kind::Pin => self.pin(i, x, w),
             Kind::Slider => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
             Kind::Helical { pitch } => w.joint[i].set(&[shift(Axis::Z, node.slide + pitch * x), turn(x)]),
             Kind::Planar => w.joint[i].set(&[shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
@@ -44,6 +44,34 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 shift(Axis::Z, q[2]),
                 Step::Rotate(quaternion_matrix([q[3], q[4], q[5], q[6]])),
             ]),
+        }
+    }
+
+    /// Steps of a pin with joint coordinate `x`.
+    fn pin(&self, i: usize, x: S, w: &mut Poses<S>) {
+        let node = &self.tree.nodes[i];
+        let shift = |axis: Axis, r: S| Step::Shift { axis, r };
+        let (mut angle, mut quarter, mut slide) = (x + node.phase, node.quarter, node.slide);
+        let mut placing = [shift(Axis::X, S::zero()), shift(Axis::Y, S::zero())];
+        let swung = self.swung(i);
+        if let Some(p) = node.parent.filter(|_| swung) {
+            let outer = &w.body[p];
+            (angle, quarter) = (angle + outer.angle, (quarter + outer.quarter) % 4);
+            let at = node.place.iter().fold([S::zero(); 3], |r, step| step.moment(S::one(), r));
+            let [rx, ry, rz] = outer.step().vector_back(at);
+            placing = [shift(Axis::X, rx), shift(Axis::Y, ry)];
+            slide = slide + rz;
+        }
+        let (s, c) = quarter_turn(angle.sin_cos(), quarter);
+        let turn = Step::Turn { axis: Axis::Z, c, s };
+        let [px, py] = placing;
+        let placed = if swung { 2 } else { 0 };
+        let steps = [px, py, shift(Axis::Z, slide), turn];
+        let last = if node.unturned { 3 } else { 4 };
+        w.joint[i].set_with(placed, &steps[2 - placed..last]);
+        if node.unturned {
+            let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
+            w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }
     }
 

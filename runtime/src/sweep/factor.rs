@@ -19,8 +19,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Before the first [`Sweeps::factor_node`]: every body by itself.
     pub fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            f.m[i] = node.inertia.articulated();
+        for i in 0..self.tree.nodes.len() {
+            f.m[i] = self.inertia(poses, i).articulated();
         }
         f.columns.fill(Force::zero());
         f.gram.fill(S::zero());

@@ -27,7 +27,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.newton_euler(q, v, Accelerations::Given(a), u, w);
         for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
             self.trace.at(Some(i), Quantity::Reaction);
-            let f = self.tree.frames[k].place.iter().fold(w.force[i], |f, step| step.force_back(&f));
+            let f = self.on_body(&w.poses, &self.tree.frames[k]).fold(w.force[i], |f, step| step.force_back(&f));
             *out = core::array::from_fn(|c| f.get(c));
         }
     }

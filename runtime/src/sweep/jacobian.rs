@@ -35,7 +35,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (o, one) = (S::zero(), S::one());
         self.trace.at(frame.node, Quantity::Jacobian);
         let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
-        frame.place.iter().for_each(|step| step.pose(&mut rot, &mut pos));
+        self.on_body(&w.poses, frame).for_each(|step| step.pose(&mut rot, &mut pos));
         let mut at = frame.node;
         while let Some(i) = at {
             self.trace.at(Some(i), Quantity::Jacobian);
@@ -76,7 +76,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             };
             self.trace.at(Some(i), Quantity::Acceleration);
             let mut m = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
-            frame.place.iter().for_each(|step| m.carry(step));
+            self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
             let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);
             *out = [ax, ay, az, bx, by, bz];
         }

@@ -69,7 +69,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Some(i) => (w.rotation[i], w.position[i], w.velocity.omega[i]),
             None => ([[one, o, o], [o, one, o], [o, o, one]], [o; 3], Motion::zero()),
         };
-        for step in &frame.place {
+        for step in self.on_body(&w.poses, frame) {
             step.pose(&mut rotation, &mut position);
             velocity = step.motion(&velocity);
         }

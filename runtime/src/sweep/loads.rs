@@ -46,8 +46,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub fn moment_begin(&self, w: &mut Workspace<S>) {
         w.loads.ground_moment = self.tree.ground_moment;
         for (i, node) in self.tree.nodes.iter().enumerate() {
-            w.loads.moment[i] = node.inertia.moment;
-            w.loads.mass[i] = node.inertia.mass;
+            (w.loads.moment[i], w.loads.mass[i]) = (self.inertia(&w.poses, i).moment, node.inertia.mass);
         }
     }
 
@@ -76,12 +75,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(Some(node), Quantity::Load);
             let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
             if wrench.axes == WrenchAxes::Ground {
-                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).chain(&wrench.frame.place);
-                for step in path {
+                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+                for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
                     f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
                 }
             }
-            let f = wrench.frame.place.iter().rev().fold(f, |f, step| step.force(&f));
+            let f = self.on_body(&w.poses, &wrench.frame).rev().fold(f, |f, step| step.force(&f));
             w.loads.own[node] = w.loads.own[node].plus(&f);
         }
     }

@@ -11,8 +11,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let nv = self.tree.dims.nv;
         self.articulate(q, u.drive_q, &mut w.poses);
         out.fill(S::zero());
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            w.factor.m[i] = node.inertia.articulated();
+        for i in 0..self.tree.nodes.len() {
+            w.factor.m[i] = self.inertia(&w.poses, i).articulated();
         }
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];

@@ -23,8 +23,8 @@ pub use kinematics::FrameState;
 pub use newton::Accelerations;
 pub use solve::Load;
 
-use crate::spatial::{Force, Motion, Step};
-use crate::tree::{Node, Tree};
+use crate::spatial::{Force, Motion, RigidInertia, Step};
+use crate::tree::{Node, Tree, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -110,13 +110,44 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.steps(w, i).rev().fold(*f, |f, step| step.force(&f))
     }
 
+    /// Whether the parent's frame does not turn, so that the way from it to node `i` does.
+    fn swung(&self, i: usize) -> bool {
+        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].unturned)
+    }
+
+    /// Constant steps from the parent frame to the joint of node `i`.
+    fn place(&self, i: usize) -> &[Step<S>] {
+        match self.swung(i) {
+            true => &[],
+            false => &self.tree.nodes[i].place,
+        }
+    }
+
+    /// Inertia of the body of node `i` in the node frame.
+    fn inertia<'b>(&'b self, w: &'b crate::workspace::Poses<S>, i: usize) -> &'b RigidInertia<S> {
+        match self.tree.nodes[i].unturned {
+            true => &w.body[i].inertia,
+            false => &self.tree.nodes[i].inertia,
+        }
+    }
+
+    /// Steps from the frame of a node to another frame on its body.
+    fn on_body<'b>(
+        &'b self,
+        w: &crate::workspace::Poses<S>,
+        frame: &'b TreeFrame<S>,
+    ) -> impl DoubleEndedIterator<Item = Step<S>> + 'b {
+        let body = frame.node.filter(|&i| self.tree.nodes[i].unturned).map(|i| w.body[i].step());
+        body.into_iter().chain(frame.place.iter().copied())
+    }
+
     /// Steps from the parent frame to node `i`.
     fn steps<'b>(
         &'b self,
         w: &'b crate::workspace::Poses<S>,
         i: usize,
     ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
-        self.tree.nodes[i].place.iter().chain(w.joint[i].get())
+        self.place(i).iter().chain(w.joint[i].get())
     }
 
     /// The part of [`Sweeps::steps`] ahead of the frame that node `i` is eliminated in.
@@ -125,9 +156,9 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         w: &'b crate::workspace::Poses<S>,
         i: usize,
     ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
-        let node = &self.tree.nodes[i];
-        let own: &[Step<S>] = if node.parent_side { &[] } else { w.joint[i].get() };
-        node.place.iter().chain(own)
+        let joint = &w.joint[i];
+        let steps = if self.tree.nodes[i].parent_side { joint.placing() } else { joint.get() };
+        self.place(i).iter().chain(steps)
     }
 
     /// The rest: from there to the node frame.
@@ -136,7 +167,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         w: &'b crate::workspace::Poses<S>,
         i: usize,
     ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
-        let own: &[Step<S>] = if self.tree.nodes[i].parent_side { w.joint[i].get() } else { &[] };
+        let own: &[Step<S>] = if self.tree.nodes[i].parent_side { w.joint[i].own() } else { &[] };
         own.iter()
     }
 

@@ -17,9 +17,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Before the first [`Sweeps::momentum_node`]: `M_i Ω_i` of every body by itself.
     pub fn momentum_begin(&self, w: &mut Workspace<S>) {
-        for (i, node) in self.tree.nodes.iter().enumerate() {
+        for i in 0..self.tree.nodes.len() {
             self.trace.at(Some(i), Quantity::Momentum);
-            w.force[i] = node.inertia.momentum(&w.velocity.omega[i]);
+            w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
     }
 

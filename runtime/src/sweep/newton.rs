@@ -39,9 +39,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Some(p) => ClassicMotion { spin: w.newton.spin[p], alpha: w.newton.alpha[p], accel: w.newton.accel[p] },
             None => ClassicMotion { spin: [S::zero(); 3], alpha: [S::zero(); 3], accel: u.gravity.map(|g| -g) },
         };
-        node.place.iter().for_each(|step| m.carry(step));
+        self.place(i).iter().chain(w.poses.joint[i].placing()).for_each(|step| m.carry(step));
         // A slide along the axis of a turn is made after it, where `B` is that of the body.
-        let steps = w.poses.joint[i].get();
+        let steps = w.poses.joint[i].own();
         let late = match node.kind {
             Kind::Pin | Kind::Helical { .. } => Some(0),
             _ => None,
@@ -76,7 +76,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub fn newton_wrench_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let motion = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
-        let needed = motion.wrench(&self.tree.nodes[i].inertia);
+        let needed = motion.wrench(self.inertia(&w.poses, i));
         w.force[i] = match self.tree.wrenches.is_empty() {
             true => needed,
             false => needed.minus(&w.loads.own[i]),
