@@ -6,6 +6,7 @@
 
 mod evaluate;
 mod expr;
+mod machine;
 pub mod passes;
 mod program;
 
