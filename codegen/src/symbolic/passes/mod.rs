@@ -1,23 +1,40 @@
 //! Rewriting of whole programs, for [`Arithmetic::Fast`]: other rounding, the same value.
 
+pub(super) mod chains;
 pub mod factor;
 mod rebuild;
 pub mod schedule;
+pub mod share;
 pub mod sums;
-mod terms;
+pub(super) mod terms;
 
 use super::Program;
 use crate::options::Arithmetic;
 pub(super) use rebuild::width;
 use schedule::Limits;
 
+/// Rounds of rewriting at the most; two or three are enough for everything met so far.
+const ROUNDS: usize = 4;
+
+/// Registers that a schedule fills: of the 32 of AVX-512, or of 16 with some in memory, which costs little.
+const LIMITS: Limits = Limits { registers: 24, search: 64 };
+
 /// The program as it is to be emitted.
 pub fn run(program: Program, arithmetic: Arithmetic) -> Program {
     match arithmetic {
         Arithmetic::Exact => program,
-        Arithmetic::Fast => {
-            let program = sums::regroup(&program);
-            schedule::schedule(&program, Limits { registers: 28, search: 64 })
-        }
+        Arithmetic::Fast => schedule::schedule(&sums::regroup(&fewer(program)), LIMITS),
     }
+}
+
+/// Fewer operations: common factors and common pairs in turn, until neither saves any.
+pub fn fewer(mut program: Program) -> Program {
+    for _ in 0..ROUNDS {
+        let next = share::share(&factor::factor(&program));
+        if next.counts().total() >= program.counts().total() {
+            break;
+        }
+        program = next;
+    }
+    program
 }

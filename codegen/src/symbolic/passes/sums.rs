@@ -4,16 +4,11 @@
 //! faster, in two or three chains at once. Likewise the factors of a product: what is late is multiplied last. A product
 //! that is used once, by the sum, is fused with its addition.
 
+use super::chains::{best_plan, Arrival, Plan};
 use super::rebuild::Rebuilt;
 use super::terms::Opened;
-use crate::symbolic::machine::{latency, PRODUCT, SUM};
+use crate::symbolic::machine::latency;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};
-
-/// Chains of one sum at the most.
-const CHAINS: usize = 3;
-
-/// Cycles that one more operation has to save.
-const WORTH: u32 = 1;
 
 /// Regroups all sums and products.
 pub fn regroup(program: &Program) -> Program {
@@ -57,13 +52,6 @@ struct Pass<'g, 'p> {
     /// When each new node is ready.
     arrival: Vec<u32>,
     opened: &'p Opened,
-}
-
-/// A term and when it is ready to be added.
-struct Timed<'g> {
-    ready: u32,
-    is_product: bool,
-    term: Term<'g>,
 }
 
 impl<'g> Pass<'g, '_> {
@@ -112,26 +100,26 @@ impl<'g> Pass<'g, '_> {
         if constant != 0.0 {
             terms.push(Term::Value(Expr::Const(constant)));
         }
-        let mut timed: Vec<Timed> = Vec::with_capacity(terms.len());
+        let mut timed: Vec<(Arrival, Term)> = Vec::with_capacity(terms.len());
         for term in terms {
             timed.push(match term {
-                Term::Value(x) => Timed { ready: self.ready(x), is_product: false, term },
-                Term::Product(x, y) => Timed { ready: self.ready(x).max(self.ready(y)), is_product: true, term },
+                Term::Value(x) => (Arrival { ready: self.ready(x), is_product: false }, term),
+                Term::Product(x, y) => (Arrival { ready: self.ready(x).max(self.ready(y)), is_product: true }, term),
             });
         }
         // Stable: equal times keep the order of the sweep.
-        timed.sort_by_key(|t| (t.ready, t.is_product));
-        let best = (1..=CHAINS.min(timed.len())).map(|k| plan(&timed, k)).min_by_key(|p| p.cost);
-        match best {
+        timed.sort_by_key(|t| t.0);
+        let arrivals: Vec<Arrival> = timed.iter().map(|t| t.0).collect();
+        match best_plan(&arrivals) {
             Some(best) => self.build(&timed, &best),
             None => Expr::Const(0.0),
         }
     }
 
-    fn build(&mut self, timed: &[Timed<'g>], plan: &Plan) -> Expr<'g> {
+    fn build(&mut self, timed: &[(Arrival, Term<'g>)], plan: &Plan) -> Expr<'g> {
         let mut chains: Vec<Option<Expr<'g>>> = vec![None; plan.chains];
-        for (t, &k) in timed.iter().zip(&plan.places) {
-            chains[k] = Some(match (chains[k], t.term) {
+        for ((_, term), &k) in timed.iter().zip(&plan.places) {
+            chains[k] = Some(match (chains[k], *term) {
                 (None, Term::Value(x)) => x,
                 (None, Term::Product(x, y)) => x * y,
                 (Some(sum), Term::Value(x)) => sum + x,
@@ -147,40 +135,4 @@ impl<'g> Pass<'g, '_> {
         }
         chains[0]
     }
-}
-
-/// Terms shared out to chains.
-struct Plan {
-    /// Cycles, and what the operations are worth.
-    cost: u32,
-    chains: usize,
-    /// The chain of each term.
-    places: Vec<usize>,
-}
-
-/// Each term goes to the chain that is free first.
-fn plan(timed: &[Timed], chains: usize) -> Plan {
-    let mut free: Vec<u32> = Vec::with_capacity(chains);
-    let mut places = Vec::with_capacity(timed.len());
-    let mut operations = 0;
-    for t in timed {
-        if free.len() < chains {
-            places.push(free.len());
-            free.push(t.ready + if t.is_product { PRODUCT } else { 0 });
-            operations += u32::from(t.is_product);
-            continue;
-        }
-        let (k, at) = free.iter().copied().enumerate().min_by_key(|(_, at)| *at).unwrap_or((0, 0));
-        free[k] = at.max(t.ready) + if t.is_product { PRODUCT } else { SUM };
-        operations += 1;
-        places.push(k);
-    }
-    while free.len() > 1 {
-        free.sort_unstable();
-        let joined = free[1] + SUM;
-        free.drain(..2);
-        free.push(joined);
-        operations += 1;
-    }
-    Plan { cost: free.first().copied().unwrap_or(0) + WORTH * operations, chains, places }
 }

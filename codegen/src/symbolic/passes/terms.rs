@@ -42,7 +42,7 @@ impl Opened {
     /// The operation of an operand that is opened by a sum.
     pub fn summand(&self, operand: Operand) -> Option<Op> {
         match operand {
-            Operand::Node(id) if self.in_sum[id as usize] => self.ops[id as usize],
+            Operand::Node(id) if self.in_sum.get(id as usize) == Some(&true) => self.ops[id as usize],
             _ => None,
         }
     }
