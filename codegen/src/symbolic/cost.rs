@@ -136,3 +136,24 @@ impl Tally<'_> {
         times.last().copied().unwrap_or(0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::symbolic::{passes, Graph};
+
+    /// The estimate is what the pass really makes, but for what sharing saves.
+    #[test]
+    fn estimates_what_regrouping_makes() {
+        let graph = Graph::default();
+        let x: Vec<_> = (0..8).map(|k| graph.input(k)).collect();
+        let inner = x[0] * x[1] + x[2] * x[3] - x[4];
+        let outputs = [inner / x[5] + x[6] * x[7] * inner, (inner + x[0] * x[7]) * x[1]];
+        let program = crate::symbolic::Program::new(&graph, &outputs);
+        let (cost, made) = (cost(&program), passes::sums::regroup(&program));
+        assert_eq!(cost.operations, program.counts().total());
+        assert_eq!(cost.instructions, made.instructions());
+        assert_eq!(cost.critical_path, made.critical_path());
+        assert_eq!(cost.throughput, made.throughput());
+    }
+}

@@ -98,3 +98,45 @@ fn best(terms: &[Term]) -> Option<Operand> {
     }
     best.map(|b| b.1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{counts_never_grow, keeps_values};
+    use super::*;
+
+    /// Additions and multiplications of a factored expression of six inputs.
+    fn factored(make: impl for<'g> Fn([Expr<'g>; 6]) -> Expr<'g>) -> (usize, usize) {
+        let graph = Graph::default();
+        let program = Program::new(&graph, &[make(std::array::from_fn(|k| graph.input(k)))]);
+        let counts = factor(&program).counts();
+        (counts.additions, counts.multiplications)
+    }
+
+    #[test]
+    fn common_factors_are_taken_out() {
+        assert_eq!(factored(|[a, b, c, ..]| a * b - a * c), (1, 1));
+        assert_eq!(factored(|[a, b, c, d, e, f]| a * b + c * d + a * e + f), (3, 2));
+        assert_eq!(factored(|[a, b, c, d, ..]| a * c + a * d + b * c + b * d), (2, 1));
+        assert_eq!(factored(|[a, b, c, ..]| a + a * b + a * c), (2, 1));
+        let two = Expr::Const(2.5);
+        assert_eq!(factored(|[a, b, ..]| two * a - two * b), (1, 1));
+        assert_eq!(factored(|[a, b, ..]| two * a + Expr::Const(3.0) * a + b), (1, 1));
+    }
+
+    #[test]
+    fn what_saves_nothing_stays() {
+        assert_eq!(factored(|[a, b, ..]| a + a * b), (1, 1));
+        // The product is used twice: to open it would compute it again.
+        assert_eq!(factored(|[a, b, c, ..]| (a * b + a * c) / (a * b)), (1, 2));
+    }
+
+    #[test]
+    fn values_stay() {
+        keeps_values(factor);
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        counts_never_grow(factor);
+    }
+}

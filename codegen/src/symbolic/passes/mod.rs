@@ -2,6 +2,8 @@
 
 pub(super) mod chains;
 pub mod factor;
+#[cfg(test)]
+mod random;
 mod rebuild;
 pub mod schedule;
 pub mod share;
@@ -37,4 +39,37 @@ pub fn fewer(mut program: Program) -> Program {
         program = next;
     }
     program
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_stay() {
+        random::keeps_values(|p| run(p.clone(), Arithmetic::Fast));
+        random::keeps_values(|p| fewer(p.clone()));
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        random::counts_never_grow(|p| run(p.clone(), Arithmetic::Fast));
+        random::counts_never_grow(|p| fewer(p.clone()));
+    }
+
+    #[test]
+    fn the_same_program_gives_the_same_program() {
+        for seed in 0..20 {
+            let program = random::integer_program(seed, 100);
+            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast));
+            assert_eq!((a.steps, a.outputs), (b.steps, b.outputs));
+        }
+    }
+
+    #[test]
+    fn exact_programs_are_left_alone() {
+        let program = random::integer_program(1, 100);
+        let exact = run(program.clone(), Arithmetic::Exact);
+        assert_eq!((exact.steps, exact.outputs), (program.steps, program.outputs));
+    }
 }

@@ -251,3 +251,63 @@ impl<'p> Scheduler<'p> {
         matches!(self.op(step), Op::Input(_))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{integer_program, keeps_values, real_program, Rng};
+    use super::*;
+
+    const LIMITS: Limits = Limits { registers: 16, search: 64 };
+
+    /// Most values between their definition and their last use; inputs, sines and cosines are in memory.
+    fn alive(program: &Program) -> usize {
+        let mut last = std::collections::BTreeMap::new();
+        for (at, (_, op, _)) in program.steps.iter().enumerate() {
+            for operand in op.operands() {
+                if let Operand::Node(id) = operand {
+                    last.insert(id, at);
+                }
+            }
+        }
+        let in_memory = |op: &Op| matches!(op, Op::Input(_) | Op::Sin(_) | Op::Cos(_));
+        let spans = program.steps.iter().enumerate().filter(|(_, s)| !in_memory(&s.1));
+        let spans: Vec<(usize, usize)> = spans.map(|(at, s)| (at, last.get(&s.0).copied().unwrap_or(at))).collect();
+        (0..program.steps.len()).map(|at| spans.iter().filter(|s| s.0 <= at && at < s.1).count()).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn the_same_operations_in_another_order() {
+        for seed in 0..50 {
+            let program = integer_program(seed, 120);
+            let ordered = schedule(&program, LIMITS);
+            assert_eq!(program.steps.len(), ordered.steps.len(), "seed {seed}");
+            assert_eq!(program.counts(), ordered.counts(), "seed {seed}");
+            assert_eq!(program.critical_path(), ordered.critical_path(), "seed {seed}");
+            let inputs = Rng::new(seed).inputs();
+            let run = |p: &Program| p.evaluate(&inputs, |a: f64, b: f64, c: f64| a * b + c);
+            assert_eq!(run(&program), run(&ordered), "seed {seed}");
+        }
+        keeps_values(|p| schedule(p, LIMITS));
+    }
+
+    /// Sums of products that are all ready at once would all be alive at once without the limit.
+    #[test]
+    fn registers_are_respected() {
+        let graph = crate::symbolic::Graph::default();
+        let products: Vec<_> = (0..100).map(|k| graph.input(k) * graph.input(k + 1)).collect();
+        let sums: Vec<_> = products.chunks(10).map(|c| c.iter().copied().reduce(|a, b| a + b).expect("ten")).collect();
+        let program = Program::new(&graph, &sums);
+        let limited = alive(&schedule(&program, LIMITS));
+        let free = alive(&schedule(&program, Limits { registers: 1000, search: 64 }));
+        assert!(limited <= LIMITS.registers && limited < free, "{limited} values alive, {free} without limit");
+    }
+
+    #[test]
+    fn sines_stand_first_in_pairs() {
+        let ordered = schedule(&real_program(1, 40), LIMITS);
+        let is_trigonometry = |op: &Op| matches!(op, Op::Sin(_) | Op::Cos(_));
+        let first = ordered.steps.iter().position(|s| !matches!(s.1, Op::Input(_))).expect("operations");
+        let count = ordered.steps.iter().filter(|s| is_trigonometry(&s.1)).count();
+        assert!(ordered.steps[first..first + count].iter().all(|s| is_trigonometry(&s.1)));
+    }
+}

@@ -114,3 +114,31 @@ fn expression<'g>(new: &Rebuilt<'g>, pairs: &[Pair], first: u32, operand: Operan
         operand => new.get(operand),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{counts_never_grow, keeps_values};
+    use super::*;
+
+    #[test]
+    fn common_pairs_are_added_once() {
+        let graph = Graph::default();
+        let [a, b, c, d] = std::array::from_fn(|k| graph.input(k));
+        let program = Program::new(&graph, &[(a + b) + c, (a + d) + b, d - (a + b)]);
+        assert_eq!(program.counts().additions, 5);
+        assert_eq!(share(&program).counts().additions, 4);
+        // Signs: a − b and b − a are one.
+        let program = Program::new(&graph, &[(a + c) - b, (b + d) - a]);
+        assert_eq!(share(&program).counts().additions, 3);
+    }
+
+    #[test]
+    fn values_stay() {
+        keeps_values(share);
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        counts_never_grow(share);
+    }
+}

@@ -136,3 +136,50 @@ impl<'g> Pass<'g, '_> {
         chains[0]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{counts_never_grow, integer_program, keeps_values};
+    use super::*;
+
+    #[test]
+    fn products_are_fused() {
+        let graph = Graph::default();
+        let [a, b, c, d] = std::array::from_fn(|k| graph.input(k));
+        let fused = |e: Expr| regroup(&Program::new(&graph, &[e])).instructions();
+        assert_eq!(fused(a * b + c), 1);
+        assert_eq!(fused(c - a * b), 1);
+        assert_eq!(fused(a * b - c * d), 2);
+        assert_eq!(fused(a * b * c + d), 2);
+    }
+
+    #[test]
+    fn late_factors_are_multiplied_last() {
+        let graph = Graph::default();
+        let [a, b, c, _] = std::array::from_fn(|k| graph.input(k));
+        let late = a / b;
+        let program = Program::new(&graph, &[(late * b) * c]);
+        assert_eq!(
+            program.critical_path() - regroup(&program).critical_path(),
+            latency(&Op::Mul(Operand::Node(0), Operand::Node(0)))
+        );
+    }
+
+    #[test]
+    fn paths_get_shorter() {
+        for seed in 0..100 {
+            let program = integer_program(seed, 120);
+            assert!(regroup(&program).critical_path() <= program.critical_path(), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn values_stay() {
+        keeps_values(regroup);
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        counts_never_grow(regroup);
+    }
+}
