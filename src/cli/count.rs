@@ -8,7 +8,7 @@ use multibody::codegen::generate::{trace, GroupProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
 use multibody::codegen::plan::{Blocks, Plan, PlanOptions};
 use multibody::codegen::symbolic::Counts;
-use multibody::codegen::{Group, Options};
+use multibody::codegen::{Arithmetic, Group, Options};
 use serde_json::json;
 
 use super::args::CountArgs;
@@ -24,6 +24,48 @@ pub struct OutputCounts {
     pub counts: Counts,
     /// By sweep.
     pub sweeps: Vec<(&'static str, Counts)>,
+}
+
+/// One output in one arithmetic, on the processor that schedules are made for.
+struct Speed {
+    group: Group,
+    arithmetic: Arithmetic,
+    counts: Counts,
+    instructions: usize,
+    critical_path: u32,
+    throughput: f64,
+}
+
+/// Every output, exact and fast.
+fn speeds(plan: &Plan, options: &Options) -> Outcome<Vec<Speed>> {
+    let mut speeds = Vec::new();
+    for &group in &options.outputs {
+        for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
+            let program =
+                trace(plan, group, &Options { arithmetic, ..options.clone() }).map_err(generate::failure)?.program;
+            speeds.push(Speed {
+                group,
+                arithmetic,
+                counts: program.counts(),
+                instructions: program.instructions(),
+                critical_path: program.critical_path(),
+                throughput: program.throughput(),
+            });
+        }
+    }
+    Ok(speeds)
+}
+
+/// The table of speeds.
+fn speed_table(speeds: &[Speed], out: &mut dyn Write) -> Outcome {
+    writeln!(out, "\nCycles of a processor with two pipes that multiply and two that add (latencies: sum 3, product 4, division 13, sine 40):")?;
+    writeln!(out, "{:<24}{:>12}{:>14}{:>16}{:>14}", "", "operations", "instructions", "critical path", "busiest pipe")?;
+    for s in speeds {
+        let name = format!("{}, {}", s.group.name(), s.arithmetic.name());
+        let n = [s.counts.total(), s.instructions, s.critical_path as usize, s.throughput.round() as usize];
+        writeln!(out, "{name:<24}{:>12}{:>14}{:>16}{:>14}", n[0], n[1], n[2], n[3])?;
+    }
+    Ok(())
 }
 
 /// What one part of the scene costs.
@@ -42,8 +84,9 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         Some(&group) => parts(&plan, &options, group)?,
         None => Vec::new(),
     };
+    let speeds = speeds(&plan, &options)?;
     if args.json {
-        return as_json(&plan, &counts, &parts, out);
+        return as_json(&plan, &counts, &speeds, &parts, out);
     }
     writeln!(
         out,
@@ -54,6 +97,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         gravity(&plan)
     )?;
     table(&counts, &options.outputs, out)?;
+    speed_table(&speeds, out)?;
     rivals(&plan, &counts, out)?;
     let group = options.outputs.first().map_or("", |g| g.name());
     if !parts.is_empty() {
@@ -191,7 +235,7 @@ fn numbers(c: &Counts) -> serde_json::Map<String, serde_json::Value> {
     pairs.into_iter().map(|(k, n)| (k.to_string(), json!(n))).collect()
 }
 
-fn as_json(plan: &Plan, counts: &[OutputCounts], parts: &[Part], out: &mut dyn Write) -> Outcome {
+fn as_json(plan: &Plan, counts: &[OutputCounts], speeds: &[Speed], parts: &[Part], out: &mut dyn Write) -> Outcome {
     let outputs: Vec<_> = counts
         .iter()
         .map(|c| {
@@ -207,6 +251,13 @@ fn as_json(plan: &Plan, counts: &[OutputCounts], parts: &[Part], out: &mut dyn W
             let mut output = numbers(&c.counts);
             output.insert("output".into(), json!(c.group.name()));
             output.insert("sweeps".into(), json!(sweeps));
+            for s in speeds.iter().filter(|s| s.group == c.group) {
+                let mut speed = numbers(&s.counts);
+                speed.insert("instructions".into(), json!(s.instructions));
+                speed.insert("critical_path".into(), json!(s.critical_path));
+                speed.insert("throughput".into(), json!(s.throughput));
+                output.insert(s.arithmetic.name().into(), json!(speed));
+            }
             output
         })
         .collect();

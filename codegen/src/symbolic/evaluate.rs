@@ -1,7 +1,5 @@
 //! Programs run on numbers: what tests compare.
 
-use std::collections::HashMap;
-
 use mbd_runtime::Scalar;
 
 use super::{Op, Operand, Output, Program};
@@ -10,13 +8,13 @@ impl Program {
     /// Results for given inputs, operation by operation in the program's order; `fused(a, b, c)` is `a · b + c`.
     ///
     /// # Panics
-    /// If an input is missing from `inputs`, or an operand comes after its use.
+    /// If an input is missing from `inputs`.
     pub fn evaluate<S: Scalar>(&self, inputs: &[S], fused: impl Fn(S, S, S) -> S) -> Vec<S> {
-        let mut values: HashMap<u32, S> = HashMap::with_capacity(self.steps.len());
+        let mut values = vec![S::zero(); super::passes::width(self)];
         for (id, op, _) in &self.steps {
             let get = |o: Operand| match o {
                 Operand::Const(bits) => S::constant(f64::from_bits(bits)),
-                Operand::Node(k) => values[&k],
+                Operand::Node(k) => values[k as usize],
             };
             let signed = |x: S, minus: bool| if minus { -x } else { x };
             let value = match *op {
@@ -26,16 +24,16 @@ impl Program {
                 Op::Mul(a, b) => get(a) * get(b),
                 Op::Div(a, b) => get(a) / get(b),
                 Op::Fma(f) => fused(signed(get(f.a), f.minus_product), get(f.b), signed(get(f.c), f.minus_addend)),
-                Op::Sqrt(a) => values[&a].sqrt(),
-                Op::Sin(a) => values[&a].sin_cos().0,
-                Op::Cos(a) => values[&a].sin_cos().1,
+                Op::Sqrt(a) => values[a as usize].sqrt(),
+                Op::Sin(a) => values[a as usize].sin_cos().0,
+                Op::Cos(a) => values[a as usize].sin_cos().1,
             };
-            values.insert(*id, value);
+            values[*id as usize] = value;
         }
         let result = |output: &Output| match *output {
             Output::Const(x) => S::constant(x),
-            Output::Node(id, true) => -values[&id],
-            Output::Node(id, false) => values[&id],
+            Output::Node(id, true) => -values[id as usize],
+            Output::Node(id, false) => values[id as usize],
         };
         self.outputs.iter().map(result).collect()
     }

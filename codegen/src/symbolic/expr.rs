@@ -119,6 +119,25 @@ impl Graph {
         (inner.ops[id as usize], inner.labels[id as usize])
     }
 
+    /// An operand of this graph as an expression.
+    pub fn expr(&self, operand: Operand) -> Expr<'_> {
+        match operand {
+            Operand::Const(bits) => Expr::Const(f64::from_bits(bits)),
+            Operand::Node(id) => Expr::Node { graph: self, id, neg: false },
+        }
+    }
+
+    /// `a · b + c`, as one operation where neither is a constant that makes it less.
+    pub fn fma<'g>(&'g self, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Expr<'g> {
+        let trivial = |e: Expr| [0.0, 1.0, -1.0].iter().any(|&x| e.is(x));
+        if trivial(a) || trivial(b) || c.is(0.0) || (a.graph(b).is_none()) {
+            return a * b + c;
+        }
+        let ((a, a_neg), (b, b_neg), (c, minus_addend)) = (a.split(), b.split(), c.split());
+        let (a, b) = if b < a { (b, a) } else { (a, b) };
+        self.node(Op::Fma(Fma { a, b, c, minus_product: a_neg != b_neg, minus_addend }), false)
+    }
+
     fn node(&self, op: Op, neg: bool) -> Expr<'_> {
         let mut inner = self.inner.borrow_mut();
         let next = inner.ops.len() as u32;
@@ -149,7 +168,7 @@ pub enum Expr<'g> {
 
 impl<'g> Expr<'g> {
     /// Splits into operand and sign.
-    fn split(self) -> (Operand, bool) {
+    pub(super) fn split(self) -> (Operand, bool) {
         match self {
             Expr::Const(x) => (Operand::Const(x.abs().to_bits()), x < 0.0),
             Expr::Node { id, neg, .. } => (Operand::Node(id), neg),

@@ -4,10 +4,13 @@
 //! of constants, order of commutative operands, sharing of equal operations. A program therefore gives the bits that the
 //! same sweep gives on numbers, up to the sign of zero.
 
+mod cost;
 mod evaluate;
 mod expr;
+pub mod machine;
 pub mod passes;
 mod program;
 
+pub use cost::{cost, Cost};
 pub use expr::{Expr, Fma, Graph, Label, Op, Operand};
 pub use program::{Counts, Output, Program};

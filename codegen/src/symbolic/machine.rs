@@ -1,0 +1,81 @@
+//! The processor that programs are scheduled for and judged by: a Zen 4 or Skylake in outline.
+
+use super::{Op, Operand, Output, Program};
+
+/// Cycles from the operands of an operation to its result.
+pub fn latency(op: &Op) -> u32 {
+    match op {
+        Op::Input(_) => 0,
+        Op::Add(..) | Op::Sub(..) => SUM,
+        Op::Mul(..) | Op::Fma(_) => PRODUCT,
+        Op::Div(..) => 13,
+        Op::Sqrt(_) => 15,
+        Op::Sin(_) | Op::Cos(_) => SINE,
+    }
+}
+
+/// Latency of a sum: 4 on Skylake, 3 on Golden Cove and Zen 4, 2 on Zen 5.
+pub const SUM: u32 = 3;
+/// Latency of a product, fused with a sum or not.
+pub const PRODUCT: u32 = 4;
+/// Latency of a sine with its cosine.
+pub const SINE: u32 = 40;
+
+/// Pipes that multiply, and pipes that add.
+pub const PIPES: usize = 2;
+
+/// Instructions that one cycle takes at the most.
+pub const WIDTH: u32 = 4;
+
+/// Where an operation is executed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pipe {
+    /// Products, fused or not, and divisions.
+    Multiply,
+    /// Sums.
+    Add,
+    /// Nowhere: inputs are read from memory by their users.
+    None,
+}
+
+/// The pipe of an operation, and the cycles for which it is occupied.
+pub fn pipe(op: &Op) -> (Pipe, u32) {
+    match op {
+        Op::Input(_) => (Pipe::None, 0),
+        Op::Add(..) | Op::Sub(..) => (Pipe::Add, 1),
+        Op::Mul(..) | Op::Fma(_) => (Pipe::Multiply, 1),
+        Op::Div(..) => (Pipe::Multiply, 5),
+        Op::Sqrt(_) => (Pipe::Multiply, 7),
+        // Half of a pair: about thirty products for both.
+        Op::Sin(_) | Op::Cos(_) => (Pipe::Multiply, 15),
+    }
+}
+
+impl Program {
+    /// Cycles from the inputs to the last result, if nothing but operands is waited for.
+    pub fn critical_path(&self) -> u32 {
+        let mut ready = vec![0; super::passes::width(self)];
+        for (id, op, _) in &self.steps {
+            let start = op.operands().map(|o| if let Operand::Node(k) = o { ready[k as usize] } else { 0 }).max();
+            ready[*id as usize] = start.unwrap_or(0) + latency(op);
+        }
+        let last = |output: &Output| if let Output::Node(id, _) = output { ready[*id as usize] } else { 0 };
+        self.outputs.iter().map(last).max().unwrap_or(0)
+    }
+
+    /// Cycles that the pipes need at least for all operations, sines and cosines left out.
+    pub fn throughput(&self) -> f64 {
+        let busy = |which: Pipe| {
+            let trigonometry = |op: &Op| matches!(op, Op::Sin(_) | Op::Cos(_));
+            let pipes = self.steps.iter().filter(|(_, op, _)| !trigonometry(op)).map(|(_, op, _)| pipe(op));
+            pipes.filter(|(pipe, _)| *pipe == which).map(|(_, cycles)| cycles).sum::<u32>()
+        };
+        let busiest = f64::from(busy(Pipe::Multiply).max(busy(Pipe::Add))) / PIPES as f64;
+        busiest.max(self.instructions() as f64 / f64::from(WIDTH))
+    }
+
+    /// Operations that become instructions: inputs, sines and cosines left out, a fused product and sum being one.
+    pub fn instructions(&self) -> usize {
+        self.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_) | Op::Sin(_) | Op::Cos(_))).count()
+    }
+}

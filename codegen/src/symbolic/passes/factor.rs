@@ -1,0 +1,142 @@
+//! Common factors taken out of sums: `a·b + a·c` becomes `a·(b + c)`.
+//!
+//! Only products that are used once are opened, so that every factor taken out of `n` terms saves `n − 1` products and
+//! nothing is computed twice. The factor that saves most goes first; what is left in brackets is treated in the same way.
+
+use std::collections::BTreeMap;
+
+use super::rebuild::Rebuilt;
+use super::terms::Opened;
+use crate::symbolic::{Expr, Graph, Op, Operand, Program};
+
+/// Factors all sums.
+pub fn factor(program: &Program) -> Program {
+    let opened = Opened::new(program);
+    let graph = Graph::default();
+    let mut new = Rebuilt::new(&graph, program);
+    for (id, op, label) in &program.steps {
+        if opened.in_sum[*id as usize] && !matches!(op, Op::Mul(..)) {
+            continue;
+        }
+        new.at(*label);
+        let value = match op {
+            Op::Add(..) | Op::Sub(..) => sum(&mut new, &opened, *op),
+            op => new.copy(*op),
+        };
+        new.set(*id, value);
+    }
+    new.finish(program)
+}
+
+/// A product with its sign; the factors in order.
+#[derive(Clone, Debug)]
+struct Term {
+    minus: bool,
+    factors: Vec<Operand>,
+}
+
+fn sum<'g>(new: &mut Rebuilt<'g>, opened: &Opened, op: Op) -> Expr<'g> {
+    let mut terms: Vec<Term> = Vec::new();
+    for (operand, minus) in opened.terms(op) {
+        let mut term = Term { minus, factors: Vec::new() };
+        for factor in opened.factors(operand) {
+            let (factor, minus) = new.get(factor).split();
+            term.minus ^= minus;
+            term.factors.push(factor);
+        }
+        terms.push(term);
+    }
+    total(new.graph, terms)
+}
+
+/// The value of a sum of products, factored.
+fn total<'g>(graph: &'g Graph, mut terms: Vec<Term>) -> Expr<'g> {
+    while let Some(factor) = best(&terms) {
+        let (with, without): (Vec<Term>, Vec<Term>) = terms.into_iter().partition(|t| t.factors.contains(&factor));
+        let inner = with.into_iter().map(|mut t| {
+            let at = t.factors.iter().position(|f| *f == factor).expect("it is there");
+            t.factors.remove(at);
+            t
+        });
+        let inner = total(graph, inner.collect());
+        let (inner, minus) = inner.split();
+        terms = without;
+        terms.push(Term { minus, factors: vec![factor, inner] });
+    }
+    let values = terms.into_iter().map(|t| {
+        let product = t.factors.iter().map(|&f| graph.expr(f)).reduce(|a, b| a * b).unwrap_or(Expr::Const(1.0));
+        if t.minus {
+            -product
+        } else {
+            product
+        }
+    });
+    values.reduce(|a, b| a + b).unwrap_or(Expr::Const(0.0))
+}
+
+/// The factor that saves most products, if any saves one; of equals, the oldest.
+fn best(terms: &[Term]) -> Option<Operand> {
+    // Terms with the factor, and those of them that are products.
+    let mut found: BTreeMap<Operand, (usize, usize)> = BTreeMap::new();
+    for term in terms {
+        for (k, factor) in term.factors.iter().enumerate() {
+            if !term.factors[..k].contains(factor) {
+                let (all, products) = found.entry(*factor).or_default();
+                *all += 1;
+                *products += usize::from(term.factors.len() > 1);
+            }
+        }
+    }
+    // The product that is left costs one.
+    let gain = |(all, products): (usize, usize)| if all > 1 { products.saturating_sub(1) } else { 0 };
+    let mut best: Option<(usize, Operand)> = None;
+    for (factor, counts) in found {
+        let gain = gain(counts);
+        if gain > best.map_or(0, |b| b.0) {
+            best = Some((gain, factor));
+        }
+    }
+    best.map(|b| b.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{counts_never_grow, keeps_values};
+    use super::*;
+
+    /// Additions and multiplications of a factored expression of six inputs.
+    fn factored(make: impl for<'g> Fn([Expr<'g>; 6]) -> Expr<'g>) -> (usize, usize) {
+        let graph = Graph::default();
+        let program = Program::new(&graph, &[make(std::array::from_fn(|k| graph.input(k)))]);
+        let counts = factor(&program).counts();
+        (counts.additions, counts.multiplications)
+    }
+
+    #[test]
+    fn common_factors_are_taken_out() {
+        assert_eq!(factored(|[a, b, c, ..]| a * b - a * c), (1, 1));
+        assert_eq!(factored(|[a, b, c, d, e, f]| a * b + c * d + a * e + f), (3, 2));
+        assert_eq!(factored(|[a, b, c, d, ..]| a * c + a * d + b * c + b * d), (2, 1));
+        assert_eq!(factored(|[a, b, c, ..]| a + a * b + a * c), (2, 1));
+        let two = Expr::Const(2.5);
+        assert_eq!(factored(|[a, b, ..]| two * a - two * b), (1, 1));
+        assert_eq!(factored(|[a, b, ..]| two * a + Expr::Const(3.0) * a + b), (1, 1));
+    }
+
+    #[test]
+    fn what_saves_nothing_stays() {
+        assert_eq!(factored(|[a, b, ..]| a + a * b), (1, 1));
+        // The product is used twice: to open it would compute it again.
+        assert_eq!(factored(|[a, b, c, ..]| (a * b + a * c) / (a * b)), (1, 2));
+    }
+
+    #[test]
+    fn values_stay() {
+        keeps_values(factor);
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        counts_never_grow(factor);
+    }
+}

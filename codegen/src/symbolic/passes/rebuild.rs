@@ -1,0 +1,108 @@
+//! What every pass starts from: a program's values in a new graph, and who uses what.
+
+use mbd_runtime::sweep::Trace;
+use mbd_runtime::Scalar;
+
+use crate::symbolic::{Expr, Graph, Label, Op, Operand, Output, Program};
+
+/// A program on its way into another graph: the expression of every node so far.
+pub struct Rebuilt<'g> {
+    /// The new graph.
+    pub graph: &'g Graph,
+    values: Vec<Option<Expr<'g>>>,
+}
+
+impl<'g> Rebuilt<'g> {
+    pub fn new(graph: &'g Graph, program: &Program) -> Self {
+        Rebuilt { graph, values: vec![None; width(program)] }
+    }
+
+    /// The expression of an operand.
+    pub fn get(&self, operand: Operand) -> Expr<'g> {
+        match operand {
+            Operand::Const(bits) => Expr::Const(f64::from_bits(bits)),
+            Operand::Node(id) => self.values[id as usize].expect("operands come before their use"),
+        }
+    }
+
+    /// Says what has become of a node.
+    pub fn set(&mut self, id: u32, value: Expr<'g>) {
+        self.values[id as usize] = Some(value);
+    }
+
+    /// New nodes carry this label from now on.
+    pub fn at(&self, label: Label) {
+        self.graph.at(label.0, label.1);
+    }
+
+    /// The same operation on the new operands, by the exact rules.
+    pub fn copy(&self, op: Op) -> Expr<'g> {
+        let node = |id| self.get(Operand::Node(id));
+        match op {
+            Op::Input(k) => self.graph.input(k as usize),
+            Op::Add(a, b) => self.get(a) + self.get(b),
+            Op::Sub(a, b) => self.get(a) - self.get(b),
+            Op::Mul(a, b) => self.get(a) * self.get(b),
+            Op::Div(a, b) => self.get(a) / self.get(b),
+            Op::Sqrt(a) => node(a).sqrt(),
+            Op::Sin(a) => node(a).sin_cos().0,
+            Op::Cos(a) => node(a).sin_cos().1,
+            Op::Fma(f) => {
+                let signed = |x: Expr<'g>, minus: bool| if minus { -x } else { x };
+                let (a, c) = (signed(self.get(f.a), f.minus_product), signed(self.get(f.c), f.minus_addend));
+                self.graph.fma(a, self.get(f.b), c)
+            }
+        }
+    }
+
+    /// The program that the new graph makes of the old one's results.
+    pub fn finish(&self, old: &Program) -> Program {
+        let result = |output: &Output| match *output {
+            Output::Const(x) => Expr::Const(x),
+            Output::Node(id, neg) => {
+                let value = self.get(Operand::Node(id));
+                if neg {
+                    -value
+                } else {
+                    value
+                }
+            }
+        };
+        let outputs: Vec<Expr> = old.outputs.iter().map(result).collect();
+        let mut program = Program::new(self.graph, &outputs);
+        program.created = old.created.clone();
+        program
+    }
+}
+
+/// One more than the largest node id.
+pub fn width(program: &Program) -> usize {
+    program.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
+}
+
+/// How often each node is used, by operations and results together.
+pub fn uses(program: &Program) -> Vec<u32> {
+    let mut uses = vec![0; width(program)];
+    for (_, op, _) in &program.steps {
+        for operand in op.operands() {
+            if let Operand::Node(id) = operand {
+                uses[id as usize] += 1;
+            }
+        }
+    }
+    for output in &program.outputs {
+        if let Output::Node(id, _) = output {
+            uses[*id as usize] += 1;
+        }
+    }
+    uses
+}
+
+/// Operations by node id.
+pub fn by_id(program: &Program) -> Vec<Option<Op>> {
+    let mut ops = vec![None; width(program)];
+    for (id, op, _) in &program.steps {
+        ops[*id as usize] = Some(*op);
+    }
+    ops
+}
