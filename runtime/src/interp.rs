@@ -89,15 +89,7 @@ impl<S: Scalar> Interpreter<S> {
             wrenches: vec![[o; 6]; dims.wrenches],
             gravity,
         };
-        Interpreter {
-            work: Workspace::new(&tree),
-            v: vec![o; dims.nv],
-            tree,
-            physical,
-            inputs,
-            quaternions,
-            neutral,
-        }
+        Interpreter { work: Workspace::new(&tree), v: vec![o; dims.nv], tree, physical, inputs, quaternions, neutral }
     }
 
     /// The tree that is run.

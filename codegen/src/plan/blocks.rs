@@ -7,7 +7,7 @@
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan};
-use crate::options::{Group, Options};
+use crate::options::{Arithmetic, Group, Options};
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
@@ -126,7 +126,7 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
 
 /// Operations of the rates.
 fn cost(plan: &Plan) -> usize {
-    let options = Options { efforts: false, ..Options::default() };
+    let options = Options { efforts: false, arithmetic: Arithmetic::Exact, ..Options::default() };
     trace(plan, Group::Rates, &options).map_or(usize::MAX, |g| g.program.counts().total())
 }
 
