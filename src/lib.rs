@@ -46,7 +46,7 @@ pub use mbd_runtime as runtime;
 /// | `name = Arm` | the type; attributes and a narrower visibility may stand before it: `pub(crate) Arm` | `pub` |
 /// | `outputs = [rates, energy]` | of `rates`, `velocities`, `momenta`, `energy`, `accelerations`, `reactions`, `mass_matrix`, `frames`, `inverse_dynamics`, `bias`, `jacobians`, `drifts` | `[rates, momenta, energy]` |
 /// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |
-/// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `exact` |
+/// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `fast` |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |
 /// | `gravity = [0.0, 0.0, -1.62]` | in ground axes, m/s², instead of that of the file | the file's; of URDF `[0, 0, -9.81]` |
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |

@@ -25,9 +25,9 @@ impl Precision {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Arithmetic {
     /// The operations as the sweeps make them: the bits of the interpreter.
-    #[default]
     Exact,
     /// Rewritten, regrouped, fused and scheduled for speed: other rounding, no larger errors.
+    #[default]
     Fast,
 }
 

@@ -190,6 +190,8 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
         change(&mut model);
         total(&Plan::new(&model, options.plan), options)
     };
+    // What the sweeps do; rewriting would blur the differences.
+    let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
     let here = total(plan, options)?;
     let mut parts = Vec::new();
     let mut part = |what, operations, present| {

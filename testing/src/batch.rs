@@ -1,6 +1,6 @@
 //! Trees that the build script generates code for; it and the test that runs the code both read this file.
 
-use mbd_codegen::generate::{Options, Precision};
+use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
 use mbd_codegen::Group;
 
@@ -19,6 +19,7 @@ pub fn tree(k: u64) -> (Model, Options) {
     let seed = 5000 + k;
     let mut rng = Rng::new(seed, 5);
     let options = Options {
+        arithmetic: Arithmetic::Exact,
         type_name: "Tree".to_string(),
         outputs: Group::ALL.to_vec(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },

@@ -64,7 +64,7 @@ fn inputs(group: &GroupProgram, s: &State, p: &[f64]) -> Vec<f64> {
         match name {
             "q" => s.q.clone(),
             "p" => p.to_vec(),
-            "v" => s.v.clone(),
+            "v" | "a" => s.v.clone(),
             "self.tau" => s.tau.clone(),
             "self.drive_q" => s.drive[0].clone(),
             "self.drive_v" => s.drive[1].clone(),

@@ -8,7 +8,7 @@ mod common;
 use std::collections::HashMap;
 
 use common::{Array, Emitted};
-use mbd_codegen::generate::{generate, Group, Options};
+use mbd_codegen::generate::{generate, Arithmetic, Group, Options};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::System;
@@ -30,6 +30,7 @@ impl Case {
         let model = random_model(seed, &Knobs::everything(seed, size));
         let mut rng = Rng::new(seed, 4);
         let options = Options {
+            arithmetic: Arithmetic::Exact,
             outputs: Group::ALL.to_vec(),
             efforts: rng.chance(0.8),
             // Small parts make long sources.

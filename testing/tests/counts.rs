@@ -4,14 +4,14 @@ use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::symbolic::Counts;
-use mbd_codegen::{Group, Options};
+use mbd_codegen::{Arithmetic, Group, Options};
 use mbd_runtime::sweep::Quantity;
 use mbd_testing::random::{random_model, Knobs};
 
 const NONE: Gravity = Gravity::Constant([Value::ZERO; 3]);
 
 fn program(model: &Model, group: Group, efforts: bool) -> mbd_codegen::symbolic::Program {
-    let options = Options { efforts, ..Options::default() };
+    let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
     trace(&Plan::new(model, options.plan), group, &options).expect("no frames are named").program
 }
 
@@ -122,7 +122,8 @@ fn outputs_are_independent() {
     for seed in 0..30 {
         let model = random_model(seed, &Knobs::everything(seed, 5));
         let generated = |outputs: Vec<Group>| {
-            generate(&model, &Options { outputs, ..Options::default() }).unwrap_or_else(|e| panic!("seed {seed}: {e}"))
+            generate(&model, &Options { outputs, arithmetic: Arithmetic::Exact, ..Options::default() })
+                .unwrap_or_else(|e| panic!("seed {seed}: {e}"))
         };
         let all = generated(Group::ALL.to_vec());
         for (k, group) in Group::ALL.into_iter().enumerate() {
@@ -143,7 +144,7 @@ fn outputs_are_independent() {
 fn frames_are_chosen_one_by_one() {
     let model = random_model(3, &Knobs { bodies: (6, 6), ..Knobs::default() });
     let count = |frames: Vec<String>| {
-        let options = Options { frames, ..Options::default() };
+        let options = Options { frames, arithmetic: Arithmetic::Exact, ..Options::default() };
         let plan = Plan::new(&model, options.plan);
         trace(&plan, Group::Frames, &options).expect("the frames exist").program.counts().total()
     };

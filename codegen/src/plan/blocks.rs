@@ -7,7 +7,8 @@
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan, PoseStep};
-use crate::options::{Group, Options};
+use crate::options::{Arithmetic, Group, Options};
+use crate::symbolic;
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
@@ -16,13 +17,15 @@ const LONGEST: usize = 10;
 /// Trees beyond this are not searched: counting a candidate means to generate it.
 const LARGEST: usize = 150;
 
-/// Which joints are solved as blocks.
+/// How the joints are eliminated: one by one, or in one of the forms of this module, branch by branch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Blocks {
-    /// Those for which the rates have the fewest operations.
+    /// The form for which the rates take the least time for one state, by the cost model.
     #[default]
+    Fastest,
+    /// The form for which the rates have the fewest operations.
     Fewest,
-    /// None: every joint by itself.
+    /// Every joint by itself.
     None,
 }
 
@@ -42,14 +45,14 @@ struct Form {
 }
 
 /// Chooses a form for every chain that ends at a tip, one after the other.
-pub fn choose(plan: &mut Plan) {
+pub fn choose(plan: &mut Plan, blocks: Blocks) {
     if plan.nodes.len() > LARGEST {
         return;
     }
     let runs = parallel_runs(plan);
-    toggle_unturned(plan, &runs);
+    toggle_unturned(plan, &runs, blocks);
     for chain in tip_chains(plan) {
-        let mut search = Search { plan, chain: &chain, best: cost(plan), chosen: None };
+        let mut search = Search { plan, chain: &chain, best: cost(plan, blocks), blocks, chosen: None };
         for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
             search.consider(form);
         }
@@ -58,7 +61,7 @@ pub fn choose(plan: &mut Plan) {
             *plan = chosen;
         }
     }
-    toggle_unturned(plan, &runs);
+    toggle_unturned(plan, &runs, blocks);
 }
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
@@ -83,12 +86,12 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 }
 
 /// Turns or does not turn the frames of every run, whichever is cheaper.
-fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>]) {
-    let mut best = cost(plan);
+fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], blocks: Blocks) {
+    let mut best = cost(plan, blocks);
     for run in runs {
         let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         flip(plan);
-        match cost(plan) {
+        match cost(plan, blocks) {
             operations if operations < best => best = operations,
             _ => flip(plan),
         }
@@ -98,7 +101,8 @@ fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>]) {
 struct Search<'a> {
     plan: &'a Plan,
     chain: &'a [usize],
-    best: usize,
+    best: f64,
+    blocks: Blocks,
     chosen: Option<(Form, Plan)>,
 }
 
@@ -107,7 +111,7 @@ impl Search<'_> {
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let operations = cost(&candidate);
+        let operations = cost(&candidate, self.blocks);
         let better = operations < self.best;
         if better {
             self.best = operations;
@@ -161,10 +165,14 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     forms
 }
 
-/// Operations of the rates.
-fn cost(plan: &Plan) -> usize {
-    let options = Options { efforts: false, ..Options::default() };
-    trace(plan, Group::Rates, &options).map_or(usize::MAX, |g| g.program.counts().total())
+/// What the rates cost, in the terms of the search: operations, or cycles.
+fn cost(plan: &Plan, blocks: Blocks) -> f64 {
+    let options = Options { efforts: false, arithmetic: Arithmetic::Exact, ..Options::default() };
+    let Ok(group) = trace(plan, Group::Rates, &options) else { return f64::INFINITY };
+    match blocks {
+        Blocks::Fastest => symbolic::cost(&group.program).cycles(),
+        _ => group.program.counts().total() as f64,
+    }
 }
 
 /// Runs of single-freedom joints that end at a tip, inner joint first.

@@ -209,8 +209,8 @@ impl Plan {
             })
             .collect();
         shared::share(&mut plan);
-        if options.blocks == Blocks::Fewest {
-            blocks::choose(&mut plan);
+        if options.blocks != Blocks::None {
+            blocks::choose(&mut plan, options.blocks);
         }
         plan
     }

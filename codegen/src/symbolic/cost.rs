@@ -31,14 +31,11 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Cycles for one state among others, roughly: the larger of path and throughput, a quarter of the smaller for what
-    /// does not overlap, and what fetching long code takes. Within 20 % of times measured on Zen 5, for chains and robots
-    /// of 3 to 35 freedoms.
+    /// Cycles for one state among others, roughly: [`machine::cycles`](super::machine::cycles), and what fetching long code
+    /// takes. Within 20 % of times measured on Zen 5, for chains and robots of 3 to 35 freedoms.
     pub fn cycles(&self) -> f64 {
-        // Sines come first and overlap with the work before; most latencies are shorter than in the model.
-        let path = 0.85 * f64::from(self.critical_path.saturating_sub(super::machine::SINE));
-        let (most, least) = (path.max(self.throughput), path.min(self.throughput));
-        most + 0.25 * least + (self.bytes - CACHE).max(0.0) / FETCH
+        let ideal = super::machine::cycles(self.critical_path, self.throughput, self.instructions);
+        ideal + (self.bytes - CACHE).max(0.0) / FETCH
     }
 }
 

@@ -27,6 +27,22 @@ pub const PIPES: usize = 2;
 /// Instructions that one cycle takes at the most.
 pub const WIDTH: u32 = 4;
 
+/// Instructions that the processor looks ahead: shorter programs overlap with the evaluation before them.
+const WINDOW: f64 = 250.0;
+
+/// Cycles for one state among others, roughly: the larger of path and throughput, and a quarter of the smaller for what does
+/// not overlap. Sines come first and overlap with the work before; most latencies are shorter than in the model.
+pub fn cycles(critical_path: u32, throughput: f64, instructions: usize) -> f64 {
+    let path = waiting(critical_path, instructions);
+    path.max(throughput) + 0.25 * path.min(throughput)
+}
+
+/// Cycles of the longest path that show in the time of a program.
+pub fn waiting(critical_path: u32, instructions: usize) -> f64 {
+    let shows = (instructions as f64 / WINDOW).min(1.0);
+    0.85 * shows * f64::from(critical_path.saturating_sub(SINE))
+}
+
 /// Where an operation is executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pipe {

@@ -1,12 +1,14 @@
 //! Rewriting of whole programs, for [`Arithmetic::Fast`]: other rounding, the same value.
 
 pub(super) mod chains;
+pub mod constants;
 pub mod factor;
 #[cfg(test)]
 mod random;
 mod rebuild;
 pub mod schedule;
 pub mod share;
+pub mod shorten;
 pub mod sums;
 pub(super) mod terms;
 
@@ -25,7 +27,7 @@ const LIMITS: Limits = Limits { registers: 24, search: 64 };
 pub fn run(program: Program, arithmetic: Arithmetic) -> Program {
     match arithmetic {
         Arithmetic::Exact => program,
-        Arithmetic::Fast => schedule::schedule(&sums::regroup(&fewer(program)), LIMITS),
+        Arithmetic::Fast => schedule::schedule(&shorten::regroup_short(&constants::gather(&fewer(program))), LIMITS),
     }
 }
 

@@ -12,11 +12,47 @@ use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
 /// Regroups all sums and products.
 pub fn regroup(program: &Program) -> Program {
-    let opened = Opened::new(program);
+    regroup_copying(program, &Copies::none(super::rebuild::width(program))).program
+}
+
+/// Shared products that are computed again by their users, by node id.
+#[derive(Clone, Debug)]
+pub struct Copies {
+    /// By sums.
+    pub in_sums: Vec<bool>,
+    /// By products.
+    pub in_products: Vec<bool>,
+}
+
+impl Copies {
+    /// None, for ids below `width`.
+    pub fn none(width: usize) -> Copies {
+        Copies { in_sums: vec![false; width], in_products: vec![false; width] }
+    }
+}
+
+/// A regrouped program, and the times of the old program's nodes in it.
+pub struct Regrouped {
+    /// The program.
+    pub program: Program,
+    /// Cycles by which a node may be late; the largest number where it is not computed.
+    pub slack: Vec<u32>,
+    /// Cycles between the operands of a product.
+    pub spread: Vec<u32>,
+}
+
+/// Regroups all sums and products, some of the shared products opened.
+pub fn regroup_copying(program: &Program, copies: &Copies) -> Regrouped {
+    let mut opened = Opened::new(program);
+    let skipped: Vec<bool> = opened.in_sum.iter().zip(&opened.in_product).map(|(a, b)| *a || *b).collect();
+    let open = |flags: &mut Vec<bool>, more: &[bool]| flags.iter_mut().zip(more).for_each(|(f, m)| *f |= *m);
+    open(&mut opened.in_sum, &copies.in_sums);
+    open(&mut opened.in_product, &copies.in_products);
     let graph = Graph::default();
     let mut pass = Pass { new: Rebuilt::new(&graph, program), arrival: Vec::new(), opened: &opened };
+    let mut spread = vec![0; skipped.len()];
     for (id, op, label) in &program.steps {
-        if opened.in_sum[*id as usize] || opened.in_product[*id as usize] {
+        if skipped[*id as usize] {
             continue;
         }
         pass.new.at(*label);
@@ -30,14 +66,47 @@ pub fn regroup(program: &Program) -> Program {
                 let factors = [opened.factors_of_product(*a), opened.factors_of_product(*b)].concat();
                 match pass.product(factors) {
                     Term::Value(x) => x,
-                    Term::Product(x, y) => x * y,
+                    Term::Product(x, y) => {
+                        spread[*id as usize] = pass.ready(x).abs_diff(pass.ready(y));
+                        x * y
+                    }
                 }
             }
             op => pass.new.copy(*op),
         };
         pass.new.set(*id, value);
     }
-    pass.new.finish(program)
+    let regrouped = pass.new.finish(program);
+    let by_node = slacks(&regrouped, graph.len());
+    let mut slack = vec![u32::MAX; skipped.len()];
+    for (id, ..) in program.steps.iter().filter(|(id, ..)| !skipped[*id as usize]) {
+        if let Expr::Node { id: new, .. } = pass.new.get(Operand::Node(*id)) {
+            slack[*id as usize] = by_node[new as usize];
+        }
+    }
+    Regrouped { program: regrouped, slack, spread }
+}
+
+/// Cycles by which each node may be late; the largest number for nodes that are not in the program.
+fn slacks(program: &Program, width: usize) -> Vec<u32> {
+    let (mut ready, mut after, mut slack) = (vec![0; width], vec![0; width], vec![u32::MAX; width]);
+    let nodes = |op: &Op| {
+        let node = |o: Operand| if let Operand::Node(k) = o { Some(k as usize) } else { None };
+        op.operands().filter_map(node).collect::<Vec<_>>()
+    };
+    for (id, op, _) in &program.steps {
+        ready[*id as usize] = nodes(op).into_iter().map(|k| ready[k]).max().unwrap_or(0) + latency(op);
+    }
+    for (id, op, _) in program.steps.iter().rev() {
+        for k in nodes(op) {
+            after[k] = after[k].max(after[*id as usize] + latency(op));
+        }
+    }
+    let path = program.critical_path();
+    for (id, ..) in &program.steps {
+        slack[*id as usize] = path.saturating_sub(ready[*id as usize] + after[*id as usize]);
+    }
+    slack
 }
 
 /// One term of a sum.

@@ -1,0 +1,55 @@
+//! Constant factors moved together: `c·(d·x)` becomes `(c·d)·x`, though `d·x` may be needed elsewhere too. Costs nothing and
+//! waits for one product less.
+
+use super::rebuild::Rebuilt;
+use crate::symbolic::{Expr, Graph, Op, Operand, Program};
+
+/// Moves constant factors together.
+pub fn gather(program: &Program) -> Program {
+    let graph = Graph::default();
+    let mut new = Rebuilt::new(&graph, program);
+    for (id, op, label) in &program.steps {
+        new.at(*label);
+        let value = match *op {
+            Op::Mul(a, b) => product(&new, a, b),
+            op => new.copy(op),
+        };
+        new.set(*id, value);
+    }
+    new.finish(program)
+}
+
+fn product<'g>(new: &Rebuilt<'g>, a: Operand, b: Operand) -> Expr<'g> {
+    let plain = (new.get(a), new.get(b));
+    let (Expr::Const(c), Expr::Node { graph, id, neg }) = plain else { return plain.0 * plain.1 };
+    let (Op::Mul(Operand::Const(bits), x), _) = graph.get(id) else { return plain.0 * plain.1 };
+    let c = c * f64::from_bits(bits);
+    graph.expr(x) * Expr::Const(if neg { -c } else { c })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::random::{counts_never_grow, keeps_values};
+    use super::*;
+
+    #[test]
+    fn constants_meet() {
+        let graph = Graph::default();
+        let c = Expr::Const;
+        let y = c(2.5) * graph.input(0);
+        let program = Program::new(&graph, &[y, c(4.0) * -y, c(0.4) * y]);
+        let gathered = gather(&program);
+        assert_eq!(gathered.counts().multiplications, 2);
+        assert_eq!(gathered.evaluate(&[3.0], |a: f64, b: f64, c: f64| a * b + c), [7.5, -30.0, 3.0]);
+    }
+
+    #[test]
+    fn values_stay() {
+        keeps_values(gather);
+    }
+
+    #[test]
+    fn counts_do_not_grow() {
+        counts_never_grow(gather);
+    }
+}
