@@ -2,6 +2,7 @@
 
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
+use mbd_codegen::plan::Forms;
 use mbd_codegen::{Arithmetic, Group, Options, Precision};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
@@ -49,12 +50,13 @@ pub struct Args {
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 14] = [
     "path",
     "name",
     "outputs",
     "scalar",
     "arithmetic",
+    "forms",
     "base",
     "gravity",
     "efforts",
@@ -153,6 +155,10 @@ impl Args {
             "arithmetic" => {
                 let choices = [Arithmetic::Exact, Arithmetic::Fast].map(|a| (a.name(), a));
                 self.options.arithmetic = choice("arithmetic", value, &choices)?;
+            }
+            "forms" => {
+                let choices = Forms::ALL.map(|f| (f.name(), f));
+                self.options.plan.forms = choice("forms", value, &choices)?;
             }
             "base" => {
                 let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];

@@ -6,7 +6,7 @@ use std::io::Write;
 use multibody::codegen::emit::quantity;
 use multibody::codegen::generate::{trace, GroupProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
-use multibody::codegen::plan::{Blocks, Plan, PlanOptions};
+use multibody::codegen::plan::{Candidate, Forms, Plan, PlanOptions};
 use multibody::codegen::symbolic::Counts;
 use multibody::codegen::{Arithmetic, Group, Options};
 use serde_json::json;
@@ -77,7 +77,7 @@ struct Part {
 
 /// Counts and prints.
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
-    let plan = source::plan(&args.model, args.code.snap)?;
+    let plan = source::plan(&args.model, args.code.plan_options())?;
     let options = args.code.options(&plan.model.name);
     let counts = all(&plan, &options)?;
     let parts = match options.outputs.first() {
@@ -98,6 +98,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     )?;
     table(&counts, &options.outputs, out)?;
     speed_table(&speeds, out)?;
+    candidates(&plan, options.plan.forms, args.candidates, out)?;
     rivals(&plan, &counts, out)?;
     let group = options.outputs.first().map_or("", |g| g.name());
     if !parts.is_empty() {
@@ -105,7 +106,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     }
     for part in &parts {
         let (sign, hint) = match (part.what, part.present) {
-            (RIGHT_ANGLES | BLOCKS, _) => ('-', ""),
+            (RIGHT_ANGLES | FORMS, _) => ('-', ""),
             (_, true) => ('+', ""),
             (_, false) => ('+', "  (not in this scene)"),
         };
@@ -114,8 +115,40 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     Ok(())
 }
 
+/// Elimination forms that were tried: the best of every branch, or all.
+fn candidates(plan: &Plan, forms: Forms, all: bool, out: &mut dyn Write) -> Outcome {
+    let mut rest = &plan.candidates[..];
+    while let Some(first) = rest.first() {
+        let n = rest.iter().take_while(|c| c.branch == first.branch).count();
+        let mut branch: Vec<&Candidate> = rest[..n].iter().collect();
+        rest = &rest[n..];
+        let key = |c: &Candidate| match forms {
+            Forms::Fastest => c.cost.cycles(),
+            _ => c.cost.operations as f64,
+        };
+        branch.sort_by(|a, b| key(a).total_cmp(&key(b)).then(b.taken.cmp(&a.taken)));
+        let [from, to] = first.branch.map(|k| plan.nodes[k].name.as_str());
+        let why = match forms {
+            Forms::Fastest => "fewest cycles for one state",
+            _ => "fewest operations",
+        };
+        writeln!(out, "\nEliminations tried from `{from}` to `{to}`: {n}; taken for its {why}: *")?;
+        writeln!(out, "  {:>10}{:>15}{:>14}{:>8}", "operations", "critical path", "busiest pipe", "cycles")?;
+        for c in branch.iter().take(if all { n } else { SHOWN }) {
+            let mark = if c.taken { '*' } else { ' ' };
+            let (k, cycles) = (&c.cost, c.cost.cycles());
+            let n = [k.operations, k.critical_path as usize, k.throughput.round() as usize, cycles.round() as usize];
+            writeln!(out, "{mark} {:>10}{:>15}{:>14}{:>8}  {}", n[0], n[1], n[2], n[3], c.form)?;
+        }
+    }
+    Ok(())
+}
+
+/// Candidates of a branch that are shown unasked.
+const SHOWN: usize = 4;
+
 const RIGHT_ANGLES: &str = "right angles taken as exact";
-const BLOCKS: &str = "joints solved as blocks";
+const FORMS: &str = "elimination forms";
 
 /// Gravity as it is printed.
 pub fn gravity(plan: &Plan) -> String {
@@ -212,8 +245,8 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
     let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
-    let single = Plan::new(&plan.model, PlanOptions { blocks: Blocks::None, ..options.plan });
-    part(BLOCKS, total(&single, options)?.saturating_sub(here), true);
+    let single = Plan::new(&plan.model, PlanOptions { forms: Forms::Single, ..options.plan });
+    part(FORMS, total(&single, options)?.saturating_sub(here), true);
     Ok(parts)
 }
 

@@ -77,8 +77,8 @@ pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
 }
 
 /// The plan of a model, with its notices told.
-pub fn plan(args: &ModelArgs, snap: f64) -> Outcome<Plan> {
-    let plan = Plan::new(&model_of(args)?, PlanOptions { snap, ..PlanOptions::default() });
+pub fn plan(args: &ModelArgs, options: PlanOptions) -> Outcome<Plan> {
+    let plan = Plan::new(&model_of(args)?, options);
     tell_notices(&args.model, &plan.notices);
     Ok(plan)
 }

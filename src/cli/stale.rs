@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{self, Arithmetic, Group, Options, Precision};
 use serde::Deserialize;
 
@@ -37,6 +37,7 @@ struct Entry {
     gravity: Option<[f64; 3]>,
     scalar: Option<String>,
     arithmetic: Option<String>,
+    forms: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -89,7 +90,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 
 const KEYS: &str =
     "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
-                    `gravity`, `scalar`, `arithmetic`, `efforts`, `frames`, `snap`, `chunk`";
+                    `gravity`, `scalar`, `arithmetic`, `forms`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// What a file should hold.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -118,6 +119,12 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         Some("fast") => Arithmetic::Fast,
         Some(other) => return Err(wrong(format!("`{other}` is no arithmetic"))),
     };
+    let forms = match entry.forms.as_deref() {
+        None => Forms::default(),
+        Some(name) => {
+            *Forms::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
+        }
+    };
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
@@ -125,7 +132,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         arithmetic,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
-        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), ..PlanOptions::default() },
+        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms },
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),

@@ -1,8 +1,8 @@
 //! From the model to the structure the sweeps run on: elementary joints, merged bodies, chosen body frames, shared
 //! coordinates. Numbers stay [`Value`]s; [`Plan::tree`] turns them into any scalar.
 
-mod blocks;
 mod elements;
+mod forms;
 mod frames;
 mod instantiate;
 mod placement;
@@ -14,7 +14,7 @@ use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use crate::model::{Gravity, JointKind, Model, Motion, Param, Value};
 
-pub use blocks::Blocks;
+pub use forms::{Candidate, Forms};
 pub use rigid::Rigid;
 
 /// Angles this close to a multiple of 90° are taken as one, rad (see [`PlanOptions::snap`]).
@@ -27,12 +27,12 @@ pub struct PlanOptions {
     /// number of the description. A decimal π/2 costs a term wherever an exact zero would have stood.
     pub snap: f64,
     /// Joints that are solved together.
-    pub blocks: Blocks,
+    pub forms: Forms,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        PlanOptions { snap: DEFAULT_SNAP, blocks: Blocks::default() }
+        PlanOptions { snap: DEFAULT_SNAP, forms: Forms::default() }
     }
 }
 
@@ -173,6 +173,8 @@ pub struct Plan {
     pub slots: Vec<Slot>,
     /// Frame index and axes of each wrench.
     pub wrenches: Vec<(usize, WrenchAxes)>,
+    /// Elimination forms that were tried, branch by branch.
+    pub candidates: Vec<Candidate>,
     /// What was changed on the way.
     pub notices: Vec<String>,
 }
@@ -194,6 +196,7 @@ impl Plan {
             joint_nodes: framed.joint_nodes,
             slots,
             wrenches: Vec::new(),
+            candidates: Vec::new(),
             notices,
         };
         plan.wrenches = model
@@ -209,8 +212,8 @@ impl Plan {
             })
             .collect();
         shared::share(&mut plan);
-        if options.blocks != Blocks::None {
-            blocks::choose(&mut plan, options.blocks);
+        if options.forms != Forms::Single {
+            forms::choose(&mut plan, options.forms);
         }
         plan
     }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{Arithmetic, Group, Options, Precision};
 use values::{camel_case, finite, outputs, positive, rust_path, snap, vector};
 
@@ -129,6 +129,10 @@ pub struct CodeArgs {
     /// Whether operations may be rewritten for speed, or give the interpreter's bits
     #[arg(long, value_enum, default_value_t = ArithmeticArg::of(Arithmetic::default()))]
     pub arithmetic: ArithmeticArg,
+    /// How joints are eliminated: in the form that is fastest by the cost model, in the one with the fewest operations, or
+    /// one by one. `mbd count` shows the candidates
+    #[arg(long, value_enum, default_value_t = FormsArg::Fastest)]
+    pub forms: FormsArg,
     /// No joint forces: they are zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -162,6 +166,11 @@ impl CodeArgs {
         groups
     }
 
+    /// How the structure is chosen.
+    pub fn plan_options(&self) -> PlanOptions {
+        PlanOptions { snap: self.snap, forms: self.forms.forms() }
+    }
+
     /// As the generator takes it; `model` is the name of the model.
     pub fn options(&self, model: &str) -> Options {
         Options {
@@ -170,10 +179,31 @@ impl CodeArgs {
             precision: self.scalar.precision(),
             efforts: !self.no_efforts,
             frames: self.frames.clone(),
-            plan: PlanOptions { snap: self.snap, ..PlanOptions::default() },
+            plan: self.plan_options(),
             chunk: self.chunk as usize,
             arithmetic: self.arithmetic.arithmetic(),
             ..Options::default()
+        }
+    }
+}
+
+/// Elimination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormsArg {
+    /// Least time for one state
+    Fastest,
+    /// Fewest operations
+    Fewest,
+    /// One by one
+    Single,
+}
+
+impl FormsArg {
+    fn forms(self) -> Forms {
+        match self {
+            FormsArg::Fastest => Forms::Fastest,
+            FormsArg::Fewest => Forms::Fewest,
+            FormsArg::Single => Forms::Single,
         }
     }
 }
@@ -253,6 +283,9 @@ pub struct CountArgs {
     pub model: ModelArgs,
     #[command(flatten)]
     pub code: CodeArgs,
+    /// Show every elimination form that was tried, not only the best of each branch
+    #[arg(long)]
+    pub candidates: bool,
     /// The same as JSON
     #[arg(long)]
     pub json: bool,

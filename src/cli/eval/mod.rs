@@ -6,7 +6,7 @@ mod outer;
 use std::io::{Read, Write};
 
 use clap::ValueEnum;
-use multibody::codegen::plan::Plan;
+use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::Interpreter;
 use serde::Serialize;
 
@@ -62,7 +62,7 @@ impl Results {
 
 /// Reads states, evaluates, writes.
 pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
-    let plan = source::plan(&args.model, args.snap)?;
+    let plan = source::plan(&args.model, PlanOptions { snap: args.snap, ..PlanOptions::default() })?;
     let outer = Outer::new(&plan, args.layout);
     let (name, text) = match args.input.as_os_str() == "-" {
         true => ("standard input".to_string(), standard_input()?),

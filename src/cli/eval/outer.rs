@@ -2,7 +2,7 @@
 
 use multibody::codegen::layout;
 use multibody::codegen::model::{JointKind, Motion};
-use multibody::codegen::plan::{Blocks, Plan, PlanOptions};
+use multibody::codegen::plan::{Forms, Plan, PlanOptions};
 use multibody::runtime::layout::{Form, Layout, Part};
 use multibody::runtime::tree::Source;
 
@@ -65,7 +65,7 @@ impl Outer {
             };
         }
         // Only its names are used: no search for blocks.
-        let options = PlanOptions { blocks: Blocks::None, ..PlanOptions::default() };
+        let options = PlanOptions { forms: Forms::Single, ..PlanOptions::default() };
         Outer::new(&Plan::new(&model, options), LayoutArg::Mbd)
     }
 

@@ -1,14 +1,17 @@
-//! Tip blocks: the last joints of a branch solved together at the first of them.
+//! Elimination forms: which freedoms are solved one by one and which together, and where.
 //!
 //! One joint at a time, every `M'` is full. Carried inward unreduced, the inertia of the outer bodies stays that of a
-//! rigid body (three zeros in four after regrouping) and each joint adds a column; the block is then eliminated at its
-//! innermost joint. Short blocks are cheaper, long ones are not: the generator counts, branch by branch.
+//! rigid body (three zeros in four after regrouping) and each joint adds a column; such a block is eliminated at its
+//! innermost joint. On a chain from the ground the inner joints can also send their screws outward to meet those columns
+//! half-way. A joint can be eliminated on its parent's side, where nothing divided waits for its turn. Momentum rates come
+//! from quadratic forms or from accumulated momenta. Frames between parallel joints need not turn. What is best depends
+//! on zeros, so the generator makes the candidates and takes the one that the cost model likes best, branch by branch.
 
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan, PoseStep};
 use crate::options::{Arithmetic, Group, Options};
-use crate::symbolic;
+use crate::symbolic::{self, Cost};
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
@@ -17,16 +20,38 @@ const LONGEST: usize = 10;
 /// Trees beyond this are not searched: counting a candidate means to generate it.
 const LARGEST: usize = 150;
 
-/// How the joints are eliminated: one by one, or in one of the forms of this module, branch by branch.
+/// How the joints are eliminated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Blocks {
-    /// The form for which the rates take the least time for one state, by the cost model.
+pub enum Forms {
+    /// Branch by branch the form for which the rates take the least time for one state, by the cost model.
     #[default]
     Fastest,
-    /// The form for which the rates have the fewest operations.
+    /// Branch by branch the form for which the rates have the fewest operations.
     Fewest,
     /// Every joint by itself.
-    None,
+    Single,
+}
+
+impl Forms {
+    /// All of them.
+    pub const ALL: [Forms; 3] = [Forms::Fastest, Forms::Fewest, Forms::Single];
+
+    /// Its name in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Forms::Fastest => "fastest",
+            Forms::Fewest => "fewest",
+            Forms::Single => "single",
+        }
+    }
+
+    /// What the search makes small.
+    fn score(self, cost: &Cost) -> f64 {
+        match self {
+            Forms::Fastest => cost.cycles(),
+            Forms::Fewest | Forms::Single => cost.operations as f64,
+        }
+    }
 }
 
 /// How the freedoms of a chain are eliminated.
@@ -45,23 +70,25 @@ struct Form {
 }
 
 /// Chooses a form for every chain that ends at a tip, one after the other.
-pub fn choose(plan: &mut Plan, blocks: Blocks) {
+pub fn choose(plan: &mut Plan, forms: Forms) {
     if plan.nodes.len() > LARGEST {
         return;
     }
     let runs = parallel_runs(plan);
-    toggle_unturned(plan, &runs, blocks);
+    toggle_unturned(plan, &runs, forms);
     for chain in tip_chains(plan) {
-        let mut search = Search { plan, chain: &chain, best: cost(plan, blocks), blocks, chosen: None };
+        let mut search = Search { plan, chain: &chain, best: f64::INFINITY, forms, chosen: None, tried: Vec::new() };
         for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
             search.consider(form);
         }
         while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
-        if let Some((_, chosen)) = search.chosen {
+        let Search { chosen, mut tried, .. } = search;
+        if let Some((_, chosen)) = chosen {
             *plan = chosen;
         }
+        plan.candidates.append(&mut tried);
     }
-    toggle_unturned(plan, &runs, blocks);
+    toggle_unturned(plan, &runs, forms);
 }
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
@@ -86,13 +113,13 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 }
 
 /// Turns or does not turn the frames of every run, whichever is cheaper.
-fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], blocks: Blocks) {
-    let mut best = cost(plan, blocks);
+fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], forms: Forms) {
+    let mut best = forms.score(&cost(plan));
     for run in runs {
         let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         flip(plan);
-        match cost(plan, blocks) {
-            operations if operations < best => best = operations,
+        match forms.score(&cost(plan)) {
+            score if score < best => best = score,
             _ => flip(plan),
         }
     }
@@ -102,8 +129,47 @@ struct Search<'a> {
     plan: &'a Plan,
     chain: &'a [usize],
     best: f64,
-    blocks: Blocks,
+    forms: Forms,
     chosen: Option<(Form, Plan)>,
+    tried: Vec<Candidate>,
+}
+
+impl Form {
+    /// In words.
+    fn words(&self, len: usize) -> String {
+        let mut words = Vec::new();
+        let met = self.split == self.base && self.split > 0;
+        match (met, len - self.base) {
+            (true, k) => words.push(format!("all at the ground: {} screws out, {k} columns in", self.split)),
+            (false, 1) if self.split == 0 => words.push("one by one".to_string()),
+            (false, 1) => {}
+            (false, k) => words.push(format!("last {k} together")),
+        }
+        if !met && self.split > 0 {
+            words.push(format!("first {} at the ground", self.split));
+        }
+        let turned = self.turned.iter().filter(|t| **t).count();
+        if turned > 0 {
+            words.push(format!("{turned} on the parent's side"));
+        }
+        if self.gather > 0 {
+            words.push(format!("momenta of {}", self.gather));
+        }
+        words.join("; ")
+    }
+}
+
+/// A form that was tried for a branch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// First and last node of the branch.
+    pub branch: [usize; 2],
+    /// The form in words.
+    pub form: String,
+    /// Cost of the rates without joint forces.
+    pub cost: Cost,
+    /// Whether it was taken.
+    pub taken: bool,
 }
 
 impl Search<'_> {
@@ -111,10 +177,15 @@ impl Search<'_> {
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let operations = cost(&candidate, self.blocks);
-        let better = operations < self.best;
+        let cost = cost(&candidate);
+        let better = self.forms.score(&cost) < self.best;
+        let branch = [self.chain[0], self.chain[self.chain.len() - 1]];
         if better {
-            self.best = operations;
+            self.best = self.forms.score(&cost);
+            self.tried.iter_mut().for_each(|c| c.taken = false);
+        }
+        self.tried.push(Candidate { branch, form: form.words(self.chain.len()), cost, taken: better });
+        if better {
             self.chosen = Some((form, candidate));
         }
         better
@@ -165,14 +236,11 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     forms
 }
 
-/// What the rates cost, in the terms of the search: operations, or cycles.
-fn cost(plan: &Plan, blocks: Blocks) -> f64 {
+/// What the rates cost.
+fn cost(plan: &Plan) -> Cost {
     let options = Options { efforts: false, arithmetic: Arithmetic::Exact, ..Options::default() };
-    let Ok(group) = trace(plan, Group::Rates, &options) else { return f64::INFINITY };
-    match blocks {
-        Blocks::Fastest => symbolic::cost(&group.program).cycles(),
-        _ => group.program.counts().total() as f64,
-    }
+    let group = trace(plan, Group::Rates, &options);
+    group.map_or(Cost::default(), |group| symbolic::cost(&group.program))
 }
 
 /// Runs of single-freedom joints that end at a tip, inner joint first.
