@@ -243,6 +243,8 @@ pub struct Tree<S> {
     pub frames: Vec<TreeFrame<S>>,
     /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
     pub joint_nodes: Vec<usize>,
+    /// The same mechanism with its freedoms eliminated in another way, where accelerations come cheaper by it.
+    pub accelerations: Option<alloc::boxed::Box<Tree<S>>>,
 }
 
 /// Dimensions of a mechanism.
@@ -261,6 +263,11 @@ pub struct Dims {
 }
 
 impl<S: Scalar> Tree<S> {
+    /// The tree for [`crate::sweep::Sweeps::accelerations`].
+    pub fn for_accelerations(&self) -> &Tree<S> {
+        self.accelerations.as_deref().unwrap_or(self)
+    }
+
     /// The same mechanism with fewer non-zero inertial parameters: what a joint cannot tell from inertia of its parent
     /// is moved there, from the tips inward (Khalil and Kleinfinger's base parameters). Past a pin goes all that is
     /// symmetric about its axis `{m, m c_z, (J_yy, J_yy, 0)}`, past a slider the rotational inertia, past a spherical
@@ -268,6 +275,9 @@ impl<S: Scalar> Tree<S> {
     /// must come from the original.
     pub fn regrouped(&self) -> Tree<S> {
         let mut tree = self.clone();
+        if let Some(other) = &mut tree.accelerations {
+            **other = other.regrouped();
+        }
         for i in (0..tree.nodes.len()).rev() {
             let moved = match tree.nodes[i].kind {
                 Kind::Pin => regroup_pin(&mut tree.nodes[i].inertia),

@@ -212,7 +212,7 @@ impl<S: Scalar> Workspace<S> {
     /// Room for a tree: the only allocation there is.
     pub fn new(tree: &Tree<S>) -> Self {
         let n = tree.nodes.len();
-        let g = tree.shared.len();
+        let g = tree.shared.len().max(tree.for_accelerations().shared.len());
         let mut first = Vec::with_capacity(n + 1);
         let mut f = 0;
         for node in &tree.nodes {

@@ -4,6 +4,7 @@
 //! rigid body (three zeros in four after regrouping) and each joint adds a column; the block is then eliminated at its
 //! innermost joint. Short blocks are cheaper, long ones are not: the generator counts, branch by branch.
 
+use mbd_runtime::sweep::Quantity;
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan, PoseStep};
@@ -47,18 +48,25 @@ pub fn choose(plan: &mut Plan) {
         return;
     }
     let runs = parallel_runs(plan);
-    toggle_unturned(plan, &runs);
+    toggle_unturned(plan, &runs, rates);
+    let mut other = plan.clone();
     for chain in tip_chains(plan) {
-        let mut search = Search { plan, chain: &chain, best: cost(plan), chosen: None };
+        let mut search = Search::new(plan, &chain, rates);
         for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
             search.consider(form);
         }
         while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
-        if let Some((_, chosen)) = search.chosen {
+        let (seen, chosen) = (search.seen, search.chosen);
+        choose_for_accelerations(&mut other, &chain, seen);
+        if let Some((_, chosen)) = chosen {
             *plan = chosen;
         }
     }
-    toggle_unturned(plan, &runs);
+    toggle_unturned(plan, &runs, rates);
+    toggle_unturned(&mut other, &runs, accelerations);
+    if accelerations(&other).0 < accelerations(plan).0 {
+        plan.accelerations = Some(Box::new(other));
+    }
 }
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
@@ -83,31 +91,63 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 }
 
 /// Turns or does not turn the frames of every run, whichever is cheaper.
-fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>]) {
-    let mut best = cost(plan);
+fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], cost: Cost) {
+    let mut best = cost(plan).0;
     for run in runs {
         let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         flip(plan);
-        match cost(plan) {
+        match cost(plan).0 {
             operations if operations < best => best = operations,
             _ => flip(plan),
         }
     }
 }
 
+/// Forms of a chain that are tried for the accelerations, beside their neighbours.
+const TRIED: usize = 6;
+
+/// Searches for the accelerations from those forms of a chain that lead to velocities with the fewest operations: what
+/// the rates need beside them differs from form to form, what the accelerations need does hardly.
+fn choose_for_accelerations(plan: &mut Plan, chain: &[usize], mut seen: Vec<(usize, Form)>) {
+    seen.sort_by_key(|(operations, _)| *operations);
+    let mut search = Search::new(plan, chain, accelerations);
+    for (_, form) in seen.into_iter().take(TRIED) {
+        search.consider(form);
+    }
+    while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
+    if let Some((_, chosen)) = search.chosen {
+        *plan = chosen;
+    }
+}
+
+/// Operations of an output, and those of them that lead to velocities.
+type Cost = fn(&Plan) -> (usize, usize);
+
 struct Search<'a> {
+    cost: Cost,
     plan: &'a Plan,
     chain: &'a [usize],
     best: usize,
     chosen: Option<(Form, Plan)>,
+    /// All forms so far, with the operations that lead to velocities.
+    seen: Vec<(usize, Form)>,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(plan: &'a Plan, chain: &'a [usize], cost: Cost) -> Search<'a> {
+        Search { cost, plan, chain, best: cost(plan).0, chosen: None, seen: Vec::new() }
+    }
+
     /// Takes a form if it is better than all before.
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let operations = cost(&candidate);
+        let (operations, velocities) = (self.cost)(&candidate);
+        // Momenta are the rates' alone.
+        let seen = (velocities, Form { gather: 0, ..form.clone() });
+        if !self.seen.contains(&seen) {
+            self.seen.push(seen);
+        }
         let better = operations < self.best;
         if better {
             self.best = operations;
@@ -161,10 +201,22 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     forms
 }
 
-/// Operations of the rates.
-fn cost(plan: &Plan) -> usize {
-    let options = Options { efforts: false, ..Options::default() };
-    trace(plan, Group::Rates, &options).map_or(usize::MAX, |g| g.program.counts().total())
+fn rates(plan: &Plan) -> (usize, usize) {
+    cost(plan, Group::Rates, false)
+}
+
+fn accelerations(plan: &Plan) -> (usize, usize) {
+    cost(plan, Group::Accelerations, true)
+}
+
+/// Operations of an output, and those of them that lead to velocities.
+fn cost(plan: &Plan, group: Group, efforts: bool) -> (usize, usize) {
+    use Quantity::{Inertia, Pivot, Remainder, Velocity};
+    let options = Options { efforts, ..Options::default() };
+    trace(plan, group, &options).map_or((usize::MAX, usize::MAX), |g| {
+        let velocities = g.program.counts_where(|(_, what)| matches!(what, Inertia | Pivot | Remainder | Velocity));
+        (g.program.counts().total(), velocities.total())
+    })
 }
 
 /// Runs of single-freedom joints that end at a tip, inner joint first.

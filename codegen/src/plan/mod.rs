@@ -175,6 +175,8 @@ pub struct Plan {
     pub wrenches: Vec<(usize, WrenchAxes)>,
     /// What was changed on the way.
     pub notices: Vec<String>,
+    /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
+    pub accelerations: Option<Box<Plan>>,
 }
 
 impl Plan {
@@ -195,6 +197,7 @@ impl Plan {
             slots,
             wrenches: Vec::new(),
             notices,
+            accelerations: None,
         };
         plan.wrenches = model
             .wrenches
