@@ -243,6 +243,8 @@ pub struct Tree<S> {
     pub frames: Vec<TreeFrame<S>>,
     /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
     pub joint_nodes: Vec<usize>,
+    /// Nodes with fewer ancestors than this are the inner ones of the mass matrix: their screws are carried outward.
+    pub matrix_depth: usize,
     /// The same mechanism with its freedoms eliminated in another way, where accelerations come cheaper by it.
     pub accelerations: Option<alloc::boxed::Box<Tree<S>>>,
 }
@@ -263,6 +265,12 @@ pub struct Dims {
 }
 
 impl<S: Scalar> Tree<S> {
+    /// Whether node `i` is less than [`Tree::matrix_depth`] nodes away from the ground.
+    pub fn inner(&self, i: usize) -> bool {
+        let up = core::iter::successors(self.nodes[i].parent, |&i| self.nodes[i].parent);
+        up.take(self.matrix_depth).count() < self.matrix_depth
+    }
+
     /// The tree for [`crate::sweep::Sweeps::accelerations`].
     pub fn for_accelerations(&self) -> &Tree<S> {
         self.accelerations.as_deref().unwrap_or(self)

@@ -5,6 +5,7 @@ mod blocks;
 mod elements;
 mod frames;
 mod instantiate;
+mod matrix;
 mod placement;
 mod rigid;
 mod shared;
@@ -175,6 +176,8 @@ pub struct Plan {
     pub wrenches: Vec<(usize, WrenchAxes)>,
     /// What was changed on the way.
     pub notices: Vec<String>,
+    /// See [`mbd_runtime::tree::Tree`].
+    pub matrix_depth: usize,
     /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
     pub accelerations: Option<Box<Plan>>,
 }
@@ -197,6 +200,7 @@ impl Plan {
             slots,
             wrenches: Vec::new(),
             notices,
+            matrix_depth: 0,
             accelerations: None,
         };
         plan.wrenches = model
@@ -214,6 +218,7 @@ impl Plan {
         shared::share(&mut plan);
         if options.blocks == Blocks::Fewest {
             blocks::choose(&mut plan);
+            matrix::choose(&mut plan);
         }
         plan
     }
