@@ -134,10 +134,12 @@ fn run<'g>(
             vec![kinetic, potential]
         }
         Group::Accelerations => {
+            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
             sweeps.accelerations(q, second, inputs, &mut w, &mut v);
             v
         }
         Group::Reactions => {
+            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
             sweeps.accelerations(q, second, inputs, &mut w, &mut v);
             let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
             Sweeps { tree: physical, trace: graph }.reactions(q, second, &v, inputs, &mut w, &mut out);

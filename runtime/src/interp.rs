@@ -123,7 +123,7 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, v) → v̇`.
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
         sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
     }
 

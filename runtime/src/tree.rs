@@ -243,6 +243,10 @@ pub struct Tree<S> {
     pub frames: Vec<TreeFrame<S>>,
     /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
     pub joint_nodes: Vec<usize>,
+    /// Nodes with fewer ancestors than this are the inner ones of the mass matrix: their screws are carried outward.
+    pub matrix_depth: usize,
+    /// The same mechanism with its freedoms eliminated in another way, where accelerations come cheaper by it.
+    pub accelerations: Option<alloc::boxed::Box<Tree<S>>>,
 }
 
 /// Dimensions of a mechanism.
@@ -261,6 +265,17 @@ pub struct Dims {
 }
 
 impl<S: Scalar> Tree<S> {
+    /// Whether node `i` is less than [`Tree::matrix_depth`] nodes away from the ground.
+    pub fn inner(&self, i: usize) -> bool {
+        let up = core::iter::successors(self.nodes[i].parent, |&i| self.nodes[i].parent);
+        up.take(self.matrix_depth).count() < self.matrix_depth
+    }
+
+    /// The tree for [`crate::sweep::Sweeps::accelerations`].
+    pub fn for_accelerations(&self) -> &Tree<S> {
+        self.accelerations.as_deref().unwrap_or(self)
+    }
+
     /// The same mechanism with fewer non-zero inertial parameters: what a joint cannot tell from inertia of its parent
     /// is moved there, from the tips inward (Khalil and Kleinfinger's base parameters). Past a pin goes all that is
     /// symmetric about its axis `{m, m c_z, (J_yy, J_yy, 0)}`, past a slider the rotational inertia, past a spherical
@@ -268,6 +283,9 @@ impl<S: Scalar> Tree<S> {
     /// must come from the original.
     pub fn regrouped(&self) -> Tree<S> {
         let mut tree = self.clone();
+        if let Some(other) = &mut tree.accelerations {
+            **other = other.regrouped();
+        }
         for i in (0..tree.nodes.len()).rev() {
             let moved = match tree.nodes[i].kind {
                 Kind::Pin => regroup_pin(&mut tree.nodes[i].inertia),

@@ -202,6 +202,8 @@ pub struct Workspace<S> {
     pub drive: Vec<S>,
     /// Motion with accelerations.
     pub newton: Newton<S>,
+    /// Screws of the freedoms of inner nodes for the mass matrix, at `freedom · nodes + i`.
+    pub screws: Vec<Motion<S>>,
     /// Pose of every node in the ground.
     pub rotation: Vec<Mat3<S>>,
     /// Origin of every node in the ground, m.
@@ -212,7 +214,7 @@ impl<S: Scalar> Workspace<S> {
     /// Room for a tree: the only allocation there is.
     pub fn new(tree: &Tree<S>) -> Self {
         let n = tree.nodes.len();
-        let g = tree.shared.len();
+        let g = tree.shared.len().max(tree.for_accelerations().shared.len());
         let mut first = Vec::with_capacity(n + 1);
         let mut f = 0;
         for node in &tree.nodes {
@@ -264,6 +266,7 @@ impl<S: Scalar> Workspace<S> {
                 accel: vec![[o; 3]; n],
                 reference: vec![o; f],
             },
+            screws: vec![Motion::zero(); if tree.matrix_depth > 0 { f * n } else { 0 }],
             rotation: vec![[[o; 3]; 3]; n],
             position: vec![[o; 3]; n],
         }

@@ -7,11 +7,12 @@
 //! from quadratic forms or from accumulated momenta. Frames between parallel joints need not turn. What is best depends
 //! on zeros, so the generator makes the candidates and takes the one that the cost model likes best, branch by branch.
 
+use mbd_runtime::sweep::Quantity;
 use mbd_runtime::tree::Source;
 
 use super::{NodeKind, Plan, PoseStep};
 use crate::options::{Arithmetic, Group, Options};
-use crate::symbolic::{self, Cost};
+use crate::symbolic::{self, Cost, Label};
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
@@ -75,20 +76,44 @@ pub fn choose(plan: &mut Plan, forms: Forms) {
         return;
     }
     let runs = parallel_runs(plan);
-    toggle_unturned(plan, &runs, forms);
+    let goals = [Goal { forms, group: Group::Rates }, Goal { forms, group: Group::Accelerations }];
+    toggle_unturned(plan, &runs, goals[0]);
+    let mut other = plan.clone();
     for chain in tip_chains(plan) {
-        let mut search = Search { plan, chain: &chain, best: f64::INFINITY, forms, chosen: None, tried: Vec::new() };
+        let mut search = Search::new(plan, &chain, goals[0]);
         for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
             search.consider(form);
         }
         while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
-        let Search { chosen, mut tried, .. } = search;
+        let Search { chosen, mut tried, seen, .. } = search;
+        choose_for_accelerations(&mut other, &chain, seen, goals[1]);
         if let Some((_, chosen)) = chosen {
             *plan = chosen;
         }
         plan.candidates.append(&mut tried);
     }
-    toggle_unturned(plan, &runs, forms);
+    toggle_unturned(plan, &runs, goals[0]);
+    toggle_unturned(&mut other, &runs, goals[1]);
+    if goals[1].score(&other) < goals[1].score(plan) {
+        plan.accelerations = Some(Box::new(other));
+    }
+}
+
+/// Forms of a chain that are tried for the accelerations, beside their neighbours.
+const TRIED: usize = 6;
+
+/// Searches for the accelerations from those forms of a chain that lead to velocities with the fewest operations: what
+/// the rates need beside them differs from form to form, what the accelerations need does hardly.
+fn choose_for_accelerations(plan: &mut Plan, chain: &[usize], mut seen: Vec<(usize, Form)>, goal: Goal) {
+    seen.sort_by_key(|(operations, _)| *operations);
+    let mut search = Search::new(plan, chain, goal);
+    for (_, form) in seen.into_iter().take(TRIED) {
+        search.consider(form);
+    }
+    while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
+    if let Some((_, chosen)) = search.chosen {
+        *plan = chosen;
+    }
 }
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
@@ -113,25 +138,51 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 }
 
 /// Turns or does not turn the frames of every run, whichever is cheaper.
-fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], forms: Forms) {
-    let mut best = forms.score(&cost(plan));
+fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], goal: Goal) {
+    let mut best = goal.score(plan);
     for run in runs {
         let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         flip(plan);
-        match forms.score(&cost(plan)) {
+        match goal.score(plan) {
             score if score < best => best = score,
             _ => flip(plan),
         }
     }
 }
 
+/// What is to be made small.
+#[derive(Clone, Copy)]
+struct Goal {
+    forms: Forms,
+    group: Group,
+}
+
+impl Goal {
+    fn score(self, plan: &Plan) -> f64 {
+        self.forms.score(&self.cost(plan).0)
+    }
+
+    /// Cost of the output, and the operations of it that lead to velocities. Joint forces cost the rates an addition each,
+    /// whatever the form.
+    fn cost(self, plan: &Plan) -> (Cost, usize) {
+        use Quantity::{Inertia, Pivot, Remainder, Velocity};
+        let efforts = self.group != Group::Rates;
+        let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
+        let Ok(group) = trace(plan, self.group, &options) else { return (Cost::default(), 0) };
+        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | Remainder | Velocity);
+        (symbolic::cost(&group.program), group.program.counts_where(velocities).total())
+    }
+}
+
 struct Search<'a> {
     plan: &'a Plan,
     chain: &'a [usize],
+    goal: Goal,
     best: f64,
-    forms: Forms,
     chosen: Option<(Form, Plan)>,
     tried: Vec<Candidate>,
+    /// All forms so far, with the operations that lead to velocities.
+    seen: Vec<(usize, Form)>,
 }
 
 impl Form {
@@ -172,16 +223,26 @@ pub struct Candidate {
     pub taken: bool,
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(plan: &'a Plan, chain: &'a [usize], goal: Goal) -> Search<'a> {
+        Search { plan, chain, goal, best: f64::INFINITY, chosen: None, tried: Vec::new(), seen: Vec::new() }
+    }
+
     /// Takes a form if it is better than all before.
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let cost = cost(&candidate);
-        let better = self.forms.score(&cost) < self.best;
+        let (cost, velocities) = self.goal.cost(&candidate);
+        // Momenta are the rates' alone.
+        let seen = (velocities, Form { gather: 0, ..form.clone() });
+        if !self.seen.contains(&seen) {
+            self.seen.push(seen);
+        }
+        let score = self.goal.forms.score(&cost);
+        let better = score < self.best;
         let branch = [self.chain[0], self.chain[self.chain.len() - 1]];
         if better {
-            self.best = self.forms.score(&cost);
+            self.best = score;
             self.tried.iter_mut().for_each(|c| c.taken = false);
         }
         self.tried.push(Candidate { branch, form: form.words(self.chain.len()), cost, taken: better });
@@ -234,13 +295,6 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
         }
     }
     forms
-}
-
-/// What the rates cost.
-fn cost(plan: &Plan) -> Cost {
-    let options = Options { efforts: false, arithmetic: Arithmetic::Exact, ..Options::default() };
-    let group = trace(plan, Group::Rates, &options);
-    group.map_or(Cost::default(), |group| symbolic::cost(&group.program))
 }
 
 /// Runs of single-freedom joints that end at a tip, inner joint first.

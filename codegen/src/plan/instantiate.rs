@@ -81,6 +81,8 @@ impl Plan {
             ground_moment: [S::zero(); 3],
             wrenches: wrenches.collect(),
             joint_nodes: self.joint_nodes.clone(),
+            matrix_depth: self.matrix_depth,
+            accelerations: self.accelerations.as_ref().map(|other| Box::new(other.tree(params))),
             frames,
         }
     }

@@ -5,6 +5,7 @@ mod elements;
 mod forms;
 mod frames;
 mod instantiate;
+mod matrix;
 mod placement;
 mod rigid;
 mod shared;
@@ -177,6 +178,10 @@ pub struct Plan {
     pub candidates: Vec<Candidate>,
     /// What was changed on the way.
     pub notices: Vec<String>,
+    /// See [`mbd_runtime::tree::Tree`].
+    pub matrix_depth: usize,
+    /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
+    pub accelerations: Option<Box<Plan>>,
 }
 
 impl Plan {
@@ -198,6 +203,8 @@ impl Plan {
             wrenches: Vec::new(),
             candidates: Vec::new(),
             notices,
+            matrix_depth: 0,
+            accelerations: None,
         };
         plan.wrenches = model
             .wrenches
@@ -214,6 +221,7 @@ impl Plan {
         shared::share(&mut plan);
         if options.forms != Forms::Single {
             forms::choose(&mut plan, options.forms);
+            matrix::choose(&mut plan);
         }
         plan
     }

@@ -1,6 +1,11 @@
 //! Mass matrix by composite inertias.
+//!
+//! An entry is the product of a column `F = M E`, carried inward, and a screw `E`, which stays where it is. Deep in a tree
+//! most of the work is columns on their way to the ground; so those of nodes from some depth on stop there, and the screws
+//! of the nodes inboard of it come to meet them.
 
 use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::Force;
 use crate::tree::Source;
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -13,13 +18,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         out.fill(S::zero());
         for i in 0..self.tree.nodes.len() {
             w.factor.m[i] = self.inertia(&w.poses, i).articulated();
+            self.matrix_screws(i, w);
         }
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::MassMatrix);
             if let Source::State { v, .. } = node.source {
                 for k in 0..node.kind.nv() {
-                    self.matrix_column(i, k, v + k, nv, w, out);
+                    self.matrix_column(i, k, v + k, w, out);
                 }
             }
             if let Some(p) = node.parent {
@@ -35,32 +41,79 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// Screws of the inner nodes' freedoms at node `i`, down to the first node of those that are not inner.
+    fn matrix_screws(&self, i: usize, w: &mut Workspace<S>) {
+        let Some(p) = self.tree.nodes[i].parent.filter(|&p| self.tree.inner(p)) else { return };
+        self.trace.at(Some(i), Quantity::MassMatrix);
+        let n = self.tree.nodes.len();
+        let mut from = Some(p);
+        while let Some(a) = from {
+            for k in 0..self.tree.nodes[a].kind.nv() {
+                let freedom = w.first[a] + k;
+                let at_parent = match a == p {
+                    true => self.tree.nodes[a].kind.axis(k).motion(S::one()),
+                    false => w.screws[freedom * n + p],
+                };
+                w.screws[freedom * n + i] = self.motion_in(&w.poses, i, &at_parent);
+            }
+            from = self.tree.nodes[a].parent;
+        }
+    }
+
     /// Adds freedom `k` of node `i` (velocity `col`) with every freedom inboard of it to the upper triangle.
-    fn matrix_column(&self, i: usize, k: usize, col: usize, nv: usize, w: &Workspace<S>, out: &mut [S]) {
-        let node = &self.tree.nodes[i];
-        let mut force = w.factor.m[i].times(&node.kind.axis(k).motion(S::one())); // F = M E
+    fn matrix_column(&self, i: usize, k: usize, col: usize, w: &Workspace<S>, out: &mut [S]) {
+        let mut force = w.factor.m[i].times(&self.tree.nodes[i].kind.axis(k).motion(S::one())); // F = M E
         let mut at = i;
         loop {
             let here = &self.tree.nodes[at];
-            if let Source::State { v, .. } = here.source {
-                let last = if at == i { k + 1 } else { here.kind.nv() };
-                for k2 in 0..last {
-                    let x = node.ratio * here.ratio * here.kind.axis(k2).dot(&force);
-                    let (row, col) = if v + k2 < col { (v + k2, col) } else { (col, v + k2) };
-                    let entry = &mut out[row * nv + col];
-                    let own = at == i && k2 == k;
-                    if own {
-                        *entry = *entry + x + node.ratio * node.ratio * node.passive[k].armature;
-                    } else if row == col {
-                        *entry = *entry + (x + x); // two joints of one shared coordinate
-                    } else {
-                        *entry = *entry + x;
-                    }
-                }
+            let last = if at == i { k + 1 } else { here.kind.nv() };
+            for k2 in 0..last {
+                self.matrix_entry((i, k, col), (at, k2), here.kind.axis(k2).dot(&force), out);
             }
             let Some(p) = here.parent else { return };
+            if self.tree.inner(p) {
+                return self.matrix_meeting((i, k, col), at, &force, w, out);
+            }
             force = self.force_out(&w.poses, at, &force);
             at = p;
+        }
+    }
+
+    /// The rest of a column that is at node `at`, with the screws of all inner nodes.
+    fn matrix_meeting(
+        &self,
+        column: (usize, usize, usize),
+        at: usize,
+        force: &Force<S>,
+        w: &Workspace<S>,
+        out: &mut [S],
+    ) {
+        let n = self.tree.nodes.len();
+        let mut inner = self.tree.nodes[at].parent;
+        while let Some(a) = inner {
+            for k in 0..self.tree.nodes[a].kind.nv() {
+                let x = force.dot(&w.screws[(w.first[a] + k) * n + at]);
+                self.matrix_entry(column, (a, k), x, out);
+            }
+            inner = self.tree.nodes[a].parent;
+        }
+    }
+
+    /// Adds the product `x` of the column of a freedom (node, number, velocity) and another's screw.
+    fn matrix_entry(&self, (i, k, col): (usize, usize, usize), (at, k2): (usize, usize), x: S, out: &mut [S]) {
+        let (node, here) = (&self.tree.nodes[i], &self.tree.nodes[at]);
+        let Source::State { v, .. } = here.source else { return };
+        let nv = self.tree.dims.nv;
+        let x = node.ratio * here.ratio * x;
+        let (row, col) = if v + k2 < col { (v + k2, col) } else { (col, v + k2) };
+        let entry = &mut out[row * nv + col];
+        let own = at == i && k2 == k;
+        if own {
+            *entry = *entry + x + node.ratio * node.ratio * node.passive[k].armature;
+        } else if row == col {
+            *entry = *entry + (x + x); // two joints of one shared coordinate
+        } else {
+            *entry = *entry + x;
         }
     }
 }

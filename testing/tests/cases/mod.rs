@@ -97,8 +97,13 @@ pub fn largest(list: &[f64]) -> f64 {
 
 /// Runs a check on all trees and shows the largest error.
 pub fn all(what: &str, check: impl Fn(&mut Case) -> f64) {
+    over(0..TREES, what, check)
+}
+
+/// The same on the trees of some seeds.
+pub fn over(seeds: impl Iterator<Item = u64>, what: &str, check: impl Fn(&mut Case) -> f64) {
     let mut worst = (0.0, 0);
-    for seed in 0..TREES {
+    for seed in seeds {
         let error = check(&mut Case::new(seed));
         if error >= worst.0 {
             worst = (error, seed);
