@@ -26,7 +26,7 @@ pub struct Generated {
 /// An unknown frame name in the options, or a number that is not finite in the code (a freedom without inertia, which the
 /// checks cannot see where parameters are involved), as a message.
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
-    let plan = Plan::new(model, options.plan);
+    let plan = Plan::new(model, options.searches());
     let groups = options.outputs.iter().map(|&g| trace(&plan, g, options));
     let groups = groups.collect::<Result<Vec<_>, String>>()?;
     groups.iter().try_for_each(|g| finite(&plan, g, options.precision))?;

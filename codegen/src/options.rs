@@ -141,6 +141,18 @@ pub struct Options {
     pub arithmetic: Arithmetic,
 }
 
+impl Options {
+    /// [`Options::plan`] without the searches that no output asks for.
+    pub fn searches(&self) -> PlanOptions {
+        let asked = |groups: &[Group]| self.outputs.iter().any(|g| groups.contains(g));
+        PlanOptions {
+            accelerations: self.plan.accelerations && asked(&[Group::Accelerations, Group::Reactions]),
+            mass_matrix: self.plan.mass_matrix && asked(&[Group::MassMatrix]),
+            ..self.plan
+        }
+    }
+}
+
 impl Default for Options {
     fn default() -> Self {
         Options {

@@ -132,7 +132,8 @@ fn candidates(plan: &Plan, forms: Forms, all: bool, out: &mut dyn Write) -> Outc
             Forms::Fastest => "fewest cycles for one state",
             _ => "fewest operations",
         };
-        writeln!(out, "\nEliminations tried from `{from}` to `{to}`: {n}; taken for its {why}: *")?;
+        let alone = if plan.nodes.len() > first.nodes { ", of this branch alone" } else { "" };
+        writeln!(out, "\nEliminations tried from `{from}` to `{to}`: {n}; taken for its {why}{alone}: *")?;
         writeln!(out, "  {:>10}{:>15}{:>14}{:>8}", "operations", "critical path", "busiest pipe", "cycles")?;
         for c in branch.iter().take(if all { n } else { SHOWN }) {
             let mark = if c.taken { '*' } else { ' ' };
@@ -221,7 +222,7 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
         let mut model = plan.model.clone();
         change(&mut model);
-        total(&Plan::new(&model, options.plan), options)
+        total(&Plan::new(&model, options.searches()), options)
     };
     // What the sweeps do; rewriting would blur the differences.
     let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
@@ -245,7 +246,7 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
     let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
-    let single = Plan::new(&plan.model, PlanOptions { forms: Forms::Single, ..options.plan });
+    let single = Plan::new(&plan.model, PlanOptions { forms: Forms::Single, ..options.searches() });
     part(FORMS, total(&single, options)?.saturating_sub(here), true);
     Ok(parts)
 }

@@ -132,7 +132,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         arithmetic,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
-        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms },
+        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms, ..PlanOptions::default() },
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),

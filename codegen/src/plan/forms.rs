@@ -10,7 +10,7 @@
 use mbd_runtime::sweep::Quantity;
 use mbd_runtime::tree::Source;
 
-use super::{NodeKind, Plan, PoseStep};
+use super::{NodeKind, Plan, PlanOptions, PoseStep};
 use crate::options::{Arithmetic, Group, Options};
 use crate::symbolic::{self, Cost, Label};
 use crate::trace::trace;
@@ -70,51 +70,77 @@ struct Form {
     gather: usize,
 }
 
-/// Chooses a form for every chain that ends at a tip, one after the other.
-pub fn choose(plan: &mut Plan, forms: Forms) {
+/// Chooses a form for every chain that ends at a tip. Each is searched with what carries it alone.
+pub fn choose(plan: &mut Plan, options: PlanOptions) {
     if plan.nodes.len() > LARGEST {
         return;
     }
     let runs = parallel_runs(plan);
-    let goals = [Goal { forms, group: Group::Rates }, Goal { forms, group: Group::Accelerations }];
+    let goals = [Group::Rates, Group::Accelerations].map(|group| Goal { forms: options.forms, group });
     toggle_unturned(plan, &runs, goals[0]);
-    let mut other = plan.clone();
+    let mut other = options.accelerations.then(|| plan.clone());
+    let mut known: Vec<Known> = Vec::new();
     for chain in tip_chains(plan) {
-        let mut search = Search::new(plan, &chain, goals[0]);
-        for form in first_forms(chain.len(), plan.nodes[chain[0]].parent.is_none()) {
-            search.consider(form);
+        let (branch, numbers) = plan.branch(chain[0]);
+        let inside: Vec<usize> = chain.iter().filter_map(|&i| numbers[i]).collect();
+        let letters = branch.letters();
+        let like = known.iter().position(|k| k.letters == letters);
+        let like = like.unwrap_or_else(|| {
+            known.push(Known::search(&branch, &inside, goals, other.is_some(), letters));
+            known.len() - 1
+        });
+        let Known { forms: [first, second], tried, .. } = &known[like];
+        let ends = [chain[0], chain[chain.len() - 1]];
+        plan.candidates.extend(tried.iter().map(|c| Candidate { branch: ends, ..c.clone() }));
+        first.iter().for_each(|form| apply(plan, &chain, form));
+        if let (Some(plan), Some(form)) = (&mut other, second) {
+            apply(plan, &chain, form);
         }
-        while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
-        let Search { chosen, mut tried, seen, .. } = search;
-        choose_for_accelerations(&mut other, &chain, seen, goals[1]);
-        if let Some((_, chosen)) = chosen {
-            *plan = chosen;
-        }
-        plan.candidates.append(&mut tried);
     }
     toggle_unturned(plan, &runs, goals[0]);
-    toggle_unturned(&mut other, &runs, goals[1]);
-    if goals[1].score(&other) < goals[1].score(plan) {
-        plan.accelerations = Some(Box::new(other));
+    if let Some(mut other) = other {
+        toggle_unturned(&mut other, &runs, goals[1]);
+        if goals[1].score(&other) < goals[1].score(plan) {
+            plan.accelerations = Some(Box::new(other));
+        }
+    }
+}
+
+/// What was found for a branch, and is right for every one like it: the other leg.
+struct Known {
+    letters: String,
+    /// For rates and for accelerations.
+    forms: [Option<Form>; 2],
+    tried: Vec<Candidate>,
+}
+
+impl Known {
+    fn search(plan: &Plan, chain: &[usize], goals: [Goal; 2], accelerations: bool, letters: String) -> Known {
+        let from_ground = plan.nodes[chain[0]].parent.is_none();
+        let mut search = Search::new(plan, chain, goals[0]);
+        for form in first_forms(chain.len(), from_ground) {
+            search.consider(form);
+        }
+        while search.neighbours(from_ground) {}
+        let Search { chosen, tried, mut seen, .. } = search;
+        let mut second = None;
+        if accelerations {
+            // From those forms that lead to velocities with the fewest operations: what the rates need beside them
+            // differs from form to form, what the accelerations need does hardly.
+            seen.sort_by_key(|(operations, _)| *operations);
+            let mut search = Search::new(plan, chain, goals[1]);
+            for (_, form) in seen.into_iter().take(TRIED) {
+                search.consider(form);
+            }
+            while search.neighbours(from_ground) {}
+            second = search.chosen;
+        }
+        Known { letters, forms: [chosen, second], tried }
     }
 }
 
 /// Forms of a chain that are tried for the accelerations, beside their neighbours.
 const TRIED: usize = 6;
-
-/// Searches for the accelerations from those forms of a chain that lead to velocities with the fewest operations: what
-/// the rates need beside them differs from form to form, what the accelerations need does hardly.
-fn choose_for_accelerations(plan: &mut Plan, chain: &[usize], mut seen: Vec<(usize, Form)>, goal: Goal) {
-    seen.sort_by_key(|(operations, _)| *operations);
-    let mut search = Search::new(plan, chain, goal);
-    for (_, form) in seen.into_iter().take(TRIED) {
-        search.consider(form);
-    }
-    while search.neighbours(plan.nodes[chain[0]].parent.is_none()) {}
-    if let Some((_, chosen)) = search.chosen {
-        *plan = chosen;
-    }
-}
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
 /// the same axis.
@@ -139,13 +165,12 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 
 /// Turns or does not turn the frames of every run, whichever is cheaper.
 fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], goal: Goal) {
-    let mut best = goal.score(plan);
     for run in runs {
-        let flip = |plan: &mut Plan| run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
-        flip(plan);
-        match goal.score(plan) {
-            score if score < best => best = score,
-            _ => flip(plan),
+        let (mut branch, numbers) = plan.branch(run[0]);
+        let score = goal.score(&branch);
+        run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].unturned ^= true);
+        if goal.score(&branch) < score {
+            run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         }
     }
 }
@@ -179,7 +204,7 @@ struct Search<'a> {
     chain: &'a [usize],
     goal: Goal,
     best: f64,
-    chosen: Option<(Form, Plan)>,
+    chosen: Option<Form>,
     tried: Vec<Candidate>,
     /// All forms so far, with the operations that lead to velocities.
     seen: Vec<(usize, Form)>,
@@ -215,9 +240,11 @@ impl Form {
 pub struct Candidate {
     /// First and last node of the branch.
     pub branch: [usize; 2],
+    /// Nodes of the branch and of what carries it.
+    pub nodes: usize,
     /// The form in words.
     pub form: String,
-    /// Cost of the rates without joint forces.
+    /// Cost of the rates of the branch and of what carries it, without joint forces.
     pub cost: Cost,
     /// Whether it was taken.
     pub taken: bool,
@@ -245,16 +272,22 @@ impl<'a> Search<'a> {
             self.best = score;
             self.tried.iter_mut().for_each(|c| c.taken = false);
         }
-        self.tried.push(Candidate { branch, form: form.words(self.chain.len()), cost, taken: better });
+        self.tried.push(Candidate {
+            branch,
+            nodes: self.plan.nodes.len(),
+            form: form.words(self.chain.len()),
+            cost,
+            taken: better,
+        });
         if better {
-            self.chosen = Some((form, candidate));
+            self.chosen = Some(form);
         }
         better
     }
 
     /// Tries forms that differ a little from the best; says whether one of them is better.
     fn neighbours(&mut self, from_ground: bool) -> bool {
-        let Some((form, _)) = self.chosen.clone() else { return false };
+        let Some(form) = self.chosen.clone() else { return false };
         let len = self.chain.len();
         let mut near = Vec::new();
         if form.gather < len {

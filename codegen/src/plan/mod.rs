@@ -1,6 +1,7 @@
 //! From the model to the structure the sweeps run on: elementary joints, merged bodies, chosen body frames, shared
 //! coordinates. Numbers stay [`Value`]s; [`Plan::tree`] turns them into any scalar.
 
+mod branch;
 mod elements;
 mod forms;
 mod frames;
@@ -29,11 +30,16 @@ pub struct PlanOptions {
     pub snap: f64,
     /// Joints that are solved together.
     pub forms: Forms,
+    /// Whether accelerations get a search of their own. Without it they are right, and cost what the form of the rates
+    /// makes them cost.
+    pub accelerations: bool,
+    /// Whether the mass matrix gets one.
+    pub mass_matrix: bool,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        PlanOptions { snap: DEFAULT_SNAP, forms: Forms::default() }
+        PlanOptions { snap: DEFAULT_SNAP, forms: Forms::default(), accelerations: true, mass_matrix: true }
     }
 }
 
@@ -220,7 +226,9 @@ impl Plan {
             .collect();
         shared::share(&mut plan);
         if options.forms != Forms::Single {
-            forms::choose(&mut plan, options.forms);
+            forms::choose(&mut plan, options);
+        }
+        if options.forms != Forms::Single && options.mass_matrix {
             matrix::choose(&mut plan);
         }
         plan

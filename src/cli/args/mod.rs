@@ -168,7 +168,7 @@ impl CodeArgs {
 
     /// How the structure is chosen.
     pub fn plan_options(&self) -> PlanOptions {
-        PlanOptions { snap: self.snap, forms: self.forms.forms() }
+        self.options("").searches()
     }
 
     /// As the generator takes it; `model` is the name of the model.
@@ -179,7 +179,7 @@ impl CodeArgs {
             precision: self.scalar.precision(),
             efforts: !self.no_efforts,
             frames: self.frames.clone(),
-            plan: self.plan_options(),
+            plan: PlanOptions { snap: self.snap, forms: self.forms.forms(), ..PlanOptions::default() },
             chunk: self.chunk as usize,
             arithmetic: self.arithmetic.arithmetic(),
             ..Options::default()

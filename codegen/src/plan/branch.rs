@@ -1,0 +1,96 @@
+//! A branch by itself: what a form costs there hardly depends on what else the tree carries.
+
+use super::{NodeKind, Plan, PlanNode, PoseStep};
+use crate::model::Value;
+
+impl Plan {
+    /// The same mechanism without all that neither carries node `i` nor is carried by it, and the number in it of every
+    /// node. What is cut off leaves no trace: results of such a plan are those of another mechanism.
+    pub(super) fn branch(&self, i: usize) -> (Plan, Vec<Option<usize>>) {
+        let mut keep = vec![false; self.nodes.len()];
+        std::iter::successors(Some(i), |&k| self.nodes[k].parent).for_each(|k| keep[k] = true);
+        for k in i + 1..self.nodes.len() {
+            keep[k] = self.nodes[k].parent.is_some_and(|p| p >= i && keep[p]);
+        }
+        let mut next = 0..;
+        let numbers: Vec<Option<usize>> = keep.iter().map(|k| if *k { next.next() } else { None }).collect();
+        let follows: Vec<bool> = (0..self.shared.len())
+            .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.shared == Some(g)))
+            .collect();
+        let left = |list: &[usize]| list.iter().copied().filter(|&g| follows[g]).collect::<Vec<_>>();
+        let kept = self.nodes.iter().zip(&keep).filter(|(_, keep)| **keep);
+        let nodes = kept.map(|(node, _)| PlanNode {
+            parent: node.parent.and_then(|p| numbers[p]),
+            ends: left(&node.ends),
+            screws: left(&node.screws),
+            open: left(&node.open),
+            solve_before: left(&node.solve_before),
+            solve_after: left(&node.solve_after),
+            ..node.clone()
+        });
+        let mut plan = Plan { nodes: nodes.collect(), solve_at_ground: left(&self.solve_at_ground), ..self.clone() };
+        // Frames matter for wrenches alone.
+        plan.wrenches.retain(|(frame, _)| self.frames[*frame].node.is_some_and(|k| keep[k]));
+        for frame in &mut plan.frames {
+            frame.node = frame.node.and_then(|k| numbers[k]);
+        }
+        plan.dims.wrenches = plan.wrenches.len();
+        plan.joint_nodes.clear();
+        (plan, numbers)
+    }
+
+    /// All of a plan that decides which form is best, in letters: two plans with the same letters differ in numbers only.
+    pub(super) fn letters(&self) -> String {
+        let value = |v: &Value| match v {
+            Value::Const(x) if *x == 0.0 => '0',
+            Value::Const(x) if x.abs() == 1.0 => '1',
+            Value::Const(_) => 'x',
+            Value::Param(_) => 'p',
+        };
+        let number = |x: f64| value(&Value::Const(x));
+        let mut letters = String::new();
+        for node in &self.nodes {
+            letters.push_str(&format!("|{:?} {} {}: ", node.parent, node.kind.letter(), node.quarter));
+            for step in &node.place {
+                match step {
+                    PoseStep::Turn { axis, c, s } => {
+                        letters.push_str(&format!("t{axis:?}{}{}", number(*c), number(*s)))
+                    }
+                    PoseStep::TurnBy { axis, angle } => letters.push_str(&format!("b{axis:?}{}", value(angle))),
+                    PoseStep::Shift { axis, r } => letters.push_str(&format!("s{axis:?}{}", value(r))),
+                    PoseStep::Rotate(m) => letters.extend(m.iter().flatten().map(|x| number(*x))),
+                }
+            }
+            letters.push(' ');
+            letters.extend(node.inertia.iter().map(|x| number(*x)));
+            let joint = &self.model.joints[node.joint.0];
+            for list in [&joint.damping, &joint.stiffness, &joint.rest, &joint.armature] {
+                letters.push(' ');
+                letters.extend(list.iter().map(value));
+            }
+            letters.push_str(&format!(
+                " {}{}{}{} {:?}",
+                number(node.phase),
+                number(node.slide),
+                node.variable.len(),
+                node.follow.len(),
+                [&node.open, &node.solve_before, &node.solve_after],
+            ));
+        }
+        letters.extend(self.wrenches.iter().map(|_| 'w'));
+        letters
+    }
+}
+
+impl NodeKind {
+    fn letter(self) -> char {
+        match self {
+            NodeKind::Pin => 'P',
+            NodeKind::Slider => 'S',
+            NodeKind::Helical(_) => 'H',
+            NodeKind::Planar => 'E',
+            NodeKind::Spherical => 'B',
+            NodeKind::Floating => 'F',
+        }
+    }
+}
