@@ -5,6 +5,7 @@ name, base, file. Chains that are not in `models/` are made up here.
 """
 
 import pathlib
+import re
 import sys
 
 import numpy as np
@@ -17,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tests" / "reference"))
 import toml_model  # noqa: E402
 import urdf_model  # noqa: E402
 
-# Name, file, base. The order of the report.
+# Name, file, base. The order of the report. Files without a folder come with example-robot-data.
 ROBOTS = [
     ("double_pendulum", "models/double_pendulum.toml", "fixed"),
     ("chain10_planar", "models/chain10_planar.toml", "fixed"),
@@ -28,6 +29,9 @@ ROBOTS = [
     ("chain20", None, "fixed"),
     ("solo12", "models/solo12.urdf", "floating"),
     ("g1", "models/g1.urdf", "floating"),
+    ("talos", "talos_reduced.urdf", "floating"),
+    ("chain100", None, "fixed"),
+    ("planar100", None, "fixed"),
 ]
 
 # As the generator's own default: a decimal π/2 is one. The rivals get the benefit of it too.
@@ -66,6 +70,44 @@ xyz = {show(rng.uniform(-0.4, 0.4, 3))}
 rpy = {show(rng.uniform(-3, 3, 3))}
 axis = {show(rng.normal(size=3))}""")
     return "\n".join(text) + "\n"
+
+
+def planar_chain(n):
+    """TOML of a chain of like bars in the plane, as `models/chain10_planar.toml`."""
+    text = [f'name = "planar{n}"\ngravity = [0, 0, -9.81]']
+    for k in range(1, n + 1):
+        parent = f"link{k - 1}" if k > 1 else "ground"
+        text.append(f"""
+[[body]]
+name = "link{k}"
+mass = 0.4
+com = [0, 0, -0.125]
+inertia = [0.0021, 0.0021, 0.00005]
+
+[[joint]]
+name = "pin{k}"
+type = "pin"
+parent = "{parent}"
+child = "link{k}"
+xyz = [0, 0, {-0.25 if k > 1 else 0}]
+axis = [0, 1, 0]""")
+    return "\n".join(text) + "\n"
+
+
+def source(name, file, folder):
+    """Path of a robot's description; written here if it is one of the made up chains."""
+    if file is None:
+        path = folder / f"{name}.toml"
+        path.write_text(general_chain(int(name[5:])) if name.startswith("chain") else planar_chain(int(name[6:])))
+        return path
+    if "/" in file:
+        return ROOT / file
+    robots = "lib/python*/site-packages/cmeel.prefix/share/example-robot-data/robots"
+    text = next(pathlib.Path(sys.prefix).glob(f"{robots}/*/robots/{file}")).read_text()
+    # Neither side has dry friction.
+    path = folder / f"{name}.urdf"
+    path.write_text(re.sub(r'friction="[^"]*"', 'friction="0.0"', text))
+    return path
 
 
 def snapped(matrix):
@@ -116,9 +158,7 @@ def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
     robots = []
     for name, file, base in ROBOTS:
-        path = ROOT / file if file else folder / f"{name}.toml"
-        if not file:
-            path.write_text(general_chain(int(name[5:])))
+        path = source(name, file, folder)
         if path.suffix == ".toml":
             system = toml_model.load(path.parent, path.name)
         else:

@@ -72,7 +72,7 @@ fn print(text: &str) {
 }
 
 /// `name`, then sixteen hexadecimal digits, then the end of the line.
-fn print_line(name: &str, value: u64) {
+pub fn print_line(name: &str, value: u64) {
     print(name);
     print(" ");
     for place in (0..16).rev() {
@@ -84,7 +84,7 @@ fn print_line(name: &str, value: u64) {
 }
 
 /// Ends the emulation, with exit status 0 or 1.
-fn exit(good: bool) -> ! {
+pub fn exit(good: bool) -> ! {
     loop {
         semihosting(0x18, if good { 0x20026 } else { 0x20024 });
     }
@@ -93,7 +93,7 @@ fn exit(good: bool) -> ! {
 const SYSTICK: *mut u32 = 0xE000_E010 as *mut u32; // CSR, RVR, CVR
 
 /// Starts the 24-bit down counter at processor clock.
-fn start_counter() {
+pub fn start_counter() {
     // SAFETY: registers of the core, used by nobody else.
     unsafe {
         SYSTICK.add(1).write_volatile(0x00FF_FFFF);
@@ -103,7 +103,7 @@ fn start_counter() {
 }
 
 /// Ticks since the start, and whether the counter has wrapped.
-fn read_counter() -> (u32, bool) {
+pub fn read_counter() -> (u32, bool) {
     // SAFETY: as above. The wrap flag clears on reading, so this is called once.
     unsafe { (0x00FF_FFFF - SYSTICK.add(2).read_volatile(), SYSTICK.read_volatile() & (1 << 16) != 0) }
 }

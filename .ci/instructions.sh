@@ -1,0 +1,69 @@
+#!/usr/bin/env bash
+# Instructions of generated functions, counted by valgrind, against the limits in .ci/instructions.txt.
+#
+#   .ci/instructions.sh            counts and compares
+#   .ci/instructions.sh --update   counts and writes the limits anew, 4 % above what was counted
+#
+# Needs valgrind (installed on Debian where it is not there and may be: run as root), and a processor with AVX2 and FMA:
+# with those the limits were counted, and valgrind imitates the processor it runs on. Elsewhere nothing is compared.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+limits=.ci/instructions.txt
+update=""
+[ "${1:-}" != --update ] || update=1
+
+if ! command -v valgrind > /dev/null; then
+    if ! command -v apt-get > /dev/null || [ "$(id -u)" != 0 ]; then
+        echo "instructions.sh: valgrind is not installed, and only root on Debian can change that here" >&2
+        exit 1
+    fi
+    apt-get update -q
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends valgrind
+fi
+if ! { grep -qw avx2 /proc/cpuinfo && grep -qw fma /proc/cpuinfo; }; then
+    echo "this processor has no AVX2 or no FMA: its instructions are not those of the limits, nothing is compared"
+    exit 0
+fi
+
+# The code that the generator makes unless told otherwise.
+generated=$PWD/target/instructions
+mkdir -p "$generated"
+cargo build --release --quiet --bin mbd
+for file in double_pendulum.toml chain6.toml chain10_planar.toml ur5.urdf panda_arm.urdf iiwa14.urdf solo12.urdf g1.urdf; do
+    base=fixed
+    case $file in solo12* | g1*) base=floating ;; esac
+    [[ $file == *.toml ]] && base=() || base=(--base "$base")
+    target/release/mbd generate "models/$file" "${base[@]}" --outputs rates,accelerations --name Robot \
+        --runtime ::mbd_runtime -o "$generated/${file%.*}.rs" 2> "$generated/log" || { cat "$generated/log" >&2; exit 1; }
+done
+INSTRUCTIONS=$generated cargo build --release --quiet --locked --manifest-path benches/instructions/Cargo.toml \
+    --target-dir target/instructions/build
+program=$generated/build/release/instructions
+
+# collected MODEL FUNCTION CALLS: instructions of a whole run.
+collected() {
+    local out
+    out=$(valgrind --tool=callgrind --callgrind-out-file=/dev/null "$program" "$@" 2>&1) || { echo "$out" >&2; return 1; }
+    sed -n 's/.*Collected : *//p' <<< "$out"
+}
+
+over="" new=$(grep '^#' "$limits")
+printf '%-16s %-14s %12s %8s\n' model function instructions limit
+while read -r model function limit; do
+    # What start-up takes is in both runs.
+    few=$(collected "$model" "$function" 100)
+    many=$(collected "$model" "$function" 1100)
+    count=$(((many - few) / 1000))
+    printf '%-16s %-14s %12d %8d\n' "$model" "$function" "$count" "$limit"
+    [ "$count" -le "$limit" ] || over+="$model $function: $count instructions, limit $limit"$'\n'
+    new+=$'\n'"$model $function $((count + count / 25 + 1))"
+done < <(grep -v '^#' "$limits")
+
+if [ -n "$update" ]; then
+    printf '%s\n' "$new" > "$limits"
+    echo "written: $limits"
+elif [ -n "$over" ]; then
+    printf '\n%s' "$over" >&2
+    echo "rustc $(rustc --version | cut -d' ' -f2). If another compiler made the difference, or it is worth it: .ci/instructions.sh --update" >&2
+    exit 1
+fi
