@@ -134,13 +134,22 @@ fn candidates(plan: &Plan, forms: Forms, all: bool, out: &mut dyn Write) -> Outc
         };
         let alone = if plan.nodes.len() > first.nodes { ", of this branch alone" } else { "" };
         writeln!(out, "\nEliminations tried from `{from}` to `{to}`: {n}; taken for its {why}{alone}: *")?;
-        writeln!(out, "  {:>10}{:>15}{:>14}{:>8}", "operations", "critical path", "busiest pipe", "cycles")?;
+        writeln!(
+            out,
+            "  {:>10}{:>15}{:>14}{:>8}{:>8}",
+            "operations", "critical path", "busiest pipe", "cycles", "error"
+        )?;
         for c in branch.iter().take(if all { n } else { SHOWN }) {
             let mark = if c.taken { '*' } else { ' ' };
-            let (k, cycles) = (&c.cost, c.cost.cycles());
+            let (k, cycles, form) = (&c.cost, c.cost.cycles(), &c.form);
+            let loss = c.loss.map_or(String::new(), |loss| format!("{loss:.2}"));
+            let refused = if c.refused { " (refused for its rounding errors)" } else { "" };
             let n = [k.operations, k.critical_path as usize, k.throughput.round() as usize, cycles.round() as usize];
-            writeln!(out, "{mark} {:>10}{:>15}{:>14}{:>8}  {}", n[0], n[1], n[2], n[3], c.form)?;
+            writeln!(out, "{mark} {:>10}{:>15}{:>14}{:>8}{loss:>8}  {form}{refused}", n[0], n[1], n[2], n[3])?;
         }
+        let refused = branch.iter().filter(|c| c.refused).count();
+        writeln!(out, "  error: rounding errors in multiples of those of one joint at a time, measured where a form was faster than those")?;
+        writeln!(out, "  before; {refused} refused for it")?;
     }
     Ok(())
 }

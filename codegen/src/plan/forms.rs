@@ -5,14 +5,16 @@
 //! innermost joint. On a chain from the ground the inner joints can also send their screws outward to meet those columns
 //! half-way. A joint can be eliminated on its parent's side, where nothing divided waits for its turn. Momentum rates come
 //! from quadratic forms or from accumulated momenta. Frames between parallel joints need not turn. What is best depends
-//! on zeros, so the generator makes the candidates and takes the one that the cost model likes best, branch by branch.
+//! on zeros, so the generator makes the candidates and takes the one that the cost model likes best, branch by branch, if
+//! its rounding errors are not much larger than those of one joint at a time.
 
 use mbd_runtime::sweep::Quantity;
 use mbd_runtime::tree::Source;
 
+use super::accuracy::{Judge, LIMIT};
 use super::{NodeKind, Plan, PlanOptions, PoseStep};
 use crate::options::{Arithmetic, Group, Options};
-use crate::symbolic::{self, Cost, Label};
+use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
@@ -24,10 +26,11 @@ const LARGEST: usize = 150;
 /// How the joints are eliminated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Forms {
-    /// Branch by branch the form for which the rates take the least time for one state, by the cost model.
+    /// Branch by branch the form for which the rates take the least time for one state, by the cost model, of those whose
+    /// rounding errors are not much larger than one joint at a time makes them.
     #[default]
     Fastest,
-    /// Branch by branch the form for which the rates have the fewest operations.
+    /// Branch by branch the form for which the rates have the fewest operations, whatever its rounding errors.
     Fewest,
     /// Every joint by itself.
     Single,
@@ -51,6 +54,14 @@ impl Forms {
         match self {
             Forms::Fastest => cost.cycles(),
             Forms::Fewest | Forms::Single => cost.operations as f64,
+        }
+    }
+
+    /// What a form may lose, see [`Judge::loss`].
+    fn limit(self) -> f64 {
+        match self {
+            Forms::Fastest => LIMIT,
+            Forms::Fewest | Forms::Single => f64::INFINITY,
         }
     }
 }
@@ -77,16 +88,17 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
     }
     let runs = parallel_runs(plan);
     let goals = [Group::Rates, Group::Accelerations].map(|group| Goal { forms: options.forms, group });
-    toggle_unturned(plan, &runs, goals[0]);
+    let single = plan.clone();
+    toggle_unturned(plan, &single, &runs, goals[0]);
     let mut other = options.accelerations.then(|| plan.clone());
     let mut known: Vec<Known> = Vec::new();
     for chain in tip_chains(plan) {
         let (branch, numbers) = plan.branch(chain[0]);
         let inside: Vec<usize> = chain.iter().filter_map(|&i| numbers[i]).collect();
-        let letters = branch.letters();
-        let like = known.iter().position(|k| k.letters == letters);
+        let here = Here { letters: branch.letters(), plan: branch, chain: inside, goals };
+        let like = known.iter().position(|k| k.letters == here.letters && k.is_accurate(&here));
         let like = like.unwrap_or_else(|| {
-            known.push(Known::search(&branch, &inside, goals, other.is_some(), letters));
+            known.push(here.search(other.is_some()));
             known.len() - 1
         });
         let Known { forms: [first, second], tried, .. } = &known[like];
@@ -97,13 +109,21 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
             apply(plan, &chain, form);
         }
     }
-    toggle_unturned(plan, &runs, goals[0]);
+    toggle_unturned(plan, &single, &runs, goals[0]);
     if let Some(mut other) = other {
-        toggle_unturned(&mut other, &runs, goals[1]);
-        if goals[1].score(&other) < goals[1].score(plan) {
+        toggle_unturned(&mut other, &single, &runs, goals[1]);
+        if goals[1].score(&other) < goals[1].score(plan) || !goals[1].accepts(plan, &single) {
             plan.accelerations = Some(Box::new(other));
         }
     }
+}
+
+/// A branch with what carries it, and what it is searched for.
+struct Here {
+    letters: String,
+    plan: Plan,
+    chain: Vec<usize>,
+    goals: [Goal; 2],
 }
 
 /// What was found for a branch, and is right for every one like it: the other leg.
@@ -115,9 +135,23 @@ struct Known {
 }
 
 impl Known {
-    fn search(plan: &Plan, chain: &[usize], goals: [Goal; 2], accelerations: bool, letters: String) -> Known {
+    /// Whether the forms are accurate with the numbers of another branch.
+    fn is_accurate(&self, here: &Here) -> bool {
+        self.forms.iter().zip(here.goals).all(|(form, goal)| {
+            form.as_ref().is_none_or(|form| {
+                let mut plan = here.plan.clone();
+                apply(&mut plan, &here.chain, form);
+                goal.accepts(&plan, &here.plan)
+            })
+        })
+    }
+}
+
+impl Here {
+    fn search(self, accelerations: bool) -> Known {
+        let (plan, chain) = (&self.plan, &self.chain[..]);
         let from_ground = plan.nodes[chain[0]].parent.is_none();
-        let mut search = Search::new(plan, chain, goals[0]);
+        let mut search = Search::new(plan, chain, self.goals[0]);
         for form in first_forms(chain.len(), from_ground) {
             search.consider(form);
         }
@@ -128,14 +162,14 @@ impl Known {
             // From those forms that lead to velocities with the fewest operations: what the rates need beside them
             // differs from form to form, what the accelerations need does hardly.
             seen.sort_by_key(|(operations, _)| *operations);
-            let mut search = Search::new(plan, chain, goals[1]);
+            let mut search = Search::new(plan, chain, self.goals[1]);
             for (_, form) in seen.into_iter().take(TRIED) {
                 search.consider(form);
             }
             while search.neighbours(from_ground) {}
             second = search.chosen;
         }
-        Known { letters, forms: [chosen, second], tried }
+        Known { forms: [chosen, second], tried, letters: self.letters }
     }
 }
 
@@ -163,13 +197,14 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     runs
 }
 
-/// Turns or does not turn the frames of every run, whichever is cheaper.
-fn toggle_unturned(plan: &mut Plan, runs: &[Vec<usize>], goal: Goal) {
+/// Turns or does not turn the frames of every run, whichever is cheaper, if that is accurate; `single` has joints one by
+/// one.
+fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Goal) {
     for run in runs {
         let (mut branch, numbers) = plan.branch(run[0]);
         let score = goal.score(&branch);
         run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].unturned ^= true);
-        if goal.score(&branch) < score {
+        if goal.score(&branch) < score && goal.accepts(&branch, &single.branch(run[0]).0) {
             run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
         }
     }
@@ -182,20 +217,42 @@ struct Goal {
     group: Group,
 }
 
+/// What forms are compared by. Joint forces cost the rates an addition each, whatever the form.
+pub(super) fn options(group: Group) -> Options {
+    Options { efforts: group != Group::Rates, arithmetic: Arithmetic::Exact, ..Options::default() }
+}
+
+/// The output of a plan, and its cost.
+struct Look {
+    program: Program,
+    cost: Cost,
+}
+
+impl Look {
+    /// Operations that lead to velocities.
+    fn velocities(&self) -> usize {
+        use Quantity::{Inertia, Pivot, Remainder, Velocity};
+        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | Remainder | Velocity);
+        self.program.counts_where(velocities).total()
+    }
+}
+
 impl Goal {
-    fn score(self, plan: &Plan) -> f64 {
-        self.forms.score(&self.cost(plan).0)
+    /// Makes the output of a plan as the sweeps do.
+    fn look(self, plan: &Plan) -> Option<Look> {
+        let program = trace(plan, self.group, &options(self.group)).ok()?.program;
+        Some(Look { cost: symbolic::cost(&program), program })
     }
 
-    /// Cost of the output, and the operations of it that lead to velocities. Joint forces cost the rates an addition each,
-    /// whatever the form.
-    fn cost(self, plan: &Plan) -> (Cost, usize) {
-        use Quantity::{Inertia, Pivot, Remainder, Velocity};
-        let efforts = self.group != Group::Rates;
-        let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
-        let Ok(group) = trace(plan, self.group, &options) else { return (Cost::default(), 0) };
-        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | Remainder | Velocity);
-        (symbolic::cost(&group.program), group.program.counts_where(velocities).total())
+    fn score(self, plan: &Plan) -> f64 {
+        self.look(plan).map_or(f64::INFINITY, |look| self.forms.score(&look.cost))
+    }
+
+    /// Whether a plan is accurate; `single` is the same with joints one by one.
+    fn accepts(self, plan: &Plan, single: &Plan) -> bool {
+        let limit = self.forms.limit();
+        let loss = || self.look(plan).map(|look| Judge::new(single, self.group).loss(&look.program));
+        limit == f64::INFINITY || loss().is_some_and(|loss| loss <= limit)
     }
 }
 
@@ -203,6 +260,7 @@ struct Search<'a> {
     plan: &'a Plan,
     chain: &'a [usize],
     goal: Goal,
+    judge: Judge,
     best: f64,
     chosen: Option<Form>,
     tried: Vec<Candidate>,
@@ -246,27 +304,35 @@ pub struct Candidate {
     pub form: String,
     /// Cost of the rates of the branch and of what carries it, without joint forces.
     pub cost: Cost,
+    /// Rounding error in multiples of that of one joint at a time, measured where the form costs less than those before:
+    /// of the array that loses most, in the mean, the median or the worst states.
+    pub loss: Option<f64>,
+    /// Whether the form was left for its rounding errors.
+    pub refused: bool,
     /// Whether it was taken.
     pub taken: bool,
 }
 
 impl<'a> Search<'a> {
     fn new(plan: &'a Plan, chain: &'a [usize], goal: Goal) -> Search<'a> {
-        Search { plan, chain, goal, best: f64::INFINITY, chosen: None, tried: Vec::new(), seen: Vec::new() }
+        let judge = Judge::new(plan, goal.group);
+        Search { plan, chain, goal, judge, best: f64::INFINITY, chosen: None, tried: Vec::new(), seen: Vec::new() }
     }
 
-    /// Takes a form if it is better than all before.
+    /// Takes a form if it is better than all before, and accurate.
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let (cost, velocities) = self.goal.cost(&candidate);
+        let Some(look) = self.goal.look(&candidate) else { return false };
         // Momenta are the rates' alone.
-        let seen = (velocities, Form { gather: 0, ..form.clone() });
+        let seen = (look.velocities(), Form { gather: 0, ..form.clone() });
         if !self.seen.contains(&seen) {
             self.seen.push(seen);
         }
-        let score = self.goal.forms.score(&cost);
-        let better = score < self.best;
+        let score = self.goal.forms.score(&look.cost);
+        let loss = (score < self.best).then(|| self.judge.loss(&look.program));
+        let refused = loss.is_some_and(|loss| loss > self.goal.forms.limit());
+        let better = loss.is_some() && !refused;
         let branch = [self.chain[0], self.chain[self.chain.len() - 1]];
         if better {
             self.best = score;
@@ -276,7 +342,9 @@ impl<'a> Search<'a> {
             branch,
             nodes: self.plan.nodes.len(),
             form: form.words(self.chain.len()),
-            cost,
+            cost: look.cost,
+            loss,
+            refused,
             taken: better,
         });
         if better {

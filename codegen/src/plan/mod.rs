@@ -1,6 +1,7 @@
 //! From the model to the structure the sweeps run on: elementary joints, merged bodies, chosen body frames, shared
 //! coordinates. Numbers stay [`Value`]s; [`Plan::tree`] turns them into any scalar.
 
+mod accuracy;
 mod branch;
 mod elements;
 mod forms;

@@ -49,14 +49,19 @@ fn choose(opened: &Opened, sums: &mut BTreeMap<u32, Vec<(Operand, bool)>>, next:
         chosen.push(pair);
         for id in at {
             let Some(terms) = sums.get_mut(&id) else { continue };
-            let position = |o: Operand| terms.iter().position(|t| t.0 == o);
-            let (Some(a), Some(b)) = (position(pair.0), position(pair.1)) else { continue };
+            let Some((a, b)) = places_of(terms, pair) else { continue };
             let minus = terms[a].1;
             terms[a] = (operand, minus);
             terms.remove(b);
         }
     }
     chosen
+}
+
+/// Where the members of a pair stand in a sum. A term may stand there twice, with either sign.
+fn places_of(terms: &[(Operand, bool)], pair: Pair) -> Option<(usize, usize)> {
+    let of = |o: Operand| (0..terms.len()).filter(move |&k| terms[k].0 == o);
+    of(pair.0).flat_map(|a| of(pair.1).map(move |b| (a, b))).find(|&(a, b)| (terms[a].1 != terms[b].1) == pair.2)
 }
 
 /// The pairs of one sum whose members could stand in other sums, too.
@@ -130,6 +135,16 @@ mod tests {
         // Signs: a − b and b − a are one.
         let program = Program::new(&graph, &[(a + c) - b, (b + d) - a]);
         assert_eq!(share(&program).counts().additions, 3);
+    }
+
+    #[test]
+    fn a_term_may_stand_twice_with_either_sign() {
+        let graph = Graph::default();
+        let [a, b, c, d] = std::array::from_fn(|k| graph.input(k));
+        let program = Program::new(&graph, &[(a + b) + (c - a), (b - a) + d]);
+        let run = |p: &Program| p.evaluate(&[1.0, 2.0, 4.0, 8.0], |a: f64, b: f64, c: f64| a * b + c);
+        assert_eq!(run(&program), [6.0, 9.0]);
+        assert_eq!(run(&share(&program)), [6.0, 9.0]);
     }
 
     #[test]

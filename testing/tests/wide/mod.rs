@@ -1,0 +1,133 @@
+//! What rounding errors are measured with: double-double numbers as a scalar, and errors of many states.
+//!
+//! Sines and cosines are rounded to 53 bits: those that programs on doubles compute. They are inputs of the algebra, the
+//! same in every form, and their own errors are held to an ulp elsewhere; what is compared here are the roundings after them.
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+use mbd_codegen::generate::GroupProgram;
+use mbd_codegen::import::{load, Base, ImportOptions};
+use mbd_codegen::model::Model;
+use mbd_runtime::Scalar;
+use mbd_testing::state::State;
+use twofloat::TwoFloat;
+
+/// A double-double number as a scalar.
+#[derive(Clone, Copy)]
+pub struct Wide(pub TwoFloat);
+
+macro_rules! operator {
+    ($trait:ident, $name:ident) => {
+        impl $trait for Wide {
+            type Output = Wide;
+            fn $name(self, other: Wide) -> Wide {
+                Wide($trait::$name(self.0, other.0))
+            }
+        }
+    };
+}
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl Neg for Wide {
+    type Output = Wide;
+    fn neg(self) -> Wide {
+        Wide(-self.0)
+    }
+}
+
+impl Scalar for Wide {
+    fn constant(x: f64) -> Self {
+        Wide(x.into())
+    }
+    fn sin_cos(self) -> (Self, Self) {
+        let (s, c) = Scalar::sin_cos(self.0.hi());
+        (Self::constant(s), Self::constant(c))
+    }
+    fn sqrt(self) -> Self {
+        Wide(self.0.sqrt())
+    }
+}
+
+/// Inputs of a program in their order.
+pub fn inputs(group: &GroupProgram, s: &State, p: &[f64]) -> Vec<f64> {
+    let array = |name: &str| -> Vec<f64> {
+        match name {
+            "q" => s.q.clone(),
+            "p" => p.to_vec(),
+            "v" | "a" => s.v.clone(),
+            "self.tau" => s.tau.clone(),
+            "self.drive_q" => s.drive[0].clone(),
+            "self.drive_v" => s.drive[1].clone(),
+            "self.drive_a" => s.drive[2].clone(),
+            "self.wrenches" => s.wrenches.concat(),
+            "self.params" => s.params.clone(),
+            "self.gravity" => s.gravity.to_vec(),
+            other => panic!("unknown input {other}"),
+        }
+    };
+    group.inputs.iter().flat_map(|a| array(&a.name)).collect()
+}
+
+/// The models of the project and how they hang on the ground.
+pub const MODELS: [(&str, Base); 11] = [
+    ("double_pendulum.toml", Base::Fixed),
+    ("spherical_pendulum.toml", Base::Fixed),
+    ("satellite.toml", Base::Fixed),
+    ("chain6.toml", Base::Fixed),
+    ("chain10_planar.toml", Base::Fixed),
+    ("ur5.urdf", Base::Fixed),
+    ("panda_arm.urdf", Base::Fixed),
+    ("panda.urdf", Base::Fixed),
+    ("iiwa14.urdf", Base::Fixed),
+    ("solo12.urdf", Base::Floating),
+    ("g1.urdf", Base::Floating),
+];
+
+/// One of them.
+pub fn model(file: &str, base: Base) -> Model {
+    let path = format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("the model");
+    let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
+    model.unwrap_or_else(|| panic!("{findings}"))
+}
+
+/// Errors of one array of results in many states.
+///
+/// The error of a state is the largest in the array, relative to the largest entry: the array is used as a whole. An array
+/// that happens to pass zero in a state has no relative error; it is measured by a tenth of the median of largest entries.
+/// Otherwise the worst of all states would be the one nearest to zero, and its error that of a single rounding.
+#[derive(Clone, Default)]
+pub struct Errors {
+    off: Vec<f64>,
+    size: Vec<f64>,
+}
+
+impl Errors {
+    /// Adds a state.
+    pub fn add(&mut self, results: &[f64], reference: &[Wide]) {
+        let size = reference.iter().fold(0.0_f64, |m, x| m.max(x.0.hi().abs()));
+        let difference = |(r, w): (&f64, &Wide)| (w.0 - TwoFloat::from(*r)).hi().abs();
+        let off = results.iter().zip(reference).map(difference).fold(0.0_f64, f64::max);
+        assert!(results.iter().all(|x| x.is_finite()));
+        self.size.push(size);
+        self.off.push(off);
+    }
+
+    /// The median of the largest entries.
+    pub fn typical(&self) -> f64 {
+        let mut sizes = self.size.clone();
+        sizes.sort_by(f64::total_cmp);
+        sizes[sizes.len() / 2]
+    }
+
+    /// The errors of all states, smallest first.
+    pub fn sorted(&self) -> Vec<f64> {
+        let least = (0.1 * self.typical()).max(f64::MIN_POSITIVE);
+        let mut errors: Vec<f64> = self.off.iter().zip(&self.size).map(|(off, size)| off / size.max(least)).collect();
+        errors.sort_by(f64::total_cmp);
+        errors
+    }
+}
