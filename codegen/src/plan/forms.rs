@@ -369,7 +369,8 @@ impl<'a> Search<'a> {
             turned[len - 1 - k] ^= true;
             near.push(Form { turned, ..form.clone() });
         }
-        near.into_iter().fold(false, |better, form| self.consider(form) || better)
+        // All of them, not only up to the first that is better.
+        near.into_iter().filter(|form| self.consider(form.clone())).count() > 0
     }
 }
 
