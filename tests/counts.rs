@@ -7,13 +7,17 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::{Group, Options};
 
 fn rates(file: &str, base: Base, gravity: Option<[f64; 3]>, efforts: bool) -> usize {
+    operations(Group::Rates, file, base, gravity, efforts)
+}
+
+fn operations(group: Group, file: &str, base: Base, gravity: Option<[f64; 3]>, efforts: bool) -> usize {
     let root = env!("CARGO_MANIFEST_DIR");
     let text = std::fs::read_to_string(format!("{root}/models/{file}")).expect("the model");
     let (model, findings) = load(file, &text, &ImportOptions { base, gravity });
     let model = model.unwrap_or_else(|| panic!("{findings}"));
     let options = Options { efforts, ..Options::default() };
     let plan = Plan::new(&model, options.plan);
-    trace(&plan, Group::Rates, &options).expect("rates").program.counts().total()
+    trace(&plan, group, &options).expect("no frame is named").program.counts().total()
 }
 
 #[test]
@@ -52,4 +56,25 @@ fn a_floating_base_without_gravity_costs_less() {
     let without = rates("solo12.urdf", Base::Floating, Some([0.0; 3]), false);
     println!("solo12: {with} with gravity, {without} without");
     assert!(without < with);
+}
+
+/// Rates and all four blocks of derivatives. In comments the operations of CasADi's code of Pinocchio's
+/// `computeABADerivatives` (`benches/rivals/derivatives`), where it has been made.
+#[test]
+fn derivatives_stay_below_their_limits() {
+    for (file, base, limit) in [
+        ("double_pendulum.toml", Base::Fixed, 70), // 173
+        ("ur5.urdf", Base::Fixed, 1280),           // 7049
+        ("panda_arm.urdf", Base::Fixed, 2760),     // 9837
+        ("iiwa14.urdf", Base::Fixed, 2090),        // 9531
+        ("chain6.toml", Base::Fixed, 2600),        // 10271
+        ("chain10_planar.toml", Base::Fixed, 5420),
+        ("satellite.toml", Base::Fixed, 580),
+        ("solo12.urdf", Base::Floating, 10700), // 37411
+        ("g1.urdf", Base::Floating, 56500),
+    ] {
+        let count = operations(Group::Derivatives, file, base, None, true);
+        println!("{file}: {count}");
+        assert!(count <= limit, "{file}: {count} operations, at most {limit}");
+    }
 }
