@@ -208,7 +208,7 @@ impl<S: Scalar> Step<S> {
     }
 
     /// A symmetric tensor of the child `[xx, xy, xz, yy, yz, zz]` in the parent's axes.
-    pub(crate) fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
+    pub fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
         match self {
             Step::Turn { axis, c, s } => {
                 let (a, b, n) = axis.cyclic();
