@@ -8,37 +8,42 @@ use crate::workspace::{Poses, Workspace};
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Steps from the parent's node frame to the frame that the columns of node `i` are taken in.
+    fn to_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+        let joint = &poses.joint[i];
+        let steps = if single(&self.tree.nodes[i]) { joint.placing() } else { joint.get() };
+        self.place(i).iter().chain(steps)
+    }
+
+    /// Steps from there to the node frame.
+    fn from_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [Step<S>] {
+        match single(&self.tree.nodes[i]) {
+            true => poses.joint[i].own(),
+            false => &[],
+        }
+    }
+
     /// Wrench at the columns' frame of node `i`, at the columns' frame of its parent.
     fn force_inward(&self, poses: &Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
-        let node = &self.tree.nodes[i];
-        let mut f = *f;
-        if !single(node) {
-            f = poses.joint[i].get().iter().rev().fold(f, |f, step| step.force(&f));
-        }
-        f = node.place.iter().rev().fold(f, |f, step| step.force(&f));
-        match node.parent {
-            Some(p) if single(&self.tree.nodes[p]) => {
-                poses.joint[p].get().iter().rev().fold(f, |f, step| step.force(&f))
-            }
-            _ => f,
-        }
+        let f = self.to_columns(poses, i).rev().fold(*f, |f, step| step.force(&f));
+        let parent = self.tree.nodes[i].parent;
+        let steps = parent.map_or(&[][..], |p| self.from_columns(poses, p));
+        steps.iter().rev().fold(f, |f, step| step.force(&f))
     }
 
     /// `I*`, the columns `F` at every node on their path, and `M`.
     pub(super) fn composite_columns(&self, w: &Workspace<S>, d: &mut Derivatives<S>) {
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            d.inertia[i] = node.inertia;
+        for i in 0..self.tree.nodes.len() {
+            d.inertia[i] = *self.inertia(&w.poses, i);
         }
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Inertia);
-            let joint = w.poses.joint[i].get();
-            let turned = joint.iter().rev().fold(d.inertia[i], |m, step| inertia_out(step, &m));
-            if single(node) {
-                d.inertia[i] = turned;
-            }
+            let steps = self.from_columns(&w.poses, i).iter();
+            let own = steps.rev().fold(d.inertia[i], |m, step| inertia_out(step, &m));
+            d.inertia[i] = own;
             if let Some(p) = node.parent {
-                let carried = node.place.iter().rev().fold(turned, |m, step| inertia_out(step, &m));
+                let carried = self.to_columns(&w.poses, i).rev().fold(own, |m, step| inertia_out(step, &m));
                 d.inertia[p] = d.inertia[p].plus(&carried);
             }
             self.trace.at(Some(i), Quantity::MassMatrix);
@@ -92,11 +97,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn outward(&self, u: &Inputs<S>, w: &mut Workspace<S>, d: &mut Derivatives<S>) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             self.trace.at(Some(i), Quantity::Velocity);
-            let joint = w.poses.joint[i].get();
             let mut hat = node.parent.map_or(Motion::zero(), |p| d.omega[p]);
             let mut g = node.parent.map_or(u.gravity, |p| d.gravity[p][1]);
-            let whole = if single(node) { &[] } else { joint };
-            for step in node.place.iter().chain(whole) {
+            for step in self.to_columns(&w.poses, i) {
                 hat = step.motion(&hat);
                 g = step.vector(g);
             }
@@ -116,12 +119,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 d.fall[freedom] = cross(g, s.ang);
             }
             d.hat[i] = hat;
-            d.gravity[i] = [g, g];
-            d.omega[i] = omega;
-            if single(node) {
-                d.omega[i] = joint.iter().fold(omega, |m, step| step.motion(&m));
-                d.gravity[i][1] = joint.iter().fold(g, |g, step| step.vector(g));
-            }
+            let own = self.from_columns(&w.poses, i).iter();
+            d.omega[i] = own.clone().fold(omega, |m, step| step.motion(&m));
+            d.gravity[i] = [g, own.fold(g, |g, step| step.vector(g))];
         }
     }
 
@@ -140,18 +140,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
             } else {
                 // The momenta of the children have arrived, in the node frame.
-                let mut all = node.inertia.momentum(&d.omega[i]).plus(&d.rest[i]);
-                if single(node) {
-                    all = w.poses.joint[i].get().iter().rev().fold(all, |f, step| step.force(&f));
-                }
-                d.rest[i] = all;
+                let all = self.inertia(&w.poses, i).momentum(&d.omega[i]).plus(&d.rest[i]);
+                d.rest[i] = self.from_columns(&w.poses, i).iter().rev().fold(all, |f, step| step.force(&f));
             }
             let Some(p) = node.parent.filter(|&p| !d.summed[p]) else { continue };
-            let mut all = self.momentum_at(i, d);
-            if !single(node) {
-                all = w.poses.joint[i].get().iter().rev().fold(all, |f, step| step.force(&f));
-            }
-            all = node.place.iter().rev().fold(all, |f, step| step.force(&f));
+            let all = self.momentum_at(i, d);
+            let all = self.to_columns(&w.poses, i).rev().fold(all, |f, step| step.force(&f));
             d.rest[p] = d.rest[p].plus(&all);
         }
     }

@@ -16,8 +16,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(Some(node), Quantity::Load);
             let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
             if wrench.axes == WrenchAxes::Ground {
-                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).chain(&wrench.frame.place);
-                for step in path {
+                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+                for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
                     f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
                 }
             }
@@ -58,7 +58,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Axis of freedom `k` of the node at `place` on the path of a wrench, in the frame of the wrench.
     fn axis_at(&self, wrench: &TreeWrench<S>, place: usize, k: usize, w: &Workspace<S>) -> Motion<S> {
         let axis = self.tree.nodes[wrench.path[place]].kind.axis(k).motion(S::one());
-        let outward = wrench.path[place + 1..].iter().flat_map(|&i| self.steps(&w.poses, i));
-        outward.chain(&wrench.frame.place).fold(axis, |m, step| step.motion(&m))
+        let outward = wrench.path[place + 1..].iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+        outward.chain(self.on_body(&w.poses, &wrench.frame)).fold(axis, |m, step| step.motion(&m))
     }
 }
