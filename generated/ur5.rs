@@ -12,11 +12,11 @@
 //   q[5] v[5] wrist_3_joint: pin, moves wrist_3_link
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 110 + 136 + 5 = 251; 0, 5
-//   velocities: 75 + 84 + 5 = 164; 0, 5
+//   rates: 118 + 141 + 5 = 264; 0, 5
+//   velocities: 77 + 87 + 5 = 169; 0, 5
 //   momenta: 45 + 71 + 0 = 116; 0, 5
-//   energy: 82 + 93 + 5 = 180; 0, 5
-//   accelerations: 146 + 183 + 5 = 334; 0, 5
+//   energy: 84 + 96 + 5 = 185; 0, 5
+//   accelerations: 149 + 188 + 5 = 342; 0, 5
 //   mass_matrix: 50 + 43 + 0 = 93; 0, 5
 //   inverse_dynamics: 102 + 143 + 0 = 245; 0, 5
 //   bias: 74 + 116 + 0 = 190; 0, 5
@@ -71,7 +71,7 @@ impl Ur5 {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 251 operations: 110 additions, 136 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
+    /// 264 operations: 118 additions, 141 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         let q_1 = q[1];
@@ -130,39 +130,47 @@ impl Ur5 {
         let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
         let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
         let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_3_link_inertia2 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_3_link_inertia2 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot3 = wrist_3_link_inertia4 + wrist_2_link_pivot2;
         // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_2_link_pivot3;
+        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
         let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
         let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_2_link_pivot3 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_inertia3 + 0.004608836229749974;
-        let wrist_2_link_inertia5 = wrist_2_link_inertia1 + 0.22402883622975;
+        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+        // wrist_2_link: inertia carried to the parent, M* (4.48)
+        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
         let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia4;
+        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
         let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_inertia2;
+        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
         let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
         let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
         // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
         let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
         let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
         let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia5 + wrist_1_link_pivot2;
+        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
         let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
         let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
         let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia5 + wrist_1_link_pivot6;
+        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
         let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia5 + wrist_1_link_inertia10;
+        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
         let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
         let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
         let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
@@ -194,7 +202,7 @@ impl Ur5 {
         let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
         let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
         // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia5;
+        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
         let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
         let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
         let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
@@ -227,35 +235,34 @@ impl Ur5 {
         // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_3_link_rest0 = 58.355064750790525 * p_5;
         // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest1 = wrist_3_link_inertia2 * wrist_2_link_rest0;
-        let wrist_2_link_rest2 = wrist_2_link_cos0 * wrist_2_link_rest1;
-        let wrist_2_link_rest3 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest4 = wrist_2_link_rest2 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_sin0 * wrist_2_link_rest1;
-        let wrist_2_link_rest6 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest7 = wrist_2_link_rest5 - wrist_2_link_rest6;
+        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
         // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_1_link_rest0 = p_4 * wrist_1_link_sin0;
         let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_2_link_rest4;
         let wrist_1_link_rest2 = p_4 * wrist_1_link_cos0;
         let wrist_1_link_rest3 = wrist_1_link_rest1 + wrist_1_link_rest2;
         // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 + wrist_2_link_rest7;
+        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
         let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
         let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest7 - shoulder_link_rest2;
+        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
         let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest7 - shoulder_link_rest4;
+        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
         let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
         let shoulder_link_rest7 = wrist_1_link_rest3 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 + shoulder_link_rest3;
+        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
         let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
         let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 - shoulder_link_rest10;
+        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
         let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
         let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 + shoulder_link_rest11;
+        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
         let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
         let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
         let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
@@ -290,20 +297,19 @@ impl Ur5 {
         let wrist_1_link_vel7 = wrist_1_link_sin0 * shoulder_link_rest19;
         let wrist_1_link_vel8 = wrist_1_link_cos0 * shoulder_link_rest19;
         // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel7;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel6;
+        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel7;
+        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel6;
         let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel6;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel7;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_pivot1 * wrist_2_link_vel2;
-        let wrist_2_link_vel7 = wrist_2_link_rest0 - wrist_2_link_vel6;
-        let wrist_2_link_vel8 = wrist_1_link_vel8 - wrist_2_link_vel7;
+        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+        let wrist_2_link_vel4 = wrist_1_link_vel8 - wrist_2_link_vel3;
+        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel7;
+        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel6;
+        let wrist_2_link_vel7 = wrist_2_link_vel5 + wrist_2_link_vel6;
+        let wrist_2_link_vel8 = wrist_2_link_cos0 * wrist_1_link_vel6;
+        let wrist_2_link_vel9 = wrist_2_link_sin0 * wrist_1_link_vel7;
+        let wrist_2_link_vel10 = wrist_2_link_vel8 - wrist_2_link_vel9;
         // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel5;
-        let wrist_3_link_vel1 = wrist_3_link_cos0 * wrist_2_link_vel2;
-        let wrist_3_link_vel2 = wrist_3_link_sin0 * wrist_2_link_vel7;
-        let wrist_3_link_vel3 = wrist_3_link_vel1 + wrist_3_link_vel2;
+        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel10;
         // wrist_1_link: gravity and wrenches
         let wrist_1_link_load0 = 9.81 * wrist_1_link_sin0;
         // upper_arm_link: momentum
@@ -326,20 +332,16 @@ impl Ur5 {
         let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel3;
         let wrist_1_link_mom4 = wrist_1_link_mom0 - wrist_1_link_mom3;
         // wrist_2_link: momentum
-        let wrist_2_link_mom0 = 0.033822000000000005 * wrist_2_link_vel2;
-        // wrist_3_link: momentum
-        let wrist_3_link_mom0 = 0.016685526854599998 * wrist_3_link_vel3;
-        let wrist_3_link_mom1 = wrist_3_link_cos0 * wrist_3_link_mom0;
-        let wrist_3_link_mom2 = wrist_3_link_sin0 * wrist_3_link_mom0;
-        let wrist_3_link_mom3 = wrist_2_link_mom0 - wrist_3_link_mom1;
-        // wrist_2_link: momentum
-        let wrist_2_link_mom1 = wrist_2_link_cos0 * wrist_3_link_mom3;
-        let wrist_2_link_mom2 = wrist_2_link_rest3 - wrist_2_link_mom1;
-        let wrist_2_link_mom3 = wrist_1_link_mom4 - wrist_2_link_mom2;
+        let wrist_2_link_mom0 = wrist_2_link_pivot4 * wrist_1_link_vel7;
+        let wrist_2_link_mom1 = wrist_2_link_pivot6 * wrist_1_link_vel6;
+        let wrist_2_link_mom2 = wrist_2_link_mom0 + wrist_2_link_mom1;
+        let wrist_2_link_mom3 = wrist_2_link_pivot6 * wrist_1_link_vel7;
+        let wrist_2_link_mom4 = wrist_2_link_rest4 - wrist_2_link_mom2;
+        let wrist_2_link_mom5 = wrist_1_link_mom4 - wrist_2_link_mom4;
         // wrist_1_link: momentum
         let wrist_1_link_mom5 = wrist_1_link_cos0 * wrist_1_link_mom1;
         let wrist_1_link_mom6 = wrist_1_link_sin0 * wrist_1_link_mom1;
-        let wrist_1_link_mom7 = wrist_1_link_cos0 * wrist_2_link_mom3;
+        let wrist_1_link_mom7 = wrist_1_link_cos0 * wrist_2_link_mom5;
         let wrist_1_link_mom8 = wrist_1_link_rest0 + wrist_1_link_mom7;
         let wrist_1_link_mom9 = 0.10915 * wrist_1_link_mom6;
         let wrist_1_link_mom10 = wrist_1_link_mom8 - wrist_1_link_mom9;
@@ -375,34 +377,44 @@ impl Ur5 {
         let wrist_1_link_pdot5 = wrist_1_link_pdot3 - wrist_1_link_pdot4;
         let wrist_1_link_pdot6 = wrist_1_link_pdot0 + wrist_1_link_pdot5;
         // wrist_2_link: momentum rate (4.36)
-        let wrist_2_link_pdot0 = p_5 * wrist_2_link_vel2;
-        let wrist_2_link_pdot1 = wrist_2_link_vel5 * wrist_3_link_mom3;
-        let wrist_2_link_pdot2 = wrist_2_link_pdot0 - wrist_2_link_pdot1;
+        let wrist_2_link_pdot0 = wrist_2_link_pivot4 - wrist_2_link_pivot8;
+        let wrist_2_link_pdot1 = wrist_1_link_vel6 * wrist_2_link_pdot0;
+        let wrist_2_link_pdot2 = wrist_2_link_mom3 - wrist_2_link_pdot1;
+        let wrist_2_link_pdot3 = wrist_2_link_rest6 + wrist_2_link_pdot2;
+        let wrist_2_link_pdot4 = wrist_2_link_rest4 - wrist_2_link_mom1;
+        let wrist_2_link_pdot5 = wrist_1_link_vel7 * wrist_2_link_pdot3;
+        let wrist_2_link_pdot6 = wrist_1_link_vel6 * wrist_2_link_pdot4;
+        let wrist_2_link_pdot7 = wrist_2_link_pdot5 + wrist_2_link_pdot6;
         // wrist_3_link: momentum rate (4.36)
-        let wrist_3_link_pdot0 = wrist_2_link_vel2 * wrist_3_link_mom2;
-        let wrist_3_link_pdot1 = wrist_2_link_vel7 * wrist_3_link_mom1;
-        let wrist_3_link_pdot2 = wrist_3_link_pdot0 - wrist_3_link_pdot1;
-        let wrist_3_link_pdot3 = tau_1 + upper_arm_link_pdot1;
-        let wrist_3_link_pdot4 = tau_2 + forearm_link_pdot6;
-        let wrist_3_link_pdot5 = tau_3 - wrist_1_link_pdot6;
-        let wrist_3_link_pdot6 = tau_4 - wrist_2_link_pdot2;
-        let wrist_3_link_pdot7 = tau_5 + wrist_3_link_pdot2;
+        let wrist_3_link_pdot0 = wrist_3_link_inertia1 + wrist_3_link_inertia3;
+        let wrist_3_link_pdot1 = wrist_3_link_inertia2 * wrist_2_link_vel7;
+        let wrist_3_link_pdot2 = wrist_2_link_vel3 * wrist_3_link_pdot0;
+        let wrist_3_link_pdot3 = wrist_3_link_pdot1 + wrist_3_link_pdot2;
+        let wrist_3_link_pdot4 = wrist_3_link_inertia2 * wrist_2_link_vel3;
+        let wrist_3_link_pdot5 = wrist_2_link_vel7 * wrist_3_link_pdot3;
+        let wrist_3_link_pdot6 = wrist_2_link_vel3 * wrist_3_link_pdot4;
+        let wrist_3_link_pdot7 = wrist_3_link_pdot5 - wrist_3_link_pdot6;
+        let wrist_3_link_pdot8 = tau_1 + upper_arm_link_pdot1;
+        let wrist_3_link_pdot9 = tau_2 + forearm_link_pdot6;
+        let wrist_3_link_pdot10 = tau_3 - wrist_1_link_pdot6;
+        let wrist_3_link_pdot11 = tau_4 - wrist_2_link_pdot7;
+        let wrist_3_link_pdot12 = tau_5 + wrist_3_link_pdot7;
         qd[0] = shoulder_link_rest19;
         qd[1] = ground_vel1;
         qd[2] = ground_vel5;
         qd[3] = ground_vel11;
-        qd[4] = wrist_2_link_vel8;
+        qd[4] = wrist_2_link_vel4;
         qd[5] = wrist_3_link_vel0;
         pd[0] = tau_0;
-        pd[1] = wrist_3_link_pdot3;
-        pd[2] = wrist_3_link_pdot4;
-        pd[3] = wrist_3_link_pdot5;
-        pd[4] = wrist_3_link_pdot6;
-        pd[5] = wrist_3_link_pdot7;
+        pd[1] = wrist_3_link_pdot8;
+        pd[2] = wrist_3_link_pdot9;
+        pd[3] = wrist_3_link_pdot10;
+        pd[4] = wrist_3_link_pdot11;
+        pd[5] = wrist_3_link_pdot12;
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 164 operations: 75 additions, 84 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
+    /// 169 operations: 77 additions, 87 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 6], p: &[f64; 6], v: &mut [f64; 6]) {
         let q_1 = q[1];
@@ -450,39 +462,47 @@ impl Ur5 {
         let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
         let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
         let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_3_link_inertia2 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_3_link_inertia2 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot3 = wrist_3_link_inertia4 + wrist_2_link_pivot2;
         // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_2_link_pivot3;
+        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
         let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
         let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_2_link_pivot3 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_inertia3 + 0.004608836229749974;
-        let wrist_2_link_inertia5 = wrist_2_link_inertia1 + 0.22402883622975;
+        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+        // wrist_2_link: inertia carried to the parent, M* (4.48)
+        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
         let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia4;
+        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
         let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_inertia2;
+        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
         let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
         let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
         // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
         let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
         let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
         let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia5 + wrist_1_link_pivot2;
+        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
         let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
         let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
         let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia5 + wrist_1_link_pivot6;
+        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
         let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia5 + wrist_1_link_inertia10;
+        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
         let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
         let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
         let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
@@ -513,7 +533,7 @@ impl Ur5 {
         let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
         let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
         // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia5;
+        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
         let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
         let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
         let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
@@ -546,34 +566,33 @@ impl Ur5 {
         // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_3_link_rest0 = 58.355064750790525 * p_5;
         // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest1 = wrist_3_link_inertia2 * wrist_2_link_rest0;
-        let wrist_2_link_rest2 = wrist_2_link_cos0 * wrist_2_link_rest1;
-        let wrist_2_link_rest3 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest4 = wrist_2_link_rest2 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_sin0 * wrist_2_link_rest1;
-        let wrist_2_link_rest6 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest7 = wrist_2_link_rest5 - wrist_2_link_rest6;
+        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
         // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
         let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
         let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
         // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 + wrist_2_link_rest7;
+        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
         let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
         let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest7 - shoulder_link_rest2;
+        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
         let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest7 - shoulder_link_rest4;
+        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
         let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
         let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 + shoulder_link_rest3;
+        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
         let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
         let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 - shoulder_link_rest10;
+        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
         let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
         let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 + shoulder_link_rest11;
+        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
         let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
         let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
         let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
@@ -599,22 +618,21 @@ impl Ur5 {
         let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
         let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
         // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel1;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel0;
+        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
+        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
         let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel0;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel1;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_pivot1 * wrist_2_link_vel2;
-        let wrist_2_link_vel7 = wrist_2_link_rest0 - wrist_2_link_vel6;
-        let wrist_2_link_vel8 = wrist_1_link_vel2 - wrist_2_link_vel7;
+        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+        let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
+        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
+        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
+        let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
         // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel5;
+        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
         v[0] = shoulder_link_rest19;
         v[1] = ground_vel1;
         v[2] = ground_vel5;
         v[3] = ground_vel11;
-        v[4] = wrist_2_link_vel8;
+        v[4] = wrist_2_link_vel4;
         v[5] = wrist_3_link_vel0;
     }
 
@@ -782,7 +800,7 @@ impl Ur5 {
     }
 
     /// Kinetic and potential energy, J.
-    /// 180 operations: 82 additions, 93 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
+    /// 185 operations: 84 additions, 96 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
         let q_1 = q[1];
@@ -831,39 +849,47 @@ impl Ur5 {
         let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
         let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
         let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_3_link_inertia2 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_3_link_inertia2 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot3 = wrist_3_link_inertia4 + wrist_2_link_pivot2;
         // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_2_link_pivot3;
+        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
         let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
         let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_2_link_pivot3 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_inertia3 + 0.004608836229749974;
-        let wrist_2_link_inertia5 = wrist_2_link_inertia1 + 0.22402883622975;
+        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+        // wrist_2_link: inertia carried to the parent, M* (4.48)
+        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
         let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia4;
+        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
         let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_inertia2;
+        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
         let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
         let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
         // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
         let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
         let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
         let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia5 + wrist_1_link_pivot2;
+        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
         let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
         let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
         let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia5 + wrist_1_link_pivot6;
+        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
         let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia5 + wrist_1_link_inertia10;
+        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
         let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
         let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
         let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
@@ -895,7 +921,7 @@ impl Ur5 {
         let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
         let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
         // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia5;
+        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
         let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
         let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
         let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
@@ -928,34 +954,33 @@ impl Ur5 {
         // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_3_link_rest0 = 58.355064750790525 * p_5;
         // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest1 = wrist_3_link_inertia2 * wrist_2_link_rest0;
-        let wrist_2_link_rest2 = wrist_2_link_cos0 * wrist_2_link_rest1;
-        let wrist_2_link_rest3 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest4 = wrist_2_link_rest2 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_sin0 * wrist_2_link_rest1;
-        let wrist_2_link_rest6 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest7 = wrist_2_link_rest5 - wrist_2_link_rest6;
+        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
         // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
         let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
         let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
         // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 + wrist_2_link_rest7;
+        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
         let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
         let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest7 - shoulder_link_rest2;
+        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
         let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest7 - shoulder_link_rest4;
+        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
         let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
         let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 + shoulder_link_rest3;
+        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
         let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
         let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 - shoulder_link_rest10;
+        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
         let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
         let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 + shoulder_link_rest11;
+        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
         let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
         let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
         let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
@@ -981,19 +1006,18 @@ impl Ur5 {
         let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
         let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
         // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel1;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel0;
+        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
+        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
         let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel0;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel1;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_pivot1 * wrist_2_link_vel2;
-        let wrist_2_link_vel7 = wrist_2_link_rest0 - wrist_2_link_vel6;
-        let wrist_2_link_vel8 = wrist_1_link_vel2 - wrist_2_link_vel7;
+        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+        let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
+        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
+        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
+        let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
         // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel5;
+        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
         // wrist_2_link: energy
-        let wrist_2_link_energy0 = p_4 * wrist_2_link_vel8;
+        let wrist_2_link_energy0 = p_4 * wrist_2_link_vel4;
         // wrist_3_link: energy
         let wrist_3_link_energy0 = p_5 * wrist_3_link_vel0;
         let wrist_3_link_energy1 = wrist_2_link_energy0 + wrist_3_link_energy0;
@@ -1016,7 +1040,7 @@ impl Ur5 {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 334 operations: 146 additions, 183 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
+    /// 342 operations: 149 additions, 188 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         let q_1 = q[1];
         let q_2 = q[2];
@@ -1074,39 +1098,47 @@ impl Ur5 {
         let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
         let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
         let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_3_link_inertia2 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_3_link_inertia2 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot3 = wrist_3_link_inertia4 + wrist_2_link_pivot2;
         // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_2_link_pivot3;
+        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
         let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
         let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_2_link_pivot3 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_inertia3 + 0.004608836229749974;
-        let wrist_2_link_inertia5 = wrist_2_link_inertia1 + 0.22402883622975;
+        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+        // wrist_2_link: inertia carried to the parent, M* (4.48)
+        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
         let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia4;
+        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
         let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_inertia2;
+        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
         let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
         let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
         // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
         let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
         let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
         let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia5 + wrist_1_link_pivot2;
+        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
         let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
         let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
         let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia5 + wrist_1_link_pivot6;
+        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
         // wrist_1_link: inertia carried to the parent, M* (4.48)
         let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
         let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia5 + wrist_1_link_inertia10;
+        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
         let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
         let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
         let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
@@ -1137,7 +1169,7 @@ impl Ur5 {
         let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
         let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
         // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia5;
+        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
         let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
         let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
         let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
@@ -1315,19 +1347,21 @@ impl Ur5 {
         let wrist_3_link_rest9 = tau_5 - wrist_2_link_load4;
         let wrist_3_link_rest10 = wrist_2_link_load5 - wrist_3_link_rest5;
         // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = tau_4 + wrist_3_link_rest10;
-        let wrist_2_link_rest1 = wrist_2_link_pivot0 * wrist_2_link_rest0;
-        let wrist_2_link_rest2 = wrist_3_link_inertia2 * wrist_2_link_rest1;
-        let wrist_2_link_rest3 = wrist_3_link_rest8 - wrist_2_link_rest2;
-        let wrist_2_link_rest4 = wrist_2_link_cos0 * wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_sin0 * wrist_3_link_rest9;
-        let wrist_2_link_rest6 = wrist_2_link_rest4 - wrist_2_link_rest5;
-        let wrist_2_link_rest7 = wrist_2_link_sin0 * wrist_2_link_rest3;
-        let wrist_2_link_rest8 = wrist_2_link_cos0 * wrist_3_link_rest9;
-        let wrist_2_link_rest9 = wrist_2_link_rest7 + wrist_2_link_rest8;
-        let wrist_2_link_rest10 = wrist_1_link_load14 + wrist_2_link_rest6;
-        let wrist_2_link_rest11 = tau_4 + wrist_1_link_load10;
-        let wrist_2_link_rest12 = wrist_1_link_load15 - wrist_2_link_rest9;
+        let wrist_2_link_rest0 = wrist_2_link_cos0 * wrist_3_link_rest8;
+        let wrist_2_link_rest1 = wrist_2_link_sin0 * wrist_3_link_rest9;
+        let wrist_2_link_rest2 = wrist_2_link_rest0 - wrist_2_link_rest1;
+        let wrist_2_link_rest3 = wrist_2_link_sin0 * wrist_3_link_rest8;
+        let wrist_2_link_rest4 = wrist_2_link_cos0 * wrist_3_link_rest9;
+        let wrist_2_link_rest5 = wrist_2_link_rest3 + wrist_2_link_rest4;
+        let wrist_2_link_rest6 = tau_4 + wrist_3_link_rest10;
+        let wrist_2_link_rest7 = wrist_2_link_pivot0 * wrist_2_link_rest6;
+        let wrist_2_link_rest8 = wrist_2_link_inertia4 * wrist_2_link_rest7;
+        let wrist_2_link_rest9 = wrist_2_link_rest2 - wrist_2_link_rest8;
+        let wrist_2_link_rest10 = wrist_2_link_inertia5 * wrist_2_link_rest7;
+        let wrist_2_link_rest11 = wrist_2_link_rest5 - wrist_2_link_rest10;
+        let wrist_2_link_rest12 = wrist_1_link_load14 + wrist_2_link_rest9;
+        let wrist_2_link_rest13 = tau_4 + wrist_1_link_load10;
+        let wrist_2_link_rest14 = wrist_1_link_load15 - wrist_2_link_rest11;
         // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
         let wrist_1_link_rest0 = wrist_1_link_cos0 * wrist_1_link_load4;
         let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_1_link_load5;
@@ -1335,13 +1369,13 @@ impl Ur5 {
         let wrist_1_link_rest3 = wrist_1_link_sin0 * wrist_1_link_load4;
         let wrist_1_link_rest4 = wrist_1_link_cos0 * wrist_1_link_load5;
         let wrist_1_link_rest5 = wrist_1_link_rest3 - wrist_1_link_rest4;
-        let wrist_1_link_rest6 = wrist_1_link_sin0 * wrist_2_link_rest10;
-        let wrist_1_link_rest7 = wrist_1_link_cos0 * wrist_2_link_rest11;
+        let wrist_1_link_rest6 = wrist_1_link_sin0 * wrist_2_link_rest12;
+        let wrist_1_link_rest7 = wrist_1_link_cos0 * wrist_2_link_rest13;
         let wrist_1_link_rest8 = wrist_1_link_rest6 - wrist_1_link_rest7;
         let wrist_1_link_rest9 = 0.10915 * wrist_1_link_rest2;
         let wrist_1_link_rest10 = wrist_1_link_rest8 - wrist_1_link_rest9;
         let wrist_1_link_rest11 = wrist_1_link_pose2 * wrist_1_link_rest2;
-        let wrist_1_link_rest12 = wrist_2_link_rest12 + wrist_1_link_rest11;
+        let wrist_1_link_rest12 = wrist_2_link_rest14 + wrist_1_link_rest11;
         let wrist_1_link_rest13 = wrist_1_link_pose1 * wrist_1_link_load6;
         let wrist_1_link_rest14 = wrist_1_link_rest10 - wrist_1_link_rest13;
         let wrist_1_link_rest15 = wrist_1_link_pose1 * wrist_1_link_rest5;
@@ -1361,7 +1395,7 @@ impl Ur5 {
         let forearm_link_rest6 = upper_arm_link_load2 + forearm_link_rest3;
         let forearm_link_rest7 = upper_arm_link_load5 + forearm_link_rest5;
         // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = tau_3 + wrist_2_link_rest12;
+        let shoulder_link_rest0 = tau_3 + wrist_2_link_rest14;
         let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
         let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
         let shoulder_link_rest3 = wrist_1_link_rest21 + shoulder_link_rest2;
@@ -1401,26 +1435,25 @@ impl Ur5 {
         let wrist_1_link_acc15 = wrist_1_link_sin0 * shoulder_link_rest19;
         let wrist_1_link_acc16 = wrist_1_link_cos0 * shoulder_link_rest19;
         // wrist_2_link: acceleration
-        let wrist_2_link_acc6 = wrist_2_link_cos0 * wrist_1_link_acc15;
-        let wrist_2_link_acc7 = wrist_2_link_sin0 * wrist_1_link_acc14;
+        let wrist_2_link_acc6 = wrist_2_link_pivot1 * wrist_1_link_acc15;
+        let wrist_2_link_acc7 = wrist_2_link_pivot2 * wrist_1_link_acc14;
         let wrist_2_link_acc8 = wrist_2_link_acc6 + wrist_2_link_acc7;
-        let wrist_2_link_acc9 = wrist_2_link_cos0 * wrist_1_link_acc14;
-        let wrist_2_link_acc10 = wrist_2_link_sin0 * wrist_1_link_acc15;
-        let wrist_2_link_acc11 = wrist_2_link_acc9 - wrist_2_link_acc10;
-        let wrist_2_link_acc12 = wrist_2_link_pivot1 * wrist_2_link_acc8;
-        let wrist_2_link_acc13 = wrist_2_link_rest1 - wrist_2_link_acc12;
-        let wrist_2_link_acc14 = wrist_1_link_acc16 - wrist_2_link_acc13;
+        let wrist_2_link_acc9 = wrist_2_link_rest7 - wrist_2_link_acc8;
+        let wrist_2_link_acc10 = wrist_1_link_acc16 - wrist_2_link_acc9;
+        let wrist_2_link_acc11 = wrist_2_link_cos0 * wrist_1_link_acc14;
+        let wrist_2_link_acc12 = wrist_2_link_sin0 * wrist_1_link_acc15;
+        let wrist_2_link_acc13 = wrist_2_link_acc11 - wrist_2_link_acc12;
         // wrist_3_link: acceleration
-        let wrist_3_link_acc4 = wrist_3_link_rest7 - wrist_2_link_acc11;
+        let wrist_3_link_acc4 = wrist_3_link_rest7 - wrist_2_link_acc13;
         // wrist_2_link: acceleration
-        let wrist_2_link_acc15 = wrist_2_link_acc14 - wrist_1_link_acc3;
+        let wrist_2_link_acc14 = wrist_2_link_acc10 - wrist_1_link_acc3;
         // wrist_3_link: acceleration
         let wrist_3_link_acc5 = wrist_2_link_acc3 + wrist_3_link_acc4;
         a[0] = shoulder_link_rest19;
         a[1] = ground_acc1;
         a[2] = ground_acc5;
         a[3] = ground_acc11;
-        a[4] = wrist_2_link_acc15;
+        a[4] = wrist_2_link_acc14;
         a[5] = wrist_3_link_acc5;
     }
 
