@@ -16,7 +16,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Steps from there to the node frame.
-    fn from_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [Step<S>] {
+    fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [Step<S>] {
         match single(&self.tree.nodes[i]) {
             true => poses.joint[i].own(),
             false => &[],
@@ -27,7 +27,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn force_inward(&self, poses: &Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
         let f = self.to_columns(poses, i).rev().fold(*f, |f, step| step.force(&f));
         let parent = self.tree.nodes[i].parent;
-        let steps = parent.map_or(&[][..], |p| self.from_columns(poses, p));
+        let steps = parent.map_or(&[][..], |p| self.past_columns(poses, p));
         steps.iter().rev().fold(f, |f, step| step.force(&f))
     }
 
@@ -39,7 +39,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Inertia);
-            let steps = self.from_columns(&w.poses, i).iter();
+            let steps = self.past_columns(&w.poses, i).iter();
             let own = steps.rev().fold(d.inertia[i], |m, step| inertia_out(step, &m));
             d.inertia[i] = own;
             if let Some(p) = node.parent {
@@ -119,7 +119,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 d.fall[freedom] = cross(g, s.ang);
             }
             d.hat[i] = hat;
-            let own = self.from_columns(&w.poses, i).iter();
+            let own = self.past_columns(&w.poses, i).iter();
             d.omega[i] = own.clone().fold(omega, |m, step| step.motion(&m));
             d.gravity[i] = [g, own.fold(g, |g, step| step.vector(g))];
         }
@@ -141,7 +141,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             } else {
                 // The momenta of the children have arrived, in the node frame.
                 let all = self.inertia(&w.poses, i).momentum(&d.omega[i]).plus(&d.rest[i]);
-                d.rest[i] = self.from_columns(&w.poses, i).iter().rev().fold(all, |f, step| step.force(&f));
+                d.rest[i] = self.past_columns(&w.poses, i).iter().rev().fold(all, |f, step| step.force(&f));
             }
             let Some(p) = node.parent.filter(|&p| !d.summed[p]) else { continue };
             let all = self.momentum_at(i, d);
