@@ -49,8 +49,11 @@ fn choose(opened: &Opened, sums: &mut BTreeMap<u32, Vec<(Operand, bool)>>, next:
         chosen.push(pair);
         for id in at {
             let Some(terms) = sums.get_mut(&id) else { continue };
-            let position = |o: Operand| terms.iter().position(|t| t.0 == o);
-            let (Some(a), Some(b)) = (position(pair.0), position(pair.1)) else { continue };
+            // One operand may stand in a sum with both signs.
+            let all = |o: Operand| terms.iter().enumerate().filter(move |(_, t)| t.0 == o);
+            let fits = |a: &(Operand, bool), b: &(Operand, bool)| (a.1 != b.1) == pair.2;
+            let mut places = all(pair.0).flat_map(|(i, a)| all(pair.1).map(move |(j, b)| (i, a, j, b)));
+            let Some((a, _, b, _)) = places.find(|(_, a, _, b)| fits(a, b)) else { continue };
             let minus = terms[a].1;
             terms[a] = (operand, minus);
             terms.remove(b);
@@ -130,6 +133,18 @@ mod tests {
         // Signs: a − b and b − a are one.
         let program = Program::new(&graph, &[(a + c) - b, (b + d) - a]);
         assert_eq!(share(&program).counts().additions, 3);
+    }
+
+    #[test]
+    fn one_operand_may_have_both_signs() {
+        let graph = Graph::default();
+        let [a, b, c, d] = std::array::from_fn(|k| graph.input(k));
+        let both = ((a + c) - a) + b;
+        for others in [[(d - a) + b, (b - a) + c], [(d + a) + b, (b + a) + c]] {
+            let program = Program::new(&graph, &[both, others[0], others[1]]);
+            let value = |p: &Program| p.evaluate(&[1.0, 20.0, 300.0, 4000.0], |a: f64, b: f64, c: f64| a * b + c);
+            assert_eq!(value(&share(&program)), value(&program));
+        }
     }
 
     #[test]
