@@ -51,8 +51,10 @@ fn main() {
         }
         let number = options.precision.name();
         let (frames, joints) = (plan.frames.len(), plan.joint_nodes.len());
+        let params = model.params.len();
         let _ = writeln!(all, "pub mod tree{k} {{\n    include!({:?});\n}}", file.display().to_string());
-        let _ = writeln!(all, "runner!(run{k}, tree{k}, {number}, [{}], {frames}, {joints});", fields.join(", "));
+        let _ =
+            writeln!(all, "runner!(run{k}, tree{k}, {number}, [{}], {frames}, {joints}, {params});", fields.join(", "));
     }
     let names: Vec<String> = (0..batch::TREES).map(|k| format!("run{k}")).collect();
     let _ = writeln!(all, "pub const RUNNERS: [Runner; {}] = [{}];", names.len(), names.join(", "));

@@ -194,3 +194,27 @@ fn joint_forces_cost_one_addition_each_at_most() {
         assert!(with - without == nv || with - without == nv - 1, "{name}: {}", with - without);
     }
 }
+
+/// Rates and all four blocks of derivatives. In comments the operations of CasADi's code of Pinocchio's
+/// `computeABADerivatives` (`benches/rivals/derivatives`), where it has been made.
+#[test]
+fn derivatives_stay_below_their_limits() {
+    for (file, base, limit) in [
+        ("double_pendulum.toml", Base::Fixed, 70), // 173
+        ("ur5.urdf", Base::Fixed, 1280),           // 7049
+        ("panda_arm.urdf", Base::Fixed, 2760),     // 9837
+        ("iiwa14.urdf", Base::Fixed, 2090),        // 9531
+        ("chain6.toml", Base::Fixed, 2600),        // 10271
+        ("chain10_planar.toml", Base::Fixed, 5420),
+        ("satellite.toml", Base::Fixed, 580),
+        ("solo12.urdf", Base::Floating, 10700), // 37411
+        ("g1.urdf", Base::Floating, 56500),
+    ] {
+        let model = self::file(file, base, None);
+        let plan = Plan::new(&model, PlanOptions::default());
+        let program = trace(&plan, Group::Derivatives, &Options::default()).expect("derivatives").program;
+        let count = program.counts().total();
+        println!("{file}: {count}");
+        assert!(count <= limit, "{file}: {count} operations, at most {limit}");
+    }
+}

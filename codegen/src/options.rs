@@ -68,11 +68,18 @@ pub enum Group {
     Jacobians,
     /// `(q, v) →` accelerations of frames at `v̇ = 0`.
     Drifts,
+    /// `(q, p) →` velocities, momentum rates, and their derivatives with respect to coordinates and momenta; with the
+    /// rates, makes the type `Differentiable`.
+    Derivatives,
+    /// `(q, v) →` momenta, their rates, and derivatives of both at given velocities.
+    MomentumDerivatives,
+    /// `(q, p) →` derivatives of velocities and momentum rates with respect to the parameters.
+    ParameterDerivatives,
 }
 
 impl Group {
     /// All of them.
-    pub const ALL: [Group; 12] = [
+    pub const ALL: [Group; 15] = [
         Group::Rates,
         Group::Velocities,
         Group::Momenta,
@@ -85,6 +92,9 @@ impl Group {
         Group::Bias,
         Group::Jacobians,
         Group::Drifts,
+        Group::Derivatives,
+        Group::MomentumDerivatives,
+        Group::ParameterDerivatives,
     ];
 
     /// Name of the generated function, and of the output in options.
@@ -102,6 +112,9 @@ impl Group {
             Group::Bias => "bias",
             Group::Jacobians => "jacobians",
             Group::Drifts => "drifts",
+            Group::Derivatives => "derivatives",
+            Group::MomentumDerivatives => "momentum_derivatives",
+            Group::ParameterDerivatives => "parameter_derivatives",
         }
     }
 

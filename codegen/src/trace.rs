@@ -1,10 +1,10 @@
 //! The sweeps run on symbols: from a plan to the program of each output group.
 
 use mbd_runtime::spatial::Motion;
-use mbd_runtime::sweep::{FrameState, Inputs, Sweeps};
+use mbd_runtime::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
-use mbd_runtime::Scalar;
+use mbd_runtime::{Dual, Scalar};
 
 use crate::model::Gravity;
 use crate::options::{Group, Options};
@@ -69,7 +69,9 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let dims = plan.dims;
     let q = symbols.array("q", dims.nq);
     let second = match group {
-        Group::Rates | Group::Velocities | Group::Energy => symbols.array("p", dims.nv),
+        Group::Rates | Group::Velocities | Group::Energy | Group::Derivatives | Group::ParameterDerivatives => {
+            symbols.array("p", dims.nv)
+        }
         Group::MassMatrix | Group::Jacobians => Vec::new(),
         _ => symbols.array("v", dims.nv),
     };
@@ -96,7 +98,10 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
     let physical: Tree<Expr> = plan.tree(&params);
     let tree = physical.regrouped();
     let frames = chosen_frames(plan, options)?;
-    let outputs = run(&graph, [&tree, &physical], group, [&q, &second, &third], &inputs, &frames);
+    let outputs = match group {
+        Group::ParameterDerivatives => parameter_derivatives(&graph, plan, &tree, &q, &second, &params, &inputs),
+        _ => run(&graph, [&tree, &physical], group, [&q, &second, &third], &inputs, &frames),
+    };
     let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);
     Ok(GroupProgram { group, inputs: symbols.arrays, program })
 }
@@ -179,7 +184,52 @@ fn run<'g>(
             let velocities = states.iter().flat_map(|s| motion(s.velocity));
             rotations.into_iter().chain(positions).chain(velocities).collect()
         }
+        Group::Derivatives => {
+            let mut d = Derivatives::new(tree);
+            sweeps.derivatives(q, second, inputs, &mut w, &mut d);
+            [d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp].concat()
+        }
+        Group::MomentumDerivatives => {
+            let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
+            sweeps.momentum_derivatives(q, second, inputs, &mut w, &mut d, &mut out);
+            [out.p, out.pd, out.dp_dq, out.dp_dv, out.dpd_dq, out.dpd_dv].concat()
+        }
+        // Needs the plan: see `parameter_derivatives`.
+        Group::ParameterDerivatives => Vec::new(),
     }
+}
+
+/// `∂v/∂params` and `∂ṗ/∂params`, row by row: one dual sweep for each parameter.
+fn parameter_derivatives<'g>(
+    graph: &'g Graph,
+    plan: &Plan,
+    tree: &Tree<Expr<'g>>,
+    q: &[Expr<'g>],
+    p: &[Expr<'g>],
+    params: &[Expr<'g>],
+    inputs: &Inputs<Expr<'g>>,
+) -> Vec<Expr<'g>> {
+    let mut d = Derivatives::new(tree);
+    Sweeps { tree, trace: graph }.derivatives(q, p, inputs, &mut Workspace::new(tree), &mut d);
+    let columns: Vec<[Vec<Expr>; 2]> = (0..params.len())
+        .map(|k| {
+            let one = |j: usize| if j == k { Expr::one() } else { Expr::zero() };
+            let varied: Vec<Dual<Expr>> = params.iter().enumerate().map(|(j, x)| Dual::new(*x, one(j))).collect();
+            let gravity = match plan.model.gravity {
+                Gravity::Constant(g) => g.map(|v| match v {
+                    crate::model::Value::Const(x) => Dual::constant(x),
+                    crate::model::Value::Param(k) => varied[k],
+                }),
+                Gravity::Input => inputs.gravity.map(|x| Dual::new(x, Expr::zero())),
+            };
+            let tree = plan.tree(&varied).regrouped();
+            let mut column = ParameterDerivatives::new(&tree);
+            column.compute(&Sweeps { tree: &tree, trace: graph }, gravity, q, inputs, &d);
+            [column.dv, column.dpd]
+        })
+        .collect();
+    let rows = (0..2).flat_map(|half| (0..p.len()).map(move |a| (half, a)));
+    rows.flat_map(|(half, a)| columns.iter().map(move |c| c[half][a])).collect()
 }
 
 /// Program of `q̇ = N(q) v`.

@@ -37,6 +37,9 @@ pub fn source(options: &Options) -> String {
         ("bias", "q v h"),
         ("jacobians", "q jacobian"),
         ("drifts", "q v drift"),
+        ("derivatives", "q p v pd dv_dq dv_dp dpd_dq dpd_dp"),
+        ("momentum_derivatives", "q v p pd dp_dq dp_dv dpd_dq dpd_dv"),
+        ("parameter_derivatives", "q p dv_dparams dpd_dparams"),
     ]
     .into_iter()
     .map(|(f, arguments)| {

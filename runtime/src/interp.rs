@@ -1,11 +1,12 @@
 //! The interpreter: the sweeps run directly on numbers, for any tree.
 
+use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::spatial::Motion;
-use crate::sweep::{FrameState, Inputs, Sweeps};
-use crate::system::{Real, System};
+use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
+use crate::system::{Blocks, Differentiable, Real, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -41,7 +42,8 @@ impl<S: Scalar> InputValues<S> {
     }
 }
 
-/// Runs the sweeps on numbers. Allocates when it is made, never afterwards.
+/// Runs the sweeps on numbers. Allocates when it is made, never afterwards, but for room for derivatives, which is made
+/// when it is first needed.
 ///
 /// All calls take slices in the order of the state; a slice of another length than [`Tree::dims`] says is a programming
 /// error and panics.
@@ -57,6 +59,8 @@ pub struct Interpreter<S> {
     v: Vec<S>,
     quaternions: Vec<usize>,
     neutral: Vec<S>,
+    /// Made when [`Differentiable::rate_derivatives`] is first called.
+    derivatives: Option<Box<Derivatives<S>>>,
 }
 
 impl<S: Scalar> Interpreter<S> {
@@ -89,7 +93,16 @@ impl<S: Scalar> Interpreter<S> {
             wrenches: vec![[o; 6]; dims.wrenches],
             gravity,
         };
-        Interpreter { work: Workspace::new(&tree), v: vec![o; dims.nv], tree, physical, inputs, quaternions, neutral }
+        Interpreter {
+            work: Workspace::new(&tree),
+            v: vec![o; dims.nv],
+            tree,
+            physical,
+            inputs,
+            quaternions,
+            neutral,
+            derivatives: None,
+        }
     }
 
     /// The tree that is run.
@@ -169,6 +182,25 @@ impl<S: Scalar> Interpreter<S> {
     pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.mass_matrix(q, &self.inputs.view(), &mut self.work, m);
+    }
+
+    /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
+    pub fn momentum_derivatives_into(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        d: &mut Derivatives<S>,
+        out: &mut MomentumDerivatives<S>,
+    ) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.momentum_derivatives(q, v, &self.inputs.view(), &mut self.work, d, out);
+    }
+
+    /// `v`, `ṗ` and their derivatives with respect to `q` and `p`. `d` is [`Derivatives::new`] of
+    /// [`Interpreter::tree`].
+    pub fn derivatives_into(&mut self, q: &[S], p: &[S], d: &mut Derivatives<S>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.derivatives(q, p, &self.inputs.view(), &mut self.work, d);
     }
 
     /// `(q, v) →` pose and velocity of every frame of [`Tree::frames`].
@@ -263,5 +295,36 @@ impl<S: Scalar> System for Interpreter<S> {
 
     fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {
         Sweeps { tree: &self.tree, trace: &() }.coordinate_rates(q, v, qd);
+    }
+}
+
+impl<S: Scalar> Differentiable for Interpreter<S> {
+    type Square = Vec<Vec<S>>;
+
+    fn square(&self) -> Vec<Vec<S>> {
+        let nv = self.tree.dims.nv;
+        vec![vec![S::zero(); nv]; nv]
+    }
+
+    fn rate_derivatives(
+        &mut self,
+        _t: S,
+        q: &Vec<S>,
+        p: &Vec<S>,
+        v: &mut Vec<S>,
+        pd: &mut Vec<S>,
+        derivatives: Blocks<'_, Vec<Vec<S>>>,
+    ) {
+        let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
+        self.derivatives_into(q, p, &mut d);
+        v.copy_from_slice(&d.v);
+        pd.copy_from_slice(&d.pd);
+        let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = derivatives;
+        for (to, from) in [(dv_dq, &d.dv_dq), (dv_dp, &d.dv_dp), (dpd_dq, &d.dpd_dq), (dpd_dp, &d.dpd_dp)] {
+            for (row, from) in to.iter_mut().zip(from.chunks(p.len().max(1))) {
+                row.copy_from_slice(from);
+            }
+        }
+        self.derivatives = Some(d);
     }
 }

@@ -29,4 +29,4 @@ pub use dual::Dual;
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
-pub use system::{Real, System};
+pub use system::{Blocks, Differentiable, Real, System};

@@ -58,3 +58,39 @@ pub trait System {
     /// `q̇ = N(q) v`: coordinate rates of given velocities.
     fn coordinate_rates(&self, q: &Self::Coordinates, v: &Self::Momenta, qd: &mut Self::Coordinates);
 }
+
+/// A [`System`] that gives the derivatives of its rates as well.
+///
+/// Columns with respect to `q` are derivatives along `q̇ = N(q) e_k`, the direction in which velocity `k` alone moves the
+/// coordinates: for angles and slides the partial derivatives, for joints with quaternions and planar joints those with
+/// respect to a small displacement in body axes. Joint forces add to `ṗ`: `∂ṗ/∂τ = 1`, `∂v/∂τ = 0`.
+pub trait Differentiable: System {
+    /// Rows of an `nv × nv` matrix.
+    type Square: Clone + AsRef<[Self::Momenta]> + AsMut<[Self::Momenta]>;
+
+    /// A zero matrix.
+    fn square(&self) -> Self::Square;
+    /// Velocities and momentum rates at time `t` (s), and their derivatives.
+    fn rate_derivatives(
+        &mut self,
+        t: Self::Scalar,
+        q: &Self::Coordinates,
+        p: &Self::Momenta,
+        v: &mut Self::Momenta,
+        pd: &mut Self::Momenta,
+        derivatives: Blocks<'_, Self::Square>,
+    );
+}
+
+/// Where the derivatives go, `nv × nv` each.
+#[derive(Debug)]
+pub struct Blocks<'a, M> {
+    /// `∂v/∂q`.
+    pub dv_dq: &'a mut M,
+    /// `∂v/∂p`, the inverse of the mass matrix.
+    pub dv_dp: &'a mut M,
+    /// `∂ṗ/∂q`.
+    pub dpd_dq: &'a mut M,
+    /// `∂ṗ/∂p`.
+    pub dpd_dp: &'a mut M,
+}

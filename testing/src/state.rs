@@ -2,8 +2,9 @@
 
 use mbd_codegen::model::JointKind;
 use mbd_codegen::plan::Plan;
+use mbd_runtime::sweep::{Derivatives, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Source;
-use mbd_runtime::{Interpreter, Scalar};
+use mbd_runtime::{Dual, Interpreter, Scalar};
 
 use crate::random::Rng;
 
@@ -103,6 +104,34 @@ impl State {
         i.inputs.wrenches = self.wrenches.iter().map(|w| w.map(|x| lift(x, 0.0))).collect();
         i
     }
+}
+
+/// Derivatives of the rates by parameter `k`, by the sweeps, at what `at` was computed for; and the varied interpreter.
+pub fn parameter<S: Scalar>(
+    plan: &Plan,
+    s: &State,
+    i: &Interpreter<S>,
+    q: &[S],
+    at: &Derivatives<S>,
+    k: usize,
+) -> (ParameterDerivatives<S>, Interpreter<Dual<S>>) {
+    use mbd_codegen::model::{Gravity, Value};
+    let one = |j: usize| if j == k { S::one() } else { S::zero() };
+    let varied: Vec<Dual<S>> = s.params.iter().enumerate().map(|(j, x)| Dual::new(S::constant(*x), one(j))).collect();
+    let gravity = match plan.model.gravity {
+        Gravity::Constant(g) => g.map(|x| match x {
+            Value::Const(x) => Dual::constant(x),
+            Value::Param(k) => varied[k],
+        }),
+        Gravity::Input => s.gravity.map(Dual::constant),
+    };
+    let mut varied = Interpreter::new(plan.tree(&varied), gravity);
+    varied.inputs = s.interpreter_of(plan, |x, _| Dual::constant(x)).inputs;
+    varied.inputs.gravity = gravity;
+    let mut column = ParameterDerivatives::new(varied.tree());
+    let sweeps = Sweeps { tree: varied.tree(), trace: &() };
+    column.compute(&sweeps, gravity, q, &i.inputs.view(), at);
+    (column, varied)
 }
 
 /// Rates of the prescribed positions that belong to the prescribed rates, joint by joint.

@@ -3,7 +3,7 @@
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::Rk4;
-use mbd_runtime::sweep::FrameState;
+use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_testing::random::{random_model, Knobs};
 use mbd_testing::state::random_state;
 
@@ -25,6 +25,7 @@ fn nothing_is_allocated_after_construction() {
         let mut frames = vec![FrameState::ground(); plan.frames.len()];
         let (mut tau, mut jacobians) = (vec![0.0; nv], vec![0.0; 6 * nv * plan.frames.len()]);
         let mut drifts = vec![[0.0; 6]; plan.frames.len()];
+        let mut derivatives = Derivatives::new(i.tree());
         let mut energy = (0.0, 0.0);
         let (mut q, mut p_stepped) = (s.q.clone(), p.clone());
         let mut rk4 = Rk4::new(&i);
@@ -37,6 +38,7 @@ fn nothing_is_allocated_after_construction() {
             i.accelerations(&s.q, &s.v, &mut a);
             i.reactions(&s.q, &s.v, &mut a, &mut reactions);
             i.mass_matrix(&s.q, &mut m);
+            i.derivatives_into(&s.q, &p, &mut derivatives);
             i.frames(&s.q, &s.v, &mut frames);
             i.inverse_dynamics(&s.q, &s.v, &a, &mut tau);
             i.bias(&s.q, &s.v, &mut tau);

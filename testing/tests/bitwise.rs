@@ -10,16 +10,17 @@ use std::collections::HashMap;
 use common::{Array, Emitted};
 use mbd_codegen::generate::{generate, Arithmetic, Group, Options};
 use mbd_codegen::plan::Plan;
-use mbd_runtime::sweep::FrameState;
-use mbd_runtime::System;
+use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
+use mbd_runtime::{Interpreter, System};
 use mbd_testing::random::{random_model, Knobs, Rng};
-use mbd_testing::state::{random_state, State};
+use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
 
 struct Case {
     seed: u64,
     plan: Plan,
     efforts: bool,
+    derivatives: bool,
     emitted: Emitted,
 }
 
@@ -29,9 +30,11 @@ impl Case {
         let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
         let model = random_model(seed, &Knobs::everything(seed, size));
         let mut rng = Rng::new(seed, 4);
+        // Derivatives are long: of the larger trees every fourth has them.
+        let derivatives = size <= 4 || seed.is_multiple_of(4);
         let options = Options {
             arithmetic: Arithmetic::Exact,
-            outputs: Group::ALL.to_vec(),
+            outputs: Group::ALL.into_iter().filter(|g| derivatives || *g < Group::Derivatives).collect(),
             efforts: rng.chance(0.8),
             // Small parts make long sources.
             chunk: if size < 4 { rng.pick(&[7, 1000]) } else { rng.pick(&[60, 200, 1000]) },
@@ -39,7 +42,7 @@ impl Case {
         };
         let plan = Plan::new(&model, options.plan);
         let source = generate(&model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
-        Case { seed, plan, efforts: options.efforts, emitted: Emitted::parse(&source) }
+        Case { seed, plan, efforts: options.efforts, derivatives, emitted: Emitted::parse(&source) }
     }
 
     fn inputs(&self, s: &State, p: &[f64]) -> HashMap<String, Array> {
@@ -66,6 +69,35 @@ impl Case {
             let text = || to_toml(&self.plan.model);
             assert!(a.is_finite() && b.is_finite(), "seed {}: {what}[{k}] is {a} and {b}\n{}", self.seed, text());
             assert!(same, "seed {}: {what}[{k}]: emitted {a:e}, interpreted {b:e}\n{}", self.seed, text());
+        }
+    }
+
+    /// Derivatives; the parameter blocks column by column.
+    fn compare_derivatives(&self, s: &State, p: &[f64], i: &mut Interpreter<f64>, inputs: &HashMap<String, Array>) {
+        let mut d = Derivatives::new(i.tree());
+        i.derivatives_into(&s.q, p, &mut d);
+        let emitted = self.emitted.run(Group::Derivatives.name(), inputs);
+        self.compare("v beside derivatives", &emitted["v"], &d.v);
+        self.compare("pd beside derivatives", &emitted["pd"], &d.pd);
+        for (name, block) in [("dv_dq", &d.dv_dq), ("dv_dp", &d.dv_dp), ("dpd_dq", &d.dpd_dq), ("dpd_dp", &d.dpd_dp)] {
+            self.compare(name, &emitted[name], block);
+        }
+        let mut at = MomentumDerivatives::new(i.tree());
+        i.momentum_derivatives_into(&s.q, &s.v, &mut Derivatives::new(i.tree()), &mut at);
+        let emitted = self.emitted.run(Group::MomentumDerivatives.name(), inputs);
+        for (name, block) in [("p", &at.p), ("pd", &at.pd), ("dp_dq", &at.dp_dq), ("dp_dv", &at.dp_dv)] {
+            self.compare(name, &emitted[name], block);
+        }
+        self.compare("dpd_dq", &emitted["dpd_dq"], &at.dpd_dq);
+        self.compare("dpd_dv", &emitted["dpd_dv"], &at.dpd_dv);
+        let emitted = self.emitted.run(Group::ParameterDerivatives.name(), inputs);
+        let n = s.params.len();
+        for k in 0..n {
+            let (column, _) = parameter(&self.plan, s, i, &s.q, &d, k);
+            for (name, ours) in [("dv_dparams", &column.dv), ("dpd_dparams", &column.dpd)] {
+                let data = emitted[name].data.iter().skip(k).step_by(n).copied().collect();
+                self.compare(name, &Array { dims: vec![ours.len()], data }, ours);
+            }
         }
     }
 
@@ -117,6 +149,9 @@ impl Case {
         self.compare("jacobians", &run(Group::Jacobians)["jacobian"], &jacobians);
         i.drifts(&s.q, &s.v, &mut drifts);
         self.compare("drifts", &run(Group::Drifts)["drift"], &drifts.concat());
+        if self.derivatives {
+            self.compare_derivatives(&s, &p, &mut i, &inputs);
+        }
         let mut frames = vec![FrameState::ground(); n];
         i.frames(&s.q, &s.v, &mut frames);
         let all = |f: &dyn Fn(&FrameState<f64>) -> Vec<f64>| frames.iter().flat_map(f).collect::<Vec<f64>>();

@@ -34,7 +34,7 @@ mod batch {
     }
 
     macro_rules! runner {
-        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], $frames:literal, $joints:literal) => {
+        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], $frames:literal, $joints:literal, $params:literal) => {
             pub fn $run(s: &State, p: &[f64]) -> Results {
                 use $tree::Tree;
                 const NQ: usize = Tree::NQ;
@@ -61,6 +61,23 @@ mod batch {
                 let mut m = [[0.0; NV]; NV];
                 tree.mass_matrix(&q, &mut m);
                 results.push(("M", numbers(&m.concat())));
+                let (mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp) = ([[0.0; NV]; NV], [[0.0; NV]; NV], [[0.0; NV]; NV], [[0.0; NV]; NV]);
+                tree.derivatives(&q, &p, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
+                results.push(("v beside derivatives", numbers(&out)));
+                results.push(("pd beside derivatives", numbers(&pd)));
+                for (name, block) in [("dv_dq", dv_dq), ("dv_dp", dv_dp), ("dpd_dq", dpd_dq), ("dpd_dp", dpd_dp)] {
+                    results.push((name, numbers(&block.concat())));
+                }
+                tree.momentum_derivatives(&q, &v, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
+                results.push(("p beside derivatives", numbers(&out)));
+                results.push(("pd beside derivatives, given v", numbers(&pd)));
+                for (name, block) in [("dp_dq", dv_dq), ("dp_dv", dv_dp), ("dpd_dq, given v", dpd_dq), ("dpd_dv", dpd_dp)] {
+                    results.push((name, numbers(&block.concat())));
+                }
+                let (mut dv, mut dpd) = ([[0.0; $params]; NV], [[0.0; $params]; NV]);
+                tree.parameter_derivatives(&q, &p, &mut dv, &mut dpd);
+                results.push(("dv_dparams", numbers(&dv.concat())));
+                results.push(("dpd_dparams", numbers(&dpd.concat())));
                 let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; $frames], [[0.0; 3]; $frames], [[0.0; 6]; $frames]);
                 tree.frames(&q, &v, &mut rotation, &mut position, &mut velocity);
                 results.push(("rotations", numbers(&rotation.concat().concat())));
@@ -97,10 +114,10 @@ mod batch {
 
 use batch::{Results, RUNNERS};
 use mbd_codegen::plan::Plan;
-use mbd_runtime::sweep::FrameState;
+use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives, ParameterDerivatives};
 use mbd_runtime::{Interpreter, Scalar};
 use mbd_testing::batch::{is_single, tree};
-use mbd_testing::state::{random_state, State};
+use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
 
 /// What the interpreter says, with the momenta it is given.
@@ -127,6 +144,29 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     results.push(("reactions", back(&reactions.concat())));
     i.mass_matrix(&q, &mut m);
     results.push(("M", back(&m)));
+    let mut d = Derivatives::new(i.tree());
+    i.derivatives_into(&q, &p, &mut d);
+    results.push(("v beside derivatives", back(&d.v)));
+    results.push(("pd beside derivatives", back(&d.pd)));
+    for (name, block) in [("dv_dq", &d.dv_dq), ("dv_dp", &d.dv_dp), ("dpd_dq", &d.dpd_dq), ("dpd_dp", &d.dpd_dp)] {
+        results.push((name, back(block)));
+    }
+    let mut at = MomentumDerivatives::new(i.tree());
+    i.momentum_derivatives_into(&q, &v, &mut Derivatives::new(&i.tree().clone()), &mut at);
+    results.push(("p beside derivatives", back(&at.p)));
+    results.push(("pd beside derivatives, given v", back(&at.pd)));
+    let blocks = [("dp_dq", &at.dp_dq), ("dp_dv", &at.dp_dv), ("dpd_dq, given v", &at.dpd_dq), ("dpd_dv", &at.dpd_dv)];
+    for (name, block) in blocks {
+        results.push((name, back(block)));
+    }
+    let n = s.params.len();
+    let columns: Vec<_> = (0..n).map(|k| parameter(plan, s, &i, &q, &d, k).0).collect();
+    let rows = |half: fn(&ParameterDerivatives<S>) -> &Vec<S>| {
+        let entries = (0..v.len()).flat_map(|a| columns.iter().map(move |c| half(c)[a]));
+        back(&entries.collect::<Vec<S>>())
+    };
+    results.push(("dv_dparams", rows(|c| &c.dv)));
+    results.push(("dpd_dparams", rows(|c| &c.dpd)));
     let mut frames = vec![FrameState::ground(); plan.frames.len()];
     i.frames(&q, &v, &mut frames);
     let all = |f: &dyn Fn(&FrameState<S>) -> Vec<S>| back(&frames.iter().flat_map(f).collect::<Vec<S>>());

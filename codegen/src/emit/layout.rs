@@ -297,6 +297,26 @@ impl ::core::default::Default for {name} {{
     );
 }
 
+/// What the derivatives are.
+const DERIVATIVES: &str =
+    "Velocities, momentum rates, and their derivatives, by rows. Column `k` with respect to `q` is the derivative along
+    /// `q̇ = N(q) e_k`: for angles and slides the partial derivative. Joint forces add to `ṗ`: `∂ṗ/∂tau = 1`.";
+
+/// What they are at given velocities.
+const MOMENTUM_DERIVATIVES: &str = "Momenta, their rates (accelerations do not enter), and their derivatives at given velocities, by rows; with respect
+    /// to `q` as in `derivatives`. `∂p/∂v` is the mass matrix.";
+
+/// Arguments for blocks of `rows` rows.
+fn squares(blocks: &[&str], rows: usize, columns: usize, t: &str) -> String {
+    blocks.iter().map(|b| format!(", {b}: &mut [[{t}; {columns}]; {rows}]")).collect()
+}
+
+/// Their entries, row by row.
+fn entries(blocks: &[&str], rows: usize, columns: usize) -> Vec<String> {
+    let rows = blocks.iter().flat_map(|b| (0..rows).map(move |k| format!("{b}[{k}]")));
+    rows.flat_map(|row| places(&row, columns)).collect()
+}
+
 /// Signature of a group's function.
 pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
     let t = options.precision.name();
@@ -316,6 +336,9 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
         Group::Bias => ("v", "Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches."),
         Group::Jacobians => ("", "Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin."),
         Group::Drifts => ("v", "Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration."),
+        Group::Derivatives => ("p", DERIVATIVES),
+        Group::MomentumDerivatives => ("v", MOMENTUM_DERIVATIVES),
+        Group::ParameterDerivatives => ("p", "Derivatives of velocities and momentum rates with respect to the parameters, by rows."),
     };
     let (outputs, returns, tail, results) = match group {
         Group::Rates => (
@@ -367,6 +390,21 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
                 .chain((0..frames).flat_map(|k| places(&format!("velocity[{k}]"), 6)));
             let outputs = format!("rotation: &mut [[[{t}; 3]; 3]; {frames}], position: &mut [[{t}; 3]; {frames}], velocity: &mut [[{t}; 6]; {frames}]");
             (outputs, String::new(), String::new(), rotations.chain(rest).collect())
+        }
+        Group::Derivatives | Group::MomentumDerivatives => {
+            let (first, blocks) = match group {
+                Group::Derivatives => ("v", ["dv_dq", "dv_dp", "dpd_dq", "dpd_dp"]),
+                _ => ("p", ["dp_dq", "dp_dv", "dpd_dq", "dpd_dv"]),
+            };
+            let lists = format!("{first}: &mut [{t}; {nv}], pd: &mut [{t}; {nv}]");
+            let outputs = [lists, squares(&blocks, nv, nv, t)].concat();
+            let results = [places(first, nv), places("pd", nv), entries(&blocks, nv, nv)].concat();
+            (outputs, String::new(), String::new(), results)
+        }
+        Group::ParameterDerivatives => {
+            let (blocks, n) = (["dv_dparams", "dpd_dparams"], plan.model.params.len());
+            let outputs = squares(&blocks, nv, n, t).trim_start_matches(", ").to_string();
+            (outputs, String::new(), String::new(), entries(&blocks, nv, n))
         }
     };
     let mut inputs = vec![("q".to_string(), format!("q: &[{t}; {nq}]"))];
@@ -448,6 +486,29 @@ impl {rt}::System for {name} {{
     #[inline]
     fn coordinate_rates(&self, q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]) {{
         Self::coordinate_rates(self, q, v, qd);
+    }}
+}}
+"
+    );
+}
+
+/// `impl Differentiable`.
+pub fn differentiable(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt, nv) = (options.precision.name(), &options.type_name, &options.runtime, plan.dims.nv);
+    let nq = plan.dims.nq;
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Differentiable for {name} {{
+    type Square = [[{t}; {nv}]; {nv}];
+
+    fn square(&self) -> [[{t}; {nv}]; {nv}] {{
+        [[0.0; {nv}]; {nv}]
+    }}
+
+    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], d: {rt}::Blocks<'_, [[{t}; {nv}]; {nv}]>) {{
+        Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
     }}
 }}
 "

@@ -37,6 +37,9 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     layout::default(&mut out, options);
     if rates {
         layout::system(&mut out, plan, options);
+        if groups.iter().any(|g| g.group == Group::Derivatives) {
+            layout::differentiable(&mut out, plan, options);
+        }
     }
     out
 }

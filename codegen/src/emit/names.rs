@@ -36,5 +36,6 @@ pub fn quantity(q: Quantity) -> (&'static str, &'static str) {
         Quantity::Reaction => ("react", "reaction wrench (4.66)"),
         Quantity::Effort => ("effort", "joint force"),
         Quantity::Jacobian => ("jac", "Jacobian"),
+        Quantity::Derivative => ("deriv", "derivatives of the rates"),
     }
 }

@@ -207,6 +207,20 @@ impl<S: Scalar> Step<S> {
         }
     }
 
+    /// A symmetric tensor of the child `[xx, xy, xz, yy, yz, zz]` in the parent's axes.
+    pub fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
+        match self {
+            Step::Turn { axis, c, s } => {
+                let (a, b, n) = axis.cyclic();
+                let mut m = *m;
+                turn_sym(*c, *s, &mut m, a, b, n);
+                m
+            }
+            Step::Shift { .. } => *m,
+            Step::Rotate(r) => congruence_sym(r, m),
+        }
+    }
+
     /// Appends the step to the pose `(R, r)` of a frame.
     pub fn pose(&self, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
         match self {

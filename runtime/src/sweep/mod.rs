@@ -8,6 +8,7 @@
 
 mod acceleration;
 mod articulate;
+mod derivatives;
 mod factor;
 mod inverse;
 mod jacobian;
@@ -19,6 +20,7 @@ mod newton;
 mod rates;
 mod solve;
 
+pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
 pub use kinematics::FrameState;
 pub use newton::Accelerations;
 pub use solve::Load;
@@ -63,6 +65,8 @@ pub enum Quantity {
     Effort,
     /// Jacobians.
     Jacobian,
+    /// Derivatives of the rates.
+    Derivative,
 }
 
 /// Is told where the sweep stands. `()` listens to nothing.

@@ -84,7 +84,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `Eᵀ T*`: gravity and external wrenches.
-    fn applied(&self, w: &Workspace<S>, i: usize, axis: &Freedom<S>) -> S {
+    pub(super) fn applied(&self, w: &Workspace<S>, i: usize, axis: &Freedom<S>) -> S {
         let weight = axis.dot(&self.weight(w, i));
         if self.tree.wrenches.is_empty() {
             return weight;

@@ -115,7 +115,12 @@ const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
   inverse_dynamics (q, v, v') -> tau
   bias           (q, v) -> h, with M v' + h = tau
   jacobians      q -> Jacobians of bodies and frames
-  drifts         (q, v) -> accelerations of bodies and frames at v' = 0";
+  drifts         (q, v) -> accelerations of bodies and frames at v' = 0
+  derivatives    (q, p) -> v, p' and their derivatives with respect to q and p
+  momentum_derivatives
+                 (q, v) -> p, p' and their derivatives with respect to q and v
+  parameter_derivatives
+                 (q, p) -> derivatives of v and p' with respect to parameters";
 
 /// What code is generated.
 #[derive(Args)]

@@ -148,6 +148,18 @@ mod tests {
     }
 
     #[test]
+    fn one_operand_may_have_both_signs() {
+        let graph = Graph::default();
+        let [a, b, c, d] = std::array::from_fn(|k| graph.input(k));
+        let both = ((a + c) - a) + b;
+        for others in [[(d - a) + b, (b - a) + c], [(d + a) + b, (b + a) + c]] {
+            let program = Program::new(&graph, &[both, others[0], others[1]]);
+            let value = |p: &Program| p.evaluate(&[1.0, 20.0, 300.0, 4000.0], |a: f64, b: f64, c: f64| a * b + c);
+            assert_eq!(value(&share(&program)), value(&program));
+        }
+    }
+
+    #[test]
     fn values_stay() {
         keeps_values(share);
     }
