@@ -131,3 +131,43 @@ impl Errors {
         errors
     }
 }
+
+/// States among which the worst is more than chance.
+pub const MANY: u64 = 10_000;
+
+/// Errors of many states in two numbers; not below two roundings.
+///
+/// Of fewer than [`MANY`] states, `worst` is what 99 in 100 stay below: the very worst of few is the error of one state,
+/// which another order of the same operations makes three times as large or as small by chance.
+#[derive(Clone, Copy, Debug)]
+pub struct Spread {
+    /// The median.
+    pub median: f64,
+    /// The worst, or what 99 in 100 stay below.
+    pub worst: f64,
+}
+
+impl Spread {
+    /// The spread of some errors.
+    pub fn new(errors: &Errors) -> Spread {
+        let e = errors.sorted();
+        let last = if e.len() < MANY as usize { (e.len() - 1) * 99 / 100 } else { e.len() - 1 };
+        let above = |k: usize| e[k].max(f64::EPSILON);
+        Spread { median: above(e.len() / 2), worst: above(last) }
+    }
+
+    /// The larger numbers of two.
+    pub fn larger(self, other: Spread) -> Spread {
+        Spread { median: self.median.max(other.median), worst: self.worst.max(other.worst) }
+    }
+
+    /// In multiples of another.
+    pub fn times(self, other: Spread) -> Spread {
+        Spread { median: self.median / other.median, worst: self.worst / other.worst }
+    }
+
+    /// Whether multiples are within the limits: 2 for medians, 3 for the worst.
+    pub fn within_limits(self) -> bool {
+        self.median <= 2.0 && self.worst <= 3.0
+    }
+}
