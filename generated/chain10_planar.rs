@@ -16,11 +16,11 @@
 //   q[9] v[9] pin10: pin, moves link10
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 234 + 258 + 9 = 501; 0, 10
-//   velocities: 181 + 211 + 9 = 401; 0, 10
+//   rates: 457 + 423 + 9 = 889; 0, 10
+//   velocities: 397 + 373 + 9 = 779; 0, 10
 //   momenta: 95 + 114 + 0 = 209; 0, 10
-//   energy: 199 + 224 + 9 = 432; 0, 10
-//   accelerations: 244 + 277 + 9 = 530; 0, 10
+//   energy: 415 + 387 + 9 = 811; 0, 10
+//   accelerations: 460 + 439 + 9 = 908; 0, 10
 //   mass_matrix: 160 + 142 + 0 = 302; 0, 10
 //   inverse_dynamics: 142 + 161 + 0 = 303; 0, 10
 //   bias: 87 + 116 + 0 = 203; 0, 10
@@ -91,3777 +91,5733 @@ impl Chain10Planar {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 501 operations: 234 additions, 258 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 889 operations: 457 additions, 423 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        let tau_6 = self.tau[6];
-        let tau_7 = self.tau[7];
-        let tau_8 = self.tau[8];
-        let tau_9 = self.tau[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        let link1_pose0 = 0.95 * link1_sin0;
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_cos0;
-        let link10_inertia1 = 0.05 * link10_sin0;
-        // link10: U, Mj, k and the reduced inertia M' (4.44)
-        let link10_pivot0 = 119.76047904191617 * link10_inertia0;
-        let link10_pivot1 = 119.76047904191617 * link10_inertia1;
-        let link10_pivot2 = link10_inertia0 * link10_pivot0;
-        let link10_pivot3 = link10_inertia0 * link10_pivot1;
-        let link10_pivot4 = link10_inertia1 * link10_pivot1;
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia2 = link10_pose2 * link10_pivot2;
-        let link10_inertia3 = link10_pose2 * link10_pivot3;
-        let link10_inertia4 = link10_pose2 * link10_inertia2;
-        let link10_inertia5 = link10_pose1 * link10_pivot3;
-        let link10_inertia6 = link10_inertia2 + link10_inertia5;
-        let link10_inertia7 = link10_pose1 * link10_pivot4;
-        let link10_inertia8 = link10_inertia3 + link10_inertia7;
-        let link10_inertia9 = link10_inertia3 + link10_inertia8;
-        let link10_inertia10 = link10_pose1 * link10_inertia9;
-        let link10_inertia11 = link10_inertia4 + link10_inertia10;
-        let link10_inertia12 = link9_pose2 + link10_inertia1;
-        let link10_inertia13 = link9_pose1 - link10_inertia6;
-        let link10_inertia14 = link9_pose2 - link10_inertia8;
-        let link10_inertia15 = link10_inertia11 - 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia15;
-        let link9_pivot1 = link10_inertia13 * link9_pivot0;
-        let link9_pivot2 = link10_inertia14 * link9_pivot0;
-        let link9_pivot3 = link10_inertia13 * link9_pivot1;
-        let link9_pivot4 = link10_pivot2 - link9_pivot3;
-        let link9_pivot5 = link10_inertia13 * link9_pivot2;
-        let link9_pivot6 = link10_pivot3 - link9_pivot5;
-        let link9_pivot7 = link10_inertia14 * link9_pivot2;
-        let link9_pivot8 = link10_pivot4 - link9_pivot7;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link8_pose3 * link9_pivot4;
-        let link9_inertia1 = link8_pose3 * link9_pivot6;
-        let link9_inertia2 = link8_pose3 * link9_inertia0;
-        let link9_inertia3 = link8_pose4 * link9_pivot6;
-        let link9_inertia4 = link9_inertia0 + link9_inertia3;
-        let link9_inertia5 = link8_pose4 * link9_pivot8;
-        let link9_inertia6 = link9_inertia1 + link9_inertia5;
-        let link9_inertia7 = link9_inertia1 + link9_inertia6;
-        let link9_inertia8 = link8_pose4 * link9_inertia7;
-        let link9_inertia9 = link9_inertia2 + link9_inertia8;
-        let link9_inertia10 = link8_pose4 + link10_inertia12;
-        let link9_inertia11 = link8_pose3 - link9_inertia4;
-        let link9_inertia12 = link8_pose4 - link9_inertia6;
-        let link9_inertia13 = link9_inertia9 - 0.05835;
-        // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia13;
-        let link8_pivot1 = link9_inertia11 * link8_pivot0;
-        let link8_pivot2 = link9_inertia12 * link8_pivot0;
-        let link8_pivot3 = link9_inertia11 * link8_pivot1;
-        let link8_pivot4 = link9_pivot4 - link8_pivot3;
-        let link8_pivot5 = link9_inertia11 * link8_pivot2;
-        let link8_pivot6 = link9_pivot6 - link8_pivot5;
-        let link8_pivot7 = link9_inertia12 * link8_pivot2;
-        let link8_pivot8 = link9_pivot8 - link8_pivot7;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pose2 * link8_pivot4;
-        let link8_inertia1 = link8_pose2 * link8_pivot6;
-        let link8_inertia2 = link8_pose2 * link8_inertia0;
-        let link8_inertia3 = link8_pose1 * link8_pivot6;
-        let link8_inertia4 = link8_inertia0 + link8_inertia3;
-        let link8_inertia5 = link8_pose1 * link8_pivot8;
-        let link8_inertia6 = link8_inertia1 + link8_inertia5;
-        let link8_inertia7 = link8_inertia1 + link8_inertia6;
-        let link8_inertia8 = link8_pose1 * link8_inertia7;
-        let link8_inertia9 = link8_inertia2 + link8_inertia8;
-        let link8_inertia10 = link7_pose4 + link9_inertia10;
-        let link8_inertia11 = link7_pose3 - link8_inertia4;
-        let link8_inertia12 = link7_pose4 - link8_inertia6;
-        let link8_inertia13 = link8_inertia9 - 0.08335000000000001;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 1.0 / link8_inertia13;
-        let link7_pivot1 = link8_inertia11 * link7_pivot0;
-        let link7_pivot2 = link8_inertia12 * link7_pivot0;
-        let link7_pivot3 = link8_inertia11 * link7_pivot1;
-        let link7_pivot4 = link8_pivot4 - link7_pivot3;
-        let link7_pivot5 = link8_inertia11 * link7_pivot2;
-        let link7_pivot6 = link8_pivot6 - link7_pivot5;
-        let link7_pivot7 = link8_inertia12 * link7_pivot2;
-        let link7_pivot8 = link8_pivot8 - link7_pivot7;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pose2 * link7_pivot4;
-        let link7_inertia1 = link7_pose2 * link7_pivot6;
-        let link7_inertia2 = link7_pose2 * link7_inertia0;
-        let link7_inertia3 = link7_pose1 * link7_pivot6;
-        let link7_inertia4 = link7_inertia0 + link7_inertia3;
-        let link7_inertia5 = link7_pose1 * link7_pivot8;
-        let link7_inertia6 = link7_inertia1 + link7_inertia5;
-        let link7_inertia7 = link7_inertia1 + link7_inertia6;
-        let link7_inertia8 = link7_pose1 * link7_inertia7;
-        let link7_inertia9 = link7_inertia2 + link7_inertia8;
-        let link7_inertia10 = link6_pose4 + link8_inertia10;
-        let link7_inertia11 = link6_pose3 - link7_inertia4;
-        let link7_inertia12 = link6_pose4 - link7_inertia6;
-        let link7_inertia13 = link7_inertia9 - 0.10835;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia13;
-        let link6_pivot1 = link7_inertia11 * link6_pivot0;
-        let link6_pivot2 = link7_inertia12 * link6_pivot0;
-        let link6_pivot3 = link7_inertia11 * link6_pivot1;
-        let link6_pivot4 = link7_pivot4 - link6_pivot3;
-        let link6_pivot5 = link7_inertia11 * link6_pivot2;
-        let link6_pivot6 = link7_pivot6 - link6_pivot5;
-        let link6_pivot7 = link7_inertia12 * link6_pivot2;
-        let link6_pivot8 = link7_pivot8 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pose2 * link6_pivot4;
-        let link6_inertia1 = link6_pose2 * link6_pivot6;
-        let link6_inertia2 = link6_pose2 * link6_inertia0;
-        let link6_inertia3 = link6_pose1 * link6_pivot6;
-        let link6_inertia4 = link6_inertia0 + link6_inertia3;
-        let link6_inertia5 = link6_pose1 * link6_pivot8;
-        let link6_inertia6 = link6_inertia1 + link6_inertia5;
-        let link6_inertia7 = link6_inertia1 + link6_inertia6;
-        let link6_inertia8 = link6_pose1 * link6_inertia7;
-        let link6_inertia9 = link6_inertia2 + link6_inertia8;
-        let link6_inertia10 = link5_pose4 + link7_inertia10;
-        let link6_inertia11 = link5_pose3 - link6_inertia4;
-        let link6_inertia12 = link5_pose4 - link6_inertia6;
-        let link6_inertia13 = link6_inertia9 - 0.13335;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia13;
-        let link5_pivot1 = link6_inertia11 * link5_pivot0;
-        let link5_pivot2 = link6_inertia12 * link5_pivot0;
-        let link5_pivot3 = link6_inertia11 * link5_pivot1;
-        let link5_pivot4 = link6_pivot4 - link5_pivot3;
-        let link5_pivot5 = link6_inertia11 * link5_pivot2;
-        let link5_pivot6 = link6_pivot6 - link5_pivot5;
-        let link5_pivot7 = link6_inertia12 * link5_pivot2;
-        let link5_pivot8 = link6_pivot8 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pose2 * link5_pivot4;
-        let link5_inertia1 = link5_pose2 * link5_pivot6;
-        let link5_inertia2 = link5_pose2 * link5_inertia0;
-        let link5_inertia3 = link5_pose1 * link5_pivot6;
-        let link5_inertia4 = link5_inertia0 + link5_inertia3;
-        let link5_inertia5 = link5_pose1 * link5_pivot8;
-        let link5_inertia6 = link5_inertia1 + link5_inertia5;
-        let link5_inertia7 = link5_inertia1 + link5_inertia6;
-        let link5_inertia8 = link5_pose1 * link5_inertia7;
-        let link5_inertia9 = link5_inertia2 + link5_inertia8;
-        let link5_inertia10 = link4_pose4 + link6_inertia10;
-        let link5_inertia11 = link4_pose3 - link5_inertia4;
-        let link5_inertia12 = link4_pose4 - link5_inertia6;
-        let link5_inertia13 = link5_inertia9 - 0.15835;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia13;
-        let link4_pivot1 = link5_inertia11 * link4_pivot0;
-        let link4_pivot2 = link5_inertia12 * link4_pivot0;
-        let link4_pivot3 = link5_inertia11 * link4_pivot1;
-        let link4_pivot4 = link5_pivot4 - link4_pivot3;
-        let link4_pivot5 = link5_inertia11 * link4_pivot2;
-        let link4_pivot6 = link5_pivot6 - link4_pivot5;
-        let link4_pivot7 = link5_inertia12 * link4_pivot2;
-        let link4_pivot8 = link5_pivot8 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pose2 * link4_pivot4;
-        let link4_inertia1 = link4_pose2 * link4_pivot6;
-        let link4_inertia2 = link4_pose2 * link4_inertia0;
-        let link4_inertia3 = link4_pose1 * link4_pivot6;
-        let link4_inertia4 = link4_inertia0 + link4_inertia3;
-        let link4_inertia5 = link4_pose1 * link4_pivot8;
-        let link4_inertia6 = link4_inertia1 + link4_inertia5;
-        let link4_inertia7 = link4_inertia1 + link4_inertia6;
-        let link4_inertia8 = link4_pose1 * link4_inertia7;
-        let link4_inertia9 = link4_inertia2 + link4_inertia8;
-        let link4_inertia10 = link3_pose4 + link5_inertia10;
-        let link4_inertia11 = link3_pose3 - link4_inertia4;
-        let link4_inertia12 = link3_pose4 - link4_inertia6;
-        let link4_inertia13 = link4_inertia9 - 0.18334999999999999;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia13;
-        let link3_pivot1 = link4_inertia11 * link3_pivot0;
-        let link3_pivot2 = link4_inertia12 * link3_pivot0;
-        let link3_pivot3 = link4_inertia11 * link3_pivot1;
-        let link3_pivot4 = link4_pivot4 - link3_pivot3;
-        let link3_pivot5 = link4_inertia11 * link3_pivot2;
-        let link3_pivot6 = link4_pivot6 - link3_pivot5;
-        let link3_pivot7 = link4_inertia12 * link3_pivot2;
-        let link3_pivot8 = link4_pivot8 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pose2 * link3_pivot4;
-        let link3_inertia1 = link3_pose2 * link3_pivot6;
-        let link3_inertia2 = link3_pose2 * link3_inertia0;
-        let link3_inertia3 = link3_pose1 * link3_pivot6;
-        let link3_inertia4 = link3_inertia0 + link3_inertia3;
-        let link3_inertia5 = link3_pose1 * link3_pivot8;
-        let link3_inertia6 = link3_inertia1 + link3_inertia5;
-        let link3_inertia7 = link3_inertia1 + link3_inertia6;
-        let link3_inertia8 = link3_pose1 * link3_inertia7;
-        let link3_inertia9 = link3_inertia2 + link3_inertia8;
-        let link3_inertia10 = link2_pose4 + link4_inertia10;
-        let link3_inertia11 = link2_pose3 - link3_inertia4;
-        let link3_inertia12 = link2_pose4 - link3_inertia6;
-        let link3_inertia13 = link3_inertia9 - 0.20834999999999998;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = link2_pose2 * link3_inertia11;
-        let link2_pivot1 = link2_pose1 * link3_inertia12;
-        let link2_pivot2 = link2_pivot0 + link2_pivot1;
-        let link2_pivot3 = link3_inertia13 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pose2 * link3_pivot4;
-        let link2_inertia1 = link3_inertia11 - link2_inertia0;
-        let link2_inertia2 = link2_pose2 * link3_pivot6;
-        let link2_inertia3 = link3_inertia12 - link2_inertia2;
-        let link2_inertia4 = link3_inertia11 + link2_inertia1;
-        let link2_inertia5 = link2_pose2 * link2_inertia4;
-        let link2_inertia6 = link3_inertia13 - link2_inertia5;
-        let link2_inertia7 = link2_pose1 * link3_pivot8;
-        let link2_inertia8 = link2_inertia3 - link2_inertia7;
-        let link2_inertia9 = link2_inertia3 + link2_inertia8;
-        let link2_inertia10 = link2_pose1 * link2_inertia9;
-        let link2_inertia11 = link2_inertia6 - link2_inertia10;
-        let link2_inertia12 = link1_pose0 + link3_inertia10;
-        let link2_inertia13 = link2_inertia11 - 0.23334999999999997;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / link3_inertia13;
-        let ground_pivot1 = link2_pivot3 * ground_pivot0;
-        let ground_pivot2 = link2_pivot3 * ground_pivot1;
-        let ground_pivot3 = link2_inertia13 - ground_pivot2;
-        let ground_pivot4 = 1.0 / ground_pivot3;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = link10_inertia0 * link10_rest0;
-        let link10_rest2 = link10_inertia1 * link10_rest0;
-        let link10_rest3 = link10_pose2 * link10_rest1;
-        let link10_rest4 = p_9 + link10_rest3;
-        let link10_rest5 = link10_pose1 * link10_rest2;
-        let link10_rest6 = link10_rest4 + link10_rest5;
-        // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest6;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia13 * link9_rest1;
-        let link9_rest3 = link10_rest1 - link9_rest2;
-        let link9_rest4 = link10_inertia14 * link9_rest1;
-        let link9_rest5 = link10_rest2 - link9_rest4;
-        let link9_rest6 = link8_pose3 * link9_rest3;
-        let link9_rest7 = p_8 + link9_rest6;
-        let link9_rest8 = link8_pose4 * link9_rest5;
-        let link9_rest9 = link9_rest7 + link9_rest8;
-        // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest9;
-        let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia11 * link8_rest1;
-        let link8_rest3 = link9_rest3 - link8_rest2;
-        let link8_rest4 = link9_inertia12 * link8_rest1;
-        let link8_rest5 = link9_rest5 - link8_rest4;
-        let link8_rest6 = link8_pose2 * link8_rest3;
-        let link8_rest7 = p_7 + link8_rest6;
-        let link8_rest8 = link8_pose1 * link8_rest5;
-        let link8_rest9 = link8_rest7 + link8_rest8;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = p_6 - link8_rest9;
-        let link7_rest1 = link7_pivot0 * link7_rest0;
-        let link7_rest2 = link8_inertia11 * link7_rest1;
-        let link7_rest3 = link8_rest3 - link7_rest2;
-        let link7_rest4 = link8_inertia12 * link7_rest1;
-        let link7_rest5 = link8_rest5 - link7_rest4;
-        let link7_rest6 = link7_pose2 * link7_rest3;
-        let link7_rest7 = p_6 + link7_rest6;
-        let link7_rest8 = link7_pose1 * link7_rest5;
-        let link7_rest9 = link7_rest7 + link7_rest8;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = p_5 - link7_rest9;
-        let link6_rest1 = link6_pivot0 * link6_rest0;
-        let link6_rest2 = link7_inertia11 * link6_rest1;
-        let link6_rest3 = link7_rest3 - link6_rest2;
-        let link6_rest4 = link7_inertia12 * link6_rest1;
-        let link6_rest5 = link7_rest5 - link6_rest4;
-        let link6_rest6 = link6_pose2 * link6_rest3;
-        let link6_rest7 = p_5 + link6_rest6;
-        let link6_rest8 = link6_pose1 * link6_rest5;
-        let link6_rest9 = link6_rest7 + link6_rest8;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = p_4 - link6_rest9;
-        let link5_rest1 = link5_pivot0 * link5_rest0;
-        let link5_rest2 = link6_inertia11 * link5_rest1;
-        let link5_rest3 = link6_rest3 - link5_rest2;
-        let link5_rest4 = link6_inertia12 * link5_rest1;
-        let link5_rest5 = link6_rest5 - link5_rest4;
-        let link5_rest6 = link5_pose2 * link5_rest3;
-        let link5_rest7 = p_4 + link5_rest6;
-        let link5_rest8 = link5_pose1 * link5_rest5;
-        let link5_rest9 = link5_rest7 + link5_rest8;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = p_3 - link5_rest9;
-        let link4_rest1 = link4_pivot0 * link4_rest0;
-        let link4_rest2 = link5_inertia11 * link4_rest1;
-        let link4_rest3 = link5_rest3 - link4_rest2;
-        let link4_rest4 = link5_inertia12 * link4_rest1;
-        let link4_rest5 = link5_rest5 - link4_rest4;
-        let link4_rest6 = link4_pose2 * link4_rest3;
-        let link4_rest7 = p_3 + link4_rest6;
-        let link4_rest8 = link4_pose1 * link4_rest5;
-        let link4_rest9 = link4_rest7 + link4_rest8;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = p_2 - link4_rest9;
-        let link3_rest1 = link3_pivot0 * link3_rest0;
-        let link3_rest2 = link4_inertia11 * link3_rest1;
-        let link3_rest3 = link4_rest3 - link3_rest2;
-        let link3_rest4 = link4_inertia12 * link3_rest1;
-        let link3_rest5 = link4_rest5 - link3_rest4;
-        let link3_rest6 = link3_pose2 * link3_rest3;
-        let link3_rest7 = p_2 + link3_rest6;
-        let link3_rest8 = link3_pose1 * link3_rest5;
-        let link3_rest9 = link3_rest7 + link3_rest8;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_pose2 * link3_rest3;
-        let link2_rest1 = link3_rest9 + link2_rest0;
-        let link2_rest2 = link2_pose1 * link3_rest5;
-        let link2_rest3 = link2_rest1 + link2_rest2;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_1 - link3_rest9;
-        let link1_rest1 = ground_pivot0 * link1_rest0;
-        let link1_rest2 = link2_pivot3 * link1_rest1;
-        let link1_rest3 = link2_rest3 + link1_rest2;
-        let link1_rest4 = p_0 - link1_rest3;
-        let link1_rest5 = ground_pivot4 * link1_rest4;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot1 * link1_rest5;
-        let ground_vel1 = link1_rest1 - ground_vel0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = link2_pose1 * link1_rest5;
-        let link2_vel1 = link2_pose2 * link1_rest5;
-        let link2_vel2 = link1_rest5 + ground_vel1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link3_pose1 * link2_vel2;
-        let link3_vel1 = link2_vel0 + link3_vel0;
-        let link3_vel2 = link3_pose2 * link2_vel2;
-        let link3_vel3 = link2_vel1 + link3_vel2;
-        let link3_vel4 = link3_pivot1 * link3_vel3;
-        let link3_vel5 = link3_pivot2 * link3_vel1;
-        let link3_vel6 = link3_vel4 + link3_vel5;
-        let link3_vel7 = link3_rest1 + link3_vel6;
-        let link3_vel8 = link2_vel2 - link3_vel7;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link4_pose1 * link3_vel7;
-        let link4_vel1 = link3_vel1 + link4_vel0;
-        let link4_vel2 = link4_pose2 * link3_vel7;
-        let link4_vel3 = link3_vel3 + link4_vel2;
-        let link4_vel4 = link4_pivot1 * link4_vel3;
-        let link4_vel5 = link4_pivot2 * link4_vel1;
-        let link4_vel6 = link4_vel4 + link4_vel5;
-        let link4_vel7 = link4_rest1 + link4_vel6;
-        let link4_vel8 = link3_vel7 - link4_vel7;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link5_pose1 * link4_vel7;
-        let link5_vel1 = link4_vel1 + link5_vel0;
-        let link5_vel2 = link5_pose2 * link4_vel7;
-        let link5_vel3 = link4_vel3 + link5_vel2;
-        let link5_vel4 = link5_pivot1 * link5_vel3;
-        let link5_vel5 = link5_pivot2 * link5_vel1;
-        let link5_vel6 = link5_vel4 + link5_vel5;
-        let link5_vel7 = link5_rest1 + link5_vel6;
-        let link5_vel8 = link4_vel7 - link5_vel7;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link6_pose1 * link5_vel7;
-        let link6_vel1 = link5_vel1 + link6_vel0;
-        let link6_vel2 = link6_pose2 * link5_vel7;
-        let link6_vel3 = link5_vel3 + link6_vel2;
-        let link6_vel4 = link6_pivot1 * link6_vel3;
-        let link6_vel5 = link6_pivot2 * link6_vel1;
-        let link6_vel6 = link6_vel4 + link6_vel5;
-        let link6_vel7 = link6_rest1 + link6_vel6;
-        let link6_vel8 = link5_vel7 - link6_vel7;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link7_pose1 * link6_vel7;
-        let link7_vel1 = link6_vel1 + link7_vel0;
-        let link7_vel2 = link7_pose2 * link6_vel7;
-        let link7_vel3 = link6_vel3 + link7_vel2;
-        let link7_vel4 = link7_pivot1 * link7_vel3;
-        let link7_vel5 = link7_pivot2 * link7_vel1;
-        let link7_vel6 = link7_vel4 + link7_vel5;
-        let link7_vel7 = link7_rest1 + link7_vel6;
-        let link7_vel8 = link6_vel7 - link7_vel7;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link8_pose1 * link7_vel7;
-        let link8_vel1 = link7_vel1 + link8_vel0;
-        let link8_vel2 = link8_pose2 * link7_vel7;
-        let link8_vel3 = link7_vel3 + link8_vel2;
-        let link8_vel4 = link8_pivot1 * link8_vel3;
-        let link8_vel5 = link8_pivot2 * link8_vel1;
-        let link8_vel6 = link8_vel4 + link8_vel5;
-        let link8_vel7 = link8_rest1 + link8_vel6;
-        let link8_vel8 = link7_vel7 - link8_vel7;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_pose4 * link8_vel7;
-        let link9_vel1 = link8_vel1 + link9_vel0;
-        let link9_vel2 = link8_pose3 * link8_vel7;
-        let link9_vel3 = link8_vel3 + link9_vel2;
-        let link9_vel4 = link9_pivot1 * link9_vel3;
-        let link9_vel5 = link9_pivot2 * link9_vel1;
-        let link9_vel6 = link9_vel4 + link9_vel5;
-        let link9_vel7 = link9_rest1 + link9_vel6;
-        let link9_vel8 = link8_vel7 - link9_vel7;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link10_pose1 * link9_vel7;
-        let link10_vel1 = link9_vel1 + link10_vel0;
-        let link10_vel2 = link10_pose2 * link9_vel7;
-        let link10_vel3 = link9_vel3 + link10_vel2;
-        let link10_vel4 = link10_pivot0 * link10_vel3;
-        let link10_vel5 = link10_pivot1 * link10_vel1;
-        let link10_vel6 = link10_vel4 + link10_vel5;
-        let link10_vel7 = link10_rest0 + link10_vel6;
-        let link10_vel8 = link9_vel7 + link10_vel7;
-        // link10: gravity and wrenches
-        let link10_load0 = 9.81 * link10_sin0;
-        // link2: momentum
-        let link2_mom0 = link2_pose3 * link2_vel2;
-        let link2_mom1 = link2_pose4 * link2_vel2;
-        // link3: momentum
-        let link3_mom0 = link3_pose3 * link3_vel7;
-        let link3_mom1 = link3_pose4 * link3_vel7;
-        // link4: momentum
-        let link4_mom0 = link4_pose3 * link4_vel7;
-        let link4_mom1 = link4_pose4 * link4_vel7;
-        // link5: momentum
-        let link5_mom0 = link5_pose3 * link5_vel7;
-        let link5_mom1 = link5_pose4 * link5_vel7;
-        // link6: momentum
-        let link6_mom0 = link6_pose3 * link6_vel7;
-        let link6_mom1 = link6_pose4 * link6_vel7;
-        // link7: momentum
-        let link7_mom0 = link7_pose3 * link7_vel7;
-        let link7_mom1 = link7_pose4 * link7_vel7;
-        // link9: momentum
-        let link9_mom0 = link9_pose1 * link9_vel7;
-        let link9_mom1 = link9_pose2 * link9_vel7;
-        // link10: momentum
-        let link10_mom0 = 0.05 * link10_vel7;
-        let link10_mom1 = link10_cos0 * link10_mom0;
-        let link10_mom2 = link10_sin0 * link10_mom0;
-        let link10_mom3 = link9_mom0 - link10_mom1;
-        let link10_mom4 = link9_mom1 - link10_mom2;
-        // link9: momentum
-        let link9_mom2 = link9_vel2 + link10_mom3;
-        let link9_mom3 = link9_vel0 + link10_mom4;
-        // link8: momentum
-        let link8_mom0 = link7_mom0 + link9_mom2;
-        let link8_mom1 = link7_mom1 + link9_mom3;
-        // link7: momentum
-        let link7_mom2 = link6_mom0 + link8_mom0;
-        let link7_mom3 = link6_mom1 + link8_mom1;
-        // link6: momentum
-        let link6_mom2 = link5_mom0 + link7_mom2;
-        let link6_mom3 = link5_mom1 + link7_mom3;
-        // link5: momentum
-        let link5_mom2 = link4_mom0 + link6_mom2;
-        let link5_mom3 = link4_mom1 + link6_mom3;
-        // link4: momentum
-        let link4_mom2 = link3_mom0 + link5_mom2;
-        let link4_mom3 = link3_mom1 + link5_mom3;
-        // link3: momentum
-        let link3_mom2 = link2_mom0 + link4_mom2;
-        let link3_mom3 = link2_mom1 + link4_mom3;
-        // link1: momentum rate (4.36)
-        let link1_pdot0 = 9.81 * link2_inertia12;
-        // link2: momentum rate (4.36)
-        let link2_pdot0 = 9.81 * link3_inertia10;
-        let link2_pdot1 = link2_vel1 * link3_mom3;
-        let link2_pdot2 = link2_vel0 * link3_mom2;
-        let link2_pdot3 = link2_pdot1 - link2_pdot2;
-        let link2_pdot4 = link2_pdot0 + link2_pdot3;
-        // link3: momentum rate (4.36)
-        let link3_pdot0 = 9.81 * link4_inertia10;
-        let link3_pdot1 = link3_vel3 * link4_mom3;
-        let link3_pdot2 = link3_vel1 * link4_mom2;
-        let link3_pdot3 = link3_pdot1 - link3_pdot2;
-        let link3_pdot4 = link3_pdot0 + link3_pdot3;
-        // link4: momentum rate (4.36)
-        let link4_pdot0 = 9.81 * link5_inertia10;
-        let link4_pdot1 = link4_vel3 * link5_mom3;
-        let link4_pdot2 = link4_vel1 * link5_mom2;
-        let link4_pdot3 = link4_pdot1 - link4_pdot2;
-        let link4_pdot4 = link4_pdot0 + link4_pdot3;
-        // link5: momentum rate (4.36)
-        let link5_pdot0 = 9.81 * link6_inertia10;
-        let link5_pdot1 = link5_vel3 * link6_mom3;
-        let link5_pdot2 = link5_vel1 * link6_mom2;
-        let link5_pdot3 = link5_pdot1 - link5_pdot2;
-        let link5_pdot4 = link5_pdot0 + link5_pdot3;
-        // link6: momentum rate (4.36)
-        let link6_pdot0 = 9.81 * link7_inertia10;
-        let link6_pdot1 = link6_vel3 * link7_mom3;
-        let link6_pdot2 = link6_vel1 * link7_mom2;
-        let link6_pdot3 = link6_pdot1 - link6_pdot2;
-        let link6_pdot4 = link6_pdot0 + link6_pdot3;
-        // link7: momentum rate (4.36)
-        let link7_pdot0 = 9.81 * link8_inertia10;
-        let link7_pdot1 = link7_vel3 * link8_mom1;
-        let link7_pdot2 = link7_vel1 * link8_mom0;
-        let link7_pdot3 = link7_pdot1 - link7_pdot2;
-        let link7_pdot4 = link7_pdot0 + link7_pdot3;
-        // link8: momentum rate (4.36)
-        let link8_pdot0 = 9.81 * link9_inertia10;
-        let link8_pdot1 = link8_vel3 * link9_mom3;
-        let link8_pdot2 = link8_vel1 * link9_mom2;
-        let link8_pdot3 = link8_pdot1 - link8_pdot2;
-        let link8_pdot4 = link8_pdot0 + link8_pdot3;
-        // link9: momentum rate (4.36)
-        let link9_pdot0 = 9.81 * link10_inertia12;
-        let link9_pdot1 = link9_vel3 * link10_mom4;
-        let link9_pdot2 = link9_vel1 * link10_mom3;
-        let link9_pdot3 = link9_pdot1 - link9_pdot2;
-        let link9_pdot4 = link9_pdot0 + link9_pdot3;
-        // link10: momentum rate (4.36)
-        let link10_pdot0 = 0.05 * link10_load0;
-        let link10_pdot1 = link10_vel3 * link10_mom2;
-        let link10_pdot2 = link10_vel1 * link10_mom1;
-        let link10_pdot3 = link10_pdot1 - link10_pdot2;
-        let link10_pdot4 = link10_pdot0 - link10_pdot3;
-        let link10_pdot5 = tau_0 - link1_pdot0;
-        let link10_pdot6 = tau_1 - link2_pdot4;
-        let link10_pdot7 = tau_2 - link3_pdot4;
-        let link10_pdot8 = tau_3 - link4_pdot4;
-        let link10_pdot9 = tau_4 - link5_pdot4;
-        let link10_pdot10 = tau_5 - link6_pdot4;
-        let link10_pdot11 = tau_6 - link7_pdot4;
-        let link10_pdot12 = tau_7 - link8_pdot4;
-        let link10_pdot13 = tau_8 - link9_pdot4;
-        let link10_pdot14 = tau_9 - link10_pdot4;
-        qd[0] = -link1_rest5;
-        qd[1] = -ground_vel1;
-        qd[2] = link3_vel8;
-        qd[3] = link4_vel8;
-        qd[4] = link5_vel8;
-        qd[5] = link6_vel8;
-        qd[6] = link7_vel8;
-        qd[7] = link8_vel8;
-        qd[8] = link9_vel8;
-        qd[9] = link10_vel8;
-        pd[0] = link10_pdot5;
-        pd[1] = link10_pdot6;
-        pd[2] = link10_pdot7;
-        pd[3] = link10_pdot8;
-        pd[4] = link10_pdot9;
-        pd[5] = link10_pdot10;
-        pd[6] = link10_pdot11;
-        pd[7] = link10_pdot12;
-        pd[8] = link10_pdot13;
-        pd[9] = link10_pdot14;
+        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+    }
+
+    #[inline(always)]
+    fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            let tau_6 = tau.get(6, l);
+            let tau_7 = tau.get(7, l);
+            let tau_8 = tau.get(8, l);
+            let tau_9 = tau.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            let link1_pose0 = 0.95 * link1_sin0;
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link2_pose1 + link3_pose1;
+            let link3_inertia1 = link2_pose2 + link3_pose2;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link3_pose1 + link4_pose1;
+            let link4_inertia1 = link3_pose2 + link4_pose2;
+            let link4_inertia2 = link4_pose1 + link3_inertia0;
+            let link4_inertia3 = link4_pose2 + link3_inertia1;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link4_pose1 + link5_pose1;
+            let link5_inertia1 = link4_pose2 + link5_pose2;
+            let link5_inertia2 = link5_pose1 + link4_inertia0;
+            let link5_inertia3 = link5_pose2 + link4_inertia1;
+            let link5_inertia4 = link5_pose1 + link4_inertia2;
+            let link5_inertia5 = link5_pose2 + link4_inertia3;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link5_pose1 + link6_pose1;
+            let link6_inertia1 = link5_pose2 + link6_pose2;
+            let link6_inertia2 = link6_pose1 + link5_inertia0;
+            let link6_inertia3 = link6_pose2 + link5_inertia1;
+            let link6_inertia4 = link6_pose1 + link5_inertia2;
+            let link6_inertia5 = link6_pose2 + link5_inertia3;
+            let link6_inertia6 = link6_pose1 + link5_inertia4;
+            let link6_inertia7 = link6_pose2 + link5_inertia5;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link6_pose1 + link7_pose1;
+            let link7_inertia1 = link6_pose2 + link7_pose2;
+            let link7_inertia2 = link7_pose1 + link6_inertia0;
+            let link7_inertia3 = link7_pose2 + link6_inertia1;
+            let link7_inertia4 = link7_pose1 + link6_inertia2;
+            let link7_inertia5 = link7_pose2 + link6_inertia3;
+            let link7_inertia6 = link7_pose1 + link6_inertia4;
+            let link7_inertia7 = link7_pose2 + link6_inertia5;
+            let link7_inertia8 = link7_pose1 + link6_inertia6;
+            let link7_inertia9 = link7_pose2 + link6_inertia7;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link7_pose1 + link8_pose1;
+            let link8_inertia1 = link7_pose2 + link8_pose2;
+            let link8_inertia2 = link8_pose1 + link7_inertia0;
+            let link8_inertia3 = link8_pose2 + link7_inertia1;
+            let link8_inertia4 = link8_pose1 + link7_inertia2;
+            let link8_inertia5 = link8_pose2 + link7_inertia3;
+            let link8_inertia6 = link8_pose1 + link7_inertia4;
+            let link8_inertia7 = link8_pose2 + link7_inertia5;
+            let link8_inertia8 = link8_pose1 + link7_inertia6;
+            let link8_inertia9 = link8_pose2 + link7_inertia7;
+            let link8_inertia10 = link8_pose1 + link7_inertia8;
+            let link8_inertia11 = link8_pose2 + link7_inertia9;
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.29940119760479045 * link10_cos0;
+            let link10_inertia1 = link10_cos0 * link10_inertia0;
+            let link10_inertia2 = link10_sin0 * link10_inertia0;
+            let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
+            let link10_inertia4 = 0.05 * link10_sin0;
+            let link10_inertia5 = link10_pose2 * link10_inertia1;
+            let link10_inertia6 = link10_pose2 * link10_inertia2;
+            let link10_inertia7 = link10_pose2 * link10_inertia5;
+            let link10_inertia8 = link10_pose1 * link10_inertia2;
+            let link10_inertia9 = link10_inertia5 + link10_inertia8;
+            let link10_inertia10 = link10_pose1 * link10_inertia3;
+            let link10_inertia11 = link10_inertia6 - link10_inertia10;
+            let link10_inertia12 = link10_inertia6 + link10_inertia11;
+            let link10_inertia13 = link10_pose1 * link10_inertia12;
+            let link10_inertia14 = link10_inertia7 + link10_inertia13;
+            let link10_inertia15 = link9_pose2 + link10_inertia4;
+            let link10_inertia16 = link9_pose1 - link10_inertia9;
+            let link10_inertia17 = link9_pose2 - link10_inertia11;
+            let link10_inertia18 = link10_inertia14 - 0.033350000000000005;
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot0 = 1.0 / link10_inertia18;
+            let link9_pivot1 = link10_inertia16 * link9_pivot0;
+            let link9_pivot2 = link10_inertia17 * link9_pivot0;
+            let link9_pivot3 = link10_inertia16 * link9_pivot1;
+            let link9_pivot4 = link10_inertia1 - link9_pivot3;
+            let link9_pivot5 = link10_inertia16 * link9_pivot2;
+            let link9_pivot6 = link10_inertia2 - link9_pivot5;
+            let link9_pivot7 = link10_inertia17 * link9_pivot2;
+            let link9_pivot8 = link10_inertia3 + link9_pivot7;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link8_pose3 * link9_pivot4;
+            let link9_inertia1 = link8_pose3 * link9_pivot6;
+            let link9_inertia2 = link8_pose3 * link9_inertia0;
+            let link9_inertia3 = link8_pose4 * link9_pivot6;
+            let link9_inertia4 = link9_inertia0 + link9_inertia3;
+            let link9_inertia5 = link8_pose4 * link9_pivot8;
+            let link9_inertia6 = link9_inertia1 - link9_inertia5;
+            let link9_inertia7 = link9_inertia1 + link9_inertia6;
+            let link9_inertia8 = link8_pose4 * link9_inertia7;
+            let link9_inertia9 = link9_inertia2 + link9_inertia8;
+            let link9_inertia10 = link8_pose4 + link10_inertia15;
+            let link9_inertia11 = link8_pose3 - link9_inertia4;
+            let link9_inertia12 = link8_pose4 - link9_inertia6;
+            let link9_inertia13 = link9_inertia9 - 0.05835;
+            // link8: U, Mj, k and the reduced inertia M' (4.44)
+            let link8_pivot0 = link8_pose2 * link9_inertia11;
+            let link8_pivot1 = link8_pose1 * link9_inertia12;
+            let link8_pivot2 = link8_pivot0 + link8_pivot1;
+            let link8_pivot3 = link9_inertia13 - link8_pivot2;
+            let link8_pivot4 = link8_inertia1 * link9_inertia11;
+            let link8_pivot5 = link8_inertia0 * link9_inertia12;
+            let link8_pivot6 = link8_pivot4 + link8_pivot5;
+            let link8_pivot7 = link9_inertia13 - link8_pivot6;
+            let link8_pivot8 = link8_inertia3 * link9_inertia11;
+            let link8_pivot9 = link8_inertia2 * link9_inertia12;
+            let link8_pivot10 = link8_pivot8 + link8_pivot9;
+            let link8_pivot11 = link9_inertia13 - link8_pivot10;
+            let link8_pivot12 = link8_inertia5 * link9_inertia11;
+            let link8_pivot13 = link8_inertia4 * link9_inertia12;
+            let link8_pivot14 = link8_pivot12 + link8_pivot13;
+            let link8_pivot15 = link9_inertia13 - link8_pivot14;
+            let link8_pivot16 = link8_inertia7 * link9_inertia11;
+            let link8_pivot17 = link8_inertia6 * link9_inertia12;
+            let link8_pivot18 = link8_pivot16 + link8_pivot17;
+            let link8_pivot19 = link9_inertia13 - link8_pivot18;
+            let link8_pivot20 = link8_inertia9 * link9_inertia11;
+            let link8_pivot21 = link8_inertia8 * link9_inertia12;
+            let link8_pivot22 = link8_pivot20 + link8_pivot21;
+            let link8_pivot23 = link9_inertia13 - link8_pivot22;
+            let link8_pivot24 = link8_inertia11 * link9_inertia11;
+            let link8_pivot25 = link8_inertia10 * link9_inertia12;
+            let link8_pivot26 = link8_pivot24 + link8_pivot25;
+            let link8_pivot27 = link9_inertia13 - link8_pivot26;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia12 = link8_pose2 * link9_pivot4;
+            let link8_inertia13 = link9_inertia11 - link8_inertia12;
+            let link8_inertia14 = link8_pose2 * link9_pivot6;
+            let link8_inertia15 = link9_inertia12 - link8_inertia14;
+            let link8_inertia16 = link9_inertia11 + link8_inertia13;
+            let link8_inertia17 = link8_pose2 * link8_inertia16;
+            let link8_inertia18 = link9_inertia13 - link8_inertia17;
+            let link8_inertia19 = link8_pose1 * link9_pivot6;
+            let link8_inertia20 = link8_inertia13 - link8_inertia19;
+            let link8_inertia21 = link8_pose1 * link9_pivot8;
+            let link8_inertia22 = link8_inertia15 + link8_inertia21;
+            let link8_inertia23 = link8_inertia15 + link8_inertia22;
+            let link8_inertia24 = link8_pose1 * link8_inertia23;
+            let link8_inertia25 = link8_inertia18 - link8_inertia24;
+            let link8_inertia26 = link7_pose4 + link9_inertia10;
+            let link8_inertia27 = link7_pose3 + link8_inertia20;
+            let link8_inertia28 = link7_pose4 + link8_inertia22;
+            let link8_inertia29 = link8_inertia25 - 0.08335000000000001;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = link7_pose2 * link8_inertia27;
+            let link7_pivot1 = link7_pose1 * link8_inertia28;
+            let link7_pivot2 = link7_pivot0 + link7_pivot1;
+            let link7_pivot3 = link8_inertia29 - link7_pivot2;
+            let link7_pivot4 = link7_inertia1 * link8_inertia27;
+            let link7_pivot5 = link7_inertia0 * link8_inertia28;
+            let link7_pivot6 = link7_pivot4 + link7_pivot5;
+            let link7_pivot7 = link8_inertia29 - link7_pivot6;
+            let link7_pivot8 = link7_inertia3 * link8_inertia27;
+            let link7_pivot9 = link7_inertia2 * link8_inertia28;
+            let link7_pivot10 = link7_pivot8 + link7_pivot9;
+            let link7_pivot11 = link8_inertia29 - link7_pivot10;
+            let link7_pivot12 = link7_inertia5 * link8_inertia27;
+            let link7_pivot13 = link7_inertia4 * link8_inertia28;
+            let link7_pivot14 = link7_pivot12 + link7_pivot13;
+            let link7_pivot15 = link8_inertia29 - link7_pivot14;
+            let link7_pivot16 = link7_inertia7 * link8_inertia27;
+            let link7_pivot17 = link7_inertia6 * link8_inertia28;
+            let link7_pivot18 = link7_pivot16 + link7_pivot17;
+            let link7_pivot19 = link8_inertia29 - link7_pivot18;
+            let link7_pivot20 = link7_inertia9 * link8_inertia27;
+            let link7_pivot21 = link7_inertia8 * link8_inertia28;
+            let link7_pivot22 = link7_pivot20 + link7_pivot21;
+            let link7_pivot23 = link8_inertia29 - link7_pivot22;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia10 = link7_pose2 * link9_pivot4;
+            let link7_inertia11 = link8_inertia27 - link7_inertia10;
+            let link7_inertia12 = link7_pose2 * link9_pivot6;
+            let link7_inertia13 = link8_inertia28 - link7_inertia12;
+            let link7_inertia14 = link8_inertia27 + link7_inertia11;
+            let link7_inertia15 = link7_pose2 * link7_inertia14;
+            let link7_inertia16 = link8_inertia29 - link7_inertia15;
+            let link7_inertia17 = link7_pose1 * link9_pivot6;
+            let link7_inertia18 = link7_inertia11 - link7_inertia17;
+            let link7_inertia19 = link7_pose1 * link9_pivot8;
+            let link7_inertia20 = link7_inertia13 + link7_inertia19;
+            let link7_inertia21 = link7_inertia13 + link7_inertia20;
+            let link7_inertia22 = link7_pose1 * link7_inertia21;
+            let link7_inertia23 = link7_inertia16 - link7_inertia22;
+            let link7_inertia24 = link6_pose4 + link8_inertia26;
+            let link7_inertia25 = link6_pose3 + link7_inertia18;
+            let link7_inertia26 = link6_pose4 + link7_inertia20;
+            let link7_inertia27 = link7_inertia23 - 0.10835;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = link6_pose2 * link7_inertia25;
+            let link6_pivot1 = link6_pose1 * link7_inertia26;
+            let link6_pivot2 = link6_pivot0 + link6_pivot1;
+            let link6_pivot3 = link7_inertia27 - link6_pivot2;
+            let link6_pivot4 = link6_inertia1 * link7_inertia25;
+            let link6_pivot5 = link6_inertia0 * link7_inertia26;
+            let link6_pivot6 = link6_pivot4 + link6_pivot5;
+            let link6_pivot7 = link7_inertia27 - link6_pivot6;
+            let link6_pivot8 = link6_inertia3 * link7_inertia25;
+            let link6_pivot9 = link6_inertia2 * link7_inertia26;
+            let link6_pivot10 = link6_pivot8 + link6_pivot9;
+            let link6_pivot11 = link7_inertia27 - link6_pivot10;
+            let link6_pivot12 = link6_inertia5 * link7_inertia25;
+            let link6_pivot13 = link6_inertia4 * link7_inertia26;
+            let link6_pivot14 = link6_pivot12 + link6_pivot13;
+            let link6_pivot15 = link7_inertia27 - link6_pivot14;
+            let link6_pivot16 = link6_inertia7 * link7_inertia25;
+            let link6_pivot17 = link6_inertia6 * link7_inertia26;
+            let link6_pivot18 = link6_pivot16 + link6_pivot17;
+            let link6_pivot19 = link7_inertia27 - link6_pivot18;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia8 = link6_pose2 * link9_pivot4;
+            let link6_inertia9 = link7_inertia25 - link6_inertia8;
+            let link6_inertia10 = link6_pose2 * link9_pivot6;
+            let link6_inertia11 = link7_inertia26 - link6_inertia10;
+            let link6_inertia12 = link7_inertia25 + link6_inertia9;
+            let link6_inertia13 = link6_pose2 * link6_inertia12;
+            let link6_inertia14 = link7_inertia27 - link6_inertia13;
+            let link6_inertia15 = link6_pose1 * link9_pivot6;
+            let link6_inertia16 = link6_inertia9 - link6_inertia15;
+            let link6_inertia17 = link6_pose1 * link9_pivot8;
+            let link6_inertia18 = link6_inertia11 + link6_inertia17;
+            let link6_inertia19 = link6_inertia11 + link6_inertia18;
+            let link6_inertia20 = link6_pose1 * link6_inertia19;
+            let link6_inertia21 = link6_inertia14 - link6_inertia20;
+            let link6_inertia22 = link5_pose4 + link7_inertia24;
+            let link6_inertia23 = link5_pose3 + link6_inertia16;
+            let link6_inertia24 = link5_pose4 + link6_inertia18;
+            let link6_inertia25 = link6_inertia21 - 0.13335;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = link5_pose2 * link6_inertia23;
+            let link5_pivot1 = link5_pose1 * link6_inertia24;
+            let link5_pivot2 = link5_pivot0 + link5_pivot1;
+            let link5_pivot3 = link6_inertia25 - link5_pivot2;
+            let link5_pivot4 = link5_inertia1 * link6_inertia23;
+            let link5_pivot5 = link5_inertia0 * link6_inertia24;
+            let link5_pivot6 = link5_pivot4 + link5_pivot5;
+            let link5_pivot7 = link6_inertia25 - link5_pivot6;
+            let link5_pivot8 = link5_inertia3 * link6_inertia23;
+            let link5_pivot9 = link5_inertia2 * link6_inertia24;
+            let link5_pivot10 = link5_pivot8 + link5_pivot9;
+            let link5_pivot11 = link6_inertia25 - link5_pivot10;
+            let link5_pivot12 = link5_inertia5 * link6_inertia23;
+            let link5_pivot13 = link5_inertia4 * link6_inertia24;
+            let link5_pivot14 = link5_pivot12 + link5_pivot13;
+            let link5_pivot15 = link6_inertia25 - link5_pivot14;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia6 = link5_pose2 * link9_pivot4;
+            let link5_inertia7 = link6_inertia23 - link5_inertia6;
+            let link5_inertia8 = link5_pose2 * link9_pivot6;
+            let link5_inertia9 = link6_inertia24 - link5_inertia8;
+            let link5_inertia10 = link6_inertia23 + link5_inertia7;
+            let link5_inertia11 = link5_pose2 * link5_inertia10;
+            let link5_inertia12 = link6_inertia25 - link5_inertia11;
+            let link5_inertia13 = link5_pose1 * link9_pivot6;
+            let link5_inertia14 = link5_inertia7 - link5_inertia13;
+            let link5_inertia15 = link5_pose1 * link9_pivot8;
+            let link5_inertia16 = link5_inertia9 + link5_inertia15;
+            let link5_inertia17 = link5_inertia9 + link5_inertia16;
+            let link5_inertia18 = link5_pose1 * link5_inertia17;
+            let link5_inertia19 = link5_inertia12 - link5_inertia18;
+            let link5_inertia20 = link4_pose4 + link6_inertia22;
+            let link5_inertia21 = link4_pose3 + link5_inertia14;
+            let link5_inertia22 = link4_pose4 + link5_inertia16;
+            let link5_inertia23 = link5_inertia19 - 0.15835;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = link4_pose2 * link5_inertia21;
+            let link4_pivot1 = link4_pose1 * link5_inertia22;
+            let link4_pivot2 = link4_pivot0 + link4_pivot1;
+            let link4_pivot3 = link5_inertia23 - link4_pivot2;
+            let link4_pivot4 = link4_inertia1 * link5_inertia21;
+            let link4_pivot5 = link4_inertia0 * link5_inertia22;
+            let link4_pivot6 = link4_pivot4 + link4_pivot5;
+            let link4_pivot7 = link5_inertia23 - link4_pivot6;
+            let link4_pivot8 = link4_inertia3 * link5_inertia21;
+            let link4_pivot9 = link4_inertia2 * link5_inertia22;
+            let link4_pivot10 = link4_pivot8 + link4_pivot9;
+            let link4_pivot11 = link5_inertia23 - link4_pivot10;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia4 = link4_pose2 * link9_pivot4;
+            let link4_inertia5 = link5_inertia21 - link4_inertia4;
+            let link4_inertia6 = link4_pose2 * link9_pivot6;
+            let link4_inertia7 = link5_inertia22 - link4_inertia6;
+            let link4_inertia8 = link5_inertia21 + link4_inertia5;
+            let link4_inertia9 = link4_pose2 * link4_inertia8;
+            let link4_inertia10 = link5_inertia23 - link4_inertia9;
+            let link4_inertia11 = link4_pose1 * link9_pivot6;
+            let link4_inertia12 = link4_inertia5 - link4_inertia11;
+            let link4_inertia13 = link4_pose1 * link9_pivot8;
+            let link4_inertia14 = link4_inertia7 + link4_inertia13;
+            let link4_inertia15 = link4_inertia7 + link4_inertia14;
+            let link4_inertia16 = link4_pose1 * link4_inertia15;
+            let link4_inertia17 = link4_inertia10 - link4_inertia16;
+            let link4_inertia18 = link3_pose4 + link5_inertia20;
+            let link4_inertia19 = link3_pose3 + link4_inertia12;
+            let link4_inertia20 = link3_pose4 + link4_inertia14;
+            let link4_inertia21 = link4_inertia17 - 0.18334999999999999;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = link3_pose2 * link4_inertia19;
+            let link3_pivot1 = link3_pose1 * link4_inertia20;
+            let link3_pivot2 = link3_pivot0 + link3_pivot1;
+            let link3_pivot3 = link4_inertia21 - link3_pivot2;
+            let link3_pivot4 = link3_inertia1 * link4_inertia19;
+            let link3_pivot5 = link3_inertia0 * link4_inertia20;
+            let link3_pivot6 = link3_pivot4 + link3_pivot5;
+            let link3_pivot7 = link4_inertia21 - link3_pivot6;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia2 = link3_pose2 * link9_pivot4;
+            let link3_inertia3 = link4_inertia19 - link3_inertia2;
+            let link3_inertia4 = link3_pose2 * link9_pivot6;
+            let link3_inertia5 = link4_inertia20 - link3_inertia4;
+            let link3_inertia6 = link4_inertia19 + link3_inertia3;
+            let link3_inertia7 = link3_pose2 * link3_inertia6;
+            let link3_inertia8 = link4_inertia21 - link3_inertia7;
+            let link3_inertia9 = link3_pose1 * link9_pivot6;
+            let link3_inertia10 = link3_inertia3 - link3_inertia9;
+            let link3_inertia11 = link3_pose1 * link9_pivot8;
+            let link3_inertia12 = link3_inertia5 + link3_inertia11;
+            let link3_inertia13 = link3_inertia5 + link3_inertia12;
+            let link3_inertia14 = link3_pose1 * link3_inertia13;
+            let link3_inertia15 = link3_inertia8 - link3_inertia14;
+            let link3_inertia16 = link2_pose4 + link4_inertia18;
+            let link3_inertia17 = link2_pose3 + link3_inertia10;
+            let link3_inertia18 = link2_pose4 + link3_inertia12;
+            let link3_inertia19 = link3_inertia15 - 0.20834999999999998;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = link2_pose2 * link3_inertia17;
+            let link2_pivot1 = link2_pose1 * link3_inertia18;
+            let link2_pivot2 = link2_pivot0 + link2_pivot1;
+            let link2_pivot3 = link3_inertia19 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link2_pose2 * link9_pivot4;
+            let link2_inertia1 = link3_inertia17 - link2_inertia0;
+            let link2_inertia2 = link2_pose2 * link9_pivot6;
+            let link2_inertia3 = link3_inertia18 - link2_inertia2;
+            let link2_inertia4 = link3_inertia17 + link2_inertia1;
+            let link2_inertia5 = link2_pose2 * link2_inertia4;
+            let link2_inertia6 = link3_inertia19 - link2_inertia5;
+            let link2_inertia7 = link2_pose1 * link9_pivot8;
+            let link2_inertia8 = link2_inertia3 + link2_inertia7;
+            let link2_inertia9 = link2_inertia3 + link2_inertia8;
+            let link2_inertia10 = link2_pose1 * link2_inertia9;
+            let link2_inertia11 = link2_inertia6 - link2_inertia10;
+            let link2_inertia12 = link1_pose0 + link3_inertia16;
+            let link2_inertia13 = link2_inertia11 - 0.23334999999999997;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / link9_inertia13;
+            let ground_pivot1 = link8_pivot3 * ground_pivot0;
+            let ground_pivot2 = link8_pivot3 * ground_pivot1;
+            let ground_pivot3 = link8_inertia29 - ground_pivot2;
+            let ground_pivot4 = link8_pivot7 * ground_pivot0;
+            let ground_pivot5 = link8_pivot3 * ground_pivot4;
+            let ground_pivot6 = link7_pivot3 - ground_pivot5;
+            let ground_pivot7 = link8_pivot11 * ground_pivot0;
+            let ground_pivot8 = link8_pivot3 * ground_pivot7;
+            let ground_pivot9 = link7_pivot7 - ground_pivot8;
+            let ground_pivot10 = link8_pivot15 * ground_pivot0;
+            let ground_pivot11 = link8_pivot3 * ground_pivot10;
+            let ground_pivot12 = link7_pivot11 - ground_pivot11;
+            let ground_pivot13 = link8_pivot19 * ground_pivot0;
+            let ground_pivot14 = link8_pivot3 * ground_pivot13;
+            let ground_pivot15 = link7_pivot15 - ground_pivot14;
+            let ground_pivot16 = link8_pivot23 * ground_pivot0;
+            let ground_pivot17 = link8_pivot3 * ground_pivot16;
+            let ground_pivot18 = link7_pivot19 - ground_pivot17;
+            let ground_pivot19 = link8_pivot27 * ground_pivot0;
+            let ground_pivot20 = link8_pivot3 * ground_pivot19;
+            let ground_pivot21 = link7_pivot23 - ground_pivot20;
+            let ground_pivot22 = link8_pivot7 * ground_pivot4;
+            let ground_pivot23 = link7_inertia27 - ground_pivot22;
+            let ground_pivot24 = link8_pivot7 * ground_pivot7;
+            let ground_pivot25 = link6_pivot3 - ground_pivot24;
+            let ground_pivot26 = link8_pivot7 * ground_pivot10;
+            let ground_pivot27 = link6_pivot7 - ground_pivot26;
+            let ground_pivot28 = link8_pivot7 * ground_pivot13;
+            let ground_pivot29 = link6_pivot11 - ground_pivot28;
+            let ground_pivot30 = link8_pivot7 * ground_pivot16;
+            let ground_pivot31 = link6_pivot15 - ground_pivot30;
+            let ground_pivot32 = link8_pivot7 * ground_pivot19;
+            let ground_pivot33 = link6_pivot19 - ground_pivot32;
+            let ground_pivot34 = link8_pivot11 * ground_pivot7;
+            let ground_pivot35 = link6_inertia25 - ground_pivot34;
+            let ground_pivot36 = link8_pivot11 * ground_pivot10;
+            let ground_pivot37 = link5_pivot3 - ground_pivot36;
+            let ground_pivot38 = link8_pivot11 * ground_pivot13;
+            let ground_pivot39 = link5_pivot7 - ground_pivot38;
+            let ground_pivot40 = link8_pivot11 * ground_pivot16;
+            let ground_pivot41 = link5_pivot11 - ground_pivot40;
+            let ground_pivot42 = link8_pivot11 * ground_pivot19;
+            let ground_pivot43 = link5_pivot15 - ground_pivot42;
+            let ground_pivot44 = link8_pivot15 * ground_pivot10;
+            let ground_pivot45 = link5_inertia23 - ground_pivot44;
+            let ground_pivot46 = link8_pivot15 * ground_pivot13;
+            let ground_pivot47 = link4_pivot3 - ground_pivot46;
+            let ground_pivot48 = link8_pivot15 * ground_pivot16;
+            let ground_pivot49 = link4_pivot7 - ground_pivot48;
+            let ground_pivot50 = link8_pivot15 * ground_pivot19;
+            let ground_pivot51 = link4_pivot11 - ground_pivot50;
+            let ground_pivot52 = link8_pivot19 * ground_pivot13;
+            let ground_pivot53 = link4_inertia21 - ground_pivot52;
+            let ground_pivot54 = link8_pivot19 * ground_pivot16;
+            let ground_pivot55 = link3_pivot3 - ground_pivot54;
+            let ground_pivot56 = link8_pivot19 * ground_pivot19;
+            let ground_pivot57 = link3_pivot7 - ground_pivot56;
+            let ground_pivot58 = link8_pivot23 * ground_pivot16;
+            let ground_pivot59 = link3_inertia19 - ground_pivot58;
+            let ground_pivot60 = link8_pivot23 * ground_pivot19;
+            let ground_pivot61 = link2_pivot3 - ground_pivot60;
+            let ground_pivot62 = link8_pivot27 * ground_pivot19;
+            let ground_pivot63 = link2_inertia13 - ground_pivot62;
+            let ground_pivot64 = 1.0 / ground_pivot3;
+            let ground_pivot65 = ground_pivot6 * ground_pivot64;
+            let ground_pivot66 = ground_pivot6 * ground_pivot65;
+            let ground_pivot67 = ground_pivot23 - ground_pivot66;
+            let ground_pivot68 = ground_pivot9 * ground_pivot64;
+            let ground_pivot69 = ground_pivot6 * ground_pivot68;
+            let ground_pivot70 = ground_pivot25 - ground_pivot69;
+            let ground_pivot71 = ground_pivot12 * ground_pivot64;
+            let ground_pivot72 = ground_pivot6 * ground_pivot71;
+            let ground_pivot73 = ground_pivot27 - ground_pivot72;
+            let ground_pivot74 = ground_pivot15 * ground_pivot64;
+            let ground_pivot75 = ground_pivot6 * ground_pivot74;
+            let ground_pivot76 = ground_pivot29 - ground_pivot75;
+            let ground_pivot77 = ground_pivot18 * ground_pivot64;
+            let ground_pivot78 = ground_pivot6 * ground_pivot77;
+            let ground_pivot79 = ground_pivot31 - ground_pivot78;
+            let ground_pivot80 = ground_pivot21 * ground_pivot64;
+            let ground_pivot81 = ground_pivot6 * ground_pivot80;
+            let ground_pivot82 = ground_pivot33 - ground_pivot81;
+            let ground_pivot83 = ground_pivot9 * ground_pivot68;
+            let ground_pivot84 = ground_pivot35 - ground_pivot83;
+            let ground_pivot85 = ground_pivot9 * ground_pivot71;
+            let ground_pivot86 = ground_pivot37 - ground_pivot85;
+            let ground_pivot87 = ground_pivot9 * ground_pivot74;
+            let ground_pivot88 = ground_pivot39 - ground_pivot87;
+            let ground_pivot89 = ground_pivot9 * ground_pivot77;
+            let ground_pivot90 = ground_pivot41 - ground_pivot89;
+            let ground_pivot91 = ground_pivot9 * ground_pivot80;
+            let ground_pivot92 = ground_pivot43 - ground_pivot91;
+            let ground_pivot93 = ground_pivot12 * ground_pivot71;
+            let ground_pivot94 = ground_pivot45 - ground_pivot93;
+            let ground_pivot95 = ground_pivot12 * ground_pivot74;
+            let ground_pivot96 = ground_pivot47 - ground_pivot95;
+            let ground_pivot97 = ground_pivot12 * ground_pivot77;
+            let ground_pivot98 = ground_pivot49 - ground_pivot97;
+            let ground_pivot99 = ground_pivot12 * ground_pivot80;
+            let ground_pivot100 = ground_pivot51 - ground_pivot99;
+            let ground_pivot101 = ground_pivot15 * ground_pivot74;
+            let ground_pivot102 = ground_pivot53 - ground_pivot101;
+            let ground_pivot103 = ground_pivot15 * ground_pivot77;
+            let ground_pivot104 = ground_pivot55 - ground_pivot103;
+            let ground_pivot105 = ground_pivot15 * ground_pivot80;
+            let ground_pivot106 = ground_pivot57 - ground_pivot105;
+            let ground_pivot107 = ground_pivot18 * ground_pivot77;
+            let ground_pivot108 = ground_pivot59 - ground_pivot107;
+            let ground_pivot109 = ground_pivot18 * ground_pivot80;
+            let ground_pivot110 = ground_pivot61 - ground_pivot109;
+            let ground_pivot111 = ground_pivot21 * ground_pivot80;
+            let ground_pivot112 = ground_pivot63 - ground_pivot111;
+            let ground_pivot113 = 1.0 / ground_pivot67;
+            let ground_pivot114 = ground_pivot70 * ground_pivot113;
+            let ground_pivot115 = ground_pivot70 * ground_pivot114;
+            let ground_pivot116 = ground_pivot84 - ground_pivot115;
+            let ground_pivot117 = ground_pivot73 * ground_pivot113;
+            let ground_pivot118 = ground_pivot70 * ground_pivot117;
+            let ground_pivot119 = ground_pivot86 - ground_pivot118;
+            let ground_pivot120 = ground_pivot76 * ground_pivot113;
+            let ground_pivot121 = ground_pivot70 * ground_pivot120;
+            let ground_pivot122 = ground_pivot88 - ground_pivot121;
+            let ground_pivot123 = ground_pivot79 * ground_pivot113;
+            let ground_pivot124 = ground_pivot70 * ground_pivot123;
+            let ground_pivot125 = ground_pivot90 - ground_pivot124;
+            let ground_pivot126 = ground_pivot82 * ground_pivot113;
+            let ground_pivot127 = ground_pivot70 * ground_pivot126;
+            let ground_pivot128 = ground_pivot92 - ground_pivot127;
+            let ground_pivot129 = ground_pivot73 * ground_pivot117;
+            let ground_pivot130 = ground_pivot94 - ground_pivot129;
+            let ground_pivot131 = ground_pivot73 * ground_pivot120;
+            let ground_pivot132 = ground_pivot96 - ground_pivot131;
+            let ground_pivot133 = ground_pivot73 * ground_pivot123;
+            let ground_pivot134 = ground_pivot98 - ground_pivot133;
+            let ground_pivot135 = ground_pivot73 * ground_pivot126;
+            let ground_pivot136 = ground_pivot100 - ground_pivot135;
+            let ground_pivot137 = ground_pivot76 * ground_pivot120;
+            let ground_pivot138 = ground_pivot102 - ground_pivot137;
+            let ground_pivot139 = ground_pivot76 * ground_pivot123;
+            let ground_pivot140 = ground_pivot104 - ground_pivot139;
+            let ground_pivot141 = ground_pivot76 * ground_pivot126;
+            let ground_pivot142 = ground_pivot106 - ground_pivot141;
+            let ground_pivot143 = ground_pivot79 * ground_pivot123;
+            let ground_pivot144 = ground_pivot108 - ground_pivot143;
+            let ground_pivot145 = ground_pivot79 * ground_pivot126;
+            let ground_pivot146 = ground_pivot110 - ground_pivot145;
+            let ground_pivot147 = ground_pivot82 * ground_pivot126;
+            let ground_pivot148 = ground_pivot112 - ground_pivot147;
+            let ground_pivot149 = 1.0 / ground_pivot116;
+            let ground_pivot150 = ground_pivot119 * ground_pivot149;
+            let ground_pivot151 = ground_pivot119 * ground_pivot150;
+            let ground_pivot152 = ground_pivot130 - ground_pivot151;
+            let ground_pivot153 = ground_pivot122 * ground_pivot149;
+            let ground_pivot154 = ground_pivot119 * ground_pivot153;
+            let ground_pivot155 = ground_pivot132 - ground_pivot154;
+            let ground_pivot156 = ground_pivot125 * ground_pivot149;
+            let ground_pivot157 = ground_pivot119 * ground_pivot156;
+            let ground_pivot158 = ground_pivot134 - ground_pivot157;
+            let ground_pivot159 = ground_pivot128 * ground_pivot149;
+            let ground_pivot160 = ground_pivot119 * ground_pivot159;
+            let ground_pivot161 = ground_pivot136 - ground_pivot160;
+            let ground_pivot162 = ground_pivot122 * ground_pivot153;
+            let ground_pivot163 = ground_pivot138 - ground_pivot162;
+            let ground_pivot164 = ground_pivot122 * ground_pivot156;
+            let ground_pivot165 = ground_pivot140 - ground_pivot164;
+            let ground_pivot166 = ground_pivot122 * ground_pivot159;
+            let ground_pivot167 = ground_pivot142 - ground_pivot166;
+            let ground_pivot168 = ground_pivot125 * ground_pivot156;
+            let ground_pivot169 = ground_pivot144 - ground_pivot168;
+            let ground_pivot170 = ground_pivot125 * ground_pivot159;
+            let ground_pivot171 = ground_pivot146 - ground_pivot170;
+            let ground_pivot172 = ground_pivot128 * ground_pivot159;
+            let ground_pivot173 = ground_pivot148 - ground_pivot172;
+            let ground_pivot174 = 1.0 / ground_pivot152;
+            let ground_pivot175 = ground_pivot155 * ground_pivot174;
+            let ground_pivot176 = ground_pivot155 * ground_pivot175;
+            let ground_pivot177 = ground_pivot163 - ground_pivot176;
+            let ground_pivot178 = ground_pivot158 * ground_pivot174;
+            let ground_pivot179 = ground_pivot155 * ground_pivot178;
+            let ground_pivot180 = ground_pivot165 - ground_pivot179;
+            let ground_pivot181 = ground_pivot161 * ground_pivot174;
+            let ground_pivot182 = ground_pivot155 * ground_pivot181;
+            let ground_pivot183 = ground_pivot167 - ground_pivot182;
+            let ground_pivot184 = ground_pivot158 * ground_pivot178;
+            let ground_pivot185 = ground_pivot169 - ground_pivot184;
+            let ground_pivot186 = ground_pivot158 * ground_pivot181;
+            let ground_pivot187 = ground_pivot171 - ground_pivot186;
+            let ground_pivot188 = ground_pivot161 * ground_pivot181;
+            let ground_pivot189 = ground_pivot173 - ground_pivot188;
+            let ground_pivot190 = 1.0 / ground_pivot177;
+            let ground_pivot191 = ground_pivot180 * ground_pivot190;
+            let ground_pivot192 = ground_pivot180 * ground_pivot191;
+            let ground_pivot193 = ground_pivot185 - ground_pivot192;
+            let ground_pivot194 = ground_pivot183 * ground_pivot190;
+            let ground_pivot195 = ground_pivot180 * ground_pivot194;
+            let ground_pivot196 = ground_pivot187 - ground_pivot195;
+            let ground_pivot197 = ground_pivot183 * ground_pivot194;
+            let ground_pivot198 = ground_pivot189 - ground_pivot197;
+            let ground_pivot199 = 1.0 / ground_pivot193;
+            let ground_pivot200 = ground_pivot196 * ground_pivot199;
+            let ground_pivot201 = ground_pivot196 * ground_pivot200;
+            let ground_pivot202 = ground_pivot198 - ground_pivot201;
+            let ground_pivot203 = 1.0 / ground_pivot202;
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest0 = 119.76047904191617 * p_9;
+            let link10_rest1 = 0.05 * link10_rest0;
+            let link10_rest2 = link10_cos0 * link10_rest1;
+            let link10_rest3 = link10_sin0 * link10_rest1;
+            let link10_rest4 = link10_pose2 * link10_rest2;
+            let link10_rest5 = p_9 + link10_rest4;
+            let link10_rest6 = link10_pose1 * link10_rest3;
+            let link10_rest7 = link10_rest5 + link10_rest6;
+            // link9: momentum remainder D, D' (4.45, 4.49)
+            let link9_rest0 = p_8 - link10_rest7;
+            let link9_rest1 = link9_pivot0 * link9_rest0;
+            let link9_rest2 = link10_inertia16 * link9_rest1;
+            let link9_rest3 = link10_rest2 - link9_rest2;
+            let link9_rest4 = link10_inertia17 * link9_rest1;
+            let link9_rest5 = link10_rest3 - link9_rest4;
+            let link9_rest6 = link8_pose3 * link9_rest3;
+            let link9_rest7 = p_8 + link9_rest6;
+            let link9_rest8 = link8_pose4 * link9_rest5;
+            let link9_rest9 = link9_rest7 + link9_rest8;
+            // link8: momentum remainder D, D' (4.45, 4.49)
+            let link8_rest0 = link8_pose2 * link9_rest3;
+            let link8_rest1 = link9_rest9 + link8_rest0;
+            let link8_rest2 = link8_pose1 * link9_rest5;
+            let link8_rest3 = link8_rest1 + link8_rest2;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = link7_pose2 * link9_rest3;
+            let link7_rest1 = link8_rest3 + link7_rest0;
+            let link7_rest2 = link7_pose1 * link9_rest5;
+            let link7_rest3 = link7_rest1 + link7_rest2;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_pose2 * link9_rest3;
+            let link6_rest1 = link7_rest3 + link6_rest0;
+            let link6_rest2 = link6_pose1 * link9_rest5;
+            let link6_rest3 = link6_rest1 + link6_rest2;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_pose2 * link9_rest3;
+            let link5_rest1 = link6_rest3 + link5_rest0;
+            let link5_rest2 = link5_pose1 * link9_rest5;
+            let link5_rest3 = link5_rest1 + link5_rest2;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_pose2 * link9_rest3;
+            let link4_rest1 = link5_rest3 + link4_rest0;
+            let link4_rest2 = link4_pose1 * link9_rest5;
+            let link4_rest3 = link4_rest1 + link4_rest2;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_pose2 * link9_rest3;
+            let link3_rest1 = link4_rest3 + link3_rest0;
+            let link3_rest2 = link3_pose1 * link9_rest5;
+            let link3_rest3 = link3_rest1 + link3_rest2;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_pose2 * link9_rest3;
+            let link2_rest1 = link3_rest3 + link2_rest0;
+            let link2_rest2 = link2_pose1 * link9_rest5;
+            let link2_rest3 = link2_rest1 + link2_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_7 - link9_rest9;
+            let link1_rest1 = ground_pivot0 * link1_rest0;
+            let link1_rest2 = link8_pivot3 * link1_rest1;
+            let link1_rest3 = link8_rest3 + link1_rest2;
+            let link1_rest4 = link8_pivot7 * link1_rest1;
+            let link1_rest5 = link7_rest3 + link1_rest4;
+            let link1_rest6 = link8_pivot11 * link1_rest1;
+            let link1_rest7 = link6_rest3 + link1_rest6;
+            let link1_rest8 = link8_pivot15 * link1_rest1;
+            let link1_rest9 = link5_rest3 + link1_rest8;
+            let link1_rest10 = link8_pivot19 * link1_rest1;
+            let link1_rest11 = link4_rest3 + link1_rest10;
+            let link1_rest12 = link8_pivot23 * link1_rest1;
+            let link1_rest13 = link3_rest3 + link1_rest12;
+            let link1_rest14 = link8_pivot27 * link1_rest1;
+            let link1_rest15 = link2_rest3 + link1_rest14;
+            let link1_rest16 = p_6 - link1_rest3;
+            let link1_rest17 = ground_pivot64 * link1_rest16;
+            let link1_rest18 = ground_pivot6 * link1_rest17;
+            let link1_rest19 = link1_rest5 + link1_rest18;
+            let link1_rest20 = ground_pivot9 * link1_rest17;
+            let link1_rest21 = link1_rest7 + link1_rest20;
+            let link1_rest22 = ground_pivot12 * link1_rest17;
+            let link1_rest23 = link1_rest9 + link1_rest22;
+            let link1_rest24 = ground_pivot15 * link1_rest17;
+            let link1_rest25 = link1_rest11 + link1_rest24;
+            let link1_rest26 = ground_pivot18 * link1_rest17;
+            let link1_rest27 = link1_rest13 + link1_rest26;
+            let link1_rest28 = ground_pivot21 * link1_rest17;
+            let link1_rest29 = link1_rest15 + link1_rest28;
+            let link1_rest30 = p_5 - link1_rest19;
+            let link1_rest31 = ground_pivot113 * link1_rest30;
+            let link1_rest32 = ground_pivot70 * link1_rest31;
+            let link1_rest33 = link1_rest21 + link1_rest32;
+            let link1_rest34 = ground_pivot73 * link1_rest31;
+            let link1_rest35 = link1_rest23 + link1_rest34;
+            let link1_rest36 = ground_pivot76 * link1_rest31;
+            let link1_rest37 = link1_rest25 + link1_rest36;
+            let link1_rest38 = ground_pivot79 * link1_rest31;
+            let link1_rest39 = link1_rest27 + link1_rest38;
+            let link1_rest40 = ground_pivot82 * link1_rest31;
+            let link1_rest41 = link1_rest29 + link1_rest40;
+            let link1_rest42 = p_4 - link1_rest33;
+            let link1_rest43 = ground_pivot149 * link1_rest42;
+            let link1_rest44 = ground_pivot119 * link1_rest43;
+            let link1_rest45 = link1_rest35 + link1_rest44;
+            let link1_rest46 = ground_pivot122 * link1_rest43;
+            let link1_rest47 = link1_rest37 + link1_rest46;
+            let link1_rest48 = ground_pivot125 * link1_rest43;
+            let link1_rest49 = link1_rest39 + link1_rest48;
+            let link1_rest50 = ground_pivot128 * link1_rest43;
+            let link1_rest51 = link1_rest41 + link1_rest50;
+            let link1_rest52 = p_3 - link1_rest45;
+            let link1_rest53 = ground_pivot174 * link1_rest52;
+            let link1_rest54 = ground_pivot155 * link1_rest53;
+            let link1_rest55 = link1_rest47 + link1_rest54;
+            let link1_rest56 = ground_pivot158 * link1_rest53;
+            let link1_rest57 = link1_rest49 + link1_rest56;
+            let link1_rest58 = ground_pivot161 * link1_rest53;
+            let link1_rest59 = link1_rest51 + link1_rest58;
+            let link1_rest60 = p_2 - link1_rest55;
+            let link1_rest61 = ground_pivot190 * link1_rest60;
+            let link1_rest62 = ground_pivot180 * link1_rest61;
+            let link1_rest63 = link1_rest57 + link1_rest62;
+            let link1_rest64 = ground_pivot183 * link1_rest61;
+            let link1_rest65 = link1_rest59 + link1_rest64;
+            let link1_rest66 = p_1 - link1_rest63;
+            let link1_rest67 = ground_pivot199 * link1_rest66;
+            let link1_rest68 = ground_pivot196 * link1_rest67;
+            let link1_rest69 = link1_rest65 + link1_rest68;
+            let link1_rest70 = p_0 - link1_rest69;
+            let link1_rest71 = ground_pivot203 * link1_rest70;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot200 * link1_rest71;
+            let ground_vel1 = link1_rest67 - ground_vel0;
+            let ground_vel2 = ground_pivot191 * ground_vel1;
+            let ground_vel3 = link1_rest61 - ground_vel2;
+            let ground_vel4 = ground_pivot194 * link1_rest71;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot175 * ground_vel5;
+            let ground_vel7 = link1_rest53 - ground_vel6;
+            let ground_vel8 = ground_pivot178 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot181 * link1_rest71;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_vel12 = ground_pivot150 * ground_vel11;
+            let ground_vel13 = link1_rest43 - ground_vel12;
+            let ground_vel14 = ground_pivot153 * ground_vel5;
+            let ground_vel15 = ground_vel13 - ground_vel14;
+            let ground_vel16 = ground_pivot156 * ground_vel1;
+            let ground_vel17 = ground_vel15 - ground_vel16;
+            let ground_vel18 = ground_pivot159 * link1_rest71;
+            let ground_vel19 = ground_vel17 - ground_vel18;
+            let ground_vel20 = ground_pivot114 * ground_vel19;
+            let ground_vel21 = link1_rest31 - ground_vel20;
+            let ground_vel22 = ground_pivot117 * ground_vel11;
+            let ground_vel23 = ground_vel21 - ground_vel22;
+            let ground_vel24 = ground_pivot120 * ground_vel5;
+            let ground_vel25 = ground_vel23 - ground_vel24;
+            let ground_vel26 = ground_pivot123 * ground_vel1;
+            let ground_vel27 = ground_vel25 - ground_vel26;
+            let ground_vel28 = ground_pivot126 * link1_rest71;
+            let ground_vel29 = ground_vel27 - ground_vel28;
+            let ground_vel30 = ground_pivot65 * ground_vel29;
+            let ground_vel31 = link1_rest17 - ground_vel30;
+            let ground_vel32 = ground_pivot68 * ground_vel19;
+            let ground_vel33 = ground_vel31 - ground_vel32;
+            let ground_vel34 = ground_pivot71 * ground_vel11;
+            let ground_vel35 = ground_vel33 - ground_vel34;
+            let ground_vel36 = ground_pivot74 * ground_vel5;
+            let ground_vel37 = ground_vel35 - ground_vel36;
+            let ground_vel38 = ground_pivot77 * ground_vel1;
+            let ground_vel39 = ground_vel37 - ground_vel38;
+            let ground_vel40 = ground_pivot80 * link1_rest71;
+            let ground_vel41 = ground_vel39 - ground_vel40;
+            let ground_vel42 = ground_pivot1 * ground_vel41;
+            let ground_vel43 = link1_rest1 - ground_vel42;
+            let ground_vel44 = ground_pivot4 * ground_vel29;
+            let ground_vel45 = ground_vel43 - ground_vel44;
+            let ground_vel46 = ground_pivot7 * ground_vel19;
+            let ground_vel47 = ground_vel45 - ground_vel46;
+            let ground_vel48 = ground_pivot10 * ground_vel11;
+            let ground_vel49 = ground_vel47 - ground_vel48;
+            let ground_vel50 = ground_pivot13 * ground_vel5;
+            let ground_vel51 = ground_vel49 - ground_vel50;
+            let ground_vel52 = ground_pivot16 * ground_vel1;
+            let ground_vel53 = ground_vel51 - ground_vel52;
+            let ground_vel54 = ground_pivot19 * link1_rest71;
+            let ground_vel55 = ground_vel53 - ground_vel54;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = link2_pose1 * link1_rest71;
+            let link2_vel1 = link2_pose2 * link1_rest71;
+            let link2_vel2 = link1_rest71 + ground_vel1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link3_pose1 * link2_vel2;
+            let link3_vel1 = link2_vel0 + link3_vel0;
+            let link3_vel2 = link3_pose2 * link2_vel2;
+            let link3_vel3 = link2_vel1 + link3_vel2;
+            let link3_vel4 = ground_vel5 + link2_vel2;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link4_pose1 * link3_vel4;
+            let link4_vel1 = link3_vel1 + link4_vel0;
+            let link4_vel2 = link4_pose2 * link3_vel4;
+            let link4_vel3 = link3_vel3 + link4_vel2;
+            let link4_vel4 = ground_vel11 + link3_vel4;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link5_pose1 * link4_vel4;
+            let link5_vel1 = link4_vel1 + link5_vel0;
+            let link5_vel2 = link5_pose2 * link4_vel4;
+            let link5_vel3 = link4_vel3 + link5_vel2;
+            let link5_vel4 = ground_vel19 + link4_vel4;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link6_pose1 * link5_vel4;
+            let link6_vel1 = link5_vel1 + link6_vel0;
+            let link6_vel2 = link6_pose2 * link5_vel4;
+            let link6_vel3 = link5_vel3 + link6_vel2;
+            let link6_vel4 = ground_vel29 + link5_vel4;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link7_pose1 * link6_vel4;
+            let link7_vel1 = link6_vel1 + link7_vel0;
+            let link7_vel2 = link7_pose2 * link6_vel4;
+            let link7_vel3 = link6_vel3 + link7_vel2;
+            let link7_vel4 = ground_vel41 + link6_vel4;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link8_pose1 * link7_vel4;
+            let link8_vel1 = link7_vel1 + link8_vel0;
+            let link8_vel2 = link8_pose2 * link7_vel4;
+            let link8_vel3 = link7_vel3 + link8_vel2;
+            let link8_vel4 = ground_vel55 + link7_vel4;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_pose4 * link8_vel4;
+            let link9_vel1 = link8_vel1 + link9_vel0;
+            let link9_vel2 = link8_pose3 * link8_vel4;
+            let link9_vel3 = link8_vel3 + link9_vel2;
+            let link9_vel4 = link9_pivot1 * link9_vel3;
+            let link9_vel5 = link9_pivot2 * link9_vel1;
+            let link9_vel6 = link9_vel4 + link9_vel5;
+            let link9_vel7 = link9_rest1 + link9_vel6;
+            let link9_vel8 = link8_vel4 - link9_vel7;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link10_pose1 * link9_vel7;
+            let link10_vel1 = link9_vel1 + link10_vel0;
+            let link10_vel2 = link10_pose2 * link9_vel7;
+            let link10_vel3 = link9_vel3 + link10_vel2;
+            let link10_vel4 = link10_sin0 * link10_vel3;
+            let link10_vel5 = link10_cos0 * link10_vel1;
+            let link10_vel6 = link10_vel4 - link10_vel5;
+            let link10_vel7 = link10_sin0 * link10_vel1;
+            let link10_vel8 = link10_cos0 * link10_vel3;
+            let link10_vel9 = link10_vel7 + link10_vel8;
+            let link10_vel10 = 5.9880239520958085 * link10_vel9;
+            let link10_vel11 = link10_rest0 + link10_vel10;
+            let link10_vel12 = link9_vel7 + link10_vel11;
+            // link10: gravity and wrenches
+            let link10_load0 = 9.81 * link10_sin0;
+            // link2: momentum
+            let link2_mom0 = link2_pose3 * link2_vel2;
+            let link2_mom1 = link2_pose4 * link2_vel2;
+            // link3: momentum
+            let link3_mom0 = link3_pose3 * link3_vel4;
+            let link3_mom1 = link3_pose4 * link3_vel4;
+            // link4: momentum
+            let link4_mom0 = link4_pose3 * link4_vel4;
+            let link4_mom1 = link4_pose4 * link4_vel4;
+            // link5: momentum
+            let link5_mom0 = link5_pose3 * link5_vel4;
+            let link5_mom1 = link5_pose4 * link5_vel4;
+            // link6: momentum
+            let link6_mom0 = link6_pose3 * link6_vel4;
+            let link6_mom1 = link6_pose4 * link6_vel4;
+            // link7: momentum
+            let link7_mom0 = link7_pose3 * link7_vel4;
+            let link7_mom1 = link7_pose4 * link7_vel4;
+            // link9: momentum
+            let link9_mom0 = link9_pivot4 * link9_vel3;
+            let link9_mom1 = link9_pivot6 * link9_vel1;
+            let link9_mom2 = link9_mom0 + link9_mom1;
+            let link9_mom3 = link9_pivot6 * link9_vel3;
+            let link9_mom4 = link9_pivot8 * link9_vel1;
+            let link9_mom5 = link9_mom3 - link9_mom4;
+            let link9_mom6 = link9_rest3 + link9_mom2;
+            let link9_mom7 = link9_rest5 + link9_mom5;
+            let link9_mom8 = link9_vel2 - link9_mom6;
+            let link9_mom9 = link9_vel0 - link9_mom7;
+            // link8: momentum
+            let link8_mom0 = link7_mom0 + link9_mom8;
+            let link8_mom1 = link7_mom1 + link9_mom9;
+            // link7: momentum
+            let link7_mom2 = link6_mom0 + link8_mom0;
+            let link7_mom3 = link6_mom1 + link8_mom1;
+            // link6: momentum
+            let link6_mom2 = link5_mom0 + link7_mom2;
+            let link6_mom3 = link5_mom1 + link7_mom3;
+            // link5: momentum
+            let link5_mom2 = link4_mom0 + link6_mom2;
+            let link5_mom3 = link4_mom1 + link6_mom3;
+            // link4: momentum
+            let link4_mom2 = link3_mom0 + link5_mom2;
+            let link4_mom3 = link3_mom1 + link5_mom3;
+            // link3: momentum
+            let link3_mom2 = link2_mom0 + link4_mom2;
+            let link3_mom3 = link2_mom1 + link4_mom3;
+            // link1: momentum rate (4.36)
+            let link1_pdot0 = 9.81 * link2_inertia12;
+            // link2: momentum rate (4.36)
+            let link2_pdot0 = 9.81 * link3_inertia16;
+            let link2_pdot1 = link2_vel1 * link3_mom3;
+            let link2_pdot2 = link2_vel0 * link3_mom2;
+            let link2_pdot3 = link2_pdot1 - link2_pdot2;
+            let link2_pdot4 = link2_pdot0 + link2_pdot3;
+            // link3: momentum rate (4.36)
+            let link3_pdot0 = 9.81 * link4_inertia18;
+            let link3_pdot1 = link3_vel3 * link4_mom3;
+            let link3_pdot2 = link3_vel1 * link4_mom2;
+            let link3_pdot3 = link3_pdot1 - link3_pdot2;
+            let link3_pdot4 = link3_pdot0 + link3_pdot3;
+            // link4: momentum rate (4.36)
+            let link4_pdot0 = 9.81 * link5_inertia20;
+            let link4_pdot1 = link4_vel3 * link5_mom3;
+            let link4_pdot2 = link4_vel1 * link5_mom2;
+            let link4_pdot3 = link4_pdot1 - link4_pdot2;
+            let link4_pdot4 = link4_pdot0 + link4_pdot3;
+            // link5: momentum rate (4.36)
+            let link5_pdot0 = 9.81 * link6_inertia22;
+            let link5_pdot1 = link5_vel3 * link6_mom3;
+            let link5_pdot2 = link5_vel1 * link6_mom2;
+            let link5_pdot3 = link5_pdot1 - link5_pdot2;
+            let link5_pdot4 = link5_pdot0 + link5_pdot3;
+            // link6: momentum rate (4.36)
+            let link6_pdot0 = 9.81 * link7_inertia24;
+            let link6_pdot1 = link6_vel3 * link7_mom3;
+            let link6_pdot2 = link6_vel1 * link7_mom2;
+            let link6_pdot3 = link6_pdot1 - link6_pdot2;
+            let link6_pdot4 = link6_pdot0 + link6_pdot3;
+            // link7: momentum rate (4.36)
+            let link7_pdot0 = 9.81 * link8_inertia26;
+            let link7_pdot1 = link7_vel3 * link8_mom1;
+            let link7_pdot2 = link7_vel1 * link8_mom0;
+            let link7_pdot3 = link7_pdot1 - link7_pdot2;
+            let link7_pdot4 = link7_pdot0 + link7_pdot3;
+            // link8: momentum rate (4.36)
+            let link8_pdot0 = 9.81 * link9_inertia10;
+            let link8_pdot1 = link8_vel3 * link9_mom9;
+            let link8_pdot2 = link8_vel1 * link9_mom8;
+            let link8_pdot3 = link8_pdot1 - link8_pdot2;
+            let link8_pdot4 = link8_pdot0 + link8_pdot3;
+            // link9: momentum rate (4.36)
+            let link9_pdot0 = link9_pivot4 + link9_pivot8;
+            let link9_pdot1 = link9_vel1 * link9_pdot0;
+            let link9_pdot2 = link9_mom3 - link9_pdot1;
+            let link9_pdot3 = link9_rest5 + link9_pdot2;
+            let link9_pdot4 = link9_rest3 + link9_mom1;
+            let link9_pdot5 = link9_vel3 * link9_pdot3;
+            let link9_pdot6 = link9_vel1 * link9_pdot4;
+            let link9_pdot7 = link9_pdot5 - link9_pdot6;
+            let link9_pdot8 = 9.81 * link10_inertia15;
+            let link9_pdot9 = link9_pdot7 - link9_pdot8;
+            // link10: momentum rate (4.36)
+            let link10_pdot0 = 0.29940119760479045 * link10_vel9;
+            let link10_pdot1 = link10_rest1 + link10_pdot0;
+            let link10_pdot2 = link10_vel6 * link10_pdot1;
+            let link10_pdot3 = 0.05 * link10_load0;
+            let link10_pdot4 = link10_pdot2 - link10_pdot3;
+            let link10_pdot5 = tau_0 - link1_pdot0;
+            let link10_pdot6 = tau_1 - link2_pdot4;
+            let link10_pdot7 = tau_2 - link3_pdot4;
+            let link10_pdot8 = tau_3 - link4_pdot4;
+            let link10_pdot9 = tau_4 - link5_pdot4;
+            let link10_pdot10 = tau_5 - link6_pdot4;
+            let link10_pdot11 = tau_6 - link7_pdot4;
+            let link10_pdot12 = tau_7 - link8_pdot4;
+            let link10_pdot13 = tau_8 + link9_pdot9;
+            let link10_pdot14 = tau_9 + link10_pdot4;
+            qd.set(0, l, -link1_rest71);
+            qd.set(1, l, -ground_vel1);
+            qd.set(2, l, -ground_vel5);
+            qd.set(3, l, -ground_vel11);
+            qd.set(4, l, -ground_vel19);
+            qd.set(5, l, -ground_vel29);
+            qd.set(6, l, -ground_vel41);
+            qd.set(7, l, -ground_vel55);
+            qd.set(8, l, link9_vel8);
+            qd.set(9, l, link10_vel12);
+            pd.set(0, l, link10_pdot5);
+            pd.set(1, l, link10_pdot6);
+            pd.set(2, l, link10_pdot7);
+            pd.set(3, l, link10_pdot8);
+            pd.set(4, l, link10_pdot9);
+            pd.set(5, l, link10_pdot10);
+            pd.set(6, l, link10_pdot11);
+            pd.set(7, l, link10_pdot12);
+            pd.set(8, l, link10_pdot13);
+            pd.set(9, l, link10_pdot14);
+        }
     }
 
     /// Velocities from momenta: `(q, p) → v`.
-    /// 401 operations: 181 additions, 211 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 779 operations: 397 additions, 373 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_cos0;
-        let link10_inertia1 = 0.05 * link10_sin0;
-        // link10: U, Mj, k and the reduced inertia M' (4.44)
-        let link10_pivot0 = 119.76047904191617 * link10_inertia0;
-        let link10_pivot1 = 119.76047904191617 * link10_inertia1;
-        let link10_pivot2 = link10_inertia0 * link10_pivot0;
-        let link10_pivot3 = link10_inertia0 * link10_pivot1;
-        let link10_pivot4 = link10_inertia1 * link10_pivot1;
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia2 = link10_pose2 * link10_pivot2;
-        let link10_inertia3 = link10_pose2 * link10_pivot3;
-        let link10_inertia4 = link10_pose2 * link10_inertia2;
-        let link10_inertia5 = link10_pose1 * link10_pivot3;
-        let link10_inertia6 = link10_inertia2 + link10_inertia5;
-        let link10_inertia7 = link10_pose1 * link10_pivot4;
-        let link10_inertia8 = link10_inertia3 + link10_inertia7;
-        let link10_inertia9 = link10_inertia3 + link10_inertia8;
-        let link10_inertia10 = link10_pose1 * link10_inertia9;
-        let link10_inertia11 = link10_inertia4 + link10_inertia10;
-        let link10_inertia12 = link9_pose1 - link10_inertia6;
-        let link10_inertia13 = link9_pose2 - link10_inertia8;
-        let link10_inertia14 = link10_inertia11 - 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia14;
-        let link9_pivot1 = link10_inertia12 * link9_pivot0;
-        let link9_pivot2 = link10_inertia13 * link9_pivot0;
-        let link9_pivot3 = link10_inertia12 * link9_pivot1;
-        let link9_pivot4 = link10_pivot2 - link9_pivot3;
-        let link9_pivot5 = link10_inertia12 * link9_pivot2;
-        let link9_pivot6 = link10_pivot3 - link9_pivot5;
-        let link9_pivot7 = link10_inertia13 * link9_pivot2;
-        let link9_pivot8 = link10_pivot4 - link9_pivot7;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link8_pose3 * link9_pivot4;
-        let link9_inertia1 = link8_pose3 * link9_pivot6;
-        let link9_inertia2 = link8_pose3 * link9_inertia0;
-        let link9_inertia3 = link8_pose4 * link9_pivot6;
-        let link9_inertia4 = link9_inertia0 + link9_inertia3;
-        let link9_inertia5 = link8_pose4 * link9_pivot8;
-        let link9_inertia6 = link9_inertia1 + link9_inertia5;
-        let link9_inertia7 = link9_inertia1 + link9_inertia6;
-        let link9_inertia8 = link8_pose4 * link9_inertia7;
-        let link9_inertia9 = link9_inertia2 + link9_inertia8;
-        let link9_inertia10 = link8_pose3 - link9_inertia4;
-        let link9_inertia11 = link8_pose4 - link9_inertia6;
-        let link9_inertia12 = link9_inertia9 - 0.05835;
-        // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia12;
-        let link8_pivot1 = link9_inertia10 * link8_pivot0;
-        let link8_pivot2 = link9_inertia11 * link8_pivot0;
-        let link8_pivot3 = link9_inertia10 * link8_pivot1;
-        let link8_pivot4 = link9_pivot4 - link8_pivot3;
-        let link8_pivot5 = link9_inertia10 * link8_pivot2;
-        let link8_pivot6 = link9_pivot6 - link8_pivot5;
-        let link8_pivot7 = link9_inertia11 * link8_pivot2;
-        let link8_pivot8 = link9_pivot8 - link8_pivot7;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pose2 * link8_pivot4;
-        let link8_inertia1 = link8_pose2 * link8_pivot6;
-        let link8_inertia2 = link8_pose2 * link8_inertia0;
-        let link8_inertia3 = link8_pose1 * link8_pivot6;
-        let link8_inertia4 = link8_inertia0 + link8_inertia3;
-        let link8_inertia5 = link8_pose1 * link8_pivot8;
-        let link8_inertia6 = link8_inertia1 + link8_inertia5;
-        let link8_inertia7 = link8_inertia1 + link8_inertia6;
-        let link8_inertia8 = link8_pose1 * link8_inertia7;
-        let link8_inertia9 = link8_inertia2 + link8_inertia8;
-        let link8_inertia10 = link7_pose3 - link8_inertia4;
-        let link8_inertia11 = link7_pose4 - link8_inertia6;
-        let link8_inertia12 = link8_inertia9 - 0.08335000000000001;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 1.0 / link8_inertia12;
-        let link7_pivot1 = link8_inertia10 * link7_pivot0;
-        let link7_pivot2 = link8_inertia11 * link7_pivot0;
-        let link7_pivot3 = link8_inertia10 * link7_pivot1;
-        let link7_pivot4 = link8_pivot4 - link7_pivot3;
-        let link7_pivot5 = link8_inertia10 * link7_pivot2;
-        let link7_pivot6 = link8_pivot6 - link7_pivot5;
-        let link7_pivot7 = link8_inertia11 * link7_pivot2;
-        let link7_pivot8 = link8_pivot8 - link7_pivot7;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pose2 * link7_pivot4;
-        let link7_inertia1 = link7_pose2 * link7_pivot6;
-        let link7_inertia2 = link7_pose2 * link7_inertia0;
-        let link7_inertia3 = link7_pose1 * link7_pivot6;
-        let link7_inertia4 = link7_inertia0 + link7_inertia3;
-        let link7_inertia5 = link7_pose1 * link7_pivot8;
-        let link7_inertia6 = link7_inertia1 + link7_inertia5;
-        let link7_inertia7 = link7_inertia1 + link7_inertia6;
-        let link7_inertia8 = link7_pose1 * link7_inertia7;
-        let link7_inertia9 = link7_inertia2 + link7_inertia8;
-        let link7_inertia10 = link6_pose3 - link7_inertia4;
-        let link7_inertia11 = link6_pose4 - link7_inertia6;
-        let link7_inertia12 = link7_inertia9 - 0.10835;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia12;
-        let link6_pivot1 = link7_inertia10 * link6_pivot0;
-        let link6_pivot2 = link7_inertia11 * link6_pivot0;
-        let link6_pivot3 = link7_inertia10 * link6_pivot1;
-        let link6_pivot4 = link7_pivot4 - link6_pivot3;
-        let link6_pivot5 = link7_inertia10 * link6_pivot2;
-        let link6_pivot6 = link7_pivot6 - link6_pivot5;
-        let link6_pivot7 = link7_inertia11 * link6_pivot2;
-        let link6_pivot8 = link7_pivot8 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pose2 * link6_pivot4;
-        let link6_inertia1 = link6_pose2 * link6_pivot6;
-        let link6_inertia2 = link6_pose2 * link6_inertia0;
-        let link6_inertia3 = link6_pose1 * link6_pivot6;
-        let link6_inertia4 = link6_inertia0 + link6_inertia3;
-        let link6_inertia5 = link6_pose1 * link6_pivot8;
-        let link6_inertia6 = link6_inertia1 + link6_inertia5;
-        let link6_inertia7 = link6_inertia1 + link6_inertia6;
-        let link6_inertia8 = link6_pose1 * link6_inertia7;
-        let link6_inertia9 = link6_inertia2 + link6_inertia8;
-        let link6_inertia10 = link5_pose3 - link6_inertia4;
-        let link6_inertia11 = link5_pose4 - link6_inertia6;
-        let link6_inertia12 = link6_inertia9 - 0.13335;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia12;
-        let link5_pivot1 = link6_inertia10 * link5_pivot0;
-        let link5_pivot2 = link6_inertia11 * link5_pivot0;
-        let link5_pivot3 = link6_inertia10 * link5_pivot1;
-        let link5_pivot4 = link6_pivot4 - link5_pivot3;
-        let link5_pivot5 = link6_inertia10 * link5_pivot2;
-        let link5_pivot6 = link6_pivot6 - link5_pivot5;
-        let link5_pivot7 = link6_inertia11 * link5_pivot2;
-        let link5_pivot8 = link6_pivot8 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pose2 * link5_pivot4;
-        let link5_inertia1 = link5_pose2 * link5_pivot6;
-        let link5_inertia2 = link5_pose2 * link5_inertia0;
-        let link5_inertia3 = link5_pose1 * link5_pivot6;
-        let link5_inertia4 = link5_inertia0 + link5_inertia3;
-        let link5_inertia5 = link5_pose1 * link5_pivot8;
-        let link5_inertia6 = link5_inertia1 + link5_inertia5;
-        let link5_inertia7 = link5_inertia1 + link5_inertia6;
-        let link5_inertia8 = link5_pose1 * link5_inertia7;
-        let link5_inertia9 = link5_inertia2 + link5_inertia8;
-        let link5_inertia10 = link4_pose3 - link5_inertia4;
-        let link5_inertia11 = link4_pose4 - link5_inertia6;
-        let link5_inertia12 = link5_inertia9 - 0.15835;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia12;
-        let link4_pivot1 = link5_inertia10 * link4_pivot0;
-        let link4_pivot2 = link5_inertia11 * link4_pivot0;
-        let link4_pivot3 = link5_inertia10 * link4_pivot1;
-        let link4_pivot4 = link5_pivot4 - link4_pivot3;
-        let link4_pivot5 = link5_inertia10 * link4_pivot2;
-        let link4_pivot6 = link5_pivot6 - link4_pivot5;
-        let link4_pivot7 = link5_inertia11 * link4_pivot2;
-        let link4_pivot8 = link5_pivot8 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pose2 * link4_pivot4;
-        let link4_inertia1 = link4_pose2 * link4_pivot6;
-        let link4_inertia2 = link4_pose2 * link4_inertia0;
-        let link4_inertia3 = link4_pose1 * link4_pivot6;
-        let link4_inertia4 = link4_inertia0 + link4_inertia3;
-        let link4_inertia5 = link4_pose1 * link4_pivot8;
-        let link4_inertia6 = link4_inertia1 + link4_inertia5;
-        let link4_inertia7 = link4_inertia1 + link4_inertia6;
-        let link4_inertia8 = link4_pose1 * link4_inertia7;
-        let link4_inertia9 = link4_inertia2 + link4_inertia8;
-        let link4_inertia10 = link3_pose3 - link4_inertia4;
-        let link4_inertia11 = link3_pose4 - link4_inertia6;
-        let link4_inertia12 = link4_inertia9 - 0.18334999999999999;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia12;
-        let link3_pivot1 = link4_inertia10 * link3_pivot0;
-        let link3_pivot2 = link4_inertia11 * link3_pivot0;
-        let link3_pivot3 = link4_inertia10 * link3_pivot1;
-        let link3_pivot4 = link4_pivot4 - link3_pivot3;
-        let link3_pivot5 = link4_inertia10 * link3_pivot2;
-        let link3_pivot6 = link4_pivot6 - link3_pivot5;
-        let link3_pivot7 = link4_inertia11 * link3_pivot2;
-        let link3_pivot8 = link4_pivot8 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pose2 * link3_pivot4;
-        let link3_inertia1 = link3_pose2 * link3_pivot6;
-        let link3_inertia2 = link3_pose2 * link3_inertia0;
-        let link3_inertia3 = link3_pose1 * link3_pivot6;
-        let link3_inertia4 = link3_inertia0 + link3_inertia3;
-        let link3_inertia5 = link3_pose1 * link3_pivot8;
-        let link3_inertia6 = link3_inertia1 + link3_inertia5;
-        let link3_inertia7 = link3_inertia1 + link3_inertia6;
-        let link3_inertia8 = link3_pose1 * link3_inertia7;
-        let link3_inertia9 = link3_inertia2 + link3_inertia8;
-        let link3_inertia10 = link2_pose3 - link3_inertia4;
-        let link3_inertia11 = link2_pose4 - link3_inertia6;
-        let link3_inertia12 = link3_inertia9 - 0.20834999999999998;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = link2_pose2 * link3_inertia10;
-        let link2_pivot1 = link2_pose1 * link3_inertia11;
-        let link2_pivot2 = link2_pivot0 + link2_pivot1;
-        let link2_pivot3 = link3_inertia12 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pose2 * link3_pivot4;
-        let link2_inertia1 = link3_inertia10 - link2_inertia0;
-        let link2_inertia2 = link2_pose2 * link3_pivot6;
-        let link2_inertia3 = link3_inertia11 - link2_inertia2;
-        let link2_inertia4 = link3_inertia10 + link2_inertia1;
-        let link2_inertia5 = link2_pose2 * link2_inertia4;
-        let link2_inertia6 = link3_inertia12 - link2_inertia5;
-        let link2_inertia7 = link2_pose1 * link3_pivot8;
-        let link2_inertia8 = link2_inertia3 - link2_inertia7;
-        let link2_inertia9 = link2_inertia3 + link2_inertia8;
-        let link2_inertia10 = link2_pose1 * link2_inertia9;
-        let link2_inertia11 = link2_inertia6 - link2_inertia10;
-        let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / link3_inertia12;
-        let ground_pivot1 = link2_pivot3 * ground_pivot0;
-        let ground_pivot2 = link2_pivot3 * ground_pivot1;
-        let ground_pivot3 = link2_inertia12 - ground_pivot2;
-        let ground_pivot4 = 1.0 / ground_pivot3;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = link10_inertia0 * link10_rest0;
-        let link10_rest2 = link10_inertia1 * link10_rest0;
-        let link10_rest3 = link10_pose2 * link10_rest1;
-        let link10_rest4 = p_9 + link10_rest3;
-        let link10_rest5 = link10_pose1 * link10_rest2;
-        let link10_rest6 = link10_rest4 + link10_rest5;
-        // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest6;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia12 * link9_rest1;
-        let link9_rest3 = link10_rest1 - link9_rest2;
-        let link9_rest4 = link10_inertia13 * link9_rest1;
-        let link9_rest5 = link10_rest2 - link9_rest4;
-        let link9_rest6 = link8_pose3 * link9_rest3;
-        let link9_rest7 = p_8 + link9_rest6;
-        let link9_rest8 = link8_pose4 * link9_rest5;
-        let link9_rest9 = link9_rest7 + link9_rest8;
-        // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest9;
-        let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia10 * link8_rest1;
-        let link8_rest3 = link9_rest3 - link8_rest2;
-        let link8_rest4 = link9_inertia11 * link8_rest1;
-        let link8_rest5 = link9_rest5 - link8_rest4;
-        let link8_rest6 = link8_pose2 * link8_rest3;
-        let link8_rest7 = p_7 + link8_rest6;
-        let link8_rest8 = link8_pose1 * link8_rest5;
-        let link8_rest9 = link8_rest7 + link8_rest8;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = p_6 - link8_rest9;
-        let link7_rest1 = link7_pivot0 * link7_rest0;
-        let link7_rest2 = link8_inertia10 * link7_rest1;
-        let link7_rest3 = link8_rest3 - link7_rest2;
-        let link7_rest4 = link8_inertia11 * link7_rest1;
-        let link7_rest5 = link8_rest5 - link7_rest4;
-        let link7_rest6 = link7_pose2 * link7_rest3;
-        let link7_rest7 = p_6 + link7_rest6;
-        let link7_rest8 = link7_pose1 * link7_rest5;
-        let link7_rest9 = link7_rest7 + link7_rest8;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = p_5 - link7_rest9;
-        let link6_rest1 = link6_pivot0 * link6_rest0;
-        let link6_rest2 = link7_inertia10 * link6_rest1;
-        let link6_rest3 = link7_rest3 - link6_rest2;
-        let link6_rest4 = link7_inertia11 * link6_rest1;
-        let link6_rest5 = link7_rest5 - link6_rest4;
-        let link6_rest6 = link6_pose2 * link6_rest3;
-        let link6_rest7 = p_5 + link6_rest6;
-        let link6_rest8 = link6_pose1 * link6_rest5;
-        let link6_rest9 = link6_rest7 + link6_rest8;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = p_4 - link6_rest9;
-        let link5_rest1 = link5_pivot0 * link5_rest0;
-        let link5_rest2 = link6_inertia10 * link5_rest1;
-        let link5_rest3 = link6_rest3 - link5_rest2;
-        let link5_rest4 = link6_inertia11 * link5_rest1;
-        let link5_rest5 = link6_rest5 - link5_rest4;
-        let link5_rest6 = link5_pose2 * link5_rest3;
-        let link5_rest7 = p_4 + link5_rest6;
-        let link5_rest8 = link5_pose1 * link5_rest5;
-        let link5_rest9 = link5_rest7 + link5_rest8;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = p_3 - link5_rest9;
-        let link4_rest1 = link4_pivot0 * link4_rest0;
-        let link4_rest2 = link5_inertia10 * link4_rest1;
-        let link4_rest3 = link5_rest3 - link4_rest2;
-        let link4_rest4 = link5_inertia11 * link4_rest1;
-        let link4_rest5 = link5_rest5 - link4_rest4;
-        let link4_rest6 = link4_pose2 * link4_rest3;
-        let link4_rest7 = p_3 + link4_rest6;
-        let link4_rest8 = link4_pose1 * link4_rest5;
-        let link4_rest9 = link4_rest7 + link4_rest8;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = p_2 - link4_rest9;
-        let link3_rest1 = link3_pivot0 * link3_rest0;
-        let link3_rest2 = link4_inertia10 * link3_rest1;
-        let link3_rest3 = link4_rest3 - link3_rest2;
-        let link3_rest4 = link4_inertia11 * link3_rest1;
-        let link3_rest5 = link4_rest5 - link3_rest4;
-        let link3_rest6 = link3_pose2 * link3_rest3;
-        let link3_rest7 = p_2 + link3_rest6;
-        let link3_rest8 = link3_pose1 * link3_rest5;
-        let link3_rest9 = link3_rest7 + link3_rest8;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_pose2 * link3_rest3;
-        let link2_rest1 = link3_rest9 + link2_rest0;
-        let link2_rest2 = link2_pose1 * link3_rest5;
-        let link2_rest3 = link2_rest1 + link2_rest2;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_1 - link3_rest9;
-        let link1_rest1 = ground_pivot0 * link1_rest0;
-        let link1_rest2 = link2_pivot3 * link1_rest1;
-        let link1_rest3 = link2_rest3 + link1_rest2;
-        let link1_rest4 = p_0 - link1_rest3;
-        let link1_rest5 = ground_pivot4 * link1_rest4;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot1 * link1_rest5;
-        let ground_vel1 = link1_rest1 - ground_vel0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = link2_pose1 * link1_rest5;
-        let link2_vel1 = link2_pose2 * link1_rest5;
-        let link2_vel2 = link1_rest5 + ground_vel1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link3_pose1 * link2_vel2;
-        let link3_vel1 = link2_vel0 + link3_vel0;
-        let link3_vel2 = link3_pose2 * link2_vel2;
-        let link3_vel3 = link2_vel1 + link3_vel2;
-        let link3_vel4 = link3_pivot1 * link3_vel3;
-        let link3_vel5 = link3_pivot2 * link3_vel1;
-        let link3_vel6 = link3_vel4 + link3_vel5;
-        let link3_vel7 = link3_rest1 + link3_vel6;
-        let link3_vel8 = link2_vel2 - link3_vel7;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link4_pose1 * link3_vel7;
-        let link4_vel1 = link3_vel1 + link4_vel0;
-        let link4_vel2 = link4_pose2 * link3_vel7;
-        let link4_vel3 = link3_vel3 + link4_vel2;
-        let link4_vel4 = link4_pivot1 * link4_vel3;
-        let link4_vel5 = link4_pivot2 * link4_vel1;
-        let link4_vel6 = link4_vel4 + link4_vel5;
-        let link4_vel7 = link4_rest1 + link4_vel6;
-        let link4_vel8 = link3_vel7 - link4_vel7;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link5_pose1 * link4_vel7;
-        let link5_vel1 = link4_vel1 + link5_vel0;
-        let link5_vel2 = link5_pose2 * link4_vel7;
-        let link5_vel3 = link4_vel3 + link5_vel2;
-        let link5_vel4 = link5_pivot1 * link5_vel3;
-        let link5_vel5 = link5_pivot2 * link5_vel1;
-        let link5_vel6 = link5_vel4 + link5_vel5;
-        let link5_vel7 = link5_rest1 + link5_vel6;
-        let link5_vel8 = link4_vel7 - link5_vel7;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link6_pose1 * link5_vel7;
-        let link6_vel1 = link5_vel1 + link6_vel0;
-        let link6_vel2 = link6_pose2 * link5_vel7;
-        let link6_vel3 = link5_vel3 + link6_vel2;
-        let link6_vel4 = link6_pivot1 * link6_vel3;
-        let link6_vel5 = link6_pivot2 * link6_vel1;
-        let link6_vel6 = link6_vel4 + link6_vel5;
-        let link6_vel7 = link6_rest1 + link6_vel6;
-        let link6_vel8 = link5_vel7 - link6_vel7;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link7_pose1 * link6_vel7;
-        let link7_vel1 = link6_vel1 + link7_vel0;
-        let link7_vel2 = link7_pose2 * link6_vel7;
-        let link7_vel3 = link6_vel3 + link7_vel2;
-        let link7_vel4 = link7_pivot1 * link7_vel3;
-        let link7_vel5 = link7_pivot2 * link7_vel1;
-        let link7_vel6 = link7_vel4 + link7_vel5;
-        let link7_vel7 = link7_rest1 + link7_vel6;
-        let link7_vel8 = link6_vel7 - link7_vel7;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link8_pose1 * link7_vel7;
-        let link8_vel1 = link7_vel1 + link8_vel0;
-        let link8_vel2 = link8_pose2 * link7_vel7;
-        let link8_vel3 = link7_vel3 + link8_vel2;
-        let link8_vel4 = link8_pivot1 * link8_vel3;
-        let link8_vel5 = link8_pivot2 * link8_vel1;
-        let link8_vel6 = link8_vel4 + link8_vel5;
-        let link8_vel7 = link8_rest1 + link8_vel6;
-        let link8_vel8 = link7_vel7 - link8_vel7;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_pose4 * link8_vel7;
-        let link9_vel1 = link8_vel1 + link9_vel0;
-        let link9_vel2 = link8_pose3 * link8_vel7;
-        let link9_vel3 = link8_vel3 + link9_vel2;
-        let link9_vel4 = link9_pivot1 * link9_vel3;
-        let link9_vel5 = link9_pivot2 * link9_vel1;
-        let link9_vel6 = link9_vel4 + link9_vel5;
-        let link9_vel7 = link9_rest1 + link9_vel6;
-        let link9_vel8 = link8_vel7 - link9_vel7;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link10_pose1 * link9_vel7;
-        let link10_vel1 = link9_vel1 + link10_vel0;
-        let link10_vel2 = link10_pose2 * link9_vel7;
-        let link10_vel3 = link9_vel3 + link10_vel2;
-        let link10_vel4 = link10_pivot0 * link10_vel3;
-        let link10_vel5 = link10_pivot1 * link10_vel1;
-        let link10_vel6 = link10_vel4 + link10_vel5;
-        let link10_vel7 = link10_rest0 + link10_vel6;
-        let link10_vel8 = link9_vel7 + link10_vel7;
-        v[0] = -link1_rest5;
-        v[1] = -ground_vel1;
-        v[2] = link3_vel8;
-        v[3] = link4_vel8;
-        v[4] = link5_vel8;
-        v[5] = link6_vel8;
-        v[6] = link7_vel8;
-        v[7] = link8_vel8;
-        v[8] = link9_vel8;
-        v[9] = link10_vel8;
+        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+    }
+
+    #[inline(always)]
+    fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link2_pose1 + link3_pose1;
+            let link3_inertia1 = link2_pose2 + link3_pose2;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link3_pose1 + link4_pose1;
+            let link4_inertia1 = link3_pose2 + link4_pose2;
+            let link4_inertia2 = link4_pose1 + link3_inertia0;
+            let link4_inertia3 = link4_pose2 + link3_inertia1;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link4_pose1 + link5_pose1;
+            let link5_inertia1 = link4_pose2 + link5_pose2;
+            let link5_inertia2 = link5_pose1 + link4_inertia0;
+            let link5_inertia3 = link5_pose2 + link4_inertia1;
+            let link5_inertia4 = link5_pose1 + link4_inertia2;
+            let link5_inertia5 = link5_pose2 + link4_inertia3;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link5_pose1 + link6_pose1;
+            let link6_inertia1 = link5_pose2 + link6_pose2;
+            let link6_inertia2 = link6_pose1 + link5_inertia0;
+            let link6_inertia3 = link6_pose2 + link5_inertia1;
+            let link6_inertia4 = link6_pose1 + link5_inertia2;
+            let link6_inertia5 = link6_pose2 + link5_inertia3;
+            let link6_inertia6 = link6_pose1 + link5_inertia4;
+            let link6_inertia7 = link6_pose2 + link5_inertia5;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link6_pose1 + link7_pose1;
+            let link7_inertia1 = link6_pose2 + link7_pose2;
+            let link7_inertia2 = link7_pose1 + link6_inertia0;
+            let link7_inertia3 = link7_pose2 + link6_inertia1;
+            let link7_inertia4 = link7_pose1 + link6_inertia2;
+            let link7_inertia5 = link7_pose2 + link6_inertia3;
+            let link7_inertia6 = link7_pose1 + link6_inertia4;
+            let link7_inertia7 = link7_pose2 + link6_inertia5;
+            let link7_inertia8 = link7_pose1 + link6_inertia6;
+            let link7_inertia9 = link7_pose2 + link6_inertia7;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link7_pose1 + link8_pose1;
+            let link8_inertia1 = link7_pose2 + link8_pose2;
+            let link8_inertia2 = link8_pose1 + link7_inertia0;
+            let link8_inertia3 = link8_pose2 + link7_inertia1;
+            let link8_inertia4 = link8_pose1 + link7_inertia2;
+            let link8_inertia5 = link8_pose2 + link7_inertia3;
+            let link8_inertia6 = link8_pose1 + link7_inertia4;
+            let link8_inertia7 = link8_pose2 + link7_inertia5;
+            let link8_inertia8 = link8_pose1 + link7_inertia6;
+            let link8_inertia9 = link8_pose2 + link7_inertia7;
+            let link8_inertia10 = link8_pose1 + link7_inertia8;
+            let link8_inertia11 = link8_pose2 + link7_inertia9;
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.29940119760479045 * link10_cos0;
+            let link10_inertia1 = link10_cos0 * link10_inertia0;
+            let link10_inertia2 = link10_sin0 * link10_inertia0;
+            let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
+            let link10_inertia4 = link10_pose2 * link10_inertia1;
+            let link10_inertia5 = link10_pose2 * link10_inertia2;
+            let link10_inertia6 = link10_pose2 * link10_inertia4;
+            let link10_inertia7 = link10_pose1 * link10_inertia2;
+            let link10_inertia8 = link10_inertia4 + link10_inertia7;
+            let link10_inertia9 = link10_pose1 * link10_inertia3;
+            let link10_inertia10 = link10_inertia5 - link10_inertia9;
+            let link10_inertia11 = link10_inertia5 + link10_inertia10;
+            let link10_inertia12 = link10_pose1 * link10_inertia11;
+            let link10_inertia13 = link10_inertia6 + link10_inertia12;
+            let link10_inertia14 = link9_pose1 - link10_inertia8;
+            let link10_inertia15 = link9_pose2 - link10_inertia10;
+            let link10_inertia16 = link10_inertia13 - 0.033350000000000005;
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot0 = 1.0 / link10_inertia16;
+            let link9_pivot1 = link10_inertia14 * link9_pivot0;
+            let link9_pivot2 = link10_inertia15 * link9_pivot0;
+            let link9_pivot3 = link10_inertia14 * link9_pivot1;
+            let link9_pivot4 = link10_inertia1 - link9_pivot3;
+            let link9_pivot5 = link10_inertia14 * link9_pivot2;
+            let link9_pivot6 = link10_inertia2 - link9_pivot5;
+            let link9_pivot7 = link10_inertia15 * link9_pivot2;
+            let link9_pivot8 = link10_inertia3 + link9_pivot7;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link8_pose3 * link9_pivot4;
+            let link9_inertia1 = link8_pose3 * link9_pivot6;
+            let link9_inertia2 = link8_pose3 * link9_inertia0;
+            let link9_inertia3 = link8_pose4 * link9_pivot6;
+            let link9_inertia4 = link9_inertia0 + link9_inertia3;
+            let link9_inertia5 = link8_pose4 * link9_pivot8;
+            let link9_inertia6 = link9_inertia1 - link9_inertia5;
+            let link9_inertia7 = link9_inertia1 + link9_inertia6;
+            let link9_inertia8 = link8_pose4 * link9_inertia7;
+            let link9_inertia9 = link9_inertia2 + link9_inertia8;
+            let link9_inertia10 = link8_pose3 - link9_inertia4;
+            let link9_inertia11 = link8_pose4 - link9_inertia6;
+            let link9_inertia12 = link9_inertia9 - 0.05835;
+            // link8: U, Mj, k and the reduced inertia M' (4.44)
+            let link8_pivot0 = link8_pose2 * link9_inertia10;
+            let link8_pivot1 = link8_pose1 * link9_inertia11;
+            let link8_pivot2 = link8_pivot0 + link8_pivot1;
+            let link8_pivot3 = link9_inertia12 - link8_pivot2;
+            let link8_pivot4 = link8_inertia1 * link9_inertia10;
+            let link8_pivot5 = link8_inertia0 * link9_inertia11;
+            let link8_pivot6 = link8_pivot4 + link8_pivot5;
+            let link8_pivot7 = link9_inertia12 - link8_pivot6;
+            let link8_pivot8 = link8_inertia3 * link9_inertia10;
+            let link8_pivot9 = link8_inertia2 * link9_inertia11;
+            let link8_pivot10 = link8_pivot8 + link8_pivot9;
+            let link8_pivot11 = link9_inertia12 - link8_pivot10;
+            let link8_pivot12 = link8_inertia5 * link9_inertia10;
+            let link8_pivot13 = link8_inertia4 * link9_inertia11;
+            let link8_pivot14 = link8_pivot12 + link8_pivot13;
+            let link8_pivot15 = link9_inertia12 - link8_pivot14;
+            let link8_pivot16 = link8_inertia7 * link9_inertia10;
+            let link8_pivot17 = link8_inertia6 * link9_inertia11;
+            let link8_pivot18 = link8_pivot16 + link8_pivot17;
+            let link8_pivot19 = link9_inertia12 - link8_pivot18;
+            let link8_pivot20 = link8_inertia9 * link9_inertia10;
+            let link8_pivot21 = link8_inertia8 * link9_inertia11;
+            let link8_pivot22 = link8_pivot20 + link8_pivot21;
+            let link8_pivot23 = link9_inertia12 - link8_pivot22;
+            let link8_pivot24 = link8_inertia11 * link9_inertia10;
+            let link8_pivot25 = link8_inertia10 * link9_inertia11;
+            let link8_pivot26 = link8_pivot24 + link8_pivot25;
+            let link8_pivot27 = link9_inertia12 - link8_pivot26;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia12 = link8_pose2 * link9_pivot4;
+            let link8_inertia13 = link9_inertia10 - link8_inertia12;
+            let link8_inertia14 = link8_pose2 * link9_pivot6;
+            let link8_inertia15 = link9_inertia11 - link8_inertia14;
+            let link8_inertia16 = link9_inertia10 + link8_inertia13;
+            let link8_inertia17 = link8_pose2 * link8_inertia16;
+            let link8_inertia18 = link9_inertia12 - link8_inertia17;
+            let link8_inertia19 = link8_pose1 * link9_pivot6;
+            let link8_inertia20 = link8_inertia13 - link8_inertia19;
+            let link8_inertia21 = link8_pose1 * link9_pivot8;
+            let link8_inertia22 = link8_inertia15 + link8_inertia21;
+            let link8_inertia23 = link8_inertia15 + link8_inertia22;
+            let link8_inertia24 = link8_pose1 * link8_inertia23;
+            let link8_inertia25 = link8_inertia18 - link8_inertia24;
+            let link8_inertia26 = link7_pose3 + link8_inertia20;
+            let link8_inertia27 = link7_pose4 + link8_inertia22;
+            let link8_inertia28 = link8_inertia25 - 0.08335000000000001;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = link7_pose2 * link8_inertia26;
+            let link7_pivot1 = link7_pose1 * link8_inertia27;
+            let link7_pivot2 = link7_pivot0 + link7_pivot1;
+            let link7_pivot3 = link8_inertia28 - link7_pivot2;
+            let link7_pivot4 = link7_inertia1 * link8_inertia26;
+            let link7_pivot5 = link7_inertia0 * link8_inertia27;
+            let link7_pivot6 = link7_pivot4 + link7_pivot5;
+            let link7_pivot7 = link8_inertia28 - link7_pivot6;
+            let link7_pivot8 = link7_inertia3 * link8_inertia26;
+            let link7_pivot9 = link7_inertia2 * link8_inertia27;
+            let link7_pivot10 = link7_pivot8 + link7_pivot9;
+            let link7_pivot11 = link8_inertia28 - link7_pivot10;
+            let link7_pivot12 = link7_inertia5 * link8_inertia26;
+            let link7_pivot13 = link7_inertia4 * link8_inertia27;
+            let link7_pivot14 = link7_pivot12 + link7_pivot13;
+            let link7_pivot15 = link8_inertia28 - link7_pivot14;
+            let link7_pivot16 = link7_inertia7 * link8_inertia26;
+            let link7_pivot17 = link7_inertia6 * link8_inertia27;
+            let link7_pivot18 = link7_pivot16 + link7_pivot17;
+            let link7_pivot19 = link8_inertia28 - link7_pivot18;
+            let link7_pivot20 = link7_inertia9 * link8_inertia26;
+            let link7_pivot21 = link7_inertia8 * link8_inertia27;
+            let link7_pivot22 = link7_pivot20 + link7_pivot21;
+            let link7_pivot23 = link8_inertia28 - link7_pivot22;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia10 = link7_pose2 * link9_pivot4;
+            let link7_inertia11 = link8_inertia26 - link7_inertia10;
+            let link7_inertia12 = link7_pose2 * link9_pivot6;
+            let link7_inertia13 = link8_inertia27 - link7_inertia12;
+            let link7_inertia14 = link8_inertia26 + link7_inertia11;
+            let link7_inertia15 = link7_pose2 * link7_inertia14;
+            let link7_inertia16 = link8_inertia28 - link7_inertia15;
+            let link7_inertia17 = link7_pose1 * link9_pivot6;
+            let link7_inertia18 = link7_inertia11 - link7_inertia17;
+            let link7_inertia19 = link7_pose1 * link9_pivot8;
+            let link7_inertia20 = link7_inertia13 + link7_inertia19;
+            let link7_inertia21 = link7_inertia13 + link7_inertia20;
+            let link7_inertia22 = link7_pose1 * link7_inertia21;
+            let link7_inertia23 = link7_inertia16 - link7_inertia22;
+            let link7_inertia24 = link6_pose3 + link7_inertia18;
+            let link7_inertia25 = link6_pose4 + link7_inertia20;
+            let link7_inertia26 = link7_inertia23 - 0.10835;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = link6_pose2 * link7_inertia24;
+            let link6_pivot1 = link6_pose1 * link7_inertia25;
+            let link6_pivot2 = link6_pivot0 + link6_pivot1;
+            let link6_pivot3 = link7_inertia26 - link6_pivot2;
+            let link6_pivot4 = link6_inertia1 * link7_inertia24;
+            let link6_pivot5 = link6_inertia0 * link7_inertia25;
+            let link6_pivot6 = link6_pivot4 + link6_pivot5;
+            let link6_pivot7 = link7_inertia26 - link6_pivot6;
+            let link6_pivot8 = link6_inertia3 * link7_inertia24;
+            let link6_pivot9 = link6_inertia2 * link7_inertia25;
+            let link6_pivot10 = link6_pivot8 + link6_pivot9;
+            let link6_pivot11 = link7_inertia26 - link6_pivot10;
+            let link6_pivot12 = link6_inertia5 * link7_inertia24;
+            let link6_pivot13 = link6_inertia4 * link7_inertia25;
+            let link6_pivot14 = link6_pivot12 + link6_pivot13;
+            let link6_pivot15 = link7_inertia26 - link6_pivot14;
+            let link6_pivot16 = link6_inertia7 * link7_inertia24;
+            let link6_pivot17 = link6_inertia6 * link7_inertia25;
+            let link6_pivot18 = link6_pivot16 + link6_pivot17;
+            let link6_pivot19 = link7_inertia26 - link6_pivot18;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia8 = link6_pose2 * link9_pivot4;
+            let link6_inertia9 = link7_inertia24 - link6_inertia8;
+            let link6_inertia10 = link6_pose2 * link9_pivot6;
+            let link6_inertia11 = link7_inertia25 - link6_inertia10;
+            let link6_inertia12 = link7_inertia24 + link6_inertia9;
+            let link6_inertia13 = link6_pose2 * link6_inertia12;
+            let link6_inertia14 = link7_inertia26 - link6_inertia13;
+            let link6_inertia15 = link6_pose1 * link9_pivot6;
+            let link6_inertia16 = link6_inertia9 - link6_inertia15;
+            let link6_inertia17 = link6_pose1 * link9_pivot8;
+            let link6_inertia18 = link6_inertia11 + link6_inertia17;
+            let link6_inertia19 = link6_inertia11 + link6_inertia18;
+            let link6_inertia20 = link6_pose1 * link6_inertia19;
+            let link6_inertia21 = link6_inertia14 - link6_inertia20;
+            let link6_inertia22 = link5_pose3 + link6_inertia16;
+            let link6_inertia23 = link5_pose4 + link6_inertia18;
+            let link6_inertia24 = link6_inertia21 - 0.13335;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = link5_pose2 * link6_inertia22;
+            let link5_pivot1 = link5_pose1 * link6_inertia23;
+            let link5_pivot2 = link5_pivot0 + link5_pivot1;
+            let link5_pivot3 = link6_inertia24 - link5_pivot2;
+            let link5_pivot4 = link5_inertia1 * link6_inertia22;
+            let link5_pivot5 = link5_inertia0 * link6_inertia23;
+            let link5_pivot6 = link5_pivot4 + link5_pivot5;
+            let link5_pivot7 = link6_inertia24 - link5_pivot6;
+            let link5_pivot8 = link5_inertia3 * link6_inertia22;
+            let link5_pivot9 = link5_inertia2 * link6_inertia23;
+            let link5_pivot10 = link5_pivot8 + link5_pivot9;
+            let link5_pivot11 = link6_inertia24 - link5_pivot10;
+            let link5_pivot12 = link5_inertia5 * link6_inertia22;
+            let link5_pivot13 = link5_inertia4 * link6_inertia23;
+            let link5_pivot14 = link5_pivot12 + link5_pivot13;
+            let link5_pivot15 = link6_inertia24 - link5_pivot14;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia6 = link5_pose2 * link9_pivot4;
+            let link5_inertia7 = link6_inertia22 - link5_inertia6;
+            let link5_inertia8 = link5_pose2 * link9_pivot6;
+            let link5_inertia9 = link6_inertia23 - link5_inertia8;
+            let link5_inertia10 = link6_inertia22 + link5_inertia7;
+            let link5_inertia11 = link5_pose2 * link5_inertia10;
+            let link5_inertia12 = link6_inertia24 - link5_inertia11;
+            let link5_inertia13 = link5_pose1 * link9_pivot6;
+            let link5_inertia14 = link5_inertia7 - link5_inertia13;
+            let link5_inertia15 = link5_pose1 * link9_pivot8;
+            let link5_inertia16 = link5_inertia9 + link5_inertia15;
+            let link5_inertia17 = link5_inertia9 + link5_inertia16;
+            let link5_inertia18 = link5_pose1 * link5_inertia17;
+            let link5_inertia19 = link5_inertia12 - link5_inertia18;
+            let link5_inertia20 = link4_pose3 + link5_inertia14;
+            let link5_inertia21 = link4_pose4 + link5_inertia16;
+            let link5_inertia22 = link5_inertia19 - 0.15835;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = link4_pose2 * link5_inertia20;
+            let link4_pivot1 = link4_pose1 * link5_inertia21;
+            let link4_pivot2 = link4_pivot0 + link4_pivot1;
+            let link4_pivot3 = link5_inertia22 - link4_pivot2;
+            let link4_pivot4 = link4_inertia1 * link5_inertia20;
+            let link4_pivot5 = link4_inertia0 * link5_inertia21;
+            let link4_pivot6 = link4_pivot4 + link4_pivot5;
+            let link4_pivot7 = link5_inertia22 - link4_pivot6;
+            let link4_pivot8 = link4_inertia3 * link5_inertia20;
+            let link4_pivot9 = link4_inertia2 * link5_inertia21;
+            let link4_pivot10 = link4_pivot8 + link4_pivot9;
+            let link4_pivot11 = link5_inertia22 - link4_pivot10;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia4 = link4_pose2 * link9_pivot4;
+            let link4_inertia5 = link5_inertia20 - link4_inertia4;
+            let link4_inertia6 = link4_pose2 * link9_pivot6;
+            let link4_inertia7 = link5_inertia21 - link4_inertia6;
+            let link4_inertia8 = link5_inertia20 + link4_inertia5;
+            let link4_inertia9 = link4_pose2 * link4_inertia8;
+            let link4_inertia10 = link5_inertia22 - link4_inertia9;
+            let link4_inertia11 = link4_pose1 * link9_pivot6;
+            let link4_inertia12 = link4_inertia5 - link4_inertia11;
+            let link4_inertia13 = link4_pose1 * link9_pivot8;
+            let link4_inertia14 = link4_inertia7 + link4_inertia13;
+            let link4_inertia15 = link4_inertia7 + link4_inertia14;
+            let link4_inertia16 = link4_pose1 * link4_inertia15;
+            let link4_inertia17 = link4_inertia10 - link4_inertia16;
+            let link4_inertia18 = link3_pose3 + link4_inertia12;
+            let link4_inertia19 = link3_pose4 + link4_inertia14;
+            let link4_inertia20 = link4_inertia17 - 0.18334999999999999;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = link3_pose2 * link4_inertia18;
+            let link3_pivot1 = link3_pose1 * link4_inertia19;
+            let link3_pivot2 = link3_pivot0 + link3_pivot1;
+            let link3_pivot3 = link4_inertia20 - link3_pivot2;
+            let link3_pivot4 = link3_inertia1 * link4_inertia18;
+            let link3_pivot5 = link3_inertia0 * link4_inertia19;
+            let link3_pivot6 = link3_pivot4 + link3_pivot5;
+            let link3_pivot7 = link4_inertia20 - link3_pivot6;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia2 = link3_pose2 * link9_pivot4;
+            let link3_inertia3 = link4_inertia18 - link3_inertia2;
+            let link3_inertia4 = link3_pose2 * link9_pivot6;
+            let link3_inertia5 = link4_inertia19 - link3_inertia4;
+            let link3_inertia6 = link4_inertia18 + link3_inertia3;
+            let link3_inertia7 = link3_pose2 * link3_inertia6;
+            let link3_inertia8 = link4_inertia20 - link3_inertia7;
+            let link3_inertia9 = link3_pose1 * link9_pivot6;
+            let link3_inertia10 = link3_inertia3 - link3_inertia9;
+            let link3_inertia11 = link3_pose1 * link9_pivot8;
+            let link3_inertia12 = link3_inertia5 + link3_inertia11;
+            let link3_inertia13 = link3_inertia5 + link3_inertia12;
+            let link3_inertia14 = link3_pose1 * link3_inertia13;
+            let link3_inertia15 = link3_inertia8 - link3_inertia14;
+            let link3_inertia16 = link2_pose3 + link3_inertia10;
+            let link3_inertia17 = link2_pose4 + link3_inertia12;
+            let link3_inertia18 = link3_inertia15 - 0.20834999999999998;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = link2_pose2 * link3_inertia16;
+            let link2_pivot1 = link2_pose1 * link3_inertia17;
+            let link2_pivot2 = link2_pivot0 + link2_pivot1;
+            let link2_pivot3 = link3_inertia18 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link2_pose2 * link9_pivot4;
+            let link2_inertia1 = link3_inertia16 - link2_inertia0;
+            let link2_inertia2 = link2_pose2 * link9_pivot6;
+            let link2_inertia3 = link3_inertia17 - link2_inertia2;
+            let link2_inertia4 = link3_inertia16 + link2_inertia1;
+            let link2_inertia5 = link2_pose2 * link2_inertia4;
+            let link2_inertia6 = link3_inertia18 - link2_inertia5;
+            let link2_inertia7 = link2_pose1 * link9_pivot8;
+            let link2_inertia8 = link2_inertia3 + link2_inertia7;
+            let link2_inertia9 = link2_inertia3 + link2_inertia8;
+            let link2_inertia10 = link2_pose1 * link2_inertia9;
+            let link2_inertia11 = link2_inertia6 - link2_inertia10;
+            let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / link9_inertia12;
+            let ground_pivot1 = link8_pivot3 * ground_pivot0;
+            let ground_pivot2 = link8_pivot3 * ground_pivot1;
+            let ground_pivot3 = link8_inertia28 - ground_pivot2;
+            let ground_pivot4 = link8_pivot7 * ground_pivot0;
+            let ground_pivot5 = link8_pivot3 * ground_pivot4;
+            let ground_pivot6 = link7_pivot3 - ground_pivot5;
+            let ground_pivot7 = link8_pivot11 * ground_pivot0;
+            let ground_pivot8 = link8_pivot3 * ground_pivot7;
+            let ground_pivot9 = link7_pivot7 - ground_pivot8;
+            let ground_pivot10 = link8_pivot15 * ground_pivot0;
+            let ground_pivot11 = link8_pivot3 * ground_pivot10;
+            let ground_pivot12 = link7_pivot11 - ground_pivot11;
+            let ground_pivot13 = link8_pivot19 * ground_pivot0;
+            let ground_pivot14 = link8_pivot3 * ground_pivot13;
+            let ground_pivot15 = link7_pivot15 - ground_pivot14;
+            let ground_pivot16 = link8_pivot23 * ground_pivot0;
+            let ground_pivot17 = link8_pivot3 * ground_pivot16;
+            let ground_pivot18 = link7_pivot19 - ground_pivot17;
+            let ground_pivot19 = link8_pivot27 * ground_pivot0;
+            let ground_pivot20 = link8_pivot3 * ground_pivot19;
+            let ground_pivot21 = link7_pivot23 - ground_pivot20;
+            let ground_pivot22 = link8_pivot7 * ground_pivot4;
+            let ground_pivot23 = link7_inertia26 - ground_pivot22;
+            let ground_pivot24 = link8_pivot7 * ground_pivot7;
+            let ground_pivot25 = link6_pivot3 - ground_pivot24;
+            let ground_pivot26 = link8_pivot7 * ground_pivot10;
+            let ground_pivot27 = link6_pivot7 - ground_pivot26;
+            let ground_pivot28 = link8_pivot7 * ground_pivot13;
+            let ground_pivot29 = link6_pivot11 - ground_pivot28;
+            let ground_pivot30 = link8_pivot7 * ground_pivot16;
+            let ground_pivot31 = link6_pivot15 - ground_pivot30;
+            let ground_pivot32 = link8_pivot7 * ground_pivot19;
+            let ground_pivot33 = link6_pivot19 - ground_pivot32;
+            let ground_pivot34 = link8_pivot11 * ground_pivot7;
+            let ground_pivot35 = link6_inertia24 - ground_pivot34;
+            let ground_pivot36 = link8_pivot11 * ground_pivot10;
+            let ground_pivot37 = link5_pivot3 - ground_pivot36;
+            let ground_pivot38 = link8_pivot11 * ground_pivot13;
+            let ground_pivot39 = link5_pivot7 - ground_pivot38;
+            let ground_pivot40 = link8_pivot11 * ground_pivot16;
+            let ground_pivot41 = link5_pivot11 - ground_pivot40;
+            let ground_pivot42 = link8_pivot11 * ground_pivot19;
+            let ground_pivot43 = link5_pivot15 - ground_pivot42;
+            let ground_pivot44 = link8_pivot15 * ground_pivot10;
+            let ground_pivot45 = link5_inertia22 - ground_pivot44;
+            let ground_pivot46 = link8_pivot15 * ground_pivot13;
+            let ground_pivot47 = link4_pivot3 - ground_pivot46;
+            let ground_pivot48 = link8_pivot15 * ground_pivot16;
+            let ground_pivot49 = link4_pivot7 - ground_pivot48;
+            let ground_pivot50 = link8_pivot15 * ground_pivot19;
+            let ground_pivot51 = link4_pivot11 - ground_pivot50;
+            let ground_pivot52 = link8_pivot19 * ground_pivot13;
+            let ground_pivot53 = link4_inertia20 - ground_pivot52;
+            let ground_pivot54 = link8_pivot19 * ground_pivot16;
+            let ground_pivot55 = link3_pivot3 - ground_pivot54;
+            let ground_pivot56 = link8_pivot19 * ground_pivot19;
+            let ground_pivot57 = link3_pivot7 - ground_pivot56;
+            let ground_pivot58 = link8_pivot23 * ground_pivot16;
+            let ground_pivot59 = link3_inertia18 - ground_pivot58;
+            let ground_pivot60 = link8_pivot23 * ground_pivot19;
+            let ground_pivot61 = link2_pivot3 - ground_pivot60;
+            let ground_pivot62 = link8_pivot27 * ground_pivot19;
+            let ground_pivot63 = link2_inertia12 - ground_pivot62;
+            let ground_pivot64 = 1.0 / ground_pivot3;
+            let ground_pivot65 = ground_pivot6 * ground_pivot64;
+            let ground_pivot66 = ground_pivot6 * ground_pivot65;
+            let ground_pivot67 = ground_pivot23 - ground_pivot66;
+            let ground_pivot68 = ground_pivot9 * ground_pivot64;
+            let ground_pivot69 = ground_pivot6 * ground_pivot68;
+            let ground_pivot70 = ground_pivot25 - ground_pivot69;
+            let ground_pivot71 = ground_pivot12 * ground_pivot64;
+            let ground_pivot72 = ground_pivot6 * ground_pivot71;
+            let ground_pivot73 = ground_pivot27 - ground_pivot72;
+            let ground_pivot74 = ground_pivot15 * ground_pivot64;
+            let ground_pivot75 = ground_pivot6 * ground_pivot74;
+            let ground_pivot76 = ground_pivot29 - ground_pivot75;
+            let ground_pivot77 = ground_pivot18 * ground_pivot64;
+            let ground_pivot78 = ground_pivot6 * ground_pivot77;
+            let ground_pivot79 = ground_pivot31 - ground_pivot78;
+            let ground_pivot80 = ground_pivot21 * ground_pivot64;
+            let ground_pivot81 = ground_pivot6 * ground_pivot80;
+            let ground_pivot82 = ground_pivot33 - ground_pivot81;
+            let ground_pivot83 = ground_pivot9 * ground_pivot68;
+            let ground_pivot84 = ground_pivot35 - ground_pivot83;
+            let ground_pivot85 = ground_pivot9 * ground_pivot71;
+            let ground_pivot86 = ground_pivot37 - ground_pivot85;
+            let ground_pivot87 = ground_pivot9 * ground_pivot74;
+            let ground_pivot88 = ground_pivot39 - ground_pivot87;
+            let ground_pivot89 = ground_pivot9 * ground_pivot77;
+            let ground_pivot90 = ground_pivot41 - ground_pivot89;
+            let ground_pivot91 = ground_pivot9 * ground_pivot80;
+            let ground_pivot92 = ground_pivot43 - ground_pivot91;
+            let ground_pivot93 = ground_pivot12 * ground_pivot71;
+            let ground_pivot94 = ground_pivot45 - ground_pivot93;
+            let ground_pivot95 = ground_pivot12 * ground_pivot74;
+            let ground_pivot96 = ground_pivot47 - ground_pivot95;
+            let ground_pivot97 = ground_pivot12 * ground_pivot77;
+            let ground_pivot98 = ground_pivot49 - ground_pivot97;
+            let ground_pivot99 = ground_pivot12 * ground_pivot80;
+            let ground_pivot100 = ground_pivot51 - ground_pivot99;
+            let ground_pivot101 = ground_pivot15 * ground_pivot74;
+            let ground_pivot102 = ground_pivot53 - ground_pivot101;
+            let ground_pivot103 = ground_pivot15 * ground_pivot77;
+            let ground_pivot104 = ground_pivot55 - ground_pivot103;
+            let ground_pivot105 = ground_pivot15 * ground_pivot80;
+            let ground_pivot106 = ground_pivot57 - ground_pivot105;
+            let ground_pivot107 = ground_pivot18 * ground_pivot77;
+            let ground_pivot108 = ground_pivot59 - ground_pivot107;
+            let ground_pivot109 = ground_pivot18 * ground_pivot80;
+            let ground_pivot110 = ground_pivot61 - ground_pivot109;
+            let ground_pivot111 = ground_pivot21 * ground_pivot80;
+            let ground_pivot112 = ground_pivot63 - ground_pivot111;
+            let ground_pivot113 = 1.0 / ground_pivot67;
+            let ground_pivot114 = ground_pivot70 * ground_pivot113;
+            let ground_pivot115 = ground_pivot70 * ground_pivot114;
+            let ground_pivot116 = ground_pivot84 - ground_pivot115;
+            let ground_pivot117 = ground_pivot73 * ground_pivot113;
+            let ground_pivot118 = ground_pivot70 * ground_pivot117;
+            let ground_pivot119 = ground_pivot86 - ground_pivot118;
+            let ground_pivot120 = ground_pivot76 * ground_pivot113;
+            let ground_pivot121 = ground_pivot70 * ground_pivot120;
+            let ground_pivot122 = ground_pivot88 - ground_pivot121;
+            let ground_pivot123 = ground_pivot79 * ground_pivot113;
+            let ground_pivot124 = ground_pivot70 * ground_pivot123;
+            let ground_pivot125 = ground_pivot90 - ground_pivot124;
+            let ground_pivot126 = ground_pivot82 * ground_pivot113;
+            let ground_pivot127 = ground_pivot70 * ground_pivot126;
+            let ground_pivot128 = ground_pivot92 - ground_pivot127;
+            let ground_pivot129 = ground_pivot73 * ground_pivot117;
+            let ground_pivot130 = ground_pivot94 - ground_pivot129;
+            let ground_pivot131 = ground_pivot73 * ground_pivot120;
+            let ground_pivot132 = ground_pivot96 - ground_pivot131;
+            let ground_pivot133 = ground_pivot73 * ground_pivot123;
+            let ground_pivot134 = ground_pivot98 - ground_pivot133;
+            let ground_pivot135 = ground_pivot73 * ground_pivot126;
+            let ground_pivot136 = ground_pivot100 - ground_pivot135;
+            let ground_pivot137 = ground_pivot76 * ground_pivot120;
+            let ground_pivot138 = ground_pivot102 - ground_pivot137;
+            let ground_pivot139 = ground_pivot76 * ground_pivot123;
+            let ground_pivot140 = ground_pivot104 - ground_pivot139;
+            let ground_pivot141 = ground_pivot76 * ground_pivot126;
+            let ground_pivot142 = ground_pivot106 - ground_pivot141;
+            let ground_pivot143 = ground_pivot79 * ground_pivot123;
+            let ground_pivot144 = ground_pivot108 - ground_pivot143;
+            let ground_pivot145 = ground_pivot79 * ground_pivot126;
+            let ground_pivot146 = ground_pivot110 - ground_pivot145;
+            let ground_pivot147 = ground_pivot82 * ground_pivot126;
+            let ground_pivot148 = ground_pivot112 - ground_pivot147;
+            let ground_pivot149 = 1.0 / ground_pivot116;
+            let ground_pivot150 = ground_pivot119 * ground_pivot149;
+            let ground_pivot151 = ground_pivot119 * ground_pivot150;
+            let ground_pivot152 = ground_pivot130 - ground_pivot151;
+            let ground_pivot153 = ground_pivot122 * ground_pivot149;
+            let ground_pivot154 = ground_pivot119 * ground_pivot153;
+            let ground_pivot155 = ground_pivot132 - ground_pivot154;
+            let ground_pivot156 = ground_pivot125 * ground_pivot149;
+            let ground_pivot157 = ground_pivot119 * ground_pivot156;
+            let ground_pivot158 = ground_pivot134 - ground_pivot157;
+            let ground_pivot159 = ground_pivot128 * ground_pivot149;
+            let ground_pivot160 = ground_pivot119 * ground_pivot159;
+            let ground_pivot161 = ground_pivot136 - ground_pivot160;
+            let ground_pivot162 = ground_pivot122 * ground_pivot153;
+            let ground_pivot163 = ground_pivot138 - ground_pivot162;
+            let ground_pivot164 = ground_pivot122 * ground_pivot156;
+            let ground_pivot165 = ground_pivot140 - ground_pivot164;
+            let ground_pivot166 = ground_pivot122 * ground_pivot159;
+            let ground_pivot167 = ground_pivot142 - ground_pivot166;
+            let ground_pivot168 = ground_pivot125 * ground_pivot156;
+            let ground_pivot169 = ground_pivot144 - ground_pivot168;
+            let ground_pivot170 = ground_pivot125 * ground_pivot159;
+            let ground_pivot171 = ground_pivot146 - ground_pivot170;
+            let ground_pivot172 = ground_pivot128 * ground_pivot159;
+            let ground_pivot173 = ground_pivot148 - ground_pivot172;
+            let ground_pivot174 = 1.0 / ground_pivot152;
+            let ground_pivot175 = ground_pivot155 * ground_pivot174;
+            let ground_pivot176 = ground_pivot155 * ground_pivot175;
+            let ground_pivot177 = ground_pivot163 - ground_pivot176;
+            let ground_pivot178 = ground_pivot158 * ground_pivot174;
+            let ground_pivot179 = ground_pivot155 * ground_pivot178;
+            let ground_pivot180 = ground_pivot165 - ground_pivot179;
+            let ground_pivot181 = ground_pivot161 * ground_pivot174;
+            let ground_pivot182 = ground_pivot155 * ground_pivot181;
+            let ground_pivot183 = ground_pivot167 - ground_pivot182;
+            let ground_pivot184 = ground_pivot158 * ground_pivot178;
+            let ground_pivot185 = ground_pivot169 - ground_pivot184;
+            let ground_pivot186 = ground_pivot158 * ground_pivot181;
+            let ground_pivot187 = ground_pivot171 - ground_pivot186;
+            let ground_pivot188 = ground_pivot161 * ground_pivot181;
+            let ground_pivot189 = ground_pivot173 - ground_pivot188;
+            let ground_pivot190 = 1.0 / ground_pivot177;
+            let ground_pivot191 = ground_pivot180 * ground_pivot190;
+            let ground_pivot192 = ground_pivot180 * ground_pivot191;
+            let ground_pivot193 = ground_pivot185 - ground_pivot192;
+            let ground_pivot194 = ground_pivot183 * ground_pivot190;
+            let ground_pivot195 = ground_pivot180 * ground_pivot194;
+            let ground_pivot196 = ground_pivot187 - ground_pivot195;
+            let ground_pivot197 = ground_pivot183 * ground_pivot194;
+            let ground_pivot198 = ground_pivot189 - ground_pivot197;
+            let ground_pivot199 = 1.0 / ground_pivot193;
+            let ground_pivot200 = ground_pivot196 * ground_pivot199;
+            let ground_pivot201 = ground_pivot196 * ground_pivot200;
+            let ground_pivot202 = ground_pivot198 - ground_pivot201;
+            let ground_pivot203 = 1.0 / ground_pivot202;
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest0 = 119.76047904191617 * p_9;
+            let link10_rest1 = 0.05 * link10_rest0;
+            let link10_rest2 = link10_cos0 * link10_rest1;
+            let link10_rest3 = link10_sin0 * link10_rest1;
+            let link10_rest4 = link10_pose2 * link10_rest2;
+            let link10_rest5 = p_9 + link10_rest4;
+            let link10_rest6 = link10_pose1 * link10_rest3;
+            let link10_rest7 = link10_rest5 + link10_rest6;
+            // link9: momentum remainder D, D' (4.45, 4.49)
+            let link9_rest0 = p_8 - link10_rest7;
+            let link9_rest1 = link9_pivot0 * link9_rest0;
+            let link9_rest2 = link10_inertia14 * link9_rest1;
+            let link9_rest3 = link10_rest2 - link9_rest2;
+            let link9_rest4 = link10_inertia15 * link9_rest1;
+            let link9_rest5 = link10_rest3 - link9_rest4;
+            let link9_rest6 = link8_pose3 * link9_rest3;
+            let link9_rest7 = p_8 + link9_rest6;
+            let link9_rest8 = link8_pose4 * link9_rest5;
+            let link9_rest9 = link9_rest7 + link9_rest8;
+            // link8: momentum remainder D, D' (4.45, 4.49)
+            let link8_rest0 = link8_pose2 * link9_rest3;
+            let link8_rest1 = link9_rest9 + link8_rest0;
+            let link8_rest2 = link8_pose1 * link9_rest5;
+            let link8_rest3 = link8_rest1 + link8_rest2;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = link7_pose2 * link9_rest3;
+            let link7_rest1 = link8_rest3 + link7_rest0;
+            let link7_rest2 = link7_pose1 * link9_rest5;
+            let link7_rest3 = link7_rest1 + link7_rest2;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_pose2 * link9_rest3;
+            let link6_rest1 = link7_rest3 + link6_rest0;
+            let link6_rest2 = link6_pose1 * link9_rest5;
+            let link6_rest3 = link6_rest1 + link6_rest2;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_pose2 * link9_rest3;
+            let link5_rest1 = link6_rest3 + link5_rest0;
+            let link5_rest2 = link5_pose1 * link9_rest5;
+            let link5_rest3 = link5_rest1 + link5_rest2;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_pose2 * link9_rest3;
+            let link4_rest1 = link5_rest3 + link4_rest0;
+            let link4_rest2 = link4_pose1 * link9_rest5;
+            let link4_rest3 = link4_rest1 + link4_rest2;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_pose2 * link9_rest3;
+            let link3_rest1 = link4_rest3 + link3_rest0;
+            let link3_rest2 = link3_pose1 * link9_rest5;
+            let link3_rest3 = link3_rest1 + link3_rest2;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_pose2 * link9_rest3;
+            let link2_rest1 = link3_rest3 + link2_rest0;
+            let link2_rest2 = link2_pose1 * link9_rest5;
+            let link2_rest3 = link2_rest1 + link2_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_7 - link9_rest9;
+            let link1_rest1 = ground_pivot0 * link1_rest0;
+            let link1_rest2 = link8_pivot3 * link1_rest1;
+            let link1_rest3 = link8_rest3 + link1_rest2;
+            let link1_rest4 = link8_pivot7 * link1_rest1;
+            let link1_rest5 = link7_rest3 + link1_rest4;
+            let link1_rest6 = link8_pivot11 * link1_rest1;
+            let link1_rest7 = link6_rest3 + link1_rest6;
+            let link1_rest8 = link8_pivot15 * link1_rest1;
+            let link1_rest9 = link5_rest3 + link1_rest8;
+            let link1_rest10 = link8_pivot19 * link1_rest1;
+            let link1_rest11 = link4_rest3 + link1_rest10;
+            let link1_rest12 = link8_pivot23 * link1_rest1;
+            let link1_rest13 = link3_rest3 + link1_rest12;
+            let link1_rest14 = link8_pivot27 * link1_rest1;
+            let link1_rest15 = link2_rest3 + link1_rest14;
+            let link1_rest16 = p_6 - link1_rest3;
+            let link1_rest17 = ground_pivot64 * link1_rest16;
+            let link1_rest18 = ground_pivot6 * link1_rest17;
+            let link1_rest19 = link1_rest5 + link1_rest18;
+            let link1_rest20 = ground_pivot9 * link1_rest17;
+            let link1_rest21 = link1_rest7 + link1_rest20;
+            let link1_rest22 = ground_pivot12 * link1_rest17;
+            let link1_rest23 = link1_rest9 + link1_rest22;
+            let link1_rest24 = ground_pivot15 * link1_rest17;
+            let link1_rest25 = link1_rest11 + link1_rest24;
+            let link1_rest26 = ground_pivot18 * link1_rest17;
+            let link1_rest27 = link1_rest13 + link1_rest26;
+            let link1_rest28 = ground_pivot21 * link1_rest17;
+            let link1_rest29 = link1_rest15 + link1_rest28;
+            let link1_rest30 = p_5 - link1_rest19;
+            let link1_rest31 = ground_pivot113 * link1_rest30;
+            let link1_rest32 = ground_pivot70 * link1_rest31;
+            let link1_rest33 = link1_rest21 + link1_rest32;
+            let link1_rest34 = ground_pivot73 * link1_rest31;
+            let link1_rest35 = link1_rest23 + link1_rest34;
+            let link1_rest36 = ground_pivot76 * link1_rest31;
+            let link1_rest37 = link1_rest25 + link1_rest36;
+            let link1_rest38 = ground_pivot79 * link1_rest31;
+            let link1_rest39 = link1_rest27 + link1_rest38;
+            let link1_rest40 = ground_pivot82 * link1_rest31;
+            let link1_rest41 = link1_rest29 + link1_rest40;
+            let link1_rest42 = p_4 - link1_rest33;
+            let link1_rest43 = ground_pivot149 * link1_rest42;
+            let link1_rest44 = ground_pivot119 * link1_rest43;
+            let link1_rest45 = link1_rest35 + link1_rest44;
+            let link1_rest46 = ground_pivot122 * link1_rest43;
+            let link1_rest47 = link1_rest37 + link1_rest46;
+            let link1_rest48 = ground_pivot125 * link1_rest43;
+            let link1_rest49 = link1_rest39 + link1_rest48;
+            let link1_rest50 = ground_pivot128 * link1_rest43;
+            let link1_rest51 = link1_rest41 + link1_rest50;
+            let link1_rest52 = p_3 - link1_rest45;
+            let link1_rest53 = ground_pivot174 * link1_rest52;
+            let link1_rest54 = ground_pivot155 * link1_rest53;
+            let link1_rest55 = link1_rest47 + link1_rest54;
+            let link1_rest56 = ground_pivot158 * link1_rest53;
+            let link1_rest57 = link1_rest49 + link1_rest56;
+            let link1_rest58 = ground_pivot161 * link1_rest53;
+            let link1_rest59 = link1_rest51 + link1_rest58;
+            let link1_rest60 = p_2 - link1_rest55;
+            let link1_rest61 = ground_pivot190 * link1_rest60;
+            let link1_rest62 = ground_pivot180 * link1_rest61;
+            let link1_rest63 = link1_rest57 + link1_rest62;
+            let link1_rest64 = ground_pivot183 * link1_rest61;
+            let link1_rest65 = link1_rest59 + link1_rest64;
+            let link1_rest66 = p_1 - link1_rest63;
+            let link1_rest67 = ground_pivot199 * link1_rest66;
+            let link1_rest68 = ground_pivot196 * link1_rest67;
+            let link1_rest69 = link1_rest65 + link1_rest68;
+            let link1_rest70 = p_0 - link1_rest69;
+            let link1_rest71 = ground_pivot203 * link1_rest70;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot200 * link1_rest71;
+            let ground_vel1 = link1_rest67 - ground_vel0;
+            let ground_vel2 = ground_pivot191 * ground_vel1;
+            let ground_vel3 = link1_rest61 - ground_vel2;
+            let ground_vel4 = ground_pivot194 * link1_rest71;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot175 * ground_vel5;
+            let ground_vel7 = link1_rest53 - ground_vel6;
+            let ground_vel8 = ground_pivot178 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot181 * link1_rest71;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_vel12 = ground_pivot150 * ground_vel11;
+            let ground_vel13 = link1_rest43 - ground_vel12;
+            let ground_vel14 = ground_pivot153 * ground_vel5;
+            let ground_vel15 = ground_vel13 - ground_vel14;
+            let ground_vel16 = ground_pivot156 * ground_vel1;
+            let ground_vel17 = ground_vel15 - ground_vel16;
+            let ground_vel18 = ground_pivot159 * link1_rest71;
+            let ground_vel19 = ground_vel17 - ground_vel18;
+            let ground_vel20 = ground_pivot114 * ground_vel19;
+            let ground_vel21 = link1_rest31 - ground_vel20;
+            let ground_vel22 = ground_pivot117 * ground_vel11;
+            let ground_vel23 = ground_vel21 - ground_vel22;
+            let ground_vel24 = ground_pivot120 * ground_vel5;
+            let ground_vel25 = ground_vel23 - ground_vel24;
+            let ground_vel26 = ground_pivot123 * ground_vel1;
+            let ground_vel27 = ground_vel25 - ground_vel26;
+            let ground_vel28 = ground_pivot126 * link1_rest71;
+            let ground_vel29 = ground_vel27 - ground_vel28;
+            let ground_vel30 = ground_pivot65 * ground_vel29;
+            let ground_vel31 = link1_rest17 - ground_vel30;
+            let ground_vel32 = ground_pivot68 * ground_vel19;
+            let ground_vel33 = ground_vel31 - ground_vel32;
+            let ground_vel34 = ground_pivot71 * ground_vel11;
+            let ground_vel35 = ground_vel33 - ground_vel34;
+            let ground_vel36 = ground_pivot74 * ground_vel5;
+            let ground_vel37 = ground_vel35 - ground_vel36;
+            let ground_vel38 = ground_pivot77 * ground_vel1;
+            let ground_vel39 = ground_vel37 - ground_vel38;
+            let ground_vel40 = ground_pivot80 * link1_rest71;
+            let ground_vel41 = ground_vel39 - ground_vel40;
+            let ground_vel42 = ground_pivot1 * ground_vel41;
+            let ground_vel43 = link1_rest1 - ground_vel42;
+            let ground_vel44 = ground_pivot4 * ground_vel29;
+            let ground_vel45 = ground_vel43 - ground_vel44;
+            let ground_vel46 = ground_pivot7 * ground_vel19;
+            let ground_vel47 = ground_vel45 - ground_vel46;
+            let ground_vel48 = ground_pivot10 * ground_vel11;
+            let ground_vel49 = ground_vel47 - ground_vel48;
+            let ground_vel50 = ground_pivot13 * ground_vel5;
+            let ground_vel51 = ground_vel49 - ground_vel50;
+            let ground_vel52 = ground_pivot16 * ground_vel1;
+            let ground_vel53 = ground_vel51 - ground_vel52;
+            let ground_vel54 = ground_pivot19 * link1_rest71;
+            let ground_vel55 = ground_vel53 - ground_vel54;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = link2_pose1 * link1_rest71;
+            let link2_vel1 = link2_pose2 * link1_rest71;
+            let link2_vel2 = link1_rest71 + ground_vel1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link3_pose1 * link2_vel2;
+            let link3_vel1 = link2_vel0 + link3_vel0;
+            let link3_vel2 = link3_pose2 * link2_vel2;
+            let link3_vel3 = link2_vel1 + link3_vel2;
+            let link3_vel4 = ground_vel5 + link2_vel2;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link4_pose1 * link3_vel4;
+            let link4_vel1 = link3_vel1 + link4_vel0;
+            let link4_vel2 = link4_pose2 * link3_vel4;
+            let link4_vel3 = link3_vel3 + link4_vel2;
+            let link4_vel4 = ground_vel11 + link3_vel4;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link5_pose1 * link4_vel4;
+            let link5_vel1 = link4_vel1 + link5_vel0;
+            let link5_vel2 = link5_pose2 * link4_vel4;
+            let link5_vel3 = link4_vel3 + link5_vel2;
+            let link5_vel4 = ground_vel19 + link4_vel4;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link6_pose1 * link5_vel4;
+            let link6_vel1 = link5_vel1 + link6_vel0;
+            let link6_vel2 = link6_pose2 * link5_vel4;
+            let link6_vel3 = link5_vel3 + link6_vel2;
+            let link6_vel4 = ground_vel29 + link5_vel4;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link7_pose1 * link6_vel4;
+            let link7_vel1 = link6_vel1 + link7_vel0;
+            let link7_vel2 = link7_pose2 * link6_vel4;
+            let link7_vel3 = link6_vel3 + link7_vel2;
+            let link7_vel4 = ground_vel41 + link6_vel4;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link8_pose1 * link7_vel4;
+            let link8_vel1 = link7_vel1 + link8_vel0;
+            let link8_vel2 = link8_pose2 * link7_vel4;
+            let link8_vel3 = link7_vel3 + link8_vel2;
+            let link8_vel4 = ground_vel55 + link7_vel4;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_pose4 * link8_vel4;
+            let link9_vel1 = link8_vel1 + link9_vel0;
+            let link9_vel2 = link8_pose3 * link8_vel4;
+            let link9_vel3 = link8_vel3 + link9_vel2;
+            let link9_vel4 = link9_pivot1 * link9_vel3;
+            let link9_vel5 = link9_pivot2 * link9_vel1;
+            let link9_vel6 = link9_vel4 + link9_vel5;
+            let link9_vel7 = link9_rest1 + link9_vel6;
+            let link9_vel8 = link8_vel4 - link9_vel7;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link10_pose1 * link9_vel7;
+            let link10_vel1 = link9_vel1 + link10_vel0;
+            let link10_vel2 = link10_pose2 * link9_vel7;
+            let link10_vel3 = link9_vel3 + link10_vel2;
+            let link10_vel4 = link10_sin0 * link10_vel1;
+            let link10_vel5 = link10_cos0 * link10_vel3;
+            let link10_vel6 = link10_vel4 + link10_vel5;
+            let link10_vel7 = 5.9880239520958085 * link10_vel6;
+            let link10_vel8 = link10_rest0 + link10_vel7;
+            let link10_vel9 = link9_vel7 + link10_vel8;
+            v.set(0, l, -link1_rest71);
+            v.set(1, l, -ground_vel1);
+            v.set(2, l, -ground_vel5);
+            v.set(3, l, -ground_vel11);
+            v.set(4, l, -ground_vel19);
+            v.set(5, l, -ground_vel29);
+            v.set(6, l, -ground_vel41);
+            v.set(7, l, -ground_vel55);
+            v.set(8, l, link9_vel8);
+            v.set(9, l, link10_vel9);
+        }
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 209 operations: 95 additions, 114 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     #[inline]
     pub fn momenta(&self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * link2_pose1;
-        let link2_vel1 = v_0 * link2_pose2;
-        let link2_vel2 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link3_pose1 * link2_vel2;
-        let link3_vel1 = link2_vel0 + link3_vel0;
-        let link3_vel2 = link3_pose2 * link2_vel2;
-        let link3_vel3 = link2_vel1 + link3_vel2;
-        let link3_vel4 = v_2 + link2_vel2;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link4_pose1 * link3_vel4;
-        let link4_vel1 = link3_vel1 + link4_vel0;
-        let link4_vel2 = link4_pose2 * link3_vel4;
-        let link4_vel3 = link3_vel3 + link4_vel2;
-        let link4_vel4 = v_3 + link3_vel4;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link5_pose1 * link4_vel4;
-        let link5_vel1 = link4_vel1 + link5_vel0;
-        let link5_vel2 = link5_pose2 * link4_vel4;
-        let link5_vel3 = link4_vel3 + link5_vel2;
-        let link5_vel4 = v_4 + link4_vel4;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link6_pose1 * link5_vel4;
-        let link6_vel1 = link5_vel1 + link6_vel0;
-        let link6_vel2 = link6_pose2 * link5_vel4;
-        let link6_vel3 = link5_vel3 + link6_vel2;
-        let link6_vel4 = v_5 + link5_vel4;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link7_pose1 * link6_vel4;
-        let link7_vel1 = link6_vel1 + link7_vel0;
-        let link7_vel2 = link7_pose2 * link6_vel4;
-        let link7_vel3 = link6_vel3 + link7_vel2;
-        let link7_vel4 = v_6 + link6_vel4;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link8_pose1 * link7_vel4;
-        let link8_vel1 = link7_vel1 + link8_vel0;
-        let link8_vel2 = link8_pose2 * link7_vel4;
-        let link8_vel3 = link7_vel3 + link8_vel2;
-        let link8_vel4 = v_7 + link7_vel4;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_pose4 * link8_vel4;
-        let link9_vel1 = link8_vel1 + link9_vel0;
-        let link9_vel2 = link8_pose3 * link8_vel4;
-        let link9_vel3 = link8_vel3 + link9_vel2;
-        let link9_vel4 = v_8 + link8_vel4;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link10_pose1 * link9_vel4;
-        let link10_vel1 = link9_vel1 + link10_vel0;
-        let link10_vel2 = link10_pose2 * link9_vel4;
-        let link10_vel3 = link9_vel3 + link10_vel2;
-        let link10_vel4 = link10_sin0 * link10_vel1;
-        let link10_vel5 = link10_cos0 * link10_vel3;
-        let link10_vel6 = link10_vel4 + link10_vel5;
-        let link10_vel7 = v_9 + link9_vel4;
-        // link1: momentum
-        let link1_mom0 = 0.23334999999999997 * v_0;
-        // link2: momentum
-        let link2_mom0 = 0.20834999999999998 * link2_vel2;
-        let link2_mom1 = link2_pose3 * link2_vel2;
-        let link2_mom2 = link2_pose4 * link2_vel2;
-        let link2_mom3 = link2_pose4 * link2_vel0;
-        let link2_mom4 = link2_pose3 * link2_vel1;
-        let link2_mom5 = link2_mom3 + link2_mom4;
-        let link2_mom6 = link2_mom0 + link2_mom5;
-        // link3: momentum
-        let link3_mom0 = 0.18334999999999999 * link3_vel4;
-        let link3_mom1 = link3_pose3 * link3_vel4;
-        let link3_mom2 = link3_pose4 * link3_vel4;
-        let link3_mom3 = link3_pose4 * link3_vel1;
-        let link3_mom4 = link3_pose3 * link3_vel3;
-        let link3_mom5 = link3_mom3 + link3_mom4;
-        let link3_mom6 = link3_mom0 + link3_mom5;
-        // link4: momentum
-        let link4_mom0 = 0.15835 * link4_vel4;
-        let link4_mom1 = link4_pose3 * link4_vel4;
-        let link4_mom2 = link4_pose4 * link4_vel4;
-        let link4_mom3 = link4_pose4 * link4_vel1;
-        let link4_mom4 = link4_pose3 * link4_vel3;
-        let link4_mom5 = link4_mom3 + link4_mom4;
-        let link4_mom6 = link4_mom0 + link4_mom5;
-        // link5: momentum
-        let link5_mom0 = 0.13335 * link5_vel4;
-        let link5_mom1 = link5_pose3 * link5_vel4;
-        let link5_mom2 = link5_pose4 * link5_vel4;
-        let link5_mom3 = link5_pose4 * link5_vel1;
-        let link5_mom4 = link5_pose3 * link5_vel3;
-        let link5_mom5 = link5_mom3 + link5_mom4;
-        let link5_mom6 = link5_mom0 + link5_mom5;
-        // link6: momentum
-        let link6_mom0 = 0.10835 * link6_vel4;
-        let link6_mom1 = link6_pose3 * link6_vel4;
-        let link6_mom2 = link6_pose4 * link6_vel4;
-        let link6_mom3 = link6_pose4 * link6_vel1;
-        let link6_mom4 = link6_pose3 * link6_vel3;
-        let link6_mom5 = link6_mom3 + link6_mom4;
-        let link6_mom6 = link6_mom0 + link6_mom5;
-        // link7: momentum
-        let link7_mom0 = 0.08335000000000001 * link7_vel4;
-        let link7_mom1 = link7_pose3 * link7_vel4;
-        let link7_mom2 = link7_pose4 * link7_vel4;
-        let link7_mom3 = link7_pose4 * link7_vel1;
-        let link7_mom4 = link7_pose3 * link7_vel3;
-        let link7_mom5 = link7_mom3 + link7_mom4;
-        let link7_mom6 = link7_mom0 + link7_mom5;
-        // link8: momentum
-        let link8_mom0 = 0.05835 * link8_vel4;
-        let link8_mom1 = link8_pose4 * link8_vel1;
-        let link8_mom2 = link8_pose3 * link8_vel3;
-        let link8_mom3 = link8_mom1 + link8_mom2;
-        let link8_mom4 = link8_mom0 + link8_mom3;
-        // link9: momentum
-        let link9_mom0 = 0.033350000000000005 * link9_vel4;
-        let link9_mom1 = link9_pose1 * link9_vel4;
-        let link9_mom2 = link9_pose2 * link9_vel4;
-        let link9_mom3 = link9_pose2 * link9_vel1;
-        let link9_mom4 = link9_pose1 * link9_vel3;
-        let link9_mom5 = link9_mom3 + link9_mom4;
-        let link9_mom6 = link9_mom0 + link9_mom5;
-        // link10: momentum
-        let link10_mom0 = 0.00835 * link10_vel7;
-        let link10_mom1 = 0.05 * link10_vel7;
-        let link10_mom2 = 0.05 * link10_vel6;
-        let link10_mom3 = link10_mom0 + link10_mom2;
-        let link10_mom4 = link10_cos0 * link10_mom1;
-        let link10_mom5 = link10_sin0 * link10_mom1;
-        let link10_mom6 = link10_pose2 * link10_mom4;
-        let link10_mom7 = link10_mom3 + link10_mom6;
-        let link10_mom8 = link10_pose1 * link10_mom5;
-        let link10_mom9 = link10_mom7 + link10_mom8;
-        let link10_mom10 = link9_mom1 + link10_mom4;
-        let link10_mom11 = link9_mom2 + link10_mom5;
-        let link10_mom12 = link9_mom6 + link10_mom9;
-        // link9: momentum
-        let link9_mom7 = link8_pose3 * link10_mom10;
-        let link9_mom8 = link10_mom12 + link9_mom7;
-        let link9_mom9 = link8_pose4 * link10_mom11;
-        let link9_mom10 = link9_mom8 + link9_mom9;
-        let link9_mom11 = link9_vel2 + link10_mom10;
-        let link9_mom12 = link9_vel0 + link10_mom11;
-        let link9_mom13 = link8_mom4 + link9_mom10;
-        // link8: momentum
-        let link8_mom5 = link8_pose2 * link9_mom11;
-        let link8_mom6 = link9_mom13 + link8_mom5;
-        let link8_mom7 = link8_pose1 * link9_mom12;
-        let link8_mom8 = link8_mom6 + link8_mom7;
-        let link8_mom9 = link7_mom1 + link9_mom11;
-        let link8_mom10 = link7_mom2 + link9_mom12;
-        let link8_mom11 = link7_mom6 + link8_mom8;
-        // link7: momentum
-        let link7_mom7 = link7_pose2 * link8_mom9;
-        let link7_mom8 = link8_mom11 + link7_mom7;
-        let link7_mom9 = link7_pose1 * link8_mom10;
-        let link7_mom10 = link7_mom8 + link7_mom9;
-        let link7_mom11 = link6_mom1 + link8_mom9;
-        let link7_mom12 = link6_mom2 + link8_mom10;
-        let link7_mom13 = link6_mom6 + link7_mom10;
-        // link6: momentum
-        let link6_mom7 = link6_pose2 * link7_mom11;
-        let link6_mom8 = link7_mom13 + link6_mom7;
-        let link6_mom9 = link6_pose1 * link7_mom12;
-        let link6_mom10 = link6_mom8 + link6_mom9;
-        let link6_mom11 = link5_mom1 + link7_mom11;
-        let link6_mom12 = link5_mom2 + link7_mom12;
-        let link6_mom13 = link5_mom6 + link6_mom10;
-        // link5: momentum
-        let link5_mom7 = link5_pose2 * link6_mom11;
-        let link5_mom8 = link6_mom13 + link5_mom7;
-        let link5_mom9 = link5_pose1 * link6_mom12;
-        let link5_mom10 = link5_mom8 + link5_mom9;
-        let link5_mom11 = link4_mom1 + link6_mom11;
-        let link5_mom12 = link4_mom2 + link6_mom12;
-        let link5_mom13 = link4_mom6 + link5_mom10;
-        // link4: momentum
-        let link4_mom7 = link4_pose2 * link5_mom11;
-        let link4_mom8 = link5_mom13 + link4_mom7;
-        let link4_mom9 = link4_pose1 * link5_mom12;
-        let link4_mom10 = link4_mom8 + link4_mom9;
-        let link4_mom11 = link3_mom1 + link5_mom11;
-        let link4_mom12 = link3_mom2 + link5_mom12;
-        let link4_mom13 = link3_mom6 + link4_mom10;
-        // link3: momentum
-        let link3_mom7 = link3_pose2 * link4_mom11;
-        let link3_mom8 = link4_mom13 + link3_mom7;
-        let link3_mom9 = link3_pose1 * link4_mom12;
-        let link3_mom10 = link3_mom8 + link3_mom9;
-        let link3_mom11 = link2_mom1 + link4_mom11;
-        let link3_mom12 = link2_mom2 + link4_mom12;
-        let link3_mom13 = link2_mom6 + link3_mom10;
-        // link2: momentum
-        let link2_mom7 = link2_pose2 * link3_mom11;
-        let link2_mom8 = link3_mom13 + link2_mom7;
-        let link2_mom9 = link2_pose1 * link3_mom12;
-        let link2_mom10 = link2_mom8 + link2_mom9;
-        let link2_mom11 = link1_mom0 + link2_mom10;
-        p[0] = link2_mom11;
-        p[1] = link3_mom13;
-        p[2] = link4_mom13;
-        p[3] = link5_mom13;
-        p[4] = link6_mom13;
-        p[5] = link7_mom13;
-        p[6] = link8_mom11;
-        p[7] = link9_mom13;
-        p[8] = link10_mom12;
-        p[9] = link10_mom3;
+        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+    }
+
+    #[inline(always)]
+    fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * link2_pose1;
+            let link2_vel1 = v_0 * link2_pose2;
+            let link2_vel2 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link3_pose1 * link2_vel2;
+            let link3_vel1 = link2_vel0 + link3_vel0;
+            let link3_vel2 = link3_pose2 * link2_vel2;
+            let link3_vel3 = link2_vel1 + link3_vel2;
+            let link3_vel4 = v_2 + link2_vel2;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link4_pose1 * link3_vel4;
+            let link4_vel1 = link3_vel1 + link4_vel0;
+            let link4_vel2 = link4_pose2 * link3_vel4;
+            let link4_vel3 = link3_vel3 + link4_vel2;
+            let link4_vel4 = v_3 + link3_vel4;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link5_pose1 * link4_vel4;
+            let link5_vel1 = link4_vel1 + link5_vel0;
+            let link5_vel2 = link5_pose2 * link4_vel4;
+            let link5_vel3 = link4_vel3 + link5_vel2;
+            let link5_vel4 = v_4 + link4_vel4;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link6_pose1 * link5_vel4;
+            let link6_vel1 = link5_vel1 + link6_vel0;
+            let link6_vel2 = link6_pose2 * link5_vel4;
+            let link6_vel3 = link5_vel3 + link6_vel2;
+            let link6_vel4 = v_5 + link5_vel4;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link7_pose1 * link6_vel4;
+            let link7_vel1 = link6_vel1 + link7_vel0;
+            let link7_vel2 = link7_pose2 * link6_vel4;
+            let link7_vel3 = link6_vel3 + link7_vel2;
+            let link7_vel4 = v_6 + link6_vel4;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link8_pose1 * link7_vel4;
+            let link8_vel1 = link7_vel1 + link8_vel0;
+            let link8_vel2 = link8_pose2 * link7_vel4;
+            let link8_vel3 = link7_vel3 + link8_vel2;
+            let link8_vel4 = v_7 + link7_vel4;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_pose4 * link8_vel4;
+            let link9_vel1 = link8_vel1 + link9_vel0;
+            let link9_vel2 = link8_pose3 * link8_vel4;
+            let link9_vel3 = link8_vel3 + link9_vel2;
+            let link9_vel4 = v_8 + link8_vel4;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link10_pose1 * link9_vel4;
+            let link10_vel1 = link9_vel1 + link10_vel0;
+            let link10_vel2 = link10_pose2 * link9_vel4;
+            let link10_vel3 = link9_vel3 + link10_vel2;
+            let link10_vel4 = link10_sin0 * link10_vel1;
+            let link10_vel5 = link10_cos0 * link10_vel3;
+            let link10_vel6 = link10_vel4 + link10_vel5;
+            let link10_vel7 = v_9 + link9_vel4;
+            // link1: momentum
+            let link1_mom0 = 0.23334999999999997 * v_0;
+            // link2: momentum
+            let link2_mom0 = 0.20834999999999998 * link2_vel2;
+            let link2_mom1 = link2_pose3 * link2_vel2;
+            let link2_mom2 = link2_pose4 * link2_vel2;
+            let link2_mom3 = link2_pose4 * link2_vel0;
+            let link2_mom4 = link2_pose3 * link2_vel1;
+            let link2_mom5 = link2_mom3 + link2_mom4;
+            let link2_mom6 = link2_mom0 + link2_mom5;
+            // link3: momentum
+            let link3_mom0 = 0.18334999999999999 * link3_vel4;
+            let link3_mom1 = link3_pose3 * link3_vel4;
+            let link3_mom2 = link3_pose4 * link3_vel4;
+            let link3_mom3 = link3_pose4 * link3_vel1;
+            let link3_mom4 = link3_pose3 * link3_vel3;
+            let link3_mom5 = link3_mom3 + link3_mom4;
+            let link3_mom6 = link3_mom0 + link3_mom5;
+            // link4: momentum
+            let link4_mom0 = 0.15835 * link4_vel4;
+            let link4_mom1 = link4_pose3 * link4_vel4;
+            let link4_mom2 = link4_pose4 * link4_vel4;
+            let link4_mom3 = link4_pose4 * link4_vel1;
+            let link4_mom4 = link4_pose3 * link4_vel3;
+            let link4_mom5 = link4_mom3 + link4_mom4;
+            let link4_mom6 = link4_mom0 + link4_mom5;
+            // link5: momentum
+            let link5_mom0 = 0.13335 * link5_vel4;
+            let link5_mom1 = link5_pose3 * link5_vel4;
+            let link5_mom2 = link5_pose4 * link5_vel4;
+            let link5_mom3 = link5_pose4 * link5_vel1;
+            let link5_mom4 = link5_pose3 * link5_vel3;
+            let link5_mom5 = link5_mom3 + link5_mom4;
+            let link5_mom6 = link5_mom0 + link5_mom5;
+            // link6: momentum
+            let link6_mom0 = 0.10835 * link6_vel4;
+            let link6_mom1 = link6_pose3 * link6_vel4;
+            let link6_mom2 = link6_pose4 * link6_vel4;
+            let link6_mom3 = link6_pose4 * link6_vel1;
+            let link6_mom4 = link6_pose3 * link6_vel3;
+            let link6_mom5 = link6_mom3 + link6_mom4;
+            let link6_mom6 = link6_mom0 + link6_mom5;
+            // link7: momentum
+            let link7_mom0 = 0.08335000000000001 * link7_vel4;
+            let link7_mom1 = link7_pose3 * link7_vel4;
+            let link7_mom2 = link7_pose4 * link7_vel4;
+            let link7_mom3 = link7_pose4 * link7_vel1;
+            let link7_mom4 = link7_pose3 * link7_vel3;
+            let link7_mom5 = link7_mom3 + link7_mom4;
+            let link7_mom6 = link7_mom0 + link7_mom5;
+            // link8: momentum
+            let link8_mom0 = 0.05835 * link8_vel4;
+            let link8_mom1 = link8_pose4 * link8_vel1;
+            let link8_mom2 = link8_pose3 * link8_vel3;
+            let link8_mom3 = link8_mom1 + link8_mom2;
+            let link8_mom4 = link8_mom0 + link8_mom3;
+            // link9: momentum
+            let link9_mom0 = 0.033350000000000005 * link9_vel4;
+            let link9_mom1 = link9_pose1 * link9_vel4;
+            let link9_mom2 = link9_pose2 * link9_vel4;
+            let link9_mom3 = link9_pose2 * link9_vel1;
+            let link9_mom4 = link9_pose1 * link9_vel3;
+            let link9_mom5 = link9_mom3 + link9_mom4;
+            let link9_mom6 = link9_mom0 + link9_mom5;
+            // link10: momentum
+            let link10_mom0 = 0.00835 * link10_vel7;
+            let link10_mom1 = 0.05 * link10_vel7;
+            let link10_mom2 = 0.05 * link10_vel6;
+            let link10_mom3 = link10_mom0 + link10_mom2;
+            let link10_mom4 = link10_cos0 * link10_mom1;
+            let link10_mom5 = link10_sin0 * link10_mom1;
+            let link10_mom6 = link10_pose2 * link10_mom4;
+            let link10_mom7 = link10_mom3 + link10_mom6;
+            let link10_mom8 = link10_pose1 * link10_mom5;
+            let link10_mom9 = link10_mom7 + link10_mom8;
+            let link10_mom10 = link9_mom1 + link10_mom4;
+            let link10_mom11 = link9_mom2 + link10_mom5;
+            let link10_mom12 = link9_mom6 + link10_mom9;
+            // link9: momentum
+            let link9_mom7 = link8_pose3 * link10_mom10;
+            let link9_mom8 = link10_mom12 + link9_mom7;
+            let link9_mom9 = link8_pose4 * link10_mom11;
+            let link9_mom10 = link9_mom8 + link9_mom9;
+            let link9_mom11 = link9_vel2 + link10_mom10;
+            let link9_mom12 = link9_vel0 + link10_mom11;
+            let link9_mom13 = link8_mom4 + link9_mom10;
+            // link8: momentum
+            let link8_mom5 = link8_pose2 * link9_mom11;
+            let link8_mom6 = link9_mom13 + link8_mom5;
+            let link8_mom7 = link8_pose1 * link9_mom12;
+            let link8_mom8 = link8_mom6 + link8_mom7;
+            let link8_mom9 = link7_mom1 + link9_mom11;
+            let link8_mom10 = link7_mom2 + link9_mom12;
+            let link8_mom11 = link7_mom6 + link8_mom8;
+            // link7: momentum
+            let link7_mom7 = link7_pose2 * link8_mom9;
+            let link7_mom8 = link8_mom11 + link7_mom7;
+            let link7_mom9 = link7_pose1 * link8_mom10;
+            let link7_mom10 = link7_mom8 + link7_mom9;
+            let link7_mom11 = link6_mom1 + link8_mom9;
+            let link7_mom12 = link6_mom2 + link8_mom10;
+            let link7_mom13 = link6_mom6 + link7_mom10;
+            // link6: momentum
+            let link6_mom7 = link6_pose2 * link7_mom11;
+            let link6_mom8 = link7_mom13 + link6_mom7;
+            let link6_mom9 = link6_pose1 * link7_mom12;
+            let link6_mom10 = link6_mom8 + link6_mom9;
+            let link6_mom11 = link5_mom1 + link7_mom11;
+            let link6_mom12 = link5_mom2 + link7_mom12;
+            let link6_mom13 = link5_mom6 + link6_mom10;
+            // link5: momentum
+            let link5_mom7 = link5_pose2 * link6_mom11;
+            let link5_mom8 = link6_mom13 + link5_mom7;
+            let link5_mom9 = link5_pose1 * link6_mom12;
+            let link5_mom10 = link5_mom8 + link5_mom9;
+            let link5_mom11 = link4_mom1 + link6_mom11;
+            let link5_mom12 = link4_mom2 + link6_mom12;
+            let link5_mom13 = link4_mom6 + link5_mom10;
+            // link4: momentum
+            let link4_mom7 = link4_pose2 * link5_mom11;
+            let link4_mom8 = link5_mom13 + link4_mom7;
+            let link4_mom9 = link4_pose1 * link5_mom12;
+            let link4_mom10 = link4_mom8 + link4_mom9;
+            let link4_mom11 = link3_mom1 + link5_mom11;
+            let link4_mom12 = link3_mom2 + link5_mom12;
+            let link4_mom13 = link3_mom6 + link4_mom10;
+            // link3: momentum
+            let link3_mom7 = link3_pose2 * link4_mom11;
+            let link3_mom8 = link4_mom13 + link3_mom7;
+            let link3_mom9 = link3_pose1 * link4_mom12;
+            let link3_mom10 = link3_mom8 + link3_mom9;
+            let link3_mom11 = link2_mom1 + link4_mom11;
+            let link3_mom12 = link2_mom2 + link4_mom12;
+            let link3_mom13 = link2_mom6 + link3_mom10;
+            // link2: momentum
+            let link2_mom7 = link2_pose2 * link3_mom11;
+            let link2_mom8 = link3_mom13 + link2_mom7;
+            let link2_mom9 = link2_pose1 * link3_mom12;
+            let link2_mom10 = link2_mom8 + link2_mom9;
+            let link2_mom11 = link1_mom0 + link2_mom10;
+            p.set(0, l, link2_mom11);
+            p.set(1, l, link3_mom13);
+            p.set(2, l, link4_mom13);
+            p.set(3, l, link5_mom13);
+            p.set(4, l, link6_mom13);
+            p.set(5, l, link7_mom13);
+            p.set(6, l, link8_mom11);
+            p.set(7, l, link9_mom13);
+            p.set(8, l, link10_mom12);
+            p.set(9, l, link10_mom3);
+        }
     }
 
     /// Kinetic and potential energy, J.
-    /// 432 operations: 199 additions, 224 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 811 operations: 415 additions, 387 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        let link1_pose0 = 0.95 * link1_cos0;
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_cos0;
-        let link10_inertia1 = 0.05 * link10_sin0;
-        // link10: U, Mj, k and the reduced inertia M' (4.44)
-        let link10_pivot0 = 119.76047904191617 * link10_inertia0;
-        let link10_pivot1 = 119.76047904191617 * link10_inertia1;
-        let link10_pivot2 = link10_inertia0 * link10_pivot0;
-        let link10_pivot3 = link10_inertia0 * link10_pivot1;
-        let link10_pivot4 = link10_inertia1 * link10_pivot1;
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia2 = link10_pose2 * link10_pivot2;
-        let link10_inertia3 = link10_pose2 * link10_pivot3;
-        let link10_inertia4 = link10_pose2 * link10_inertia2;
-        let link10_inertia5 = link10_pose1 * link10_pivot3;
-        let link10_inertia6 = link10_inertia2 + link10_inertia5;
-        let link10_inertia7 = link10_pose1 * link10_pivot4;
-        let link10_inertia8 = link10_inertia3 + link10_inertia7;
-        let link10_inertia9 = link10_inertia3 + link10_inertia8;
-        let link10_inertia10 = link10_pose1 * link10_inertia9;
-        let link10_inertia11 = link10_inertia4 + link10_inertia10;
-        let link10_inertia12 = link9_pose1 + link10_inertia0;
-        let link10_inertia13 = link9_pose1 - link10_inertia6;
-        let link10_inertia14 = link9_pose2 - link10_inertia8;
-        let link10_inertia15 = link10_inertia11 - 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia15;
-        let link9_pivot1 = link10_inertia13 * link9_pivot0;
-        let link9_pivot2 = link10_inertia14 * link9_pivot0;
-        let link9_pivot3 = link10_inertia13 * link9_pivot1;
-        let link9_pivot4 = link10_pivot2 - link9_pivot3;
-        let link9_pivot5 = link10_inertia13 * link9_pivot2;
-        let link9_pivot6 = link10_pivot3 - link9_pivot5;
-        let link9_pivot7 = link10_inertia14 * link9_pivot2;
-        let link9_pivot8 = link10_pivot4 - link9_pivot7;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link8_pose3 * link9_pivot4;
-        let link9_inertia1 = link8_pose3 * link9_pivot6;
-        let link9_inertia2 = link8_pose3 * link9_inertia0;
-        let link9_inertia3 = link8_pose4 * link9_pivot6;
-        let link9_inertia4 = link9_inertia0 + link9_inertia3;
-        let link9_inertia5 = link8_pose4 * link9_pivot8;
-        let link9_inertia6 = link9_inertia1 + link9_inertia5;
-        let link9_inertia7 = link9_inertia1 + link9_inertia6;
-        let link9_inertia8 = link8_pose4 * link9_inertia7;
-        let link9_inertia9 = link9_inertia2 + link9_inertia8;
-        let link9_inertia10 = link8_pose3 + link10_inertia12;
-        let link9_inertia11 = link8_pose3 - link9_inertia4;
-        let link9_inertia12 = link8_pose4 - link9_inertia6;
-        let link9_inertia13 = link9_inertia9 - 0.05835;
-        // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia13;
-        let link8_pivot1 = link9_inertia11 * link8_pivot0;
-        let link8_pivot2 = link9_inertia12 * link8_pivot0;
-        let link8_pivot3 = link9_inertia11 * link8_pivot1;
-        let link8_pivot4 = link9_pivot4 - link8_pivot3;
-        let link8_pivot5 = link9_inertia11 * link8_pivot2;
-        let link8_pivot6 = link9_pivot6 - link8_pivot5;
-        let link8_pivot7 = link9_inertia12 * link8_pivot2;
-        let link8_pivot8 = link9_pivot8 - link8_pivot7;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pose2 * link8_pivot4;
-        let link8_inertia1 = link8_pose2 * link8_pivot6;
-        let link8_inertia2 = link8_pose2 * link8_inertia0;
-        let link8_inertia3 = link8_pose1 * link8_pivot6;
-        let link8_inertia4 = link8_inertia0 + link8_inertia3;
-        let link8_inertia5 = link8_pose1 * link8_pivot8;
-        let link8_inertia6 = link8_inertia1 + link8_inertia5;
-        let link8_inertia7 = link8_inertia1 + link8_inertia6;
-        let link8_inertia8 = link8_pose1 * link8_inertia7;
-        let link8_inertia9 = link8_inertia2 + link8_inertia8;
-        let link8_inertia10 = link7_pose3 + link9_inertia10;
-        let link8_inertia11 = link7_pose3 - link8_inertia4;
-        let link8_inertia12 = link7_pose4 - link8_inertia6;
-        let link8_inertia13 = link8_inertia9 - 0.08335000000000001;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 1.0 / link8_inertia13;
-        let link7_pivot1 = link8_inertia11 * link7_pivot0;
-        let link7_pivot2 = link8_inertia12 * link7_pivot0;
-        let link7_pivot3 = link8_inertia11 * link7_pivot1;
-        let link7_pivot4 = link8_pivot4 - link7_pivot3;
-        let link7_pivot5 = link8_inertia11 * link7_pivot2;
-        let link7_pivot6 = link8_pivot6 - link7_pivot5;
-        let link7_pivot7 = link8_inertia12 * link7_pivot2;
-        let link7_pivot8 = link8_pivot8 - link7_pivot7;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pose2 * link7_pivot4;
-        let link7_inertia1 = link7_pose2 * link7_pivot6;
-        let link7_inertia2 = link7_pose2 * link7_inertia0;
-        let link7_inertia3 = link7_pose1 * link7_pivot6;
-        let link7_inertia4 = link7_inertia0 + link7_inertia3;
-        let link7_inertia5 = link7_pose1 * link7_pivot8;
-        let link7_inertia6 = link7_inertia1 + link7_inertia5;
-        let link7_inertia7 = link7_inertia1 + link7_inertia6;
-        let link7_inertia8 = link7_pose1 * link7_inertia7;
-        let link7_inertia9 = link7_inertia2 + link7_inertia8;
-        let link7_inertia10 = link6_pose3 + link8_inertia10;
-        let link7_inertia11 = link6_pose3 - link7_inertia4;
-        let link7_inertia12 = link6_pose4 - link7_inertia6;
-        let link7_inertia13 = link7_inertia9 - 0.10835;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia13;
-        let link6_pivot1 = link7_inertia11 * link6_pivot0;
-        let link6_pivot2 = link7_inertia12 * link6_pivot0;
-        let link6_pivot3 = link7_inertia11 * link6_pivot1;
-        let link6_pivot4 = link7_pivot4 - link6_pivot3;
-        let link6_pivot5 = link7_inertia11 * link6_pivot2;
-        let link6_pivot6 = link7_pivot6 - link6_pivot5;
-        let link6_pivot7 = link7_inertia12 * link6_pivot2;
-        let link6_pivot8 = link7_pivot8 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pose2 * link6_pivot4;
-        let link6_inertia1 = link6_pose2 * link6_pivot6;
-        let link6_inertia2 = link6_pose2 * link6_inertia0;
-        let link6_inertia3 = link6_pose1 * link6_pivot6;
-        let link6_inertia4 = link6_inertia0 + link6_inertia3;
-        let link6_inertia5 = link6_pose1 * link6_pivot8;
-        let link6_inertia6 = link6_inertia1 + link6_inertia5;
-        let link6_inertia7 = link6_inertia1 + link6_inertia6;
-        let link6_inertia8 = link6_pose1 * link6_inertia7;
-        let link6_inertia9 = link6_inertia2 + link6_inertia8;
-        let link6_inertia10 = link5_pose3 + link7_inertia10;
-        let link6_inertia11 = link5_pose3 - link6_inertia4;
-        let link6_inertia12 = link5_pose4 - link6_inertia6;
-        let link6_inertia13 = link6_inertia9 - 0.13335;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia13;
-        let link5_pivot1 = link6_inertia11 * link5_pivot0;
-        let link5_pivot2 = link6_inertia12 * link5_pivot0;
-        let link5_pivot3 = link6_inertia11 * link5_pivot1;
-        let link5_pivot4 = link6_pivot4 - link5_pivot3;
-        let link5_pivot5 = link6_inertia11 * link5_pivot2;
-        let link5_pivot6 = link6_pivot6 - link5_pivot5;
-        let link5_pivot7 = link6_inertia12 * link5_pivot2;
-        let link5_pivot8 = link6_pivot8 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pose2 * link5_pivot4;
-        let link5_inertia1 = link5_pose2 * link5_pivot6;
-        let link5_inertia2 = link5_pose2 * link5_inertia0;
-        let link5_inertia3 = link5_pose1 * link5_pivot6;
-        let link5_inertia4 = link5_inertia0 + link5_inertia3;
-        let link5_inertia5 = link5_pose1 * link5_pivot8;
-        let link5_inertia6 = link5_inertia1 + link5_inertia5;
-        let link5_inertia7 = link5_inertia1 + link5_inertia6;
-        let link5_inertia8 = link5_pose1 * link5_inertia7;
-        let link5_inertia9 = link5_inertia2 + link5_inertia8;
-        let link5_inertia10 = link4_pose3 + link6_inertia10;
-        let link5_inertia11 = link4_pose3 - link5_inertia4;
-        let link5_inertia12 = link4_pose4 - link5_inertia6;
-        let link5_inertia13 = link5_inertia9 - 0.15835;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia13;
-        let link4_pivot1 = link5_inertia11 * link4_pivot0;
-        let link4_pivot2 = link5_inertia12 * link4_pivot0;
-        let link4_pivot3 = link5_inertia11 * link4_pivot1;
-        let link4_pivot4 = link5_pivot4 - link4_pivot3;
-        let link4_pivot5 = link5_inertia11 * link4_pivot2;
-        let link4_pivot6 = link5_pivot6 - link4_pivot5;
-        let link4_pivot7 = link5_inertia12 * link4_pivot2;
-        let link4_pivot8 = link5_pivot8 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pose2 * link4_pivot4;
-        let link4_inertia1 = link4_pose2 * link4_pivot6;
-        let link4_inertia2 = link4_pose2 * link4_inertia0;
-        let link4_inertia3 = link4_pose1 * link4_pivot6;
-        let link4_inertia4 = link4_inertia0 + link4_inertia3;
-        let link4_inertia5 = link4_pose1 * link4_pivot8;
-        let link4_inertia6 = link4_inertia1 + link4_inertia5;
-        let link4_inertia7 = link4_inertia1 + link4_inertia6;
-        let link4_inertia8 = link4_pose1 * link4_inertia7;
-        let link4_inertia9 = link4_inertia2 + link4_inertia8;
-        let link4_inertia10 = link3_pose3 + link5_inertia10;
-        let link4_inertia11 = link3_pose3 - link4_inertia4;
-        let link4_inertia12 = link3_pose4 - link4_inertia6;
-        let link4_inertia13 = link4_inertia9 - 0.18334999999999999;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia13;
-        let link3_pivot1 = link4_inertia11 * link3_pivot0;
-        let link3_pivot2 = link4_inertia12 * link3_pivot0;
-        let link3_pivot3 = link4_inertia11 * link3_pivot1;
-        let link3_pivot4 = link4_pivot4 - link3_pivot3;
-        let link3_pivot5 = link4_inertia11 * link3_pivot2;
-        let link3_pivot6 = link4_pivot6 - link3_pivot5;
-        let link3_pivot7 = link4_inertia12 * link3_pivot2;
-        let link3_pivot8 = link4_pivot8 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pose2 * link3_pivot4;
-        let link3_inertia1 = link3_pose2 * link3_pivot6;
-        let link3_inertia2 = link3_pose2 * link3_inertia0;
-        let link3_inertia3 = link3_pose1 * link3_pivot6;
-        let link3_inertia4 = link3_inertia0 + link3_inertia3;
-        let link3_inertia5 = link3_pose1 * link3_pivot8;
-        let link3_inertia6 = link3_inertia1 + link3_inertia5;
-        let link3_inertia7 = link3_inertia1 + link3_inertia6;
-        let link3_inertia8 = link3_pose1 * link3_inertia7;
-        let link3_inertia9 = link3_inertia2 + link3_inertia8;
-        let link3_inertia10 = link2_pose3 + link4_inertia10;
-        let link3_inertia11 = link2_pose3 - link3_inertia4;
-        let link3_inertia12 = link2_pose4 - link3_inertia6;
-        let link3_inertia13 = link3_inertia9 - 0.20834999999999998;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = link2_pose2 * link3_inertia11;
-        let link2_pivot1 = link2_pose1 * link3_inertia12;
-        let link2_pivot2 = link2_pivot0 + link2_pivot1;
-        let link2_pivot3 = link3_inertia13 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pose2 * link3_pivot4;
-        let link2_inertia1 = link3_inertia11 - link2_inertia0;
-        let link2_inertia2 = link2_pose2 * link3_pivot6;
-        let link2_inertia3 = link3_inertia12 - link2_inertia2;
-        let link2_inertia4 = link3_inertia11 + link2_inertia1;
-        let link2_inertia5 = link2_pose2 * link2_inertia4;
-        let link2_inertia6 = link3_inertia13 - link2_inertia5;
-        let link2_inertia7 = link2_pose1 * link3_pivot8;
-        let link2_inertia8 = link2_inertia3 - link2_inertia7;
-        let link2_inertia9 = link2_inertia3 + link2_inertia8;
-        let link2_inertia10 = link2_pose1 * link2_inertia9;
-        let link2_inertia11 = link2_inertia6 - link2_inertia10;
-        let link2_inertia12 = link1_pose0 + link3_inertia10;
-        let link2_inertia13 = link2_inertia11 - 0.23334999999999997;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / link3_inertia13;
-        let ground_pivot1 = link2_pivot3 * ground_pivot0;
-        let ground_pivot2 = link2_pivot3 * ground_pivot1;
-        let ground_pivot3 = link2_inertia13 - ground_pivot2;
-        let ground_pivot4 = 1.0 / ground_pivot3;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = 119.76047904191617 * p_9;
-        let link10_rest1 = link10_inertia0 * link10_rest0;
-        let link10_rest2 = link10_inertia1 * link10_rest0;
-        let link10_rest3 = link10_pose2 * link10_rest1;
-        let link10_rest4 = p_9 + link10_rest3;
-        let link10_rest5 = link10_pose1 * link10_rest2;
-        let link10_rest6 = link10_rest4 + link10_rest5;
-        // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = p_8 - link10_rest6;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia13 * link9_rest1;
-        let link9_rest3 = link10_rest1 - link9_rest2;
-        let link9_rest4 = link10_inertia14 * link9_rest1;
-        let link9_rest5 = link10_rest2 - link9_rest4;
-        let link9_rest6 = link8_pose3 * link9_rest3;
-        let link9_rest7 = p_8 + link9_rest6;
-        let link9_rest8 = link8_pose4 * link9_rest5;
-        let link9_rest9 = link9_rest7 + link9_rest8;
-        // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = p_7 - link9_rest9;
-        let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia11 * link8_rest1;
-        let link8_rest3 = link9_rest3 - link8_rest2;
-        let link8_rest4 = link9_inertia12 * link8_rest1;
-        let link8_rest5 = link9_rest5 - link8_rest4;
-        let link8_rest6 = link8_pose2 * link8_rest3;
-        let link8_rest7 = p_7 + link8_rest6;
-        let link8_rest8 = link8_pose1 * link8_rest5;
-        let link8_rest9 = link8_rest7 + link8_rest8;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = p_6 - link8_rest9;
-        let link7_rest1 = link7_pivot0 * link7_rest0;
-        let link7_rest2 = link8_inertia11 * link7_rest1;
-        let link7_rest3 = link8_rest3 - link7_rest2;
-        let link7_rest4 = link8_inertia12 * link7_rest1;
-        let link7_rest5 = link8_rest5 - link7_rest4;
-        let link7_rest6 = link7_pose2 * link7_rest3;
-        let link7_rest7 = p_6 + link7_rest6;
-        let link7_rest8 = link7_pose1 * link7_rest5;
-        let link7_rest9 = link7_rest7 + link7_rest8;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = p_5 - link7_rest9;
-        let link6_rest1 = link6_pivot0 * link6_rest0;
-        let link6_rest2 = link7_inertia11 * link6_rest1;
-        let link6_rest3 = link7_rest3 - link6_rest2;
-        let link6_rest4 = link7_inertia12 * link6_rest1;
-        let link6_rest5 = link7_rest5 - link6_rest4;
-        let link6_rest6 = link6_pose2 * link6_rest3;
-        let link6_rest7 = p_5 + link6_rest6;
-        let link6_rest8 = link6_pose1 * link6_rest5;
-        let link6_rest9 = link6_rest7 + link6_rest8;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = p_4 - link6_rest9;
-        let link5_rest1 = link5_pivot0 * link5_rest0;
-        let link5_rest2 = link6_inertia11 * link5_rest1;
-        let link5_rest3 = link6_rest3 - link5_rest2;
-        let link5_rest4 = link6_inertia12 * link5_rest1;
-        let link5_rest5 = link6_rest5 - link5_rest4;
-        let link5_rest6 = link5_pose2 * link5_rest3;
-        let link5_rest7 = p_4 + link5_rest6;
-        let link5_rest8 = link5_pose1 * link5_rest5;
-        let link5_rest9 = link5_rest7 + link5_rest8;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = p_3 - link5_rest9;
-        let link4_rest1 = link4_pivot0 * link4_rest0;
-        let link4_rest2 = link5_inertia11 * link4_rest1;
-        let link4_rest3 = link5_rest3 - link4_rest2;
-        let link4_rest4 = link5_inertia12 * link4_rest1;
-        let link4_rest5 = link5_rest5 - link4_rest4;
-        let link4_rest6 = link4_pose2 * link4_rest3;
-        let link4_rest7 = p_3 + link4_rest6;
-        let link4_rest8 = link4_pose1 * link4_rest5;
-        let link4_rest9 = link4_rest7 + link4_rest8;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = p_2 - link4_rest9;
-        let link3_rest1 = link3_pivot0 * link3_rest0;
-        let link3_rest2 = link4_inertia11 * link3_rest1;
-        let link3_rest3 = link4_rest3 - link3_rest2;
-        let link3_rest4 = link4_inertia12 * link3_rest1;
-        let link3_rest5 = link4_rest5 - link3_rest4;
-        let link3_rest6 = link3_pose2 * link3_rest3;
-        let link3_rest7 = p_2 + link3_rest6;
-        let link3_rest8 = link3_pose1 * link3_rest5;
-        let link3_rest9 = link3_rest7 + link3_rest8;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_pose2 * link3_rest3;
-        let link2_rest1 = link3_rest9 + link2_rest0;
-        let link2_rest2 = link2_pose1 * link3_rest5;
-        let link2_rest3 = link2_rest1 + link2_rest2;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_1 - link3_rest9;
-        let link1_rest1 = ground_pivot0 * link1_rest0;
-        let link1_rest2 = link2_pivot3 * link1_rest1;
-        let link1_rest3 = link2_rest3 + link1_rest2;
-        let link1_rest4 = p_0 - link1_rest3;
-        let link1_rest5 = ground_pivot4 * link1_rest4;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot1 * link1_rest5;
-        let ground_vel1 = link1_rest1 - ground_vel0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = link2_pose1 * link1_rest5;
-        let link2_vel1 = link2_pose2 * link1_rest5;
-        let link2_vel2 = link1_rest5 + ground_vel1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link3_pose1 * link2_vel2;
-        let link3_vel1 = link2_vel0 + link3_vel0;
-        let link3_vel2 = link3_pose2 * link2_vel2;
-        let link3_vel3 = link2_vel1 + link3_vel2;
-        let link3_vel4 = link3_pivot1 * link3_vel3;
-        let link3_vel5 = link3_pivot2 * link3_vel1;
-        let link3_vel6 = link3_vel4 + link3_vel5;
-        let link3_vel7 = link3_rest1 + link3_vel6;
-        let link3_vel8 = link2_vel2 - link3_vel7;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link4_pose1 * link3_vel7;
-        let link4_vel1 = link3_vel1 + link4_vel0;
-        let link4_vel2 = link4_pose2 * link3_vel7;
-        let link4_vel3 = link3_vel3 + link4_vel2;
-        let link4_vel4 = link4_pivot1 * link4_vel3;
-        let link4_vel5 = link4_pivot2 * link4_vel1;
-        let link4_vel6 = link4_vel4 + link4_vel5;
-        let link4_vel7 = link4_rest1 + link4_vel6;
-        let link4_vel8 = link3_vel7 - link4_vel7;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link5_pose1 * link4_vel7;
-        let link5_vel1 = link4_vel1 + link5_vel0;
-        let link5_vel2 = link5_pose2 * link4_vel7;
-        let link5_vel3 = link4_vel3 + link5_vel2;
-        let link5_vel4 = link5_pivot1 * link5_vel3;
-        let link5_vel5 = link5_pivot2 * link5_vel1;
-        let link5_vel6 = link5_vel4 + link5_vel5;
-        let link5_vel7 = link5_rest1 + link5_vel6;
-        let link5_vel8 = link4_vel7 - link5_vel7;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link6_pose1 * link5_vel7;
-        let link6_vel1 = link5_vel1 + link6_vel0;
-        let link6_vel2 = link6_pose2 * link5_vel7;
-        let link6_vel3 = link5_vel3 + link6_vel2;
-        let link6_vel4 = link6_pivot1 * link6_vel3;
-        let link6_vel5 = link6_pivot2 * link6_vel1;
-        let link6_vel6 = link6_vel4 + link6_vel5;
-        let link6_vel7 = link6_rest1 + link6_vel6;
-        let link6_vel8 = link5_vel7 - link6_vel7;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link7_pose1 * link6_vel7;
-        let link7_vel1 = link6_vel1 + link7_vel0;
-        let link7_vel2 = link7_pose2 * link6_vel7;
-        let link7_vel3 = link6_vel3 + link7_vel2;
-        let link7_vel4 = link7_pivot1 * link7_vel3;
-        let link7_vel5 = link7_pivot2 * link7_vel1;
-        let link7_vel6 = link7_vel4 + link7_vel5;
-        let link7_vel7 = link7_rest1 + link7_vel6;
-        let link7_vel8 = link6_vel7 - link7_vel7;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link8_pose1 * link7_vel7;
-        let link8_vel1 = link7_vel1 + link8_vel0;
-        let link8_vel2 = link8_pose2 * link7_vel7;
-        let link8_vel3 = link7_vel3 + link8_vel2;
-        let link8_vel4 = link8_pivot1 * link8_vel3;
-        let link8_vel5 = link8_pivot2 * link8_vel1;
-        let link8_vel6 = link8_vel4 + link8_vel5;
-        let link8_vel7 = link8_rest1 + link8_vel6;
-        let link8_vel8 = link7_vel7 - link8_vel7;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_pose4 * link8_vel7;
-        let link9_vel1 = link8_vel1 + link9_vel0;
-        let link9_vel2 = link8_pose3 * link8_vel7;
-        let link9_vel3 = link8_vel3 + link9_vel2;
-        let link9_vel4 = link9_pivot1 * link9_vel3;
-        let link9_vel5 = link9_pivot2 * link9_vel1;
-        let link9_vel6 = link9_vel4 + link9_vel5;
-        let link9_vel7 = link9_rest1 + link9_vel6;
-        let link9_vel8 = link8_vel7 - link9_vel7;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link10_pose1 * link9_vel7;
-        let link10_vel1 = link9_vel1 + link10_vel0;
-        let link10_vel2 = link10_pose2 * link9_vel7;
-        let link10_vel3 = link9_vel3 + link10_vel2;
-        let link10_vel4 = link10_pivot0 * link10_vel3;
-        let link10_vel5 = link10_pivot1 * link10_vel1;
-        let link10_vel6 = link10_vel4 + link10_vel5;
-        let link10_vel7 = link10_rest0 + link10_vel6;
-        let link10_vel8 = link9_vel7 + link10_vel7;
-        // link3: energy
-        let link3_energy0 = p_2 * link3_vel8;
-        // link4: energy
-        let link4_energy0 = p_3 * link4_vel8;
-        let link4_energy1 = link3_energy0 + link4_energy0;
-        // link5: energy
-        let link5_energy0 = p_4 * link5_vel8;
-        let link5_energy1 = link4_energy1 + link5_energy0;
-        // link6: energy
-        let link6_energy0 = p_5 * link6_vel8;
-        let link6_energy1 = link5_energy1 + link6_energy0;
-        // link7: energy
-        let link7_energy0 = p_6 * link7_vel8;
-        let link7_energy1 = link6_energy1 + link7_energy0;
-        // link8: energy
-        let link8_energy0 = p_7 * link8_vel8;
-        let link8_energy1 = link7_energy1 + link8_energy0;
-        // link9: energy
-        let link9_energy0 = p_8 * link9_vel8;
-        let link9_energy1 = link8_energy1 + link9_energy0;
-        // link10: energy
-        let link10_energy0 = p_9 * link10_vel8;
-        let link10_energy1 = link9_energy1 + link10_energy0;
-        let link10_energy2 = p_1 * ground_vel1;
-        let link10_energy3 = link10_energy1 - link10_energy2;
-        let link10_energy4 = p_0 * link1_rest5;
-        let link10_energy5 = link10_energy3 - link10_energy4;
-        let link10_energy6 = 0.5 * link10_energy5;
-        // ground: energy
-        let ground_energy0 = 9.81 * link2_inertia12;
-        let kinetic = link10_energy6;
-        let potential = -ground_energy0;
-        [kinetic, potential]
+        let mut result = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
+        result
+    }
+
+    #[inline(always)]
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            let link1_pose0 = 0.95 * link1_cos0;
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link2_pose1 + link3_pose1;
+            let link3_inertia1 = link2_pose2 + link3_pose2;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link3_pose1 + link4_pose1;
+            let link4_inertia1 = link3_pose2 + link4_pose2;
+            let link4_inertia2 = link4_pose1 + link3_inertia0;
+            let link4_inertia3 = link4_pose2 + link3_inertia1;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link4_pose1 + link5_pose1;
+            let link5_inertia1 = link4_pose2 + link5_pose2;
+            let link5_inertia2 = link5_pose1 + link4_inertia0;
+            let link5_inertia3 = link5_pose2 + link4_inertia1;
+            let link5_inertia4 = link5_pose1 + link4_inertia2;
+            let link5_inertia5 = link5_pose2 + link4_inertia3;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link5_pose1 + link6_pose1;
+            let link6_inertia1 = link5_pose2 + link6_pose2;
+            let link6_inertia2 = link6_pose1 + link5_inertia0;
+            let link6_inertia3 = link6_pose2 + link5_inertia1;
+            let link6_inertia4 = link6_pose1 + link5_inertia2;
+            let link6_inertia5 = link6_pose2 + link5_inertia3;
+            let link6_inertia6 = link6_pose1 + link5_inertia4;
+            let link6_inertia7 = link6_pose2 + link5_inertia5;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link6_pose1 + link7_pose1;
+            let link7_inertia1 = link6_pose2 + link7_pose2;
+            let link7_inertia2 = link7_pose1 + link6_inertia0;
+            let link7_inertia3 = link7_pose2 + link6_inertia1;
+            let link7_inertia4 = link7_pose1 + link6_inertia2;
+            let link7_inertia5 = link7_pose2 + link6_inertia3;
+            let link7_inertia6 = link7_pose1 + link6_inertia4;
+            let link7_inertia7 = link7_pose2 + link6_inertia5;
+            let link7_inertia8 = link7_pose1 + link6_inertia6;
+            let link7_inertia9 = link7_pose2 + link6_inertia7;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link7_pose1 + link8_pose1;
+            let link8_inertia1 = link7_pose2 + link8_pose2;
+            let link8_inertia2 = link8_pose1 + link7_inertia0;
+            let link8_inertia3 = link8_pose2 + link7_inertia1;
+            let link8_inertia4 = link8_pose1 + link7_inertia2;
+            let link8_inertia5 = link8_pose2 + link7_inertia3;
+            let link8_inertia6 = link8_pose1 + link7_inertia4;
+            let link8_inertia7 = link8_pose2 + link7_inertia5;
+            let link8_inertia8 = link8_pose1 + link7_inertia6;
+            let link8_inertia9 = link8_pose2 + link7_inertia7;
+            let link8_inertia10 = link8_pose1 + link7_inertia8;
+            let link8_inertia11 = link8_pose2 + link7_inertia9;
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.29940119760479045 * link10_cos0;
+            let link10_inertia1 = link10_cos0 * link10_inertia0;
+            let link10_inertia2 = link10_sin0 * link10_inertia0;
+            let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
+            let link10_inertia4 = 0.05 * link10_cos0;
+            let link10_inertia5 = link10_pose2 * link10_inertia1;
+            let link10_inertia6 = link10_pose2 * link10_inertia2;
+            let link10_inertia7 = link10_pose2 * link10_inertia5;
+            let link10_inertia8 = link10_pose1 * link10_inertia2;
+            let link10_inertia9 = link10_inertia5 + link10_inertia8;
+            let link10_inertia10 = link10_pose1 * link10_inertia3;
+            let link10_inertia11 = link10_inertia6 - link10_inertia10;
+            let link10_inertia12 = link10_inertia6 + link10_inertia11;
+            let link10_inertia13 = link10_pose1 * link10_inertia12;
+            let link10_inertia14 = link10_inertia7 + link10_inertia13;
+            let link10_inertia15 = link9_pose1 + link10_inertia4;
+            let link10_inertia16 = link9_pose1 - link10_inertia9;
+            let link10_inertia17 = link9_pose2 - link10_inertia11;
+            let link10_inertia18 = link10_inertia14 - 0.033350000000000005;
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot0 = 1.0 / link10_inertia18;
+            let link9_pivot1 = link10_inertia16 * link9_pivot0;
+            let link9_pivot2 = link10_inertia17 * link9_pivot0;
+            let link9_pivot3 = link10_inertia16 * link9_pivot1;
+            let link9_pivot4 = link10_inertia1 - link9_pivot3;
+            let link9_pivot5 = link10_inertia16 * link9_pivot2;
+            let link9_pivot6 = link10_inertia2 - link9_pivot5;
+            let link9_pivot7 = link10_inertia17 * link9_pivot2;
+            let link9_pivot8 = link10_inertia3 + link9_pivot7;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link8_pose3 * link9_pivot4;
+            let link9_inertia1 = link8_pose3 * link9_pivot6;
+            let link9_inertia2 = link8_pose3 * link9_inertia0;
+            let link9_inertia3 = link8_pose4 * link9_pivot6;
+            let link9_inertia4 = link9_inertia0 + link9_inertia3;
+            let link9_inertia5 = link8_pose4 * link9_pivot8;
+            let link9_inertia6 = link9_inertia1 - link9_inertia5;
+            let link9_inertia7 = link9_inertia1 + link9_inertia6;
+            let link9_inertia8 = link8_pose4 * link9_inertia7;
+            let link9_inertia9 = link9_inertia2 + link9_inertia8;
+            let link9_inertia10 = link8_pose3 + link10_inertia15;
+            let link9_inertia11 = link8_pose3 - link9_inertia4;
+            let link9_inertia12 = link8_pose4 - link9_inertia6;
+            let link9_inertia13 = link9_inertia9 - 0.05835;
+            // link8: U, Mj, k and the reduced inertia M' (4.44)
+            let link8_pivot0 = link8_pose2 * link9_inertia11;
+            let link8_pivot1 = link8_pose1 * link9_inertia12;
+            let link8_pivot2 = link8_pivot0 + link8_pivot1;
+            let link8_pivot3 = link9_inertia13 - link8_pivot2;
+            let link8_pivot4 = link8_inertia1 * link9_inertia11;
+            let link8_pivot5 = link8_inertia0 * link9_inertia12;
+            let link8_pivot6 = link8_pivot4 + link8_pivot5;
+            let link8_pivot7 = link9_inertia13 - link8_pivot6;
+            let link8_pivot8 = link8_inertia3 * link9_inertia11;
+            let link8_pivot9 = link8_inertia2 * link9_inertia12;
+            let link8_pivot10 = link8_pivot8 + link8_pivot9;
+            let link8_pivot11 = link9_inertia13 - link8_pivot10;
+            let link8_pivot12 = link8_inertia5 * link9_inertia11;
+            let link8_pivot13 = link8_inertia4 * link9_inertia12;
+            let link8_pivot14 = link8_pivot12 + link8_pivot13;
+            let link8_pivot15 = link9_inertia13 - link8_pivot14;
+            let link8_pivot16 = link8_inertia7 * link9_inertia11;
+            let link8_pivot17 = link8_inertia6 * link9_inertia12;
+            let link8_pivot18 = link8_pivot16 + link8_pivot17;
+            let link8_pivot19 = link9_inertia13 - link8_pivot18;
+            let link8_pivot20 = link8_inertia9 * link9_inertia11;
+            let link8_pivot21 = link8_inertia8 * link9_inertia12;
+            let link8_pivot22 = link8_pivot20 + link8_pivot21;
+            let link8_pivot23 = link9_inertia13 - link8_pivot22;
+            let link8_pivot24 = link8_inertia11 * link9_inertia11;
+            let link8_pivot25 = link8_inertia10 * link9_inertia12;
+            let link8_pivot26 = link8_pivot24 + link8_pivot25;
+            let link8_pivot27 = link9_inertia13 - link8_pivot26;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia12 = link8_pose2 * link9_pivot4;
+            let link8_inertia13 = link9_inertia11 - link8_inertia12;
+            let link8_inertia14 = link8_pose2 * link9_pivot6;
+            let link8_inertia15 = link9_inertia12 - link8_inertia14;
+            let link8_inertia16 = link9_inertia11 + link8_inertia13;
+            let link8_inertia17 = link8_pose2 * link8_inertia16;
+            let link8_inertia18 = link9_inertia13 - link8_inertia17;
+            let link8_inertia19 = link8_pose1 * link9_pivot6;
+            let link8_inertia20 = link8_inertia13 - link8_inertia19;
+            let link8_inertia21 = link8_pose1 * link9_pivot8;
+            let link8_inertia22 = link8_inertia15 + link8_inertia21;
+            let link8_inertia23 = link8_inertia15 + link8_inertia22;
+            let link8_inertia24 = link8_pose1 * link8_inertia23;
+            let link8_inertia25 = link8_inertia18 - link8_inertia24;
+            let link8_inertia26 = link7_pose3 + link9_inertia10;
+            let link8_inertia27 = link7_pose3 + link8_inertia20;
+            let link8_inertia28 = link7_pose4 + link8_inertia22;
+            let link8_inertia29 = link8_inertia25 - 0.08335000000000001;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = link7_pose2 * link8_inertia27;
+            let link7_pivot1 = link7_pose1 * link8_inertia28;
+            let link7_pivot2 = link7_pivot0 + link7_pivot1;
+            let link7_pivot3 = link8_inertia29 - link7_pivot2;
+            let link7_pivot4 = link7_inertia1 * link8_inertia27;
+            let link7_pivot5 = link7_inertia0 * link8_inertia28;
+            let link7_pivot6 = link7_pivot4 + link7_pivot5;
+            let link7_pivot7 = link8_inertia29 - link7_pivot6;
+            let link7_pivot8 = link7_inertia3 * link8_inertia27;
+            let link7_pivot9 = link7_inertia2 * link8_inertia28;
+            let link7_pivot10 = link7_pivot8 + link7_pivot9;
+            let link7_pivot11 = link8_inertia29 - link7_pivot10;
+            let link7_pivot12 = link7_inertia5 * link8_inertia27;
+            let link7_pivot13 = link7_inertia4 * link8_inertia28;
+            let link7_pivot14 = link7_pivot12 + link7_pivot13;
+            let link7_pivot15 = link8_inertia29 - link7_pivot14;
+            let link7_pivot16 = link7_inertia7 * link8_inertia27;
+            let link7_pivot17 = link7_inertia6 * link8_inertia28;
+            let link7_pivot18 = link7_pivot16 + link7_pivot17;
+            let link7_pivot19 = link8_inertia29 - link7_pivot18;
+            let link7_pivot20 = link7_inertia9 * link8_inertia27;
+            let link7_pivot21 = link7_inertia8 * link8_inertia28;
+            let link7_pivot22 = link7_pivot20 + link7_pivot21;
+            let link7_pivot23 = link8_inertia29 - link7_pivot22;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia10 = link7_pose2 * link9_pivot4;
+            let link7_inertia11 = link8_inertia27 - link7_inertia10;
+            let link7_inertia12 = link7_pose2 * link9_pivot6;
+            let link7_inertia13 = link8_inertia28 - link7_inertia12;
+            let link7_inertia14 = link8_inertia27 + link7_inertia11;
+            let link7_inertia15 = link7_pose2 * link7_inertia14;
+            let link7_inertia16 = link8_inertia29 - link7_inertia15;
+            let link7_inertia17 = link7_pose1 * link9_pivot6;
+            let link7_inertia18 = link7_inertia11 - link7_inertia17;
+            let link7_inertia19 = link7_pose1 * link9_pivot8;
+            let link7_inertia20 = link7_inertia13 + link7_inertia19;
+            let link7_inertia21 = link7_inertia13 + link7_inertia20;
+            let link7_inertia22 = link7_pose1 * link7_inertia21;
+            let link7_inertia23 = link7_inertia16 - link7_inertia22;
+            let link7_inertia24 = link6_pose3 + link8_inertia26;
+            let link7_inertia25 = link6_pose3 + link7_inertia18;
+            let link7_inertia26 = link6_pose4 + link7_inertia20;
+            let link7_inertia27 = link7_inertia23 - 0.10835;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = link6_pose2 * link7_inertia25;
+            let link6_pivot1 = link6_pose1 * link7_inertia26;
+            let link6_pivot2 = link6_pivot0 + link6_pivot1;
+            let link6_pivot3 = link7_inertia27 - link6_pivot2;
+            let link6_pivot4 = link6_inertia1 * link7_inertia25;
+            let link6_pivot5 = link6_inertia0 * link7_inertia26;
+            let link6_pivot6 = link6_pivot4 + link6_pivot5;
+            let link6_pivot7 = link7_inertia27 - link6_pivot6;
+            let link6_pivot8 = link6_inertia3 * link7_inertia25;
+            let link6_pivot9 = link6_inertia2 * link7_inertia26;
+            let link6_pivot10 = link6_pivot8 + link6_pivot9;
+            let link6_pivot11 = link7_inertia27 - link6_pivot10;
+            let link6_pivot12 = link6_inertia5 * link7_inertia25;
+            let link6_pivot13 = link6_inertia4 * link7_inertia26;
+            let link6_pivot14 = link6_pivot12 + link6_pivot13;
+            let link6_pivot15 = link7_inertia27 - link6_pivot14;
+            let link6_pivot16 = link6_inertia7 * link7_inertia25;
+            let link6_pivot17 = link6_inertia6 * link7_inertia26;
+            let link6_pivot18 = link6_pivot16 + link6_pivot17;
+            let link6_pivot19 = link7_inertia27 - link6_pivot18;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia8 = link6_pose2 * link9_pivot4;
+            let link6_inertia9 = link7_inertia25 - link6_inertia8;
+            let link6_inertia10 = link6_pose2 * link9_pivot6;
+            let link6_inertia11 = link7_inertia26 - link6_inertia10;
+            let link6_inertia12 = link7_inertia25 + link6_inertia9;
+            let link6_inertia13 = link6_pose2 * link6_inertia12;
+            let link6_inertia14 = link7_inertia27 - link6_inertia13;
+            let link6_inertia15 = link6_pose1 * link9_pivot6;
+            let link6_inertia16 = link6_inertia9 - link6_inertia15;
+            let link6_inertia17 = link6_pose1 * link9_pivot8;
+            let link6_inertia18 = link6_inertia11 + link6_inertia17;
+            let link6_inertia19 = link6_inertia11 + link6_inertia18;
+            let link6_inertia20 = link6_pose1 * link6_inertia19;
+            let link6_inertia21 = link6_inertia14 - link6_inertia20;
+            let link6_inertia22 = link5_pose3 + link7_inertia24;
+            let link6_inertia23 = link5_pose3 + link6_inertia16;
+            let link6_inertia24 = link5_pose4 + link6_inertia18;
+            let link6_inertia25 = link6_inertia21 - 0.13335;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = link5_pose2 * link6_inertia23;
+            let link5_pivot1 = link5_pose1 * link6_inertia24;
+            let link5_pivot2 = link5_pivot0 + link5_pivot1;
+            let link5_pivot3 = link6_inertia25 - link5_pivot2;
+            let link5_pivot4 = link5_inertia1 * link6_inertia23;
+            let link5_pivot5 = link5_inertia0 * link6_inertia24;
+            let link5_pivot6 = link5_pivot4 + link5_pivot5;
+            let link5_pivot7 = link6_inertia25 - link5_pivot6;
+            let link5_pivot8 = link5_inertia3 * link6_inertia23;
+            let link5_pivot9 = link5_inertia2 * link6_inertia24;
+            let link5_pivot10 = link5_pivot8 + link5_pivot9;
+            let link5_pivot11 = link6_inertia25 - link5_pivot10;
+            let link5_pivot12 = link5_inertia5 * link6_inertia23;
+            let link5_pivot13 = link5_inertia4 * link6_inertia24;
+            let link5_pivot14 = link5_pivot12 + link5_pivot13;
+            let link5_pivot15 = link6_inertia25 - link5_pivot14;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia6 = link5_pose2 * link9_pivot4;
+            let link5_inertia7 = link6_inertia23 - link5_inertia6;
+            let link5_inertia8 = link5_pose2 * link9_pivot6;
+            let link5_inertia9 = link6_inertia24 - link5_inertia8;
+            let link5_inertia10 = link6_inertia23 + link5_inertia7;
+            let link5_inertia11 = link5_pose2 * link5_inertia10;
+            let link5_inertia12 = link6_inertia25 - link5_inertia11;
+            let link5_inertia13 = link5_pose1 * link9_pivot6;
+            let link5_inertia14 = link5_inertia7 - link5_inertia13;
+            let link5_inertia15 = link5_pose1 * link9_pivot8;
+            let link5_inertia16 = link5_inertia9 + link5_inertia15;
+            let link5_inertia17 = link5_inertia9 + link5_inertia16;
+            let link5_inertia18 = link5_pose1 * link5_inertia17;
+            let link5_inertia19 = link5_inertia12 - link5_inertia18;
+            let link5_inertia20 = link4_pose3 + link6_inertia22;
+            let link5_inertia21 = link4_pose3 + link5_inertia14;
+            let link5_inertia22 = link4_pose4 + link5_inertia16;
+            let link5_inertia23 = link5_inertia19 - 0.15835;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = link4_pose2 * link5_inertia21;
+            let link4_pivot1 = link4_pose1 * link5_inertia22;
+            let link4_pivot2 = link4_pivot0 + link4_pivot1;
+            let link4_pivot3 = link5_inertia23 - link4_pivot2;
+            let link4_pivot4 = link4_inertia1 * link5_inertia21;
+            let link4_pivot5 = link4_inertia0 * link5_inertia22;
+            let link4_pivot6 = link4_pivot4 + link4_pivot5;
+            let link4_pivot7 = link5_inertia23 - link4_pivot6;
+            let link4_pivot8 = link4_inertia3 * link5_inertia21;
+            let link4_pivot9 = link4_inertia2 * link5_inertia22;
+            let link4_pivot10 = link4_pivot8 + link4_pivot9;
+            let link4_pivot11 = link5_inertia23 - link4_pivot10;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia4 = link4_pose2 * link9_pivot4;
+            let link4_inertia5 = link5_inertia21 - link4_inertia4;
+            let link4_inertia6 = link4_pose2 * link9_pivot6;
+            let link4_inertia7 = link5_inertia22 - link4_inertia6;
+            let link4_inertia8 = link5_inertia21 + link4_inertia5;
+            let link4_inertia9 = link4_pose2 * link4_inertia8;
+            let link4_inertia10 = link5_inertia23 - link4_inertia9;
+            let link4_inertia11 = link4_pose1 * link9_pivot6;
+            let link4_inertia12 = link4_inertia5 - link4_inertia11;
+            let link4_inertia13 = link4_pose1 * link9_pivot8;
+            let link4_inertia14 = link4_inertia7 + link4_inertia13;
+            let link4_inertia15 = link4_inertia7 + link4_inertia14;
+            let link4_inertia16 = link4_pose1 * link4_inertia15;
+            let link4_inertia17 = link4_inertia10 - link4_inertia16;
+            let link4_inertia18 = link3_pose3 + link5_inertia20;
+            let link4_inertia19 = link3_pose3 + link4_inertia12;
+            let link4_inertia20 = link3_pose4 + link4_inertia14;
+            let link4_inertia21 = link4_inertia17 - 0.18334999999999999;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = link3_pose2 * link4_inertia19;
+            let link3_pivot1 = link3_pose1 * link4_inertia20;
+            let link3_pivot2 = link3_pivot0 + link3_pivot1;
+            let link3_pivot3 = link4_inertia21 - link3_pivot2;
+            let link3_pivot4 = link3_inertia1 * link4_inertia19;
+            let link3_pivot5 = link3_inertia0 * link4_inertia20;
+            let link3_pivot6 = link3_pivot4 + link3_pivot5;
+            let link3_pivot7 = link4_inertia21 - link3_pivot6;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia2 = link3_pose2 * link9_pivot4;
+            let link3_inertia3 = link4_inertia19 - link3_inertia2;
+            let link3_inertia4 = link3_pose2 * link9_pivot6;
+            let link3_inertia5 = link4_inertia20 - link3_inertia4;
+            let link3_inertia6 = link4_inertia19 + link3_inertia3;
+            let link3_inertia7 = link3_pose2 * link3_inertia6;
+            let link3_inertia8 = link4_inertia21 - link3_inertia7;
+            let link3_inertia9 = link3_pose1 * link9_pivot6;
+            let link3_inertia10 = link3_inertia3 - link3_inertia9;
+            let link3_inertia11 = link3_pose1 * link9_pivot8;
+            let link3_inertia12 = link3_inertia5 + link3_inertia11;
+            let link3_inertia13 = link3_inertia5 + link3_inertia12;
+            let link3_inertia14 = link3_pose1 * link3_inertia13;
+            let link3_inertia15 = link3_inertia8 - link3_inertia14;
+            let link3_inertia16 = link2_pose3 + link4_inertia18;
+            let link3_inertia17 = link2_pose3 + link3_inertia10;
+            let link3_inertia18 = link2_pose4 + link3_inertia12;
+            let link3_inertia19 = link3_inertia15 - 0.20834999999999998;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = link2_pose2 * link3_inertia17;
+            let link2_pivot1 = link2_pose1 * link3_inertia18;
+            let link2_pivot2 = link2_pivot0 + link2_pivot1;
+            let link2_pivot3 = link3_inertia19 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link2_pose2 * link9_pivot4;
+            let link2_inertia1 = link3_inertia17 - link2_inertia0;
+            let link2_inertia2 = link2_pose2 * link9_pivot6;
+            let link2_inertia3 = link3_inertia18 - link2_inertia2;
+            let link2_inertia4 = link3_inertia17 + link2_inertia1;
+            let link2_inertia5 = link2_pose2 * link2_inertia4;
+            let link2_inertia6 = link3_inertia19 - link2_inertia5;
+            let link2_inertia7 = link2_pose1 * link9_pivot8;
+            let link2_inertia8 = link2_inertia3 + link2_inertia7;
+            let link2_inertia9 = link2_inertia3 + link2_inertia8;
+            let link2_inertia10 = link2_pose1 * link2_inertia9;
+            let link2_inertia11 = link2_inertia6 - link2_inertia10;
+            let link2_inertia12 = link1_pose0 + link3_inertia16;
+            let link2_inertia13 = link2_inertia11 - 0.23334999999999997;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / link9_inertia13;
+            let ground_pivot1 = link8_pivot3 * ground_pivot0;
+            let ground_pivot2 = link8_pivot3 * ground_pivot1;
+            let ground_pivot3 = link8_inertia29 - ground_pivot2;
+            let ground_pivot4 = link8_pivot7 * ground_pivot0;
+            let ground_pivot5 = link8_pivot3 * ground_pivot4;
+            let ground_pivot6 = link7_pivot3 - ground_pivot5;
+            let ground_pivot7 = link8_pivot11 * ground_pivot0;
+            let ground_pivot8 = link8_pivot3 * ground_pivot7;
+            let ground_pivot9 = link7_pivot7 - ground_pivot8;
+            let ground_pivot10 = link8_pivot15 * ground_pivot0;
+            let ground_pivot11 = link8_pivot3 * ground_pivot10;
+            let ground_pivot12 = link7_pivot11 - ground_pivot11;
+            let ground_pivot13 = link8_pivot19 * ground_pivot0;
+            let ground_pivot14 = link8_pivot3 * ground_pivot13;
+            let ground_pivot15 = link7_pivot15 - ground_pivot14;
+            let ground_pivot16 = link8_pivot23 * ground_pivot0;
+            let ground_pivot17 = link8_pivot3 * ground_pivot16;
+            let ground_pivot18 = link7_pivot19 - ground_pivot17;
+            let ground_pivot19 = link8_pivot27 * ground_pivot0;
+            let ground_pivot20 = link8_pivot3 * ground_pivot19;
+            let ground_pivot21 = link7_pivot23 - ground_pivot20;
+            let ground_pivot22 = link8_pivot7 * ground_pivot4;
+            let ground_pivot23 = link7_inertia27 - ground_pivot22;
+            let ground_pivot24 = link8_pivot7 * ground_pivot7;
+            let ground_pivot25 = link6_pivot3 - ground_pivot24;
+            let ground_pivot26 = link8_pivot7 * ground_pivot10;
+            let ground_pivot27 = link6_pivot7 - ground_pivot26;
+            let ground_pivot28 = link8_pivot7 * ground_pivot13;
+            let ground_pivot29 = link6_pivot11 - ground_pivot28;
+            let ground_pivot30 = link8_pivot7 * ground_pivot16;
+            let ground_pivot31 = link6_pivot15 - ground_pivot30;
+            let ground_pivot32 = link8_pivot7 * ground_pivot19;
+            let ground_pivot33 = link6_pivot19 - ground_pivot32;
+            let ground_pivot34 = link8_pivot11 * ground_pivot7;
+            let ground_pivot35 = link6_inertia25 - ground_pivot34;
+            let ground_pivot36 = link8_pivot11 * ground_pivot10;
+            let ground_pivot37 = link5_pivot3 - ground_pivot36;
+            let ground_pivot38 = link8_pivot11 * ground_pivot13;
+            let ground_pivot39 = link5_pivot7 - ground_pivot38;
+            let ground_pivot40 = link8_pivot11 * ground_pivot16;
+            let ground_pivot41 = link5_pivot11 - ground_pivot40;
+            let ground_pivot42 = link8_pivot11 * ground_pivot19;
+            let ground_pivot43 = link5_pivot15 - ground_pivot42;
+            let ground_pivot44 = link8_pivot15 * ground_pivot10;
+            let ground_pivot45 = link5_inertia23 - ground_pivot44;
+            let ground_pivot46 = link8_pivot15 * ground_pivot13;
+            let ground_pivot47 = link4_pivot3 - ground_pivot46;
+            let ground_pivot48 = link8_pivot15 * ground_pivot16;
+            let ground_pivot49 = link4_pivot7 - ground_pivot48;
+            let ground_pivot50 = link8_pivot15 * ground_pivot19;
+            let ground_pivot51 = link4_pivot11 - ground_pivot50;
+            let ground_pivot52 = link8_pivot19 * ground_pivot13;
+            let ground_pivot53 = link4_inertia21 - ground_pivot52;
+            let ground_pivot54 = link8_pivot19 * ground_pivot16;
+            let ground_pivot55 = link3_pivot3 - ground_pivot54;
+            let ground_pivot56 = link8_pivot19 * ground_pivot19;
+            let ground_pivot57 = link3_pivot7 - ground_pivot56;
+            let ground_pivot58 = link8_pivot23 * ground_pivot16;
+            let ground_pivot59 = link3_inertia19 - ground_pivot58;
+            let ground_pivot60 = link8_pivot23 * ground_pivot19;
+            let ground_pivot61 = link2_pivot3 - ground_pivot60;
+            let ground_pivot62 = link8_pivot27 * ground_pivot19;
+            let ground_pivot63 = link2_inertia13 - ground_pivot62;
+            let ground_pivot64 = 1.0 / ground_pivot3;
+            let ground_pivot65 = ground_pivot6 * ground_pivot64;
+            let ground_pivot66 = ground_pivot6 * ground_pivot65;
+            let ground_pivot67 = ground_pivot23 - ground_pivot66;
+            let ground_pivot68 = ground_pivot9 * ground_pivot64;
+            let ground_pivot69 = ground_pivot6 * ground_pivot68;
+            let ground_pivot70 = ground_pivot25 - ground_pivot69;
+            let ground_pivot71 = ground_pivot12 * ground_pivot64;
+            let ground_pivot72 = ground_pivot6 * ground_pivot71;
+            let ground_pivot73 = ground_pivot27 - ground_pivot72;
+            let ground_pivot74 = ground_pivot15 * ground_pivot64;
+            let ground_pivot75 = ground_pivot6 * ground_pivot74;
+            let ground_pivot76 = ground_pivot29 - ground_pivot75;
+            let ground_pivot77 = ground_pivot18 * ground_pivot64;
+            let ground_pivot78 = ground_pivot6 * ground_pivot77;
+            let ground_pivot79 = ground_pivot31 - ground_pivot78;
+            let ground_pivot80 = ground_pivot21 * ground_pivot64;
+            let ground_pivot81 = ground_pivot6 * ground_pivot80;
+            let ground_pivot82 = ground_pivot33 - ground_pivot81;
+            let ground_pivot83 = ground_pivot9 * ground_pivot68;
+            let ground_pivot84 = ground_pivot35 - ground_pivot83;
+            let ground_pivot85 = ground_pivot9 * ground_pivot71;
+            let ground_pivot86 = ground_pivot37 - ground_pivot85;
+            let ground_pivot87 = ground_pivot9 * ground_pivot74;
+            let ground_pivot88 = ground_pivot39 - ground_pivot87;
+            let ground_pivot89 = ground_pivot9 * ground_pivot77;
+            let ground_pivot90 = ground_pivot41 - ground_pivot89;
+            let ground_pivot91 = ground_pivot9 * ground_pivot80;
+            let ground_pivot92 = ground_pivot43 - ground_pivot91;
+            let ground_pivot93 = ground_pivot12 * ground_pivot71;
+            let ground_pivot94 = ground_pivot45 - ground_pivot93;
+            let ground_pivot95 = ground_pivot12 * ground_pivot74;
+            let ground_pivot96 = ground_pivot47 - ground_pivot95;
+            let ground_pivot97 = ground_pivot12 * ground_pivot77;
+            let ground_pivot98 = ground_pivot49 - ground_pivot97;
+            let ground_pivot99 = ground_pivot12 * ground_pivot80;
+            let ground_pivot100 = ground_pivot51 - ground_pivot99;
+            let ground_pivot101 = ground_pivot15 * ground_pivot74;
+            let ground_pivot102 = ground_pivot53 - ground_pivot101;
+            let ground_pivot103 = ground_pivot15 * ground_pivot77;
+            let ground_pivot104 = ground_pivot55 - ground_pivot103;
+            let ground_pivot105 = ground_pivot15 * ground_pivot80;
+            let ground_pivot106 = ground_pivot57 - ground_pivot105;
+            let ground_pivot107 = ground_pivot18 * ground_pivot77;
+            let ground_pivot108 = ground_pivot59 - ground_pivot107;
+            let ground_pivot109 = ground_pivot18 * ground_pivot80;
+            let ground_pivot110 = ground_pivot61 - ground_pivot109;
+            let ground_pivot111 = ground_pivot21 * ground_pivot80;
+            let ground_pivot112 = ground_pivot63 - ground_pivot111;
+            let ground_pivot113 = 1.0 / ground_pivot67;
+            let ground_pivot114 = ground_pivot70 * ground_pivot113;
+            let ground_pivot115 = ground_pivot70 * ground_pivot114;
+            let ground_pivot116 = ground_pivot84 - ground_pivot115;
+            let ground_pivot117 = ground_pivot73 * ground_pivot113;
+            let ground_pivot118 = ground_pivot70 * ground_pivot117;
+            let ground_pivot119 = ground_pivot86 - ground_pivot118;
+            let ground_pivot120 = ground_pivot76 * ground_pivot113;
+            let ground_pivot121 = ground_pivot70 * ground_pivot120;
+            let ground_pivot122 = ground_pivot88 - ground_pivot121;
+            let ground_pivot123 = ground_pivot79 * ground_pivot113;
+            let ground_pivot124 = ground_pivot70 * ground_pivot123;
+            let ground_pivot125 = ground_pivot90 - ground_pivot124;
+            let ground_pivot126 = ground_pivot82 * ground_pivot113;
+            let ground_pivot127 = ground_pivot70 * ground_pivot126;
+            let ground_pivot128 = ground_pivot92 - ground_pivot127;
+            let ground_pivot129 = ground_pivot73 * ground_pivot117;
+            let ground_pivot130 = ground_pivot94 - ground_pivot129;
+            let ground_pivot131 = ground_pivot73 * ground_pivot120;
+            let ground_pivot132 = ground_pivot96 - ground_pivot131;
+            let ground_pivot133 = ground_pivot73 * ground_pivot123;
+            let ground_pivot134 = ground_pivot98 - ground_pivot133;
+            let ground_pivot135 = ground_pivot73 * ground_pivot126;
+            let ground_pivot136 = ground_pivot100 - ground_pivot135;
+            let ground_pivot137 = ground_pivot76 * ground_pivot120;
+            let ground_pivot138 = ground_pivot102 - ground_pivot137;
+            let ground_pivot139 = ground_pivot76 * ground_pivot123;
+            let ground_pivot140 = ground_pivot104 - ground_pivot139;
+            let ground_pivot141 = ground_pivot76 * ground_pivot126;
+            let ground_pivot142 = ground_pivot106 - ground_pivot141;
+            let ground_pivot143 = ground_pivot79 * ground_pivot123;
+            let ground_pivot144 = ground_pivot108 - ground_pivot143;
+            let ground_pivot145 = ground_pivot79 * ground_pivot126;
+            let ground_pivot146 = ground_pivot110 - ground_pivot145;
+            let ground_pivot147 = ground_pivot82 * ground_pivot126;
+            let ground_pivot148 = ground_pivot112 - ground_pivot147;
+            let ground_pivot149 = 1.0 / ground_pivot116;
+            let ground_pivot150 = ground_pivot119 * ground_pivot149;
+            let ground_pivot151 = ground_pivot119 * ground_pivot150;
+            let ground_pivot152 = ground_pivot130 - ground_pivot151;
+            let ground_pivot153 = ground_pivot122 * ground_pivot149;
+            let ground_pivot154 = ground_pivot119 * ground_pivot153;
+            let ground_pivot155 = ground_pivot132 - ground_pivot154;
+            let ground_pivot156 = ground_pivot125 * ground_pivot149;
+            let ground_pivot157 = ground_pivot119 * ground_pivot156;
+            let ground_pivot158 = ground_pivot134 - ground_pivot157;
+            let ground_pivot159 = ground_pivot128 * ground_pivot149;
+            let ground_pivot160 = ground_pivot119 * ground_pivot159;
+            let ground_pivot161 = ground_pivot136 - ground_pivot160;
+            let ground_pivot162 = ground_pivot122 * ground_pivot153;
+            let ground_pivot163 = ground_pivot138 - ground_pivot162;
+            let ground_pivot164 = ground_pivot122 * ground_pivot156;
+            let ground_pivot165 = ground_pivot140 - ground_pivot164;
+            let ground_pivot166 = ground_pivot122 * ground_pivot159;
+            let ground_pivot167 = ground_pivot142 - ground_pivot166;
+            let ground_pivot168 = ground_pivot125 * ground_pivot156;
+            let ground_pivot169 = ground_pivot144 - ground_pivot168;
+            let ground_pivot170 = ground_pivot125 * ground_pivot159;
+            let ground_pivot171 = ground_pivot146 - ground_pivot170;
+            let ground_pivot172 = ground_pivot128 * ground_pivot159;
+            let ground_pivot173 = ground_pivot148 - ground_pivot172;
+            let ground_pivot174 = 1.0 / ground_pivot152;
+            let ground_pivot175 = ground_pivot155 * ground_pivot174;
+            let ground_pivot176 = ground_pivot155 * ground_pivot175;
+            let ground_pivot177 = ground_pivot163 - ground_pivot176;
+            let ground_pivot178 = ground_pivot158 * ground_pivot174;
+            let ground_pivot179 = ground_pivot155 * ground_pivot178;
+            let ground_pivot180 = ground_pivot165 - ground_pivot179;
+            let ground_pivot181 = ground_pivot161 * ground_pivot174;
+            let ground_pivot182 = ground_pivot155 * ground_pivot181;
+            let ground_pivot183 = ground_pivot167 - ground_pivot182;
+            let ground_pivot184 = ground_pivot158 * ground_pivot178;
+            let ground_pivot185 = ground_pivot169 - ground_pivot184;
+            let ground_pivot186 = ground_pivot158 * ground_pivot181;
+            let ground_pivot187 = ground_pivot171 - ground_pivot186;
+            let ground_pivot188 = ground_pivot161 * ground_pivot181;
+            let ground_pivot189 = ground_pivot173 - ground_pivot188;
+            let ground_pivot190 = 1.0 / ground_pivot177;
+            let ground_pivot191 = ground_pivot180 * ground_pivot190;
+            let ground_pivot192 = ground_pivot180 * ground_pivot191;
+            let ground_pivot193 = ground_pivot185 - ground_pivot192;
+            let ground_pivot194 = ground_pivot183 * ground_pivot190;
+            let ground_pivot195 = ground_pivot180 * ground_pivot194;
+            let ground_pivot196 = ground_pivot187 - ground_pivot195;
+            let ground_pivot197 = ground_pivot183 * ground_pivot194;
+            let ground_pivot198 = ground_pivot189 - ground_pivot197;
+            let ground_pivot199 = 1.0 / ground_pivot193;
+            let ground_pivot200 = ground_pivot196 * ground_pivot199;
+            let ground_pivot201 = ground_pivot196 * ground_pivot200;
+            let ground_pivot202 = ground_pivot198 - ground_pivot201;
+            let ground_pivot203 = 1.0 / ground_pivot202;
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest0 = 119.76047904191617 * p_9;
+            let link10_rest1 = 0.05 * link10_rest0;
+            let link10_rest2 = link10_cos0 * link10_rest1;
+            let link10_rest3 = link10_sin0 * link10_rest1;
+            let link10_rest4 = link10_pose2 * link10_rest2;
+            let link10_rest5 = p_9 + link10_rest4;
+            let link10_rest6 = link10_pose1 * link10_rest3;
+            let link10_rest7 = link10_rest5 + link10_rest6;
+            // link9: momentum remainder D, D' (4.45, 4.49)
+            let link9_rest0 = p_8 - link10_rest7;
+            let link9_rest1 = link9_pivot0 * link9_rest0;
+            let link9_rest2 = link10_inertia16 * link9_rest1;
+            let link9_rest3 = link10_rest2 - link9_rest2;
+            let link9_rest4 = link10_inertia17 * link9_rest1;
+            let link9_rest5 = link10_rest3 - link9_rest4;
+            let link9_rest6 = link8_pose3 * link9_rest3;
+            let link9_rest7 = p_8 + link9_rest6;
+            let link9_rest8 = link8_pose4 * link9_rest5;
+            let link9_rest9 = link9_rest7 + link9_rest8;
+            // link8: momentum remainder D, D' (4.45, 4.49)
+            let link8_rest0 = link8_pose2 * link9_rest3;
+            let link8_rest1 = link9_rest9 + link8_rest0;
+            let link8_rest2 = link8_pose1 * link9_rest5;
+            let link8_rest3 = link8_rest1 + link8_rest2;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = link7_pose2 * link9_rest3;
+            let link7_rest1 = link8_rest3 + link7_rest0;
+            let link7_rest2 = link7_pose1 * link9_rest5;
+            let link7_rest3 = link7_rest1 + link7_rest2;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_pose2 * link9_rest3;
+            let link6_rest1 = link7_rest3 + link6_rest0;
+            let link6_rest2 = link6_pose1 * link9_rest5;
+            let link6_rest3 = link6_rest1 + link6_rest2;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_pose2 * link9_rest3;
+            let link5_rest1 = link6_rest3 + link5_rest0;
+            let link5_rest2 = link5_pose1 * link9_rest5;
+            let link5_rest3 = link5_rest1 + link5_rest2;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_pose2 * link9_rest3;
+            let link4_rest1 = link5_rest3 + link4_rest0;
+            let link4_rest2 = link4_pose1 * link9_rest5;
+            let link4_rest3 = link4_rest1 + link4_rest2;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_pose2 * link9_rest3;
+            let link3_rest1 = link4_rest3 + link3_rest0;
+            let link3_rest2 = link3_pose1 * link9_rest5;
+            let link3_rest3 = link3_rest1 + link3_rest2;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_pose2 * link9_rest3;
+            let link2_rest1 = link3_rest3 + link2_rest0;
+            let link2_rest2 = link2_pose1 * link9_rest5;
+            let link2_rest3 = link2_rest1 + link2_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_7 - link9_rest9;
+            let link1_rest1 = ground_pivot0 * link1_rest0;
+            let link1_rest2 = link8_pivot3 * link1_rest1;
+            let link1_rest3 = link8_rest3 + link1_rest2;
+            let link1_rest4 = link8_pivot7 * link1_rest1;
+            let link1_rest5 = link7_rest3 + link1_rest4;
+            let link1_rest6 = link8_pivot11 * link1_rest1;
+            let link1_rest7 = link6_rest3 + link1_rest6;
+            let link1_rest8 = link8_pivot15 * link1_rest1;
+            let link1_rest9 = link5_rest3 + link1_rest8;
+            let link1_rest10 = link8_pivot19 * link1_rest1;
+            let link1_rest11 = link4_rest3 + link1_rest10;
+            let link1_rest12 = link8_pivot23 * link1_rest1;
+            let link1_rest13 = link3_rest3 + link1_rest12;
+            let link1_rest14 = link8_pivot27 * link1_rest1;
+            let link1_rest15 = link2_rest3 + link1_rest14;
+            let link1_rest16 = p_6 - link1_rest3;
+            let link1_rest17 = ground_pivot64 * link1_rest16;
+            let link1_rest18 = ground_pivot6 * link1_rest17;
+            let link1_rest19 = link1_rest5 + link1_rest18;
+            let link1_rest20 = ground_pivot9 * link1_rest17;
+            let link1_rest21 = link1_rest7 + link1_rest20;
+            let link1_rest22 = ground_pivot12 * link1_rest17;
+            let link1_rest23 = link1_rest9 + link1_rest22;
+            let link1_rest24 = ground_pivot15 * link1_rest17;
+            let link1_rest25 = link1_rest11 + link1_rest24;
+            let link1_rest26 = ground_pivot18 * link1_rest17;
+            let link1_rest27 = link1_rest13 + link1_rest26;
+            let link1_rest28 = ground_pivot21 * link1_rest17;
+            let link1_rest29 = link1_rest15 + link1_rest28;
+            let link1_rest30 = p_5 - link1_rest19;
+            let link1_rest31 = ground_pivot113 * link1_rest30;
+            let link1_rest32 = ground_pivot70 * link1_rest31;
+            let link1_rest33 = link1_rest21 + link1_rest32;
+            let link1_rest34 = ground_pivot73 * link1_rest31;
+            let link1_rest35 = link1_rest23 + link1_rest34;
+            let link1_rest36 = ground_pivot76 * link1_rest31;
+            let link1_rest37 = link1_rest25 + link1_rest36;
+            let link1_rest38 = ground_pivot79 * link1_rest31;
+            let link1_rest39 = link1_rest27 + link1_rest38;
+            let link1_rest40 = ground_pivot82 * link1_rest31;
+            let link1_rest41 = link1_rest29 + link1_rest40;
+            let link1_rest42 = p_4 - link1_rest33;
+            let link1_rest43 = ground_pivot149 * link1_rest42;
+            let link1_rest44 = ground_pivot119 * link1_rest43;
+            let link1_rest45 = link1_rest35 + link1_rest44;
+            let link1_rest46 = ground_pivot122 * link1_rest43;
+            let link1_rest47 = link1_rest37 + link1_rest46;
+            let link1_rest48 = ground_pivot125 * link1_rest43;
+            let link1_rest49 = link1_rest39 + link1_rest48;
+            let link1_rest50 = ground_pivot128 * link1_rest43;
+            let link1_rest51 = link1_rest41 + link1_rest50;
+            let link1_rest52 = p_3 - link1_rest45;
+            let link1_rest53 = ground_pivot174 * link1_rest52;
+            let link1_rest54 = ground_pivot155 * link1_rest53;
+            let link1_rest55 = link1_rest47 + link1_rest54;
+            let link1_rest56 = ground_pivot158 * link1_rest53;
+            let link1_rest57 = link1_rest49 + link1_rest56;
+            let link1_rest58 = ground_pivot161 * link1_rest53;
+            let link1_rest59 = link1_rest51 + link1_rest58;
+            let link1_rest60 = p_2 - link1_rest55;
+            let link1_rest61 = ground_pivot190 * link1_rest60;
+            let link1_rest62 = ground_pivot180 * link1_rest61;
+            let link1_rest63 = link1_rest57 + link1_rest62;
+            let link1_rest64 = ground_pivot183 * link1_rest61;
+            let link1_rest65 = link1_rest59 + link1_rest64;
+            let link1_rest66 = p_1 - link1_rest63;
+            let link1_rest67 = ground_pivot199 * link1_rest66;
+            let link1_rest68 = ground_pivot196 * link1_rest67;
+            let link1_rest69 = link1_rest65 + link1_rest68;
+            let link1_rest70 = p_0 - link1_rest69;
+            let link1_rest71 = ground_pivot203 * link1_rest70;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot200 * link1_rest71;
+            let ground_vel1 = link1_rest67 - ground_vel0;
+            let ground_vel2 = ground_pivot191 * ground_vel1;
+            let ground_vel3 = link1_rest61 - ground_vel2;
+            let ground_vel4 = ground_pivot194 * link1_rest71;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot175 * ground_vel5;
+            let ground_vel7 = link1_rest53 - ground_vel6;
+            let ground_vel8 = ground_pivot178 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot181 * link1_rest71;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_vel12 = ground_pivot150 * ground_vel11;
+            let ground_vel13 = link1_rest43 - ground_vel12;
+            let ground_vel14 = ground_pivot153 * ground_vel5;
+            let ground_vel15 = ground_vel13 - ground_vel14;
+            let ground_vel16 = ground_pivot156 * ground_vel1;
+            let ground_vel17 = ground_vel15 - ground_vel16;
+            let ground_vel18 = ground_pivot159 * link1_rest71;
+            let ground_vel19 = ground_vel17 - ground_vel18;
+            let ground_vel20 = ground_pivot114 * ground_vel19;
+            let ground_vel21 = link1_rest31 - ground_vel20;
+            let ground_vel22 = ground_pivot117 * ground_vel11;
+            let ground_vel23 = ground_vel21 - ground_vel22;
+            let ground_vel24 = ground_pivot120 * ground_vel5;
+            let ground_vel25 = ground_vel23 - ground_vel24;
+            let ground_vel26 = ground_pivot123 * ground_vel1;
+            let ground_vel27 = ground_vel25 - ground_vel26;
+            let ground_vel28 = ground_pivot126 * link1_rest71;
+            let ground_vel29 = ground_vel27 - ground_vel28;
+            let ground_vel30 = ground_pivot65 * ground_vel29;
+            let ground_vel31 = link1_rest17 - ground_vel30;
+            let ground_vel32 = ground_pivot68 * ground_vel19;
+            let ground_vel33 = ground_vel31 - ground_vel32;
+            let ground_vel34 = ground_pivot71 * ground_vel11;
+            let ground_vel35 = ground_vel33 - ground_vel34;
+            let ground_vel36 = ground_pivot74 * ground_vel5;
+            let ground_vel37 = ground_vel35 - ground_vel36;
+            let ground_vel38 = ground_pivot77 * ground_vel1;
+            let ground_vel39 = ground_vel37 - ground_vel38;
+            let ground_vel40 = ground_pivot80 * link1_rest71;
+            let ground_vel41 = ground_vel39 - ground_vel40;
+            let ground_vel42 = ground_pivot1 * ground_vel41;
+            let ground_vel43 = link1_rest1 - ground_vel42;
+            let ground_vel44 = ground_pivot4 * ground_vel29;
+            let ground_vel45 = ground_vel43 - ground_vel44;
+            let ground_vel46 = ground_pivot7 * ground_vel19;
+            let ground_vel47 = ground_vel45 - ground_vel46;
+            let ground_vel48 = ground_pivot10 * ground_vel11;
+            let ground_vel49 = ground_vel47 - ground_vel48;
+            let ground_vel50 = ground_pivot13 * ground_vel5;
+            let ground_vel51 = ground_vel49 - ground_vel50;
+            let ground_vel52 = ground_pivot16 * ground_vel1;
+            let ground_vel53 = ground_vel51 - ground_vel52;
+            let ground_vel54 = ground_pivot19 * link1_rest71;
+            let ground_vel55 = ground_vel53 - ground_vel54;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = link2_pose1 * link1_rest71;
+            let link2_vel1 = link2_pose2 * link1_rest71;
+            let link2_vel2 = link1_rest71 + ground_vel1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link3_pose1 * link2_vel2;
+            let link3_vel1 = link2_vel0 + link3_vel0;
+            let link3_vel2 = link3_pose2 * link2_vel2;
+            let link3_vel3 = link2_vel1 + link3_vel2;
+            let link3_vel4 = ground_vel5 + link2_vel2;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link4_pose1 * link3_vel4;
+            let link4_vel1 = link3_vel1 + link4_vel0;
+            let link4_vel2 = link4_pose2 * link3_vel4;
+            let link4_vel3 = link3_vel3 + link4_vel2;
+            let link4_vel4 = ground_vel11 + link3_vel4;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link5_pose1 * link4_vel4;
+            let link5_vel1 = link4_vel1 + link5_vel0;
+            let link5_vel2 = link5_pose2 * link4_vel4;
+            let link5_vel3 = link4_vel3 + link5_vel2;
+            let link5_vel4 = ground_vel19 + link4_vel4;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link6_pose1 * link5_vel4;
+            let link6_vel1 = link5_vel1 + link6_vel0;
+            let link6_vel2 = link6_pose2 * link5_vel4;
+            let link6_vel3 = link5_vel3 + link6_vel2;
+            let link6_vel4 = ground_vel29 + link5_vel4;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link7_pose1 * link6_vel4;
+            let link7_vel1 = link6_vel1 + link7_vel0;
+            let link7_vel2 = link7_pose2 * link6_vel4;
+            let link7_vel3 = link6_vel3 + link7_vel2;
+            let link7_vel4 = ground_vel41 + link6_vel4;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link8_pose1 * link7_vel4;
+            let link8_vel1 = link7_vel1 + link8_vel0;
+            let link8_vel2 = link8_pose2 * link7_vel4;
+            let link8_vel3 = link7_vel3 + link8_vel2;
+            let link8_vel4 = ground_vel55 + link7_vel4;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_pose4 * link8_vel4;
+            let link9_vel1 = link8_vel1 + link9_vel0;
+            let link9_vel2 = link8_pose3 * link8_vel4;
+            let link9_vel3 = link8_vel3 + link9_vel2;
+            let link9_vel4 = link9_pivot1 * link9_vel3;
+            let link9_vel5 = link9_pivot2 * link9_vel1;
+            let link9_vel6 = link9_vel4 + link9_vel5;
+            let link9_vel7 = link9_rest1 + link9_vel6;
+            let link9_vel8 = link8_vel4 - link9_vel7;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link10_pose1 * link9_vel7;
+            let link10_vel1 = link9_vel1 + link10_vel0;
+            let link10_vel2 = link10_pose2 * link9_vel7;
+            let link10_vel3 = link9_vel3 + link10_vel2;
+            let link10_vel4 = link10_sin0 * link10_vel1;
+            let link10_vel5 = link10_cos0 * link10_vel3;
+            let link10_vel6 = link10_vel4 + link10_vel5;
+            let link10_vel7 = 5.9880239520958085 * link10_vel6;
+            let link10_vel8 = link10_rest0 + link10_vel7;
+            let link10_vel9 = link9_vel7 + link10_vel8;
+            // link9: energy
+            let link9_energy0 = p_8 * link9_vel8;
+            // link10: energy
+            let link10_energy0 = p_9 * link10_vel9;
+            let link10_energy1 = link9_energy0 + link10_energy0;
+            let link10_energy2 = p_7 * ground_vel55;
+            let link10_energy3 = link10_energy1 - link10_energy2;
+            let link10_energy4 = p_6 * ground_vel41;
+            let link10_energy5 = link10_energy3 - link10_energy4;
+            let link10_energy6 = p_5 * ground_vel29;
+            let link10_energy7 = link10_energy5 - link10_energy6;
+            let link10_energy8 = p_4 * ground_vel19;
+            let link10_energy9 = link10_energy7 - link10_energy8;
+            let link10_energy10 = p_3 * ground_vel11;
+            let link10_energy11 = link10_energy9 - link10_energy10;
+            let link10_energy12 = p_2 * ground_vel5;
+            let link10_energy13 = link10_energy11 - link10_energy12;
+            let link10_energy14 = p_1 * ground_vel1;
+            let link10_energy15 = link10_energy13 - link10_energy14;
+            let link10_energy16 = p_0 * link1_rest71;
+            let link10_energy17 = link10_energy15 - link10_energy16;
+            let link10_energy18 = 0.5 * link10_energy17;
+            // ground: energy
+            let ground_energy0 = 9.81 * link2_inertia12;
+            result.set(0, l, link10_energy18);
+            result.set(1, l, -ground_energy0);
+        }
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 530 operations: 244 additions, 277 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 908 operations: 460 additions, 439 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        let tau_6 = self.tau[6];
-        let tau_7 = self.tau[7];
-        let tau_8 = self.tau[8];
-        let tau_9 = self.tau[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        let link1_pose0 = 0.95 * link1_sin0;
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_cos0;
-        let link10_inertia1 = 0.05 * link10_sin0;
-        // link10: U, Mj, k and the reduced inertia M' (4.44)
-        let link10_pivot0 = 119.76047904191617 * link10_inertia0;
-        let link10_pivot1 = 119.76047904191617 * link10_inertia1;
-        let link10_pivot2 = link10_inertia0 * link10_pivot0;
-        let link10_pivot3 = link10_inertia0 * link10_pivot1;
-        let link10_pivot4 = link10_inertia1 * link10_pivot1;
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia2 = link10_pose2 * link10_pivot2;
-        let link10_inertia3 = link10_pose2 * link10_pivot3;
-        let link10_inertia4 = link10_pose2 * link10_inertia2;
-        let link10_inertia5 = link10_pose1 * link10_pivot3;
-        let link10_inertia6 = link10_inertia2 + link10_inertia5;
-        let link10_inertia7 = link10_pose1 * link10_pivot4;
-        let link10_inertia8 = link10_inertia3 + link10_inertia7;
-        let link10_inertia9 = link10_inertia3 + link10_inertia8;
-        let link10_inertia10 = link10_pose1 * link10_inertia9;
-        let link10_inertia11 = link10_inertia4 + link10_inertia10;
-        let link10_inertia12 = link9_pose1 - link10_inertia6;
-        let link10_inertia13 = link9_pose2 - link10_inertia8;
-        let link10_inertia14 = link10_inertia11 - 0.033350000000000005;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 1.0 / link10_inertia14;
-        let link9_pivot1 = link10_inertia12 * link9_pivot0;
-        let link9_pivot2 = link10_inertia13 * link9_pivot0;
-        let link9_pivot3 = link10_inertia12 * link9_pivot1;
-        let link9_pivot4 = link10_pivot2 - link9_pivot3;
-        let link9_pivot5 = link10_inertia12 * link9_pivot2;
-        let link9_pivot6 = link10_pivot3 - link9_pivot5;
-        let link9_pivot7 = link10_inertia13 * link9_pivot2;
-        let link9_pivot8 = link10_pivot4 - link9_pivot7;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link8_pose3 * link9_pivot4;
-        let link9_inertia1 = link8_pose3 * link9_pivot6;
-        let link9_inertia2 = link8_pose3 * link9_inertia0;
-        let link9_inertia3 = link8_pose4 * link9_pivot6;
-        let link9_inertia4 = link9_inertia0 + link9_inertia3;
-        let link9_inertia5 = link8_pose4 * link9_pivot8;
-        let link9_inertia6 = link9_inertia1 + link9_inertia5;
-        let link9_inertia7 = link9_inertia1 + link9_inertia6;
-        let link9_inertia8 = link8_pose4 * link9_inertia7;
-        let link9_inertia9 = link9_inertia2 + link9_inertia8;
-        let link9_inertia10 = link8_pose3 - link9_inertia4;
-        let link9_inertia11 = link8_pose4 - link9_inertia6;
-        let link9_inertia12 = link9_inertia9 - 0.05835;
-        // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia12;
-        let link8_pivot1 = link9_inertia10 * link8_pivot0;
-        let link8_pivot2 = link9_inertia11 * link8_pivot0;
-        let link8_pivot3 = link9_inertia10 * link8_pivot1;
-        let link8_pivot4 = link9_pivot4 - link8_pivot3;
-        let link8_pivot5 = link9_inertia10 * link8_pivot2;
-        let link8_pivot6 = link9_pivot6 - link8_pivot5;
-        let link8_pivot7 = link9_inertia11 * link8_pivot2;
-        let link8_pivot8 = link9_pivot8 - link8_pivot7;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_pose2 * link8_pivot4;
-        let link8_inertia1 = link8_pose2 * link8_pivot6;
-        let link8_inertia2 = link8_pose2 * link8_inertia0;
-        let link8_inertia3 = link8_pose1 * link8_pivot6;
-        let link8_inertia4 = link8_inertia0 + link8_inertia3;
-        let link8_inertia5 = link8_pose1 * link8_pivot8;
-        let link8_inertia6 = link8_inertia1 + link8_inertia5;
-        let link8_inertia7 = link8_inertia1 + link8_inertia6;
-        let link8_inertia8 = link8_pose1 * link8_inertia7;
-        let link8_inertia9 = link8_inertia2 + link8_inertia8;
-        let link8_inertia10 = link7_pose3 - link8_inertia4;
-        let link8_inertia11 = link7_pose4 - link8_inertia6;
-        let link8_inertia12 = link8_inertia9 - 0.08335000000000001;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 1.0 / link8_inertia12;
-        let link7_pivot1 = link8_inertia10 * link7_pivot0;
-        let link7_pivot2 = link8_inertia11 * link7_pivot0;
-        let link7_pivot3 = link8_inertia10 * link7_pivot1;
-        let link7_pivot4 = link8_pivot4 - link7_pivot3;
-        let link7_pivot5 = link8_inertia10 * link7_pivot2;
-        let link7_pivot6 = link8_pivot6 - link7_pivot5;
-        let link7_pivot7 = link8_inertia11 * link7_pivot2;
-        let link7_pivot8 = link8_pivot8 - link7_pivot7;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_pose2 * link7_pivot4;
-        let link7_inertia1 = link7_pose2 * link7_pivot6;
-        let link7_inertia2 = link7_pose2 * link7_inertia0;
-        let link7_inertia3 = link7_pose1 * link7_pivot6;
-        let link7_inertia4 = link7_inertia0 + link7_inertia3;
-        let link7_inertia5 = link7_pose1 * link7_pivot8;
-        let link7_inertia6 = link7_inertia1 + link7_inertia5;
-        let link7_inertia7 = link7_inertia1 + link7_inertia6;
-        let link7_inertia8 = link7_pose1 * link7_inertia7;
-        let link7_inertia9 = link7_inertia2 + link7_inertia8;
-        let link7_inertia10 = link6_pose3 - link7_inertia4;
-        let link7_inertia11 = link6_pose4 - link7_inertia6;
-        let link7_inertia12 = link7_inertia9 - 0.10835;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia12;
-        let link6_pivot1 = link7_inertia10 * link6_pivot0;
-        let link6_pivot2 = link7_inertia11 * link6_pivot0;
-        let link6_pivot3 = link7_inertia10 * link6_pivot1;
-        let link6_pivot4 = link7_pivot4 - link6_pivot3;
-        let link6_pivot5 = link7_inertia10 * link6_pivot2;
-        let link6_pivot6 = link7_pivot6 - link6_pivot5;
-        let link6_pivot7 = link7_inertia11 * link6_pivot2;
-        let link6_pivot8 = link7_pivot8 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link6_pose2 * link6_pivot4;
-        let link6_inertia1 = link6_pose2 * link6_pivot6;
-        let link6_inertia2 = link6_pose2 * link6_inertia0;
-        let link6_inertia3 = link6_pose1 * link6_pivot6;
-        let link6_inertia4 = link6_inertia0 + link6_inertia3;
-        let link6_inertia5 = link6_pose1 * link6_pivot8;
-        let link6_inertia6 = link6_inertia1 + link6_inertia5;
-        let link6_inertia7 = link6_inertia1 + link6_inertia6;
-        let link6_inertia8 = link6_pose1 * link6_inertia7;
-        let link6_inertia9 = link6_inertia2 + link6_inertia8;
-        let link6_inertia10 = link5_pose3 - link6_inertia4;
-        let link6_inertia11 = link5_pose4 - link6_inertia6;
-        let link6_inertia12 = link6_inertia9 - 0.13335;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia12;
-        let link5_pivot1 = link6_inertia10 * link5_pivot0;
-        let link5_pivot2 = link6_inertia11 * link5_pivot0;
-        let link5_pivot3 = link6_inertia10 * link5_pivot1;
-        let link5_pivot4 = link6_pivot4 - link5_pivot3;
-        let link5_pivot5 = link6_inertia10 * link5_pivot2;
-        let link5_pivot6 = link6_pivot6 - link5_pivot5;
-        let link5_pivot7 = link6_inertia11 * link5_pivot2;
-        let link5_pivot8 = link6_pivot8 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link5_pose2 * link5_pivot4;
-        let link5_inertia1 = link5_pose2 * link5_pivot6;
-        let link5_inertia2 = link5_pose2 * link5_inertia0;
-        let link5_inertia3 = link5_pose1 * link5_pivot6;
-        let link5_inertia4 = link5_inertia0 + link5_inertia3;
-        let link5_inertia5 = link5_pose1 * link5_pivot8;
-        let link5_inertia6 = link5_inertia1 + link5_inertia5;
-        let link5_inertia7 = link5_inertia1 + link5_inertia6;
-        let link5_inertia8 = link5_pose1 * link5_inertia7;
-        let link5_inertia9 = link5_inertia2 + link5_inertia8;
-        let link5_inertia10 = link4_pose3 - link5_inertia4;
-        let link5_inertia11 = link4_pose4 - link5_inertia6;
-        let link5_inertia12 = link5_inertia9 - 0.15835;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia12;
-        let link4_pivot1 = link5_inertia10 * link4_pivot0;
-        let link4_pivot2 = link5_inertia11 * link4_pivot0;
-        let link4_pivot3 = link5_inertia10 * link4_pivot1;
-        let link4_pivot4 = link5_pivot4 - link4_pivot3;
-        let link4_pivot5 = link5_inertia10 * link4_pivot2;
-        let link4_pivot6 = link5_pivot6 - link4_pivot5;
-        let link4_pivot7 = link5_inertia11 * link4_pivot2;
-        let link4_pivot8 = link5_pivot8 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link4_pose2 * link4_pivot4;
-        let link4_inertia1 = link4_pose2 * link4_pivot6;
-        let link4_inertia2 = link4_pose2 * link4_inertia0;
-        let link4_inertia3 = link4_pose1 * link4_pivot6;
-        let link4_inertia4 = link4_inertia0 + link4_inertia3;
-        let link4_inertia5 = link4_pose1 * link4_pivot8;
-        let link4_inertia6 = link4_inertia1 + link4_inertia5;
-        let link4_inertia7 = link4_inertia1 + link4_inertia6;
-        let link4_inertia8 = link4_pose1 * link4_inertia7;
-        let link4_inertia9 = link4_inertia2 + link4_inertia8;
-        let link4_inertia10 = link3_pose3 - link4_inertia4;
-        let link4_inertia11 = link3_pose4 - link4_inertia6;
-        let link4_inertia12 = link4_inertia9 - 0.18334999999999999;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia12;
-        let link3_pivot1 = link4_inertia10 * link3_pivot0;
-        let link3_pivot2 = link4_inertia11 * link3_pivot0;
-        let link3_pivot3 = link4_inertia10 * link3_pivot1;
-        let link3_pivot4 = link4_pivot4 - link3_pivot3;
-        let link3_pivot5 = link4_inertia10 * link3_pivot2;
-        let link3_pivot6 = link4_pivot6 - link3_pivot5;
-        let link3_pivot7 = link4_inertia11 * link3_pivot2;
-        let link3_pivot8 = link4_pivot8 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link3_pose2 * link3_pivot4;
-        let link3_inertia1 = link3_pose2 * link3_pivot6;
-        let link3_inertia2 = link3_pose2 * link3_inertia0;
-        let link3_inertia3 = link3_pose1 * link3_pivot6;
-        let link3_inertia4 = link3_inertia0 + link3_inertia3;
-        let link3_inertia5 = link3_pose1 * link3_pivot8;
-        let link3_inertia6 = link3_inertia1 + link3_inertia5;
-        let link3_inertia7 = link3_inertia1 + link3_inertia6;
-        let link3_inertia8 = link3_pose1 * link3_inertia7;
-        let link3_inertia9 = link3_inertia2 + link3_inertia8;
-        let link3_inertia10 = link2_pose3 - link3_inertia4;
-        let link3_inertia11 = link2_pose4 - link3_inertia6;
-        let link3_inertia12 = link3_inertia9 - 0.20834999999999998;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = link2_pose2 * link3_inertia10;
-        let link2_pivot1 = link2_pose1 * link3_inertia11;
-        let link2_pivot2 = link2_pivot0 + link2_pivot1;
-        let link2_pivot3 = link3_inertia12 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link2_pose2 * link3_pivot4;
-        let link2_inertia1 = link3_inertia10 - link2_inertia0;
-        let link2_inertia2 = link2_pose2 * link3_pivot6;
-        let link2_inertia3 = link3_inertia11 - link2_inertia2;
-        let link2_inertia4 = link3_inertia10 + link2_inertia1;
-        let link2_inertia5 = link2_pose2 * link2_inertia4;
-        let link2_inertia6 = link3_inertia12 - link2_inertia5;
-        let link2_inertia7 = link2_pose1 * link3_pivot8;
-        let link2_inertia8 = link2_inertia3 - link2_inertia7;
-        let link2_inertia9 = link2_inertia3 + link2_inertia8;
-        let link2_inertia10 = link2_pose1 * link2_inertia9;
-        let link2_inertia11 = link2_inertia6 - link2_inertia10;
-        let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / link3_inertia12;
-        let ground_pivot1 = link2_pivot3 * ground_pivot0;
-        let ground_pivot2 = link2_pivot3 * ground_pivot1;
-        let ground_pivot3 = link2_inertia12 - ground_pivot2;
-        let ground_pivot4 = 1.0 / ground_pivot3;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = link2_pose1 * link2_vel0;
-        let link2_vel2 = link2_pose2 * link2_vel0;
-        let link2_vel3 = link2_vel2 + 9.81;
-        let link2_vel4 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel4 * link2_vel4;
-        let link3_vel1 = link3_pose1 * link3_vel0;
-        let link3_vel2 = link2_vel1 + link3_vel1;
-        let link3_vel3 = link3_pose2 * link3_vel0;
-        let link3_vel4 = link2_vel3 + link3_vel3;
-        let link3_vel5 = v_2 + link2_vel4;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel5 * link3_vel5;
-        let link4_vel1 = link4_pose1 * link4_vel0;
-        let link4_vel2 = link3_vel2 + link4_vel1;
-        let link4_vel3 = link4_pose2 * link4_vel0;
-        let link4_vel4 = link3_vel4 + link4_vel3;
-        let link4_vel5 = v_3 + link3_vel5;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel5 * link4_vel5;
-        let link5_vel1 = link5_pose1 * link5_vel0;
-        let link5_vel2 = link4_vel2 + link5_vel1;
-        let link5_vel3 = link5_pose2 * link5_vel0;
-        let link5_vel4 = link4_vel4 + link5_vel3;
-        let link5_vel5 = v_4 + link4_vel5;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel5 * link5_vel5;
-        let link6_vel1 = link6_pose1 * link6_vel0;
-        let link6_vel2 = link5_vel2 + link6_vel1;
-        let link6_vel3 = link6_pose2 * link6_vel0;
-        let link6_vel4 = link5_vel4 + link6_vel3;
-        let link6_vel5 = v_5 + link5_vel5;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel5 * link6_vel5;
-        let link7_vel1 = link7_pose1 * link7_vel0;
-        let link7_vel2 = link6_vel2 + link7_vel1;
-        let link7_vel3 = link7_pose2 * link7_vel0;
-        let link7_vel4 = link6_vel4 + link7_vel3;
-        let link7_vel5 = v_6 + link6_vel5;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel5 * link7_vel5;
-        let link8_vel1 = link8_pose1 * link8_vel0;
-        let link8_vel2 = link7_vel2 + link8_vel1;
-        let link8_vel3 = link8_pose2 * link8_vel0;
-        let link8_vel4 = link7_vel4 + link8_vel3;
-        let link8_vel5 = v_7 + link7_vel5;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel5 * link8_vel5;
-        let link9_vel1 = link8_pose4 * link9_vel0;
-        let link9_vel2 = link8_vel2 + link9_vel1;
-        let link9_vel3 = link8_pose3 * link9_vel0;
-        let link9_vel4 = link8_vel4 + link9_vel3;
-        let link9_vel5 = v_8 + link8_vel5;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel5 * link9_vel5;
-        let link10_vel1 = link10_pose1 * link10_vel0;
-        let link10_vel2 = link9_vel2 + link10_vel1;
-        let link10_vel3 = link10_pose2 * link10_vel0;
-        let link10_vel4 = link9_vel4 + link10_vel3;
-        let link10_vel5 = link10_sin0 * link10_vel4;
-        let link10_vel6 = link10_cos0 * link10_vel2;
-        let link10_vel7 = link10_vel5 - link10_vel6;
-        let link10_vel8 = v_9 + link9_vel5;
-        // link1: gravity and wrenches
-        let link1_load0 = 9.81 * link1_pose0;
-        // link2: gravity and wrenches
-        let link2_load0 = link2_pose4 * link3_vel0;
-        let link2_load1 = link2_pose3 * link3_vel0;
-        let link2_load2 = link2_pose4 * link2_vel3;
-        let link2_load3 = link2_pose3 * link2_vel1;
-        let link2_load4 = link2_load2 - link2_load3;
-        // link3: gravity and wrenches
-        let link3_load0 = link3_pose4 * link4_vel0;
-        let link3_load1 = link3_pose3 * link4_vel0;
-        let link3_load2 = link3_pose4 * link3_vel4;
-        let link3_load3 = link3_pose3 * link3_vel2;
-        let link3_load4 = link3_load2 - link3_load3;
-        // link4: gravity and wrenches
-        let link4_load0 = link4_pose4 * link5_vel0;
-        let link4_load1 = link4_pose3 * link5_vel0;
-        let link4_load2 = link4_pose4 * link4_vel4;
-        let link4_load3 = link4_pose3 * link4_vel2;
-        let link4_load4 = link4_load2 - link4_load3;
-        // link5: gravity and wrenches
-        let link5_load0 = link5_pose4 * link6_vel0;
-        let link5_load1 = link5_pose3 * link6_vel0;
-        let link5_load2 = link5_pose4 * link5_vel4;
-        let link5_load3 = link5_pose3 * link5_vel2;
-        let link5_load4 = link5_load2 - link5_load3;
-        // link6: gravity and wrenches
-        let link6_load0 = link6_pose4 * link7_vel0;
-        let link6_load1 = link6_pose3 * link7_vel0;
-        let link6_load2 = link6_pose4 * link6_vel4;
-        let link6_load3 = link6_pose3 * link6_vel2;
-        let link6_load4 = link6_load2 - link6_load3;
-        // link7: gravity and wrenches
-        let link7_load0 = link7_pose4 * link8_vel0;
-        let link7_load1 = link7_pose3 * link8_vel0;
-        let link7_load2 = link7_pose4 * link7_vel4;
-        let link7_load3 = link7_pose3 * link7_vel2;
-        let link7_load4 = link7_load2 - link7_load3;
-        // link8: gravity and wrenches
-        let link8_load0 = link8_pose4 * link8_vel4;
-        let link8_load1 = link8_pose3 * link8_vel2;
-        let link8_load2 = link8_load0 - link8_load1;
-        // link9: gravity and wrenches
-        let link9_load0 = link9_pose2 * link10_vel0;
-        let link9_load1 = link9_pose1 * link10_vel0;
-        let link9_load2 = link9_pose2 * link9_vel4;
-        let link9_load3 = link9_pose1 * link9_vel2;
-        let link9_load4 = link9_load2 - link9_load3;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel8 * link10_vel8;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_vel7;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = link10_sin0 * link10_load1;
-        let link10_rest1 = link10_cos0 * link10_load1;
-        let link10_rest2 = tau_9 - link10_load2;
-        let link10_rest3 = 119.76047904191617 * link10_rest2;
-        let link10_rest4 = link10_inertia0 * link10_rest3;
-        let link10_rest5 = link10_rest0 - link10_rest4;
-        let link10_rest6 = link10_inertia1 * link10_rest3;
-        let link10_rest7 = link10_rest1 + link10_rest6;
-        let link10_rest8 = link10_pose2 * link10_rest5;
-        let link10_rest9 = tau_9 - link10_rest8;
-        let link10_rest10 = link10_pose1 * link10_rest7;
-        let link10_rest11 = link10_rest9 + link10_rest10;
-        let link10_rest12 = link9_load0 + link10_rest5;
-        let link10_rest13 = link9_load1 + link10_rest7;
-        let link10_rest14 = link9_load4 + link10_rest11;
-        // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = tau_8 - link10_rest14;
-        let link9_rest1 = link9_pivot0 * link9_rest0;
-        let link9_rest2 = link10_inertia12 * link9_rest1;
-        let link9_rest3 = link10_rest12 + link9_rest2;
-        let link9_rest4 = link10_inertia13 * link9_rest1;
-        let link9_rest5 = link10_rest13 - link9_rest4;
-        let link9_rest6 = link8_pose3 * link9_rest3;
-        let link9_rest7 = tau_8 - link9_rest6;
-        let link9_rest8 = link8_pose4 * link9_rest5;
-        let link9_rest9 = link9_rest7 + link9_rest8;
-        let link9_rest10 = link9_vel1 + link9_rest3;
-        let link9_rest11 = link9_vel3 + link9_rest5;
-        let link9_rest12 = link8_load2 + link9_rest9;
-        // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = tau_7 - link9_rest12;
-        let link8_rest1 = link8_pivot0 * link8_rest0;
-        let link8_rest2 = link9_inertia10 * link8_rest1;
-        let link8_rest3 = link9_rest10 + link8_rest2;
-        let link8_rest4 = link9_inertia11 * link8_rest1;
-        let link8_rest5 = link9_rest11 - link8_rest4;
-        let link8_rest6 = link8_pose2 * link8_rest3;
-        let link8_rest7 = tau_7 - link8_rest6;
-        let link8_rest8 = link8_pose1 * link8_rest5;
-        let link8_rest9 = link8_rest7 + link8_rest8;
-        let link8_rest10 = link7_load0 + link8_rest3;
-        let link8_rest11 = link7_load1 + link8_rest5;
-        let link8_rest12 = link7_load4 + link8_rest9;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = tau_6 - link8_rest12;
-        let link7_rest1 = link7_pivot0 * link7_rest0;
-        let link7_rest2 = link8_inertia10 * link7_rest1;
-        let link7_rest3 = link8_rest10 + link7_rest2;
-        let link7_rest4 = link8_inertia11 * link7_rest1;
-        let link7_rest5 = link8_rest11 - link7_rest4;
-        let link7_rest6 = link7_pose2 * link7_rest3;
-        let link7_rest7 = tau_6 - link7_rest6;
-        let link7_rest8 = link7_pose1 * link7_rest5;
-        let link7_rest9 = link7_rest7 + link7_rest8;
-        let link7_rest10 = link6_load0 + link7_rest3;
-        let link7_rest11 = link6_load1 + link7_rest5;
-        let link7_rest12 = link6_load4 + link7_rest9;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = tau_5 - link7_rest12;
-        let link6_rest1 = link6_pivot0 * link6_rest0;
-        let link6_rest2 = link7_inertia10 * link6_rest1;
-        let link6_rest3 = link7_rest10 + link6_rest2;
-        let link6_rest4 = link7_inertia11 * link6_rest1;
-        let link6_rest5 = link7_rest11 - link6_rest4;
-        let link6_rest6 = link6_pose2 * link6_rest3;
-        let link6_rest7 = tau_5 - link6_rest6;
-        let link6_rest8 = link6_pose1 * link6_rest5;
-        let link6_rest9 = link6_rest7 + link6_rest8;
-        let link6_rest10 = link5_load0 + link6_rest3;
-        let link6_rest11 = link5_load1 + link6_rest5;
-        let link6_rest12 = link5_load4 + link6_rest9;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = tau_4 - link6_rest12;
-        let link5_rest1 = link5_pivot0 * link5_rest0;
-        let link5_rest2 = link6_inertia10 * link5_rest1;
-        let link5_rest3 = link6_rest10 + link5_rest2;
-        let link5_rest4 = link6_inertia11 * link5_rest1;
-        let link5_rest5 = link6_rest11 - link5_rest4;
-        let link5_rest6 = link5_pose2 * link5_rest3;
-        let link5_rest7 = tau_4 - link5_rest6;
-        let link5_rest8 = link5_pose1 * link5_rest5;
-        let link5_rest9 = link5_rest7 + link5_rest8;
-        let link5_rest10 = link4_load0 + link5_rest3;
-        let link5_rest11 = link4_load1 + link5_rest5;
-        let link5_rest12 = link4_load4 + link5_rest9;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = tau_3 - link5_rest12;
-        let link4_rest1 = link4_pivot0 * link4_rest0;
-        let link4_rest2 = link5_inertia10 * link4_rest1;
-        let link4_rest3 = link5_rest10 + link4_rest2;
-        let link4_rest4 = link5_inertia11 * link4_rest1;
-        let link4_rest5 = link5_rest11 - link4_rest4;
-        let link4_rest6 = link4_pose2 * link4_rest3;
-        let link4_rest7 = tau_3 - link4_rest6;
-        let link4_rest8 = link4_pose1 * link4_rest5;
-        let link4_rest9 = link4_rest7 + link4_rest8;
-        let link4_rest10 = link3_load0 + link4_rest3;
-        let link4_rest11 = link3_load1 + link4_rest5;
-        let link4_rest12 = link3_load4 + link4_rest9;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = tau_2 - link4_rest12;
-        let link3_rest1 = link3_pivot0 * link3_rest0;
-        let link3_rest2 = link4_inertia10 * link3_rest1;
-        let link3_rest3 = link4_rest10 + link3_rest2;
-        let link3_rest4 = link4_inertia11 * link3_rest1;
-        let link3_rest5 = link4_rest11 - link3_rest4;
-        let link3_rest6 = link3_pose2 * link3_rest3;
-        let link3_rest7 = tau_2 - link3_rest6;
-        let link3_rest8 = link3_pose1 * link3_rest5;
-        let link3_rest9 = link3_rest7 + link3_rest8;
-        let link3_rest10 = link2_load0 + link3_rest3;
-        let link3_rest11 = link2_load1 + link3_rest5;
-        let link3_rest12 = link2_load4 + link3_rest9;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_pose2 * link3_rest10;
-        let link2_rest1 = link3_rest12 - link2_rest0;
-        let link2_rest2 = link2_pose1 * link3_rest11;
-        let link2_rest3 = link2_rest1 + link2_rest2;
-        let link2_rest4 = link1_load0 + link2_rest3;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = tau_1 - link3_rest12;
-        let link1_rest1 = ground_pivot0 * link1_rest0;
-        let link1_rest2 = link2_pivot3 * link1_rest1;
-        let link1_rest3 = link2_rest4 + link1_rest2;
-        let link1_rest4 = tau_0 - link1_rest3;
-        let link1_rest5 = ground_pivot4 * link1_rest4;
-        // ground: acceleration
-        let ground_acc0 = ground_pivot1 * link1_rest5;
-        let ground_acc1 = link1_rest1 - ground_acc0;
-        // link2: acceleration
-        let link2_acc0 = link2_pose1 * link1_rest5;
-        let link2_acc1 = link2_pose2 * link1_rest5;
-        let link2_acc2 = link1_rest5 + ground_acc1;
-        // link3: acceleration
-        let link3_acc0 = link3_pose1 * link2_acc2;
-        let link3_acc1 = link2_acc0 + link3_acc0;
-        let link3_acc2 = link3_pose2 * link2_acc2;
-        let link3_acc3 = link2_acc1 + link3_acc2;
-        let link3_acc4 = link3_pivot1 * link3_acc3;
-        let link3_acc5 = link3_pivot2 * link3_acc1;
-        let link3_acc6 = link3_acc4 + link3_acc5;
-        let link3_acc7 = link3_rest1 + link3_acc6;
-        let link3_acc8 = link2_acc2 - link3_acc7;
-        // link4: acceleration
-        let link4_acc0 = link4_pose1 * link3_acc7;
-        let link4_acc1 = link3_acc1 + link4_acc0;
-        let link4_acc2 = link4_pose2 * link3_acc7;
-        let link4_acc3 = link3_acc3 + link4_acc2;
-        let link4_acc4 = link4_pivot1 * link4_acc3;
-        let link4_acc5 = link4_pivot2 * link4_acc1;
-        let link4_acc6 = link4_acc4 + link4_acc5;
-        let link4_acc7 = link4_rest1 + link4_acc6;
-        let link4_acc8 = link3_acc7 - link4_acc7;
-        // link5: acceleration
-        let link5_acc0 = link5_pose1 * link4_acc7;
-        let link5_acc1 = link4_acc1 + link5_acc0;
-        let link5_acc2 = link5_pose2 * link4_acc7;
-        let link5_acc3 = link4_acc3 + link5_acc2;
-        let link5_acc4 = link5_pivot1 * link5_acc3;
-        let link5_acc5 = link5_pivot2 * link5_acc1;
-        let link5_acc6 = link5_acc4 + link5_acc5;
-        let link5_acc7 = link5_rest1 + link5_acc6;
-        let link5_acc8 = link4_acc7 - link5_acc7;
-        // link6: acceleration
-        let link6_acc0 = link6_pose1 * link5_acc7;
-        let link6_acc1 = link5_acc1 + link6_acc0;
-        let link6_acc2 = link6_pose2 * link5_acc7;
-        let link6_acc3 = link5_acc3 + link6_acc2;
-        let link6_acc4 = link6_pivot1 * link6_acc3;
-        let link6_acc5 = link6_pivot2 * link6_acc1;
-        let link6_acc6 = link6_acc4 + link6_acc5;
-        let link6_acc7 = link6_rest1 + link6_acc6;
-        let link6_acc8 = link5_acc7 - link6_acc7;
-        // link7: acceleration
-        let link7_acc0 = link7_pose1 * link6_acc7;
-        let link7_acc1 = link6_acc1 + link7_acc0;
-        let link7_acc2 = link7_pose2 * link6_acc7;
-        let link7_acc3 = link6_acc3 + link7_acc2;
-        let link7_acc4 = link7_pivot1 * link7_acc3;
-        let link7_acc5 = link7_pivot2 * link7_acc1;
-        let link7_acc6 = link7_acc4 + link7_acc5;
-        let link7_acc7 = link7_rest1 + link7_acc6;
-        let link7_acc8 = link6_acc7 - link7_acc7;
-        // link8: acceleration
-        let link8_acc0 = link8_pose1 * link7_acc7;
-        let link8_acc1 = link7_acc1 + link8_acc0;
-        let link8_acc2 = link8_pose2 * link7_acc7;
-        let link8_acc3 = link7_acc3 + link8_acc2;
-        let link8_acc4 = link8_pivot1 * link8_acc3;
-        let link8_acc5 = link8_pivot2 * link8_acc1;
-        let link8_acc6 = link8_acc4 + link8_acc5;
-        let link8_acc7 = link8_rest1 + link8_acc6;
-        let link8_acc8 = link7_acc7 - link8_acc7;
-        // link9: acceleration
-        let link9_acc0 = link8_pose4 * link8_acc7;
-        let link9_acc1 = link8_acc1 + link9_acc0;
-        let link9_acc2 = link8_pose3 * link8_acc7;
-        let link9_acc3 = link8_acc3 + link9_acc2;
-        let link9_acc4 = link9_pivot1 * link9_acc3;
-        let link9_acc5 = link9_pivot2 * link9_acc1;
-        let link9_acc6 = link9_acc4 + link9_acc5;
-        let link9_acc7 = link9_rest1 + link9_acc6;
-        let link9_acc8 = link8_acc7 - link9_acc7;
-        // link10: acceleration
-        let link10_acc0 = link10_pose1 * link9_acc7;
-        let link10_acc1 = link9_acc1 + link10_acc0;
-        let link10_acc2 = link10_pose2 * link9_acc7;
-        let link10_acc3 = link9_acc3 + link10_acc2;
-        let link10_acc4 = link10_pivot0 * link10_acc3;
-        let link10_acc5 = link10_pivot1 * link10_acc1;
-        let link10_acc6 = link10_acc4 + link10_acc5;
-        let link10_acc7 = link10_rest3 + link10_acc6;
-        let link10_acc8 = link9_acc7 + link10_acc7;
-        a[0] = -link1_rest5;
-        a[1] = -ground_acc1;
-        a[2] = link3_acc8;
-        a[3] = link4_acc8;
-        a[4] = link5_acc8;
-        a[5] = link6_acc8;
-        a[6] = link7_acc8;
-        a[7] = link8_acc8;
-        a[8] = link9_acc8;
-        a[9] = link10_acc8;
+        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+    }
+
+    #[inline(always)]
+    fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            let tau_6 = tau.get(6, l);
+            let tau_7 = tau.get(7, l);
+            let tau_8 = tau.get(8, l);
+            let tau_9 = tau.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            let link1_pose0 = 0.95 * link1_sin0;
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link2_pose1 + link3_pose1;
+            let link3_inertia1 = link2_pose2 + link3_pose2;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link3_pose1 + link4_pose1;
+            let link4_inertia1 = link3_pose2 + link4_pose2;
+            let link4_inertia2 = link4_pose1 + link3_inertia0;
+            let link4_inertia3 = link4_pose2 + link3_inertia1;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link4_pose1 + link5_pose1;
+            let link5_inertia1 = link4_pose2 + link5_pose2;
+            let link5_inertia2 = link5_pose1 + link4_inertia0;
+            let link5_inertia3 = link5_pose2 + link4_inertia1;
+            let link5_inertia4 = link5_pose1 + link4_inertia2;
+            let link5_inertia5 = link5_pose2 + link4_inertia3;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link5_pose1 + link6_pose1;
+            let link6_inertia1 = link5_pose2 + link6_pose2;
+            let link6_inertia2 = link6_pose1 + link5_inertia0;
+            let link6_inertia3 = link6_pose2 + link5_inertia1;
+            let link6_inertia4 = link6_pose1 + link5_inertia2;
+            let link6_inertia5 = link6_pose2 + link5_inertia3;
+            let link6_inertia6 = link6_pose1 + link5_inertia4;
+            let link6_inertia7 = link6_pose2 + link5_inertia5;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link6_pose1 + link7_pose1;
+            let link7_inertia1 = link6_pose2 + link7_pose2;
+            let link7_inertia2 = link7_pose1 + link6_inertia0;
+            let link7_inertia3 = link7_pose2 + link6_inertia1;
+            let link7_inertia4 = link7_pose1 + link6_inertia2;
+            let link7_inertia5 = link7_pose2 + link6_inertia3;
+            let link7_inertia6 = link7_pose1 + link6_inertia4;
+            let link7_inertia7 = link7_pose2 + link6_inertia5;
+            let link7_inertia8 = link7_pose1 + link6_inertia6;
+            let link7_inertia9 = link7_pose2 + link6_inertia7;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link7_pose1 + link8_pose1;
+            let link8_inertia1 = link7_pose2 + link8_pose2;
+            let link8_inertia2 = link8_pose1 + link7_inertia0;
+            let link8_inertia3 = link8_pose2 + link7_inertia1;
+            let link8_inertia4 = link8_pose1 + link7_inertia2;
+            let link8_inertia5 = link8_pose2 + link7_inertia3;
+            let link8_inertia6 = link8_pose1 + link7_inertia4;
+            let link8_inertia7 = link8_pose2 + link7_inertia5;
+            let link8_inertia8 = link8_pose1 + link7_inertia6;
+            let link8_inertia9 = link8_pose2 + link7_inertia7;
+            let link8_inertia10 = link8_pose1 + link7_inertia8;
+            let link8_inertia11 = link8_pose2 + link7_inertia9;
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.29940119760479045 * link10_cos0;
+            let link10_inertia1 = link10_cos0 * link10_inertia0;
+            let link10_inertia2 = link10_sin0 * link10_inertia0;
+            let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
+            let link10_inertia4 = link10_pose2 * link10_inertia1;
+            let link10_inertia5 = link10_pose2 * link10_inertia2;
+            let link10_inertia6 = link10_pose2 * link10_inertia4;
+            let link10_inertia7 = link10_pose1 * link10_inertia2;
+            let link10_inertia8 = link10_inertia4 + link10_inertia7;
+            let link10_inertia9 = link10_pose1 * link10_inertia3;
+            let link10_inertia10 = link10_inertia5 - link10_inertia9;
+            let link10_inertia11 = link10_inertia5 + link10_inertia10;
+            let link10_inertia12 = link10_pose1 * link10_inertia11;
+            let link10_inertia13 = link10_inertia6 + link10_inertia12;
+            let link10_inertia14 = link9_pose1 - link10_inertia8;
+            let link10_inertia15 = link9_pose2 - link10_inertia10;
+            let link10_inertia16 = link10_inertia13 - 0.033350000000000005;
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot0 = 1.0 / link10_inertia16;
+            let link9_pivot1 = link10_inertia14 * link9_pivot0;
+            let link9_pivot2 = link10_inertia15 * link9_pivot0;
+            let link9_pivot3 = link10_inertia14 * link9_pivot1;
+            let link9_pivot4 = link10_inertia1 - link9_pivot3;
+            let link9_pivot5 = link10_inertia14 * link9_pivot2;
+            let link9_pivot6 = link10_inertia2 - link9_pivot5;
+            let link9_pivot7 = link10_inertia15 * link9_pivot2;
+            let link9_pivot8 = link10_inertia3 + link9_pivot7;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link8_pose3 * link9_pivot4;
+            let link9_inertia1 = link8_pose3 * link9_pivot6;
+            let link9_inertia2 = link8_pose3 * link9_inertia0;
+            let link9_inertia3 = link8_pose4 * link9_pivot6;
+            let link9_inertia4 = link9_inertia0 + link9_inertia3;
+            let link9_inertia5 = link8_pose4 * link9_pivot8;
+            let link9_inertia6 = link9_inertia1 - link9_inertia5;
+            let link9_inertia7 = link9_inertia1 + link9_inertia6;
+            let link9_inertia8 = link8_pose4 * link9_inertia7;
+            let link9_inertia9 = link9_inertia2 + link9_inertia8;
+            let link9_inertia10 = link8_pose3 - link9_inertia4;
+            let link9_inertia11 = link8_pose4 - link9_inertia6;
+            let link9_inertia12 = link9_inertia9 - 0.05835;
+            // link8: U, Mj, k and the reduced inertia M' (4.44)
+            let link8_pivot0 = link8_pose2 * link9_inertia10;
+            let link8_pivot1 = link8_pose1 * link9_inertia11;
+            let link8_pivot2 = link8_pivot0 + link8_pivot1;
+            let link8_pivot3 = link9_inertia12 - link8_pivot2;
+            let link8_pivot4 = link8_inertia1 * link9_inertia10;
+            let link8_pivot5 = link8_inertia0 * link9_inertia11;
+            let link8_pivot6 = link8_pivot4 + link8_pivot5;
+            let link8_pivot7 = link9_inertia12 - link8_pivot6;
+            let link8_pivot8 = link8_inertia3 * link9_inertia10;
+            let link8_pivot9 = link8_inertia2 * link9_inertia11;
+            let link8_pivot10 = link8_pivot8 + link8_pivot9;
+            let link8_pivot11 = link9_inertia12 - link8_pivot10;
+            let link8_pivot12 = link8_inertia5 * link9_inertia10;
+            let link8_pivot13 = link8_inertia4 * link9_inertia11;
+            let link8_pivot14 = link8_pivot12 + link8_pivot13;
+            let link8_pivot15 = link9_inertia12 - link8_pivot14;
+            let link8_pivot16 = link8_inertia7 * link9_inertia10;
+            let link8_pivot17 = link8_inertia6 * link9_inertia11;
+            let link8_pivot18 = link8_pivot16 + link8_pivot17;
+            let link8_pivot19 = link9_inertia12 - link8_pivot18;
+            let link8_pivot20 = link8_inertia9 * link9_inertia10;
+            let link8_pivot21 = link8_inertia8 * link9_inertia11;
+            let link8_pivot22 = link8_pivot20 + link8_pivot21;
+            let link8_pivot23 = link9_inertia12 - link8_pivot22;
+            let link8_pivot24 = link8_inertia11 * link9_inertia10;
+            let link8_pivot25 = link8_inertia10 * link9_inertia11;
+            let link8_pivot26 = link8_pivot24 + link8_pivot25;
+            let link8_pivot27 = link9_inertia12 - link8_pivot26;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia12 = link8_pose2 * link9_pivot4;
+            let link8_inertia13 = link9_inertia10 - link8_inertia12;
+            let link8_inertia14 = link8_pose2 * link9_pivot6;
+            let link8_inertia15 = link9_inertia11 - link8_inertia14;
+            let link8_inertia16 = link9_inertia10 + link8_inertia13;
+            let link8_inertia17 = link8_pose2 * link8_inertia16;
+            let link8_inertia18 = link9_inertia12 - link8_inertia17;
+            let link8_inertia19 = link8_pose1 * link9_pivot6;
+            let link8_inertia20 = link8_inertia13 - link8_inertia19;
+            let link8_inertia21 = link8_pose1 * link9_pivot8;
+            let link8_inertia22 = link8_inertia15 + link8_inertia21;
+            let link8_inertia23 = link8_inertia15 + link8_inertia22;
+            let link8_inertia24 = link8_pose1 * link8_inertia23;
+            let link8_inertia25 = link8_inertia18 - link8_inertia24;
+            let link8_inertia26 = link7_pose3 + link8_inertia20;
+            let link8_inertia27 = link7_pose4 + link8_inertia22;
+            let link8_inertia28 = link8_inertia25 - 0.08335000000000001;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = link7_pose2 * link8_inertia26;
+            let link7_pivot1 = link7_pose1 * link8_inertia27;
+            let link7_pivot2 = link7_pivot0 + link7_pivot1;
+            let link7_pivot3 = link8_inertia28 - link7_pivot2;
+            let link7_pivot4 = link7_inertia1 * link8_inertia26;
+            let link7_pivot5 = link7_inertia0 * link8_inertia27;
+            let link7_pivot6 = link7_pivot4 + link7_pivot5;
+            let link7_pivot7 = link8_inertia28 - link7_pivot6;
+            let link7_pivot8 = link7_inertia3 * link8_inertia26;
+            let link7_pivot9 = link7_inertia2 * link8_inertia27;
+            let link7_pivot10 = link7_pivot8 + link7_pivot9;
+            let link7_pivot11 = link8_inertia28 - link7_pivot10;
+            let link7_pivot12 = link7_inertia5 * link8_inertia26;
+            let link7_pivot13 = link7_inertia4 * link8_inertia27;
+            let link7_pivot14 = link7_pivot12 + link7_pivot13;
+            let link7_pivot15 = link8_inertia28 - link7_pivot14;
+            let link7_pivot16 = link7_inertia7 * link8_inertia26;
+            let link7_pivot17 = link7_inertia6 * link8_inertia27;
+            let link7_pivot18 = link7_pivot16 + link7_pivot17;
+            let link7_pivot19 = link8_inertia28 - link7_pivot18;
+            let link7_pivot20 = link7_inertia9 * link8_inertia26;
+            let link7_pivot21 = link7_inertia8 * link8_inertia27;
+            let link7_pivot22 = link7_pivot20 + link7_pivot21;
+            let link7_pivot23 = link8_inertia28 - link7_pivot22;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia10 = link7_pose2 * link9_pivot4;
+            let link7_inertia11 = link8_inertia26 - link7_inertia10;
+            let link7_inertia12 = link7_pose2 * link9_pivot6;
+            let link7_inertia13 = link8_inertia27 - link7_inertia12;
+            let link7_inertia14 = link8_inertia26 + link7_inertia11;
+            let link7_inertia15 = link7_pose2 * link7_inertia14;
+            let link7_inertia16 = link8_inertia28 - link7_inertia15;
+            let link7_inertia17 = link7_pose1 * link9_pivot6;
+            let link7_inertia18 = link7_inertia11 - link7_inertia17;
+            let link7_inertia19 = link7_pose1 * link9_pivot8;
+            let link7_inertia20 = link7_inertia13 + link7_inertia19;
+            let link7_inertia21 = link7_inertia13 + link7_inertia20;
+            let link7_inertia22 = link7_pose1 * link7_inertia21;
+            let link7_inertia23 = link7_inertia16 - link7_inertia22;
+            let link7_inertia24 = link6_pose3 + link7_inertia18;
+            let link7_inertia25 = link6_pose4 + link7_inertia20;
+            let link7_inertia26 = link7_inertia23 - 0.10835;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = link6_pose2 * link7_inertia24;
+            let link6_pivot1 = link6_pose1 * link7_inertia25;
+            let link6_pivot2 = link6_pivot0 + link6_pivot1;
+            let link6_pivot3 = link7_inertia26 - link6_pivot2;
+            let link6_pivot4 = link6_inertia1 * link7_inertia24;
+            let link6_pivot5 = link6_inertia0 * link7_inertia25;
+            let link6_pivot6 = link6_pivot4 + link6_pivot5;
+            let link6_pivot7 = link7_inertia26 - link6_pivot6;
+            let link6_pivot8 = link6_inertia3 * link7_inertia24;
+            let link6_pivot9 = link6_inertia2 * link7_inertia25;
+            let link6_pivot10 = link6_pivot8 + link6_pivot9;
+            let link6_pivot11 = link7_inertia26 - link6_pivot10;
+            let link6_pivot12 = link6_inertia5 * link7_inertia24;
+            let link6_pivot13 = link6_inertia4 * link7_inertia25;
+            let link6_pivot14 = link6_pivot12 + link6_pivot13;
+            let link6_pivot15 = link7_inertia26 - link6_pivot14;
+            let link6_pivot16 = link6_inertia7 * link7_inertia24;
+            let link6_pivot17 = link6_inertia6 * link7_inertia25;
+            let link6_pivot18 = link6_pivot16 + link6_pivot17;
+            let link6_pivot19 = link7_inertia26 - link6_pivot18;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia8 = link6_pose2 * link9_pivot4;
+            let link6_inertia9 = link7_inertia24 - link6_inertia8;
+            let link6_inertia10 = link6_pose2 * link9_pivot6;
+            let link6_inertia11 = link7_inertia25 - link6_inertia10;
+            let link6_inertia12 = link7_inertia24 + link6_inertia9;
+            let link6_inertia13 = link6_pose2 * link6_inertia12;
+            let link6_inertia14 = link7_inertia26 - link6_inertia13;
+            let link6_inertia15 = link6_pose1 * link9_pivot6;
+            let link6_inertia16 = link6_inertia9 - link6_inertia15;
+            let link6_inertia17 = link6_pose1 * link9_pivot8;
+            let link6_inertia18 = link6_inertia11 + link6_inertia17;
+            let link6_inertia19 = link6_inertia11 + link6_inertia18;
+            let link6_inertia20 = link6_pose1 * link6_inertia19;
+            let link6_inertia21 = link6_inertia14 - link6_inertia20;
+            let link6_inertia22 = link5_pose3 + link6_inertia16;
+            let link6_inertia23 = link5_pose4 + link6_inertia18;
+            let link6_inertia24 = link6_inertia21 - 0.13335;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = link5_pose2 * link6_inertia22;
+            let link5_pivot1 = link5_pose1 * link6_inertia23;
+            let link5_pivot2 = link5_pivot0 + link5_pivot1;
+            let link5_pivot3 = link6_inertia24 - link5_pivot2;
+            let link5_pivot4 = link5_inertia1 * link6_inertia22;
+            let link5_pivot5 = link5_inertia0 * link6_inertia23;
+            let link5_pivot6 = link5_pivot4 + link5_pivot5;
+            let link5_pivot7 = link6_inertia24 - link5_pivot6;
+            let link5_pivot8 = link5_inertia3 * link6_inertia22;
+            let link5_pivot9 = link5_inertia2 * link6_inertia23;
+            let link5_pivot10 = link5_pivot8 + link5_pivot9;
+            let link5_pivot11 = link6_inertia24 - link5_pivot10;
+            let link5_pivot12 = link5_inertia5 * link6_inertia22;
+            let link5_pivot13 = link5_inertia4 * link6_inertia23;
+            let link5_pivot14 = link5_pivot12 + link5_pivot13;
+            let link5_pivot15 = link6_inertia24 - link5_pivot14;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia6 = link5_pose2 * link9_pivot4;
+            let link5_inertia7 = link6_inertia22 - link5_inertia6;
+            let link5_inertia8 = link5_pose2 * link9_pivot6;
+            let link5_inertia9 = link6_inertia23 - link5_inertia8;
+            let link5_inertia10 = link6_inertia22 + link5_inertia7;
+            let link5_inertia11 = link5_pose2 * link5_inertia10;
+            let link5_inertia12 = link6_inertia24 - link5_inertia11;
+            let link5_inertia13 = link5_pose1 * link9_pivot6;
+            let link5_inertia14 = link5_inertia7 - link5_inertia13;
+            let link5_inertia15 = link5_pose1 * link9_pivot8;
+            let link5_inertia16 = link5_inertia9 + link5_inertia15;
+            let link5_inertia17 = link5_inertia9 + link5_inertia16;
+            let link5_inertia18 = link5_pose1 * link5_inertia17;
+            let link5_inertia19 = link5_inertia12 - link5_inertia18;
+            let link5_inertia20 = link4_pose3 + link5_inertia14;
+            let link5_inertia21 = link4_pose4 + link5_inertia16;
+            let link5_inertia22 = link5_inertia19 - 0.15835;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = link4_pose2 * link5_inertia20;
+            let link4_pivot1 = link4_pose1 * link5_inertia21;
+            let link4_pivot2 = link4_pivot0 + link4_pivot1;
+            let link4_pivot3 = link5_inertia22 - link4_pivot2;
+            let link4_pivot4 = link4_inertia1 * link5_inertia20;
+            let link4_pivot5 = link4_inertia0 * link5_inertia21;
+            let link4_pivot6 = link4_pivot4 + link4_pivot5;
+            let link4_pivot7 = link5_inertia22 - link4_pivot6;
+            let link4_pivot8 = link4_inertia3 * link5_inertia20;
+            let link4_pivot9 = link4_inertia2 * link5_inertia21;
+            let link4_pivot10 = link4_pivot8 + link4_pivot9;
+            let link4_pivot11 = link5_inertia22 - link4_pivot10;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia4 = link4_pose2 * link9_pivot4;
+            let link4_inertia5 = link5_inertia20 - link4_inertia4;
+            let link4_inertia6 = link4_pose2 * link9_pivot6;
+            let link4_inertia7 = link5_inertia21 - link4_inertia6;
+            let link4_inertia8 = link5_inertia20 + link4_inertia5;
+            let link4_inertia9 = link4_pose2 * link4_inertia8;
+            let link4_inertia10 = link5_inertia22 - link4_inertia9;
+            let link4_inertia11 = link4_pose1 * link9_pivot6;
+            let link4_inertia12 = link4_inertia5 - link4_inertia11;
+            let link4_inertia13 = link4_pose1 * link9_pivot8;
+            let link4_inertia14 = link4_inertia7 + link4_inertia13;
+            let link4_inertia15 = link4_inertia7 + link4_inertia14;
+            let link4_inertia16 = link4_pose1 * link4_inertia15;
+            let link4_inertia17 = link4_inertia10 - link4_inertia16;
+            let link4_inertia18 = link3_pose3 + link4_inertia12;
+            let link4_inertia19 = link3_pose4 + link4_inertia14;
+            let link4_inertia20 = link4_inertia17 - 0.18334999999999999;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = link3_pose2 * link4_inertia18;
+            let link3_pivot1 = link3_pose1 * link4_inertia19;
+            let link3_pivot2 = link3_pivot0 + link3_pivot1;
+            let link3_pivot3 = link4_inertia20 - link3_pivot2;
+            let link3_pivot4 = link3_inertia1 * link4_inertia18;
+            let link3_pivot5 = link3_inertia0 * link4_inertia19;
+            let link3_pivot6 = link3_pivot4 + link3_pivot5;
+            let link3_pivot7 = link4_inertia20 - link3_pivot6;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia2 = link3_pose2 * link9_pivot4;
+            let link3_inertia3 = link4_inertia18 - link3_inertia2;
+            let link3_inertia4 = link3_pose2 * link9_pivot6;
+            let link3_inertia5 = link4_inertia19 - link3_inertia4;
+            let link3_inertia6 = link4_inertia18 + link3_inertia3;
+            let link3_inertia7 = link3_pose2 * link3_inertia6;
+            let link3_inertia8 = link4_inertia20 - link3_inertia7;
+            let link3_inertia9 = link3_pose1 * link9_pivot6;
+            let link3_inertia10 = link3_inertia3 - link3_inertia9;
+            let link3_inertia11 = link3_pose1 * link9_pivot8;
+            let link3_inertia12 = link3_inertia5 + link3_inertia11;
+            let link3_inertia13 = link3_inertia5 + link3_inertia12;
+            let link3_inertia14 = link3_pose1 * link3_inertia13;
+            let link3_inertia15 = link3_inertia8 - link3_inertia14;
+            let link3_inertia16 = link2_pose3 + link3_inertia10;
+            let link3_inertia17 = link2_pose4 + link3_inertia12;
+            let link3_inertia18 = link3_inertia15 - 0.20834999999999998;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = link2_pose2 * link3_inertia16;
+            let link2_pivot1 = link2_pose1 * link3_inertia17;
+            let link2_pivot2 = link2_pivot0 + link2_pivot1;
+            let link2_pivot3 = link3_inertia18 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link2_pose2 * link9_pivot4;
+            let link2_inertia1 = link3_inertia16 - link2_inertia0;
+            let link2_inertia2 = link2_pose2 * link9_pivot6;
+            let link2_inertia3 = link3_inertia17 - link2_inertia2;
+            let link2_inertia4 = link3_inertia16 + link2_inertia1;
+            let link2_inertia5 = link2_pose2 * link2_inertia4;
+            let link2_inertia6 = link3_inertia18 - link2_inertia5;
+            let link2_inertia7 = link2_pose1 * link9_pivot8;
+            let link2_inertia8 = link2_inertia3 + link2_inertia7;
+            let link2_inertia9 = link2_inertia3 + link2_inertia8;
+            let link2_inertia10 = link2_pose1 * link2_inertia9;
+            let link2_inertia11 = link2_inertia6 - link2_inertia10;
+            let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / link9_inertia12;
+            let ground_pivot1 = link8_pivot3 * ground_pivot0;
+            let ground_pivot2 = link8_pivot3 * ground_pivot1;
+            let ground_pivot3 = link8_inertia28 - ground_pivot2;
+            let ground_pivot4 = link8_pivot7 * ground_pivot0;
+            let ground_pivot5 = link8_pivot3 * ground_pivot4;
+            let ground_pivot6 = link7_pivot3 - ground_pivot5;
+            let ground_pivot7 = link8_pivot11 * ground_pivot0;
+            let ground_pivot8 = link8_pivot3 * ground_pivot7;
+            let ground_pivot9 = link7_pivot7 - ground_pivot8;
+            let ground_pivot10 = link8_pivot15 * ground_pivot0;
+            let ground_pivot11 = link8_pivot3 * ground_pivot10;
+            let ground_pivot12 = link7_pivot11 - ground_pivot11;
+            let ground_pivot13 = link8_pivot19 * ground_pivot0;
+            let ground_pivot14 = link8_pivot3 * ground_pivot13;
+            let ground_pivot15 = link7_pivot15 - ground_pivot14;
+            let ground_pivot16 = link8_pivot23 * ground_pivot0;
+            let ground_pivot17 = link8_pivot3 * ground_pivot16;
+            let ground_pivot18 = link7_pivot19 - ground_pivot17;
+            let ground_pivot19 = link8_pivot27 * ground_pivot0;
+            let ground_pivot20 = link8_pivot3 * ground_pivot19;
+            let ground_pivot21 = link7_pivot23 - ground_pivot20;
+            let ground_pivot22 = link8_pivot7 * ground_pivot4;
+            let ground_pivot23 = link7_inertia26 - ground_pivot22;
+            let ground_pivot24 = link8_pivot7 * ground_pivot7;
+            let ground_pivot25 = link6_pivot3 - ground_pivot24;
+            let ground_pivot26 = link8_pivot7 * ground_pivot10;
+            let ground_pivot27 = link6_pivot7 - ground_pivot26;
+            let ground_pivot28 = link8_pivot7 * ground_pivot13;
+            let ground_pivot29 = link6_pivot11 - ground_pivot28;
+            let ground_pivot30 = link8_pivot7 * ground_pivot16;
+            let ground_pivot31 = link6_pivot15 - ground_pivot30;
+            let ground_pivot32 = link8_pivot7 * ground_pivot19;
+            let ground_pivot33 = link6_pivot19 - ground_pivot32;
+            let ground_pivot34 = link8_pivot11 * ground_pivot7;
+            let ground_pivot35 = link6_inertia24 - ground_pivot34;
+            let ground_pivot36 = link8_pivot11 * ground_pivot10;
+            let ground_pivot37 = link5_pivot3 - ground_pivot36;
+            let ground_pivot38 = link8_pivot11 * ground_pivot13;
+            let ground_pivot39 = link5_pivot7 - ground_pivot38;
+            let ground_pivot40 = link8_pivot11 * ground_pivot16;
+            let ground_pivot41 = link5_pivot11 - ground_pivot40;
+            let ground_pivot42 = link8_pivot11 * ground_pivot19;
+            let ground_pivot43 = link5_pivot15 - ground_pivot42;
+            let ground_pivot44 = link8_pivot15 * ground_pivot10;
+            let ground_pivot45 = link5_inertia22 - ground_pivot44;
+            let ground_pivot46 = link8_pivot15 * ground_pivot13;
+            let ground_pivot47 = link4_pivot3 - ground_pivot46;
+            let ground_pivot48 = link8_pivot15 * ground_pivot16;
+            let ground_pivot49 = link4_pivot7 - ground_pivot48;
+            let ground_pivot50 = link8_pivot15 * ground_pivot19;
+            let ground_pivot51 = link4_pivot11 - ground_pivot50;
+            let ground_pivot52 = link8_pivot19 * ground_pivot13;
+            let ground_pivot53 = link4_inertia20 - ground_pivot52;
+            let ground_pivot54 = link8_pivot19 * ground_pivot16;
+            let ground_pivot55 = link3_pivot3 - ground_pivot54;
+            let ground_pivot56 = link8_pivot19 * ground_pivot19;
+            let ground_pivot57 = link3_pivot7 - ground_pivot56;
+            let ground_pivot58 = link8_pivot23 * ground_pivot16;
+            let ground_pivot59 = link3_inertia18 - ground_pivot58;
+            let ground_pivot60 = link8_pivot23 * ground_pivot19;
+            let ground_pivot61 = link2_pivot3 - ground_pivot60;
+            let ground_pivot62 = link8_pivot27 * ground_pivot19;
+            let ground_pivot63 = link2_inertia12 - ground_pivot62;
+            let ground_pivot64 = 1.0 / ground_pivot3;
+            let ground_pivot65 = ground_pivot6 * ground_pivot64;
+            let ground_pivot66 = ground_pivot6 * ground_pivot65;
+            let ground_pivot67 = ground_pivot23 - ground_pivot66;
+            let ground_pivot68 = ground_pivot9 * ground_pivot64;
+            let ground_pivot69 = ground_pivot6 * ground_pivot68;
+            let ground_pivot70 = ground_pivot25 - ground_pivot69;
+            let ground_pivot71 = ground_pivot12 * ground_pivot64;
+            let ground_pivot72 = ground_pivot6 * ground_pivot71;
+            let ground_pivot73 = ground_pivot27 - ground_pivot72;
+            let ground_pivot74 = ground_pivot15 * ground_pivot64;
+            let ground_pivot75 = ground_pivot6 * ground_pivot74;
+            let ground_pivot76 = ground_pivot29 - ground_pivot75;
+            let ground_pivot77 = ground_pivot18 * ground_pivot64;
+            let ground_pivot78 = ground_pivot6 * ground_pivot77;
+            let ground_pivot79 = ground_pivot31 - ground_pivot78;
+            let ground_pivot80 = ground_pivot21 * ground_pivot64;
+            let ground_pivot81 = ground_pivot6 * ground_pivot80;
+            let ground_pivot82 = ground_pivot33 - ground_pivot81;
+            let ground_pivot83 = ground_pivot9 * ground_pivot68;
+            let ground_pivot84 = ground_pivot35 - ground_pivot83;
+            let ground_pivot85 = ground_pivot9 * ground_pivot71;
+            let ground_pivot86 = ground_pivot37 - ground_pivot85;
+            let ground_pivot87 = ground_pivot9 * ground_pivot74;
+            let ground_pivot88 = ground_pivot39 - ground_pivot87;
+            let ground_pivot89 = ground_pivot9 * ground_pivot77;
+            let ground_pivot90 = ground_pivot41 - ground_pivot89;
+            let ground_pivot91 = ground_pivot9 * ground_pivot80;
+            let ground_pivot92 = ground_pivot43 - ground_pivot91;
+            let ground_pivot93 = ground_pivot12 * ground_pivot71;
+            let ground_pivot94 = ground_pivot45 - ground_pivot93;
+            let ground_pivot95 = ground_pivot12 * ground_pivot74;
+            let ground_pivot96 = ground_pivot47 - ground_pivot95;
+            let ground_pivot97 = ground_pivot12 * ground_pivot77;
+            let ground_pivot98 = ground_pivot49 - ground_pivot97;
+            let ground_pivot99 = ground_pivot12 * ground_pivot80;
+            let ground_pivot100 = ground_pivot51 - ground_pivot99;
+            let ground_pivot101 = ground_pivot15 * ground_pivot74;
+            let ground_pivot102 = ground_pivot53 - ground_pivot101;
+            let ground_pivot103 = ground_pivot15 * ground_pivot77;
+            let ground_pivot104 = ground_pivot55 - ground_pivot103;
+            let ground_pivot105 = ground_pivot15 * ground_pivot80;
+            let ground_pivot106 = ground_pivot57 - ground_pivot105;
+            let ground_pivot107 = ground_pivot18 * ground_pivot77;
+            let ground_pivot108 = ground_pivot59 - ground_pivot107;
+            let ground_pivot109 = ground_pivot18 * ground_pivot80;
+            let ground_pivot110 = ground_pivot61 - ground_pivot109;
+            let ground_pivot111 = ground_pivot21 * ground_pivot80;
+            let ground_pivot112 = ground_pivot63 - ground_pivot111;
+            let ground_pivot113 = 1.0 / ground_pivot67;
+            let ground_pivot114 = ground_pivot70 * ground_pivot113;
+            let ground_pivot115 = ground_pivot70 * ground_pivot114;
+            let ground_pivot116 = ground_pivot84 - ground_pivot115;
+            let ground_pivot117 = ground_pivot73 * ground_pivot113;
+            let ground_pivot118 = ground_pivot70 * ground_pivot117;
+            let ground_pivot119 = ground_pivot86 - ground_pivot118;
+            let ground_pivot120 = ground_pivot76 * ground_pivot113;
+            let ground_pivot121 = ground_pivot70 * ground_pivot120;
+            let ground_pivot122 = ground_pivot88 - ground_pivot121;
+            let ground_pivot123 = ground_pivot79 * ground_pivot113;
+            let ground_pivot124 = ground_pivot70 * ground_pivot123;
+            let ground_pivot125 = ground_pivot90 - ground_pivot124;
+            let ground_pivot126 = ground_pivot82 * ground_pivot113;
+            let ground_pivot127 = ground_pivot70 * ground_pivot126;
+            let ground_pivot128 = ground_pivot92 - ground_pivot127;
+            let ground_pivot129 = ground_pivot73 * ground_pivot117;
+            let ground_pivot130 = ground_pivot94 - ground_pivot129;
+            let ground_pivot131 = ground_pivot73 * ground_pivot120;
+            let ground_pivot132 = ground_pivot96 - ground_pivot131;
+            let ground_pivot133 = ground_pivot73 * ground_pivot123;
+            let ground_pivot134 = ground_pivot98 - ground_pivot133;
+            let ground_pivot135 = ground_pivot73 * ground_pivot126;
+            let ground_pivot136 = ground_pivot100 - ground_pivot135;
+            let ground_pivot137 = ground_pivot76 * ground_pivot120;
+            let ground_pivot138 = ground_pivot102 - ground_pivot137;
+            let ground_pivot139 = ground_pivot76 * ground_pivot123;
+            let ground_pivot140 = ground_pivot104 - ground_pivot139;
+            let ground_pivot141 = ground_pivot76 * ground_pivot126;
+            let ground_pivot142 = ground_pivot106 - ground_pivot141;
+            let ground_pivot143 = ground_pivot79 * ground_pivot123;
+            let ground_pivot144 = ground_pivot108 - ground_pivot143;
+            let ground_pivot145 = ground_pivot79 * ground_pivot126;
+            let ground_pivot146 = ground_pivot110 - ground_pivot145;
+            let ground_pivot147 = ground_pivot82 * ground_pivot126;
+            let ground_pivot148 = ground_pivot112 - ground_pivot147;
+            let ground_pivot149 = 1.0 / ground_pivot116;
+            let ground_pivot150 = ground_pivot119 * ground_pivot149;
+            let ground_pivot151 = ground_pivot119 * ground_pivot150;
+            let ground_pivot152 = ground_pivot130 - ground_pivot151;
+            let ground_pivot153 = ground_pivot122 * ground_pivot149;
+            let ground_pivot154 = ground_pivot119 * ground_pivot153;
+            let ground_pivot155 = ground_pivot132 - ground_pivot154;
+            let ground_pivot156 = ground_pivot125 * ground_pivot149;
+            let ground_pivot157 = ground_pivot119 * ground_pivot156;
+            let ground_pivot158 = ground_pivot134 - ground_pivot157;
+            let ground_pivot159 = ground_pivot128 * ground_pivot149;
+            let ground_pivot160 = ground_pivot119 * ground_pivot159;
+            let ground_pivot161 = ground_pivot136 - ground_pivot160;
+            let ground_pivot162 = ground_pivot122 * ground_pivot153;
+            let ground_pivot163 = ground_pivot138 - ground_pivot162;
+            let ground_pivot164 = ground_pivot122 * ground_pivot156;
+            let ground_pivot165 = ground_pivot140 - ground_pivot164;
+            let ground_pivot166 = ground_pivot122 * ground_pivot159;
+            let ground_pivot167 = ground_pivot142 - ground_pivot166;
+            let ground_pivot168 = ground_pivot125 * ground_pivot156;
+            let ground_pivot169 = ground_pivot144 - ground_pivot168;
+            let ground_pivot170 = ground_pivot125 * ground_pivot159;
+            let ground_pivot171 = ground_pivot146 - ground_pivot170;
+            let ground_pivot172 = ground_pivot128 * ground_pivot159;
+            let ground_pivot173 = ground_pivot148 - ground_pivot172;
+            let ground_pivot174 = 1.0 / ground_pivot152;
+            let ground_pivot175 = ground_pivot155 * ground_pivot174;
+            let ground_pivot176 = ground_pivot155 * ground_pivot175;
+            let ground_pivot177 = ground_pivot163 - ground_pivot176;
+            let ground_pivot178 = ground_pivot158 * ground_pivot174;
+            let ground_pivot179 = ground_pivot155 * ground_pivot178;
+            let ground_pivot180 = ground_pivot165 - ground_pivot179;
+            let ground_pivot181 = ground_pivot161 * ground_pivot174;
+            let ground_pivot182 = ground_pivot155 * ground_pivot181;
+            let ground_pivot183 = ground_pivot167 - ground_pivot182;
+            let ground_pivot184 = ground_pivot158 * ground_pivot178;
+            let ground_pivot185 = ground_pivot169 - ground_pivot184;
+            let ground_pivot186 = ground_pivot158 * ground_pivot181;
+            let ground_pivot187 = ground_pivot171 - ground_pivot186;
+            let ground_pivot188 = ground_pivot161 * ground_pivot181;
+            let ground_pivot189 = ground_pivot173 - ground_pivot188;
+            let ground_pivot190 = 1.0 / ground_pivot177;
+            let ground_pivot191 = ground_pivot180 * ground_pivot190;
+            let ground_pivot192 = ground_pivot180 * ground_pivot191;
+            let ground_pivot193 = ground_pivot185 - ground_pivot192;
+            let ground_pivot194 = ground_pivot183 * ground_pivot190;
+            let ground_pivot195 = ground_pivot180 * ground_pivot194;
+            let ground_pivot196 = ground_pivot187 - ground_pivot195;
+            let ground_pivot197 = ground_pivot183 * ground_pivot194;
+            let ground_pivot198 = ground_pivot189 - ground_pivot197;
+            let ground_pivot199 = 1.0 / ground_pivot193;
+            let ground_pivot200 = ground_pivot196 * ground_pivot199;
+            let ground_pivot201 = ground_pivot196 * ground_pivot200;
+            let ground_pivot202 = ground_pivot198 - ground_pivot201;
+            let ground_pivot203 = 1.0 / ground_pivot202;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = link2_pose1 * link2_vel0;
+            let link2_vel2 = link2_pose2 * link2_vel0;
+            let link2_vel3 = link2_vel2 + 9.81;
+            let link2_vel4 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel4 * link2_vel4;
+            let link3_vel1 = link3_pose1 * link3_vel0;
+            let link3_vel2 = link2_vel1 + link3_vel1;
+            let link3_vel3 = link3_pose2 * link3_vel0;
+            let link3_vel4 = link2_vel3 + link3_vel3;
+            let link3_vel5 = v_2 + link2_vel4;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel5 * link3_vel5;
+            let link4_vel1 = link4_pose1 * link4_vel0;
+            let link4_vel2 = link3_vel2 + link4_vel1;
+            let link4_vel3 = link4_pose2 * link4_vel0;
+            let link4_vel4 = link3_vel4 + link4_vel3;
+            let link4_vel5 = v_3 + link3_vel5;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel5 * link4_vel5;
+            let link5_vel1 = link5_pose1 * link5_vel0;
+            let link5_vel2 = link4_vel2 + link5_vel1;
+            let link5_vel3 = link5_pose2 * link5_vel0;
+            let link5_vel4 = link4_vel4 + link5_vel3;
+            let link5_vel5 = v_4 + link4_vel5;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel5 * link5_vel5;
+            let link6_vel1 = link6_pose1 * link6_vel0;
+            let link6_vel2 = link5_vel2 + link6_vel1;
+            let link6_vel3 = link6_pose2 * link6_vel0;
+            let link6_vel4 = link5_vel4 + link6_vel3;
+            let link6_vel5 = v_5 + link5_vel5;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel5 * link6_vel5;
+            let link7_vel1 = link7_pose1 * link7_vel0;
+            let link7_vel2 = link6_vel2 + link7_vel1;
+            let link7_vel3 = link7_pose2 * link7_vel0;
+            let link7_vel4 = link6_vel4 + link7_vel3;
+            let link7_vel5 = v_6 + link6_vel5;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel5 * link7_vel5;
+            let link8_vel1 = link8_pose1 * link8_vel0;
+            let link8_vel2 = link7_vel2 + link8_vel1;
+            let link8_vel3 = link8_pose2 * link8_vel0;
+            let link8_vel4 = link7_vel4 + link8_vel3;
+            let link8_vel5 = v_7 + link7_vel5;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel5 * link8_vel5;
+            let link9_vel1 = link8_pose4 * link9_vel0;
+            let link9_vel2 = link8_vel2 + link9_vel1;
+            let link9_vel3 = link8_pose3 * link9_vel0;
+            let link9_vel4 = link8_vel4 + link9_vel3;
+            let link9_vel5 = v_8 + link8_vel5;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel5 * link9_vel5;
+            let link10_vel1 = link10_pose1 * link10_vel0;
+            let link10_vel2 = link9_vel2 + link10_vel1;
+            let link10_vel3 = link10_pose2 * link10_vel0;
+            let link10_vel4 = link9_vel4 + link10_vel3;
+            let link10_vel5 = link10_sin0 * link10_vel4;
+            let link10_vel6 = link10_cos0 * link10_vel2;
+            let link10_vel7 = link10_vel5 - link10_vel6;
+            let link10_vel8 = v_9 + link9_vel5;
+            // link1: gravity and wrenches
+            let link1_load0 = 9.81 * link1_pose0;
+            // link2: gravity and wrenches
+            let link2_load0 = link2_pose4 * link3_vel0;
+            let link2_load1 = link2_pose3 * link3_vel0;
+            let link2_load2 = link2_pose4 * link2_vel3;
+            let link2_load3 = link2_pose3 * link2_vel1;
+            let link2_load4 = link2_load2 - link2_load3;
+            // link3: gravity and wrenches
+            let link3_load0 = link3_pose4 * link4_vel0;
+            let link3_load1 = link3_pose3 * link4_vel0;
+            let link3_load2 = link3_pose4 * link3_vel4;
+            let link3_load3 = link3_pose3 * link3_vel2;
+            let link3_load4 = link3_load2 - link3_load3;
+            // link4: gravity and wrenches
+            let link4_load0 = link4_pose4 * link5_vel0;
+            let link4_load1 = link4_pose3 * link5_vel0;
+            let link4_load2 = link4_pose4 * link4_vel4;
+            let link4_load3 = link4_pose3 * link4_vel2;
+            let link4_load4 = link4_load2 - link4_load3;
+            // link5: gravity and wrenches
+            let link5_load0 = link5_pose4 * link6_vel0;
+            let link5_load1 = link5_pose3 * link6_vel0;
+            let link5_load2 = link5_pose4 * link5_vel4;
+            let link5_load3 = link5_pose3 * link5_vel2;
+            let link5_load4 = link5_load2 - link5_load3;
+            // link6: gravity and wrenches
+            let link6_load0 = link6_pose4 * link7_vel0;
+            let link6_load1 = link6_pose3 * link7_vel0;
+            let link6_load2 = link6_pose4 * link6_vel4;
+            let link6_load3 = link6_pose3 * link6_vel2;
+            let link6_load4 = link6_load2 - link6_load3;
+            // link7: gravity and wrenches
+            let link7_load0 = link7_pose4 * link8_vel0;
+            let link7_load1 = link7_pose3 * link8_vel0;
+            let link7_load2 = link7_pose4 * link7_vel4;
+            let link7_load3 = link7_pose3 * link7_vel2;
+            let link7_load4 = link7_load2 - link7_load3;
+            // link8: gravity and wrenches
+            let link8_load0 = link8_pose4 * link8_vel4;
+            let link8_load1 = link8_pose3 * link8_vel2;
+            let link8_load2 = link8_load0 - link8_load1;
+            // link9: gravity and wrenches
+            let link9_load0 = link9_pose2 * link10_vel0;
+            let link9_load1 = link9_pose1 * link10_vel0;
+            let link9_load2 = link9_pose2 * link9_vel4;
+            let link9_load3 = link9_pose1 * link9_vel2;
+            let link9_load4 = link9_load2 - link9_load3;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel8 * link10_vel8;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_vel7;
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest0 = tau_9 - link10_load2;
+            let link10_rest1 = 119.76047904191617 * link10_rest0;
+            let link10_rest2 = 0.05 * link10_rest1;
+            let link10_rest3 = link10_sin0 * link10_load1;
+            let link10_rest4 = link10_cos0 * link10_rest2;
+            let link10_rest5 = link10_rest3 - link10_rest4;
+            let link10_rest6 = link10_cos0 * link10_load1;
+            let link10_rest7 = link10_sin0 * link10_rest2;
+            let link10_rest8 = link10_rest6 + link10_rest7;
+            let link10_rest9 = link10_pose2 * link10_rest5;
+            let link10_rest10 = tau_9 - link10_rest9;
+            let link10_rest11 = link10_pose1 * link10_rest8;
+            let link10_rest12 = link10_rest10 + link10_rest11;
+            let link10_rest13 = link9_load0 + link10_rest5;
+            let link10_rest14 = link9_load1 + link10_rest8;
+            let link10_rest15 = link9_load4 + link10_rest12;
+            // link9: momentum remainder D, D' (4.45, 4.49)
+            let link9_rest0 = tau_8 - link10_rest15;
+            let link9_rest1 = link9_pivot0 * link9_rest0;
+            let link9_rest2 = link10_inertia14 * link9_rest1;
+            let link9_rest3 = link10_rest13 + link9_rest2;
+            let link9_rest4 = link10_inertia15 * link9_rest1;
+            let link9_rest5 = link10_rest14 - link9_rest4;
+            let link9_rest6 = link8_pose3 * link9_rest3;
+            let link9_rest7 = tau_8 - link9_rest6;
+            let link9_rest8 = link8_pose4 * link9_rest5;
+            let link9_rest9 = link9_rest7 + link9_rest8;
+            let link9_rest10 = link9_vel1 + link9_rest3;
+            let link9_rest11 = link9_vel3 + link9_rest5;
+            let link9_rest12 = link8_load2 + link9_rest9;
+            // link8: momentum remainder D, D' (4.45, 4.49)
+            let link8_rest0 = link8_pose2 * link9_rest10;
+            let link8_rest1 = link9_rest12 - link8_rest0;
+            let link8_rest2 = link8_pose1 * link9_rest11;
+            let link8_rest3 = link8_rest1 + link8_rest2;
+            let link8_rest4 = link7_load0 + link9_rest10;
+            let link8_rest5 = link7_load1 + link9_rest11;
+            let link8_rest6 = link7_load4 + link8_rest3;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = link7_pose2 * link8_rest4;
+            let link7_rest1 = link8_rest6 - link7_rest0;
+            let link7_rest2 = link7_pose1 * link8_rest5;
+            let link7_rest3 = link7_rest1 + link7_rest2;
+            let link7_rest4 = link6_load0 + link8_rest4;
+            let link7_rest5 = link6_load1 + link8_rest5;
+            let link7_rest6 = link6_load4 + link7_rest3;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_pose2 * link7_rest4;
+            let link6_rest1 = link7_rest6 - link6_rest0;
+            let link6_rest2 = link6_pose1 * link7_rest5;
+            let link6_rest3 = link6_rest1 + link6_rest2;
+            let link6_rest4 = link5_load0 + link7_rest4;
+            let link6_rest5 = link5_load1 + link7_rest5;
+            let link6_rest6 = link5_load4 + link6_rest3;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_pose2 * link6_rest4;
+            let link5_rest1 = link6_rest6 - link5_rest0;
+            let link5_rest2 = link5_pose1 * link6_rest5;
+            let link5_rest3 = link5_rest1 + link5_rest2;
+            let link5_rest4 = link4_load0 + link6_rest4;
+            let link5_rest5 = link4_load1 + link6_rest5;
+            let link5_rest6 = link4_load4 + link5_rest3;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_pose2 * link5_rest4;
+            let link4_rest1 = link5_rest6 - link4_rest0;
+            let link4_rest2 = link4_pose1 * link5_rest5;
+            let link4_rest3 = link4_rest1 + link4_rest2;
+            let link4_rest4 = link3_load0 + link5_rest4;
+            let link4_rest5 = link3_load1 + link5_rest5;
+            let link4_rest6 = link3_load4 + link4_rest3;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_pose2 * link4_rest4;
+            let link3_rest1 = link4_rest6 - link3_rest0;
+            let link3_rest2 = link3_pose1 * link4_rest5;
+            let link3_rest3 = link3_rest1 + link3_rest2;
+            let link3_rest4 = link2_load0 + link4_rest4;
+            let link3_rest5 = link2_load1 + link4_rest5;
+            let link3_rest6 = link2_load4 + link3_rest3;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_pose2 * link3_rest4;
+            let link2_rest1 = link3_rest6 - link2_rest0;
+            let link2_rest2 = link2_pose1 * link3_rest5;
+            let link2_rest3 = link2_rest1 + link2_rest2;
+            let link2_rest4 = link1_load0 + link2_rest3;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = tau_7 - link9_rest12;
+            let link1_rest1 = ground_pivot0 * link1_rest0;
+            let link1_rest2 = link8_pivot3 * link1_rest1;
+            let link1_rest3 = link8_rest6 + link1_rest2;
+            let link1_rest4 = link8_pivot7 * link1_rest1;
+            let link1_rest5 = link7_rest6 + link1_rest4;
+            let link1_rest6 = link8_pivot11 * link1_rest1;
+            let link1_rest7 = link6_rest6 + link1_rest6;
+            let link1_rest8 = link8_pivot15 * link1_rest1;
+            let link1_rest9 = link5_rest6 + link1_rest8;
+            let link1_rest10 = link8_pivot19 * link1_rest1;
+            let link1_rest11 = link4_rest6 + link1_rest10;
+            let link1_rest12 = link8_pivot23 * link1_rest1;
+            let link1_rest13 = link3_rest6 + link1_rest12;
+            let link1_rest14 = link8_pivot27 * link1_rest1;
+            let link1_rest15 = link2_rest4 + link1_rest14;
+            let link1_rest16 = tau_6 - link1_rest3;
+            let link1_rest17 = ground_pivot64 * link1_rest16;
+            let link1_rest18 = ground_pivot6 * link1_rest17;
+            let link1_rest19 = link1_rest5 + link1_rest18;
+            let link1_rest20 = ground_pivot9 * link1_rest17;
+            let link1_rest21 = link1_rest7 + link1_rest20;
+            let link1_rest22 = ground_pivot12 * link1_rest17;
+            let link1_rest23 = link1_rest9 + link1_rest22;
+            let link1_rest24 = ground_pivot15 * link1_rest17;
+            let link1_rest25 = link1_rest11 + link1_rest24;
+            let link1_rest26 = ground_pivot18 * link1_rest17;
+            let link1_rest27 = link1_rest13 + link1_rest26;
+            let link1_rest28 = ground_pivot21 * link1_rest17;
+            let link1_rest29 = link1_rest15 + link1_rest28;
+            let link1_rest30 = tau_5 - link1_rest19;
+            let link1_rest31 = ground_pivot113 * link1_rest30;
+            let link1_rest32 = ground_pivot70 * link1_rest31;
+            let link1_rest33 = link1_rest21 + link1_rest32;
+            let link1_rest34 = ground_pivot73 * link1_rest31;
+            let link1_rest35 = link1_rest23 + link1_rest34;
+            let link1_rest36 = ground_pivot76 * link1_rest31;
+            let link1_rest37 = link1_rest25 + link1_rest36;
+            let link1_rest38 = ground_pivot79 * link1_rest31;
+            let link1_rest39 = link1_rest27 + link1_rest38;
+            let link1_rest40 = ground_pivot82 * link1_rest31;
+            let link1_rest41 = link1_rest29 + link1_rest40;
+            let link1_rest42 = tau_4 - link1_rest33;
+            let link1_rest43 = ground_pivot149 * link1_rest42;
+            let link1_rest44 = ground_pivot119 * link1_rest43;
+            let link1_rest45 = link1_rest35 + link1_rest44;
+            let link1_rest46 = ground_pivot122 * link1_rest43;
+            let link1_rest47 = link1_rest37 + link1_rest46;
+            let link1_rest48 = ground_pivot125 * link1_rest43;
+            let link1_rest49 = link1_rest39 + link1_rest48;
+            let link1_rest50 = ground_pivot128 * link1_rest43;
+            let link1_rest51 = link1_rest41 + link1_rest50;
+            let link1_rest52 = tau_3 - link1_rest45;
+            let link1_rest53 = ground_pivot174 * link1_rest52;
+            let link1_rest54 = ground_pivot155 * link1_rest53;
+            let link1_rest55 = link1_rest47 + link1_rest54;
+            let link1_rest56 = ground_pivot158 * link1_rest53;
+            let link1_rest57 = link1_rest49 + link1_rest56;
+            let link1_rest58 = ground_pivot161 * link1_rest53;
+            let link1_rest59 = link1_rest51 + link1_rest58;
+            let link1_rest60 = tau_2 - link1_rest55;
+            let link1_rest61 = ground_pivot190 * link1_rest60;
+            let link1_rest62 = ground_pivot180 * link1_rest61;
+            let link1_rest63 = link1_rest57 + link1_rest62;
+            let link1_rest64 = ground_pivot183 * link1_rest61;
+            let link1_rest65 = link1_rest59 + link1_rest64;
+            let link1_rest66 = tau_1 - link1_rest63;
+            let link1_rest67 = ground_pivot199 * link1_rest66;
+            let link1_rest68 = ground_pivot196 * link1_rest67;
+            let link1_rest69 = link1_rest65 + link1_rest68;
+            let link1_rest70 = tau_0 - link1_rest69;
+            let link1_rest71 = ground_pivot203 * link1_rest70;
+            // ground: acceleration
+            let ground_acc0 = ground_pivot200 * link1_rest71;
+            let ground_acc1 = link1_rest67 - ground_acc0;
+            let ground_acc2 = ground_pivot191 * ground_acc1;
+            let ground_acc3 = link1_rest61 - ground_acc2;
+            let ground_acc4 = ground_pivot194 * link1_rest71;
+            let ground_acc5 = ground_acc3 - ground_acc4;
+            let ground_acc6 = ground_pivot175 * ground_acc5;
+            let ground_acc7 = link1_rest53 - ground_acc6;
+            let ground_acc8 = ground_pivot178 * ground_acc1;
+            let ground_acc9 = ground_acc7 - ground_acc8;
+            let ground_acc10 = ground_pivot181 * link1_rest71;
+            let ground_acc11 = ground_acc9 - ground_acc10;
+            let ground_acc12 = ground_pivot150 * ground_acc11;
+            let ground_acc13 = link1_rest43 - ground_acc12;
+            let ground_acc14 = ground_pivot153 * ground_acc5;
+            let ground_acc15 = ground_acc13 - ground_acc14;
+            let ground_acc16 = ground_pivot156 * ground_acc1;
+            let ground_acc17 = ground_acc15 - ground_acc16;
+            let ground_acc18 = ground_pivot159 * link1_rest71;
+            let ground_acc19 = ground_acc17 - ground_acc18;
+            let ground_acc20 = ground_pivot114 * ground_acc19;
+            let ground_acc21 = link1_rest31 - ground_acc20;
+            let ground_acc22 = ground_pivot117 * ground_acc11;
+            let ground_acc23 = ground_acc21 - ground_acc22;
+            let ground_acc24 = ground_pivot120 * ground_acc5;
+            let ground_acc25 = ground_acc23 - ground_acc24;
+            let ground_acc26 = ground_pivot123 * ground_acc1;
+            let ground_acc27 = ground_acc25 - ground_acc26;
+            let ground_acc28 = ground_pivot126 * link1_rest71;
+            let ground_acc29 = ground_acc27 - ground_acc28;
+            let ground_acc30 = ground_pivot65 * ground_acc29;
+            let ground_acc31 = link1_rest17 - ground_acc30;
+            let ground_acc32 = ground_pivot68 * ground_acc19;
+            let ground_acc33 = ground_acc31 - ground_acc32;
+            let ground_acc34 = ground_pivot71 * ground_acc11;
+            let ground_acc35 = ground_acc33 - ground_acc34;
+            let ground_acc36 = ground_pivot74 * ground_acc5;
+            let ground_acc37 = ground_acc35 - ground_acc36;
+            let ground_acc38 = ground_pivot77 * ground_acc1;
+            let ground_acc39 = ground_acc37 - ground_acc38;
+            let ground_acc40 = ground_pivot80 * link1_rest71;
+            let ground_acc41 = ground_acc39 - ground_acc40;
+            let ground_acc42 = ground_pivot1 * ground_acc41;
+            let ground_acc43 = link1_rest1 - ground_acc42;
+            let ground_acc44 = ground_pivot4 * ground_acc29;
+            let ground_acc45 = ground_acc43 - ground_acc44;
+            let ground_acc46 = ground_pivot7 * ground_acc19;
+            let ground_acc47 = ground_acc45 - ground_acc46;
+            let ground_acc48 = ground_pivot10 * ground_acc11;
+            let ground_acc49 = ground_acc47 - ground_acc48;
+            let ground_acc50 = ground_pivot13 * ground_acc5;
+            let ground_acc51 = ground_acc49 - ground_acc50;
+            let ground_acc52 = ground_pivot16 * ground_acc1;
+            let ground_acc53 = ground_acc51 - ground_acc52;
+            let ground_acc54 = ground_pivot19 * link1_rest71;
+            let ground_acc55 = ground_acc53 - ground_acc54;
+            // link2: acceleration
+            let link2_acc0 = link2_pose1 * link1_rest71;
+            let link2_acc1 = link2_pose2 * link1_rest71;
+            let link2_acc2 = link1_rest71 + ground_acc1;
+            // link3: acceleration
+            let link3_acc0 = link3_pose1 * link2_acc2;
+            let link3_acc1 = link2_acc0 + link3_acc0;
+            let link3_acc2 = link3_pose2 * link2_acc2;
+            let link3_acc3 = link2_acc1 + link3_acc2;
+            let link3_acc4 = ground_acc5 + link2_acc2;
+            // link4: acceleration
+            let link4_acc0 = link4_pose1 * link3_acc4;
+            let link4_acc1 = link3_acc1 + link4_acc0;
+            let link4_acc2 = link4_pose2 * link3_acc4;
+            let link4_acc3 = link3_acc3 + link4_acc2;
+            let link4_acc4 = ground_acc11 + link3_acc4;
+            // link5: acceleration
+            let link5_acc0 = link5_pose1 * link4_acc4;
+            let link5_acc1 = link4_acc1 + link5_acc0;
+            let link5_acc2 = link5_pose2 * link4_acc4;
+            let link5_acc3 = link4_acc3 + link5_acc2;
+            let link5_acc4 = ground_acc19 + link4_acc4;
+            // link6: acceleration
+            let link6_acc0 = link6_pose1 * link5_acc4;
+            let link6_acc1 = link5_acc1 + link6_acc0;
+            let link6_acc2 = link6_pose2 * link5_acc4;
+            let link6_acc3 = link5_acc3 + link6_acc2;
+            let link6_acc4 = ground_acc29 + link5_acc4;
+            // link7: acceleration
+            let link7_acc0 = link7_pose1 * link6_acc4;
+            let link7_acc1 = link6_acc1 + link7_acc0;
+            let link7_acc2 = link7_pose2 * link6_acc4;
+            let link7_acc3 = link6_acc3 + link7_acc2;
+            let link7_acc4 = ground_acc41 + link6_acc4;
+            // link8: acceleration
+            let link8_acc0 = link8_pose1 * link7_acc4;
+            let link8_acc1 = link7_acc1 + link8_acc0;
+            let link8_acc2 = link8_pose2 * link7_acc4;
+            let link8_acc3 = link7_acc3 + link8_acc2;
+            let link8_acc4 = ground_acc55 + link7_acc4;
+            // link9: acceleration
+            let link9_acc0 = link8_pose4 * link8_acc4;
+            let link9_acc1 = link8_acc1 + link9_acc0;
+            let link9_acc2 = link8_pose3 * link8_acc4;
+            let link9_acc3 = link8_acc3 + link9_acc2;
+            let link9_acc4 = link9_pivot1 * link9_acc3;
+            let link9_acc5 = link9_pivot2 * link9_acc1;
+            let link9_acc6 = link9_acc4 + link9_acc5;
+            let link9_acc7 = link9_rest1 + link9_acc6;
+            let link9_acc8 = link8_acc4 - link9_acc7;
+            // link10: acceleration
+            let link10_acc0 = link10_pose1 * link9_acc7;
+            let link10_acc1 = link9_acc1 + link10_acc0;
+            let link10_acc2 = link10_pose2 * link9_acc7;
+            let link10_acc3 = link9_acc3 + link10_acc2;
+            let link10_acc4 = link10_sin0 * link10_acc1;
+            let link10_acc5 = link10_cos0 * link10_acc3;
+            let link10_acc6 = link10_acc4 + link10_acc5;
+            let link10_acc7 = 5.9880239520958085 * link10_acc6;
+            let link10_acc8 = link10_rest1 + link10_acc7;
+            let link10_acc9 = link9_acc7 + link10_acc8;
+            a.set(0, l, -link1_rest71);
+            a.set(1, l, -ground_acc1);
+            a.set(2, l, -ground_acc5);
+            a.set(3, l, -ground_acc11);
+            a.set(4, l, -ground_acc19);
+            a.set(5, l, -ground_acc29);
+            a.set(6, l, -ground_acc41);
+            a.set(7, l, -ground_acc55);
+            a.set(8, l, link9_acc8);
+            a.set(9, l, link10_acc9);
+        }
     }
 
     /// Mass matrix, by rows.
     /// 302 operations: 160 additions, 142 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn mass_matrix(&self, q: &[f64; 10], m: &mut [[f64; 10]; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link10: mass matrix by composite inertias
-        let link10_mass0 = 0.05 * link10_cos0;
-        let link10_mass1 = 0.05 * link10_sin0;
-        let link10_mass2 = link10_pose2 * link10_mass0;
-        let link10_mass3 = link10_mass2 + 0.00835;
-        let link10_mass4 = link10_pose1 * link10_mass1;
-        let link10_mass5 = link10_mass3 + link10_mass4;
-        let link10_mass6 = link8_pose3 * link10_mass0;
-        let link10_mass7 = link10_mass5 + link10_mass6;
-        let link10_mass8 = link8_pose4 * link10_mass1;
-        let link10_mass9 = link10_mass7 + link10_mass8;
-        let link10_mass10 = link8_pose2 * link10_mass0;
-        let link10_mass11 = link10_mass9 + link10_mass10;
-        let link10_mass12 = link8_pose1 * link10_mass1;
-        let link10_mass13 = link10_mass11 + link10_mass12;
-        let link10_mass14 = link7_pose2 * link10_mass0;
-        let link10_mass15 = link10_mass13 + link10_mass14;
-        let link10_mass16 = link7_pose1 * link10_mass1;
-        let link10_mass17 = link10_mass15 + link10_mass16;
-        let link10_mass18 = link6_pose2 * link10_mass0;
-        let link10_mass19 = link10_mass17 + link10_mass18;
-        let link10_mass20 = link6_pose1 * link10_mass1;
-        let link10_mass21 = link10_mass19 + link10_mass20;
-        let link10_mass22 = link5_pose2 * link10_mass0;
-        let link10_mass23 = link10_mass21 + link10_mass22;
-        let link10_mass24 = link5_pose1 * link10_mass1;
-        let link10_mass25 = link10_mass23 + link10_mass24;
-        let link10_mass26 = link4_pose2 * link10_mass0;
-        let link10_mass27 = link10_mass25 + link10_mass26;
-        let link10_mass28 = link4_pose1 * link10_mass1;
-        let link10_mass29 = link10_mass27 + link10_mass28;
-        let link10_mass30 = link3_pose2 * link10_mass0;
-        let link10_mass31 = link10_mass29 + link10_mass30;
-        let link10_mass32 = link3_pose1 * link10_mass1;
-        let link10_mass33 = link10_mass31 + link10_mass32;
-        let link10_mass34 = link2_pose2 * link10_mass0;
-        let link10_mass35 = link10_mass33 + link10_mass34;
-        let link10_mass36 = link2_pose1 * link10_mass1;
-        let link10_mass37 = link10_mass35 + link10_mass36;
-        let link10_mass38 = link10_mass0 + link10_mass0;
-        let link10_mass39 = link10_pose2 * link10_mass38;
-        let link10_mass40 = link10_mass39 + 0.00835;
-        let link10_mass41 = link10_mass1 + link10_mass1;
-        let link10_mass42 = link10_pose1 * link10_mass41;
-        let link10_mass43 = link10_mass40 + link10_mass42;
-        let link10_mass44 = link9_pose1 + link10_mass0;
-        let link10_mass45 = link9_pose2 + link10_mass1;
-        let link10_mass46 = link10_mass43 + 0.033350000000000005;
-        // link9: mass matrix by composite inertias
-        let link9_mass0 = link8_pose3 * link10_mass44;
-        let link9_mass1 = link10_mass46 + link9_mass0;
-        let link9_mass2 = link8_pose4 * link10_mass45;
-        let link9_mass3 = link9_mass1 + link9_mass2;
-        let link9_mass4 = link8_pose2 * link10_mass44;
-        let link9_mass5 = link9_mass3 + link9_mass4;
-        let link9_mass6 = link8_pose1 * link10_mass45;
-        let link9_mass7 = link9_mass5 + link9_mass6;
-        let link9_mass8 = link7_pose2 * link10_mass44;
-        let link9_mass9 = link9_mass7 + link9_mass8;
-        let link9_mass10 = link7_pose1 * link10_mass45;
-        let link9_mass11 = link9_mass9 + link9_mass10;
-        let link9_mass12 = link6_pose2 * link10_mass44;
-        let link9_mass13 = link9_mass11 + link9_mass12;
-        let link9_mass14 = link6_pose1 * link10_mass45;
-        let link9_mass15 = link9_mass13 + link9_mass14;
-        let link9_mass16 = link5_pose2 * link10_mass44;
-        let link9_mass17 = link9_mass15 + link9_mass16;
-        let link9_mass18 = link5_pose1 * link10_mass45;
-        let link9_mass19 = link9_mass17 + link9_mass18;
-        let link9_mass20 = link4_pose2 * link10_mass44;
-        let link9_mass21 = link9_mass19 + link9_mass20;
-        let link9_mass22 = link4_pose1 * link10_mass45;
-        let link9_mass23 = link9_mass21 + link9_mass22;
-        let link9_mass24 = link3_pose2 * link10_mass44;
-        let link9_mass25 = link9_mass23 + link9_mass24;
-        let link9_mass26 = link3_pose1 * link10_mass45;
-        let link9_mass27 = link9_mass25 + link9_mass26;
-        let link9_mass28 = link2_pose2 * link10_mass44;
-        let link9_mass29 = link9_mass27 + link9_mass28;
-        let link9_mass30 = link2_pose1 * link10_mass45;
-        let link9_mass31 = link9_mass29 + link9_mass30;
-        let link9_mass32 = link10_mass44 + link10_mass44;
-        let link9_mass33 = link8_pose3 * link9_mass32;
-        let link9_mass34 = link10_mass46 + link9_mass33;
-        let link9_mass35 = link10_mass45 + link10_mass45;
-        let link9_mass36 = link8_pose4 * link9_mass35;
-        let link9_mass37 = link9_mass34 + link9_mass36;
-        let link9_mass38 = link8_pose3 + link10_mass44;
-        let link9_mass39 = link8_pose4 + link10_mass45;
-        let link9_mass40 = link9_mass37 + 0.05835;
-        // link8: mass matrix by composite inertias
-        let link8_mass0 = link8_pose2 * link9_mass38;
-        let link8_mass1 = link9_mass40 + link8_mass0;
-        let link8_mass2 = link8_pose1 * link9_mass39;
-        let link8_mass3 = link8_mass1 + link8_mass2;
-        let link8_mass4 = link7_pose2 * link9_mass38;
-        let link8_mass5 = link8_mass3 + link8_mass4;
-        let link8_mass6 = link7_pose1 * link9_mass39;
-        let link8_mass7 = link8_mass5 + link8_mass6;
-        let link8_mass8 = link6_pose2 * link9_mass38;
-        let link8_mass9 = link8_mass7 + link8_mass8;
-        let link8_mass10 = link6_pose1 * link9_mass39;
-        let link8_mass11 = link8_mass9 + link8_mass10;
-        let link8_mass12 = link5_pose2 * link9_mass38;
-        let link8_mass13 = link8_mass11 + link8_mass12;
-        let link8_mass14 = link5_pose1 * link9_mass39;
-        let link8_mass15 = link8_mass13 + link8_mass14;
-        let link8_mass16 = link4_pose2 * link9_mass38;
-        let link8_mass17 = link8_mass15 + link8_mass16;
-        let link8_mass18 = link4_pose1 * link9_mass39;
-        let link8_mass19 = link8_mass17 + link8_mass18;
-        let link8_mass20 = link3_pose2 * link9_mass38;
-        let link8_mass21 = link8_mass19 + link8_mass20;
-        let link8_mass22 = link3_pose1 * link9_mass39;
-        let link8_mass23 = link8_mass21 + link8_mass22;
-        let link8_mass24 = link2_pose2 * link9_mass38;
-        let link8_mass25 = link8_mass23 + link8_mass24;
-        let link8_mass26 = link2_pose1 * link9_mass39;
-        let link8_mass27 = link8_mass25 + link8_mass26;
-        let link8_mass28 = link9_mass38 + link9_mass38;
-        let link8_mass29 = link8_pose2 * link8_mass28;
-        let link8_mass30 = link9_mass40 + link8_mass29;
-        let link8_mass31 = link9_mass39 + link9_mass39;
-        let link8_mass32 = link8_pose1 * link8_mass31;
-        let link8_mass33 = link8_mass30 + link8_mass32;
-        let link8_mass34 = link7_pose3 + link9_mass38;
-        let link8_mass35 = link7_pose4 + link9_mass39;
-        let link8_mass36 = link8_mass33 + 0.08335000000000001;
-        // link7: mass matrix by composite inertias
-        let link7_mass0 = link7_pose2 * link8_mass34;
-        let link7_mass1 = link8_mass36 + link7_mass0;
-        let link7_mass2 = link7_pose1 * link8_mass35;
-        let link7_mass3 = link7_mass1 + link7_mass2;
-        let link7_mass4 = link6_pose2 * link8_mass34;
-        let link7_mass5 = link7_mass3 + link7_mass4;
-        let link7_mass6 = link6_pose1 * link8_mass35;
-        let link7_mass7 = link7_mass5 + link7_mass6;
-        let link7_mass8 = link5_pose2 * link8_mass34;
-        let link7_mass9 = link7_mass7 + link7_mass8;
-        let link7_mass10 = link5_pose1 * link8_mass35;
-        let link7_mass11 = link7_mass9 + link7_mass10;
-        let link7_mass12 = link4_pose2 * link8_mass34;
-        let link7_mass13 = link7_mass11 + link7_mass12;
-        let link7_mass14 = link4_pose1 * link8_mass35;
-        let link7_mass15 = link7_mass13 + link7_mass14;
-        let link7_mass16 = link3_pose2 * link8_mass34;
-        let link7_mass17 = link7_mass15 + link7_mass16;
-        let link7_mass18 = link3_pose1 * link8_mass35;
-        let link7_mass19 = link7_mass17 + link7_mass18;
-        let link7_mass20 = link2_pose2 * link8_mass34;
-        let link7_mass21 = link7_mass19 + link7_mass20;
-        let link7_mass22 = link2_pose1 * link8_mass35;
-        let link7_mass23 = link7_mass21 + link7_mass22;
-        let link7_mass24 = link8_mass34 + link8_mass34;
-        let link7_mass25 = link7_pose2 * link7_mass24;
-        let link7_mass26 = link8_mass36 + link7_mass25;
-        let link7_mass27 = link8_mass35 + link8_mass35;
-        let link7_mass28 = link7_pose1 * link7_mass27;
-        let link7_mass29 = link7_mass26 + link7_mass28;
-        let link7_mass30 = link6_pose3 + link8_mass34;
-        let link7_mass31 = link6_pose4 + link8_mass35;
-        let link7_mass32 = link7_mass29 + 0.10835;
-        // link6: mass matrix by composite inertias
-        let link6_mass0 = link6_pose2 * link7_mass30;
-        let link6_mass1 = link7_mass32 + link6_mass0;
-        let link6_mass2 = link6_pose1 * link7_mass31;
-        let link6_mass3 = link6_mass1 + link6_mass2;
-        let link6_mass4 = link5_pose2 * link7_mass30;
-        let link6_mass5 = link6_mass3 + link6_mass4;
-        let link6_mass6 = link5_pose1 * link7_mass31;
-        let link6_mass7 = link6_mass5 + link6_mass6;
-        let link6_mass8 = link4_pose2 * link7_mass30;
-        let link6_mass9 = link6_mass7 + link6_mass8;
-        let link6_mass10 = link4_pose1 * link7_mass31;
-        let link6_mass11 = link6_mass9 + link6_mass10;
-        let link6_mass12 = link3_pose2 * link7_mass30;
-        let link6_mass13 = link6_mass11 + link6_mass12;
-        let link6_mass14 = link3_pose1 * link7_mass31;
-        let link6_mass15 = link6_mass13 + link6_mass14;
-        let link6_mass16 = link2_pose2 * link7_mass30;
-        let link6_mass17 = link6_mass15 + link6_mass16;
-        let link6_mass18 = link2_pose1 * link7_mass31;
-        let link6_mass19 = link6_mass17 + link6_mass18;
-        let link6_mass20 = link7_mass30 + link7_mass30;
-        let link6_mass21 = link6_pose2 * link6_mass20;
-        let link6_mass22 = link7_mass32 + link6_mass21;
-        let link6_mass23 = link7_mass31 + link7_mass31;
-        let link6_mass24 = link6_pose1 * link6_mass23;
-        let link6_mass25 = link6_mass22 + link6_mass24;
-        let link6_mass26 = link5_pose3 + link7_mass30;
-        let link6_mass27 = link5_pose4 + link7_mass31;
-        let link6_mass28 = link6_mass25 + 0.13335;
-        // link5: mass matrix by composite inertias
-        let link5_mass0 = link5_pose2 * link6_mass26;
-        let link5_mass1 = link6_mass28 + link5_mass0;
-        let link5_mass2 = link5_pose1 * link6_mass27;
-        let link5_mass3 = link5_mass1 + link5_mass2;
-        let link5_mass4 = link4_pose2 * link6_mass26;
-        let link5_mass5 = link5_mass3 + link5_mass4;
-        let link5_mass6 = link4_pose1 * link6_mass27;
-        let link5_mass7 = link5_mass5 + link5_mass6;
-        let link5_mass8 = link3_pose2 * link6_mass26;
-        let link5_mass9 = link5_mass7 + link5_mass8;
-        let link5_mass10 = link3_pose1 * link6_mass27;
-        let link5_mass11 = link5_mass9 + link5_mass10;
-        let link5_mass12 = link2_pose2 * link6_mass26;
-        let link5_mass13 = link5_mass11 + link5_mass12;
-        let link5_mass14 = link2_pose1 * link6_mass27;
-        let link5_mass15 = link5_mass13 + link5_mass14;
-        let link5_mass16 = link6_mass26 + link6_mass26;
-        let link5_mass17 = link5_pose2 * link5_mass16;
-        let link5_mass18 = link6_mass28 + link5_mass17;
-        let link5_mass19 = link6_mass27 + link6_mass27;
-        let link5_mass20 = link5_pose1 * link5_mass19;
-        let link5_mass21 = link5_mass18 + link5_mass20;
-        let link5_mass22 = link4_pose3 + link6_mass26;
-        let link5_mass23 = link4_pose4 + link6_mass27;
-        let link5_mass24 = link5_mass21 + 0.15835;
-        // link4: mass matrix by composite inertias
-        let link4_mass0 = link4_pose2 * link5_mass22;
-        let link4_mass1 = link5_mass24 + link4_mass0;
-        let link4_mass2 = link4_pose1 * link5_mass23;
-        let link4_mass3 = link4_mass1 + link4_mass2;
-        let link4_mass4 = link3_pose2 * link5_mass22;
-        let link4_mass5 = link4_mass3 + link4_mass4;
-        let link4_mass6 = link3_pose1 * link5_mass23;
-        let link4_mass7 = link4_mass5 + link4_mass6;
-        let link4_mass8 = link2_pose2 * link5_mass22;
-        let link4_mass9 = link4_mass7 + link4_mass8;
-        let link4_mass10 = link2_pose1 * link5_mass23;
-        let link4_mass11 = link4_mass9 + link4_mass10;
-        let link4_mass12 = link5_mass22 + link5_mass22;
-        let link4_mass13 = link4_pose2 * link4_mass12;
-        let link4_mass14 = link5_mass24 + link4_mass13;
-        let link4_mass15 = link5_mass23 + link5_mass23;
-        let link4_mass16 = link4_pose1 * link4_mass15;
-        let link4_mass17 = link4_mass14 + link4_mass16;
-        let link4_mass18 = link3_pose3 + link5_mass22;
-        let link4_mass19 = link3_pose4 + link5_mass23;
-        let link4_mass20 = link4_mass17 + 0.18334999999999999;
-        // link3: mass matrix by composite inertias
-        let link3_mass0 = link3_pose2 * link4_mass18;
-        let link3_mass1 = link4_mass20 + link3_mass0;
-        let link3_mass2 = link3_pose1 * link4_mass19;
-        let link3_mass3 = link3_mass1 + link3_mass2;
-        let link3_mass4 = link2_pose2 * link4_mass18;
-        let link3_mass5 = link3_mass3 + link3_mass4;
-        let link3_mass6 = link2_pose1 * link4_mass19;
-        let link3_mass7 = link3_mass5 + link3_mass6;
-        let link3_mass8 = link4_mass18 + link4_mass18;
-        let link3_mass9 = link3_pose2 * link3_mass8;
-        let link3_mass10 = link4_mass20 + link3_mass9;
-        let link3_mass11 = link4_mass19 + link4_mass19;
-        let link3_mass12 = link3_pose1 * link3_mass11;
-        let link3_mass13 = link3_mass10 + link3_mass12;
-        let link3_mass14 = link2_pose3 + link4_mass18;
-        let link3_mass15 = link2_pose4 + link4_mass19;
-        let link3_mass16 = link3_mass13 + 0.20834999999999998;
-        // link2: mass matrix by composite inertias
-        let link2_mass0 = link2_pose2 * link3_mass14;
-        let link2_mass1 = link3_mass16 + link2_mass0;
-        let link2_mass2 = link2_pose1 * link3_mass15;
-        let link2_mass3 = link2_mass1 + link2_mass2;
-        let link2_mass4 = link3_mass14 + link3_mass14;
-        let link2_mass5 = link2_pose2 * link2_mass4;
-        let link2_mass6 = link3_mass16 + link2_mass5;
-        let link2_mass7 = link3_mass15 + link3_mass15;
-        let link2_mass8 = link2_pose1 * link2_mass7;
-        let link2_mass9 = link2_mass6 + link2_mass8;
-        let link2_mass10 = link2_mass9 + 0.23334999999999997;
-        m[0][0] = link2_mass10;
-        m[0][1] = link2_mass3;
-        m[0][2] = link3_mass7;
-        m[0][3] = link4_mass11;
-        m[0][4] = link5_mass15;
-        m[0][5] = link6_mass19;
-        m[0][6] = link7_mass23;
-        m[0][7] = link8_mass27;
-        m[0][8] = link9_mass31;
-        m[0][9] = link10_mass37;
-        m[1][0] = link2_mass3;
-        m[1][1] = link3_mass16;
-        m[1][2] = link3_mass3;
-        m[1][3] = link4_mass7;
-        m[1][4] = link5_mass11;
-        m[1][5] = link6_mass15;
-        m[1][6] = link7_mass19;
-        m[1][7] = link8_mass23;
-        m[1][8] = link9_mass27;
-        m[1][9] = link10_mass33;
-        m[2][0] = link3_mass7;
-        m[2][1] = link3_mass3;
-        m[2][2] = link4_mass20;
-        m[2][3] = link4_mass3;
-        m[2][4] = link5_mass7;
-        m[2][5] = link6_mass11;
-        m[2][6] = link7_mass15;
-        m[2][7] = link8_mass19;
-        m[2][8] = link9_mass23;
-        m[2][9] = link10_mass29;
-        m[3][0] = link4_mass11;
-        m[3][1] = link4_mass7;
-        m[3][2] = link4_mass3;
-        m[3][3] = link5_mass24;
-        m[3][4] = link5_mass3;
-        m[3][5] = link6_mass7;
-        m[3][6] = link7_mass11;
-        m[3][7] = link8_mass15;
-        m[3][8] = link9_mass19;
-        m[3][9] = link10_mass25;
-        m[4][0] = link5_mass15;
-        m[4][1] = link5_mass11;
-        m[4][2] = link5_mass7;
-        m[4][3] = link5_mass3;
-        m[4][4] = link6_mass28;
-        m[4][5] = link6_mass3;
-        m[4][6] = link7_mass7;
-        m[4][7] = link8_mass11;
-        m[4][8] = link9_mass15;
-        m[4][9] = link10_mass21;
-        m[5][0] = link6_mass19;
-        m[5][1] = link6_mass15;
-        m[5][2] = link6_mass11;
-        m[5][3] = link6_mass7;
-        m[5][4] = link6_mass3;
-        m[5][5] = link7_mass32;
-        m[5][6] = link7_mass3;
-        m[5][7] = link8_mass7;
-        m[5][8] = link9_mass11;
-        m[5][9] = link10_mass17;
-        m[6][0] = link7_mass23;
-        m[6][1] = link7_mass19;
-        m[6][2] = link7_mass15;
-        m[6][3] = link7_mass11;
-        m[6][4] = link7_mass7;
-        m[6][5] = link7_mass3;
-        m[6][6] = link8_mass36;
-        m[6][7] = link8_mass3;
-        m[6][8] = link9_mass7;
-        m[6][9] = link10_mass13;
-        m[7][0] = link8_mass27;
-        m[7][1] = link8_mass23;
-        m[7][2] = link8_mass19;
-        m[7][3] = link8_mass15;
-        m[7][4] = link8_mass11;
-        m[7][5] = link8_mass7;
-        m[7][6] = link8_mass3;
-        m[7][7] = link9_mass40;
-        m[7][8] = link9_mass3;
-        m[7][9] = link10_mass9;
-        m[8][0] = link9_mass31;
-        m[8][1] = link9_mass27;
-        m[8][2] = link9_mass23;
-        m[8][3] = link9_mass19;
-        m[8][4] = link9_mass15;
-        m[8][5] = link9_mass11;
-        m[8][6] = link9_mass7;
-        m[8][7] = link9_mass3;
-        m[8][8] = link10_mass46;
-        m[8][9] = link10_mass5;
-        m[9][0] = link10_mass37;
-        m[9][1] = link10_mass33;
-        m[9][2] = link10_mass29;
-        m[9][3] = link10_mass25;
-        m[9][4] = link10_mass21;
-        m[9][5] = link10_mass17;
-        m[9][6] = link10_mass13;
-        m[9][7] = link10_mass9;
-        m[9][8] = link10_mass5;
-        m[9][9] = 0.00835;
+        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link10: mass matrix by composite inertias
+            let link10_mass0 = 0.05 * link10_cos0;
+            let link10_mass1 = 0.05 * link10_sin0;
+            let link10_mass2 = link10_pose2 * link10_mass0;
+            let link10_mass3 = link10_mass2 + 0.00835;
+            let link10_mass4 = link10_pose1 * link10_mass1;
+            let link10_mass5 = link10_mass3 + link10_mass4;
+            let link10_mass6 = link8_pose3 * link10_mass0;
+            let link10_mass7 = link10_mass5 + link10_mass6;
+            let link10_mass8 = link8_pose4 * link10_mass1;
+            let link10_mass9 = link10_mass7 + link10_mass8;
+            let link10_mass10 = link8_pose2 * link10_mass0;
+            let link10_mass11 = link10_mass9 + link10_mass10;
+            let link10_mass12 = link8_pose1 * link10_mass1;
+            let link10_mass13 = link10_mass11 + link10_mass12;
+            let link10_mass14 = link7_pose2 * link10_mass0;
+            let link10_mass15 = link10_mass13 + link10_mass14;
+            let link10_mass16 = link7_pose1 * link10_mass1;
+            let link10_mass17 = link10_mass15 + link10_mass16;
+            let link10_mass18 = link6_pose2 * link10_mass0;
+            let link10_mass19 = link10_mass17 + link10_mass18;
+            let link10_mass20 = link6_pose1 * link10_mass1;
+            let link10_mass21 = link10_mass19 + link10_mass20;
+            let link10_mass22 = link5_pose2 * link10_mass0;
+            let link10_mass23 = link10_mass21 + link10_mass22;
+            let link10_mass24 = link5_pose1 * link10_mass1;
+            let link10_mass25 = link10_mass23 + link10_mass24;
+            let link10_mass26 = link4_pose2 * link10_mass0;
+            let link10_mass27 = link10_mass25 + link10_mass26;
+            let link10_mass28 = link4_pose1 * link10_mass1;
+            let link10_mass29 = link10_mass27 + link10_mass28;
+            let link10_mass30 = link3_pose2 * link10_mass0;
+            let link10_mass31 = link10_mass29 + link10_mass30;
+            let link10_mass32 = link3_pose1 * link10_mass1;
+            let link10_mass33 = link10_mass31 + link10_mass32;
+            let link10_mass34 = link2_pose2 * link10_mass0;
+            let link10_mass35 = link10_mass33 + link10_mass34;
+            let link10_mass36 = link2_pose1 * link10_mass1;
+            let link10_mass37 = link10_mass35 + link10_mass36;
+            let link10_mass38 = link10_mass0 + link10_mass0;
+            let link10_mass39 = link10_pose2 * link10_mass38;
+            let link10_mass40 = link10_mass39 + 0.00835;
+            let link10_mass41 = link10_mass1 + link10_mass1;
+            let link10_mass42 = link10_pose1 * link10_mass41;
+            let link10_mass43 = link10_mass40 + link10_mass42;
+            let link10_mass44 = link9_pose1 + link10_mass0;
+            let link10_mass45 = link9_pose2 + link10_mass1;
+            let link10_mass46 = link10_mass43 + 0.033350000000000005;
+            // link9: mass matrix by composite inertias
+            let link9_mass0 = link8_pose3 * link10_mass44;
+            let link9_mass1 = link10_mass46 + link9_mass0;
+            let link9_mass2 = link8_pose4 * link10_mass45;
+            let link9_mass3 = link9_mass1 + link9_mass2;
+            let link9_mass4 = link8_pose2 * link10_mass44;
+            let link9_mass5 = link9_mass3 + link9_mass4;
+            let link9_mass6 = link8_pose1 * link10_mass45;
+            let link9_mass7 = link9_mass5 + link9_mass6;
+            let link9_mass8 = link7_pose2 * link10_mass44;
+            let link9_mass9 = link9_mass7 + link9_mass8;
+            let link9_mass10 = link7_pose1 * link10_mass45;
+            let link9_mass11 = link9_mass9 + link9_mass10;
+            let link9_mass12 = link6_pose2 * link10_mass44;
+            let link9_mass13 = link9_mass11 + link9_mass12;
+            let link9_mass14 = link6_pose1 * link10_mass45;
+            let link9_mass15 = link9_mass13 + link9_mass14;
+            let link9_mass16 = link5_pose2 * link10_mass44;
+            let link9_mass17 = link9_mass15 + link9_mass16;
+            let link9_mass18 = link5_pose1 * link10_mass45;
+            let link9_mass19 = link9_mass17 + link9_mass18;
+            let link9_mass20 = link4_pose2 * link10_mass44;
+            let link9_mass21 = link9_mass19 + link9_mass20;
+            let link9_mass22 = link4_pose1 * link10_mass45;
+            let link9_mass23 = link9_mass21 + link9_mass22;
+            let link9_mass24 = link3_pose2 * link10_mass44;
+            let link9_mass25 = link9_mass23 + link9_mass24;
+            let link9_mass26 = link3_pose1 * link10_mass45;
+            let link9_mass27 = link9_mass25 + link9_mass26;
+            let link9_mass28 = link2_pose2 * link10_mass44;
+            let link9_mass29 = link9_mass27 + link9_mass28;
+            let link9_mass30 = link2_pose1 * link10_mass45;
+            let link9_mass31 = link9_mass29 + link9_mass30;
+            let link9_mass32 = link10_mass44 + link10_mass44;
+            let link9_mass33 = link8_pose3 * link9_mass32;
+            let link9_mass34 = link10_mass46 + link9_mass33;
+            let link9_mass35 = link10_mass45 + link10_mass45;
+            let link9_mass36 = link8_pose4 * link9_mass35;
+            let link9_mass37 = link9_mass34 + link9_mass36;
+            let link9_mass38 = link8_pose3 + link10_mass44;
+            let link9_mass39 = link8_pose4 + link10_mass45;
+            let link9_mass40 = link9_mass37 + 0.05835;
+            // link8: mass matrix by composite inertias
+            let link8_mass0 = link8_pose2 * link9_mass38;
+            let link8_mass1 = link9_mass40 + link8_mass0;
+            let link8_mass2 = link8_pose1 * link9_mass39;
+            let link8_mass3 = link8_mass1 + link8_mass2;
+            let link8_mass4 = link7_pose2 * link9_mass38;
+            let link8_mass5 = link8_mass3 + link8_mass4;
+            let link8_mass6 = link7_pose1 * link9_mass39;
+            let link8_mass7 = link8_mass5 + link8_mass6;
+            let link8_mass8 = link6_pose2 * link9_mass38;
+            let link8_mass9 = link8_mass7 + link8_mass8;
+            let link8_mass10 = link6_pose1 * link9_mass39;
+            let link8_mass11 = link8_mass9 + link8_mass10;
+            let link8_mass12 = link5_pose2 * link9_mass38;
+            let link8_mass13 = link8_mass11 + link8_mass12;
+            let link8_mass14 = link5_pose1 * link9_mass39;
+            let link8_mass15 = link8_mass13 + link8_mass14;
+            let link8_mass16 = link4_pose2 * link9_mass38;
+            let link8_mass17 = link8_mass15 + link8_mass16;
+            let link8_mass18 = link4_pose1 * link9_mass39;
+            let link8_mass19 = link8_mass17 + link8_mass18;
+            let link8_mass20 = link3_pose2 * link9_mass38;
+            let link8_mass21 = link8_mass19 + link8_mass20;
+            let link8_mass22 = link3_pose1 * link9_mass39;
+            let link8_mass23 = link8_mass21 + link8_mass22;
+            let link8_mass24 = link2_pose2 * link9_mass38;
+            let link8_mass25 = link8_mass23 + link8_mass24;
+            let link8_mass26 = link2_pose1 * link9_mass39;
+            let link8_mass27 = link8_mass25 + link8_mass26;
+            let link8_mass28 = link9_mass38 + link9_mass38;
+            let link8_mass29 = link8_pose2 * link8_mass28;
+            let link8_mass30 = link9_mass40 + link8_mass29;
+            let link8_mass31 = link9_mass39 + link9_mass39;
+            let link8_mass32 = link8_pose1 * link8_mass31;
+            let link8_mass33 = link8_mass30 + link8_mass32;
+            let link8_mass34 = link7_pose3 + link9_mass38;
+            let link8_mass35 = link7_pose4 + link9_mass39;
+            let link8_mass36 = link8_mass33 + 0.08335000000000001;
+            // link7: mass matrix by composite inertias
+            let link7_mass0 = link7_pose2 * link8_mass34;
+            let link7_mass1 = link8_mass36 + link7_mass0;
+            let link7_mass2 = link7_pose1 * link8_mass35;
+            let link7_mass3 = link7_mass1 + link7_mass2;
+            let link7_mass4 = link6_pose2 * link8_mass34;
+            let link7_mass5 = link7_mass3 + link7_mass4;
+            let link7_mass6 = link6_pose1 * link8_mass35;
+            let link7_mass7 = link7_mass5 + link7_mass6;
+            let link7_mass8 = link5_pose2 * link8_mass34;
+            let link7_mass9 = link7_mass7 + link7_mass8;
+            let link7_mass10 = link5_pose1 * link8_mass35;
+            let link7_mass11 = link7_mass9 + link7_mass10;
+            let link7_mass12 = link4_pose2 * link8_mass34;
+            let link7_mass13 = link7_mass11 + link7_mass12;
+            let link7_mass14 = link4_pose1 * link8_mass35;
+            let link7_mass15 = link7_mass13 + link7_mass14;
+            let link7_mass16 = link3_pose2 * link8_mass34;
+            let link7_mass17 = link7_mass15 + link7_mass16;
+            let link7_mass18 = link3_pose1 * link8_mass35;
+            let link7_mass19 = link7_mass17 + link7_mass18;
+            let link7_mass20 = link2_pose2 * link8_mass34;
+            let link7_mass21 = link7_mass19 + link7_mass20;
+            let link7_mass22 = link2_pose1 * link8_mass35;
+            let link7_mass23 = link7_mass21 + link7_mass22;
+            let link7_mass24 = link8_mass34 + link8_mass34;
+            let link7_mass25 = link7_pose2 * link7_mass24;
+            let link7_mass26 = link8_mass36 + link7_mass25;
+            let link7_mass27 = link8_mass35 + link8_mass35;
+            let link7_mass28 = link7_pose1 * link7_mass27;
+            let link7_mass29 = link7_mass26 + link7_mass28;
+            let link7_mass30 = link6_pose3 + link8_mass34;
+            let link7_mass31 = link6_pose4 + link8_mass35;
+            let link7_mass32 = link7_mass29 + 0.10835;
+            // link6: mass matrix by composite inertias
+            let link6_mass0 = link6_pose2 * link7_mass30;
+            let link6_mass1 = link7_mass32 + link6_mass0;
+            let link6_mass2 = link6_pose1 * link7_mass31;
+            let link6_mass3 = link6_mass1 + link6_mass2;
+            let link6_mass4 = link5_pose2 * link7_mass30;
+            let link6_mass5 = link6_mass3 + link6_mass4;
+            let link6_mass6 = link5_pose1 * link7_mass31;
+            let link6_mass7 = link6_mass5 + link6_mass6;
+            let link6_mass8 = link4_pose2 * link7_mass30;
+            let link6_mass9 = link6_mass7 + link6_mass8;
+            let link6_mass10 = link4_pose1 * link7_mass31;
+            let link6_mass11 = link6_mass9 + link6_mass10;
+            let link6_mass12 = link3_pose2 * link7_mass30;
+            let link6_mass13 = link6_mass11 + link6_mass12;
+            let link6_mass14 = link3_pose1 * link7_mass31;
+            let link6_mass15 = link6_mass13 + link6_mass14;
+            let link6_mass16 = link2_pose2 * link7_mass30;
+            let link6_mass17 = link6_mass15 + link6_mass16;
+            let link6_mass18 = link2_pose1 * link7_mass31;
+            let link6_mass19 = link6_mass17 + link6_mass18;
+            let link6_mass20 = link7_mass30 + link7_mass30;
+            let link6_mass21 = link6_pose2 * link6_mass20;
+            let link6_mass22 = link7_mass32 + link6_mass21;
+            let link6_mass23 = link7_mass31 + link7_mass31;
+            let link6_mass24 = link6_pose1 * link6_mass23;
+            let link6_mass25 = link6_mass22 + link6_mass24;
+            let link6_mass26 = link5_pose3 + link7_mass30;
+            let link6_mass27 = link5_pose4 + link7_mass31;
+            let link6_mass28 = link6_mass25 + 0.13335;
+            // link5: mass matrix by composite inertias
+            let link5_mass0 = link5_pose2 * link6_mass26;
+            let link5_mass1 = link6_mass28 + link5_mass0;
+            let link5_mass2 = link5_pose1 * link6_mass27;
+            let link5_mass3 = link5_mass1 + link5_mass2;
+            let link5_mass4 = link4_pose2 * link6_mass26;
+            let link5_mass5 = link5_mass3 + link5_mass4;
+            let link5_mass6 = link4_pose1 * link6_mass27;
+            let link5_mass7 = link5_mass5 + link5_mass6;
+            let link5_mass8 = link3_pose2 * link6_mass26;
+            let link5_mass9 = link5_mass7 + link5_mass8;
+            let link5_mass10 = link3_pose1 * link6_mass27;
+            let link5_mass11 = link5_mass9 + link5_mass10;
+            let link5_mass12 = link2_pose2 * link6_mass26;
+            let link5_mass13 = link5_mass11 + link5_mass12;
+            let link5_mass14 = link2_pose1 * link6_mass27;
+            let link5_mass15 = link5_mass13 + link5_mass14;
+            let link5_mass16 = link6_mass26 + link6_mass26;
+            let link5_mass17 = link5_pose2 * link5_mass16;
+            let link5_mass18 = link6_mass28 + link5_mass17;
+            let link5_mass19 = link6_mass27 + link6_mass27;
+            let link5_mass20 = link5_pose1 * link5_mass19;
+            let link5_mass21 = link5_mass18 + link5_mass20;
+            let link5_mass22 = link4_pose3 + link6_mass26;
+            let link5_mass23 = link4_pose4 + link6_mass27;
+            let link5_mass24 = link5_mass21 + 0.15835;
+            // link4: mass matrix by composite inertias
+            let link4_mass0 = link4_pose2 * link5_mass22;
+            let link4_mass1 = link5_mass24 + link4_mass0;
+            let link4_mass2 = link4_pose1 * link5_mass23;
+            let link4_mass3 = link4_mass1 + link4_mass2;
+            let link4_mass4 = link3_pose2 * link5_mass22;
+            let link4_mass5 = link4_mass3 + link4_mass4;
+            let link4_mass6 = link3_pose1 * link5_mass23;
+            let link4_mass7 = link4_mass5 + link4_mass6;
+            let link4_mass8 = link2_pose2 * link5_mass22;
+            let link4_mass9 = link4_mass7 + link4_mass8;
+            let link4_mass10 = link2_pose1 * link5_mass23;
+            let link4_mass11 = link4_mass9 + link4_mass10;
+            let link4_mass12 = link5_mass22 + link5_mass22;
+            let link4_mass13 = link4_pose2 * link4_mass12;
+            let link4_mass14 = link5_mass24 + link4_mass13;
+            let link4_mass15 = link5_mass23 + link5_mass23;
+            let link4_mass16 = link4_pose1 * link4_mass15;
+            let link4_mass17 = link4_mass14 + link4_mass16;
+            let link4_mass18 = link3_pose3 + link5_mass22;
+            let link4_mass19 = link3_pose4 + link5_mass23;
+            let link4_mass20 = link4_mass17 + 0.18334999999999999;
+            // link3: mass matrix by composite inertias
+            let link3_mass0 = link3_pose2 * link4_mass18;
+            let link3_mass1 = link4_mass20 + link3_mass0;
+            let link3_mass2 = link3_pose1 * link4_mass19;
+            let link3_mass3 = link3_mass1 + link3_mass2;
+            let link3_mass4 = link2_pose2 * link4_mass18;
+            let link3_mass5 = link3_mass3 + link3_mass4;
+            let link3_mass6 = link2_pose1 * link4_mass19;
+            let link3_mass7 = link3_mass5 + link3_mass6;
+            let link3_mass8 = link4_mass18 + link4_mass18;
+            let link3_mass9 = link3_pose2 * link3_mass8;
+            let link3_mass10 = link4_mass20 + link3_mass9;
+            let link3_mass11 = link4_mass19 + link4_mass19;
+            let link3_mass12 = link3_pose1 * link3_mass11;
+            let link3_mass13 = link3_mass10 + link3_mass12;
+            let link3_mass14 = link2_pose3 + link4_mass18;
+            let link3_mass15 = link2_pose4 + link4_mass19;
+            let link3_mass16 = link3_mass13 + 0.20834999999999998;
+            // link2: mass matrix by composite inertias
+            let link2_mass0 = link2_pose2 * link3_mass14;
+            let link2_mass1 = link3_mass16 + link2_mass0;
+            let link2_mass2 = link2_pose1 * link3_mass15;
+            let link2_mass3 = link2_mass1 + link2_mass2;
+            let link2_mass4 = link3_mass14 + link3_mass14;
+            let link2_mass5 = link2_pose2 * link2_mass4;
+            let link2_mass6 = link3_mass16 + link2_mass5;
+            let link2_mass7 = link3_mass15 + link3_mass15;
+            let link2_mass8 = link2_pose1 * link2_mass7;
+            let link2_mass9 = link2_mass6 + link2_mass8;
+            let link2_mass10 = link2_mass9 + 0.23334999999999997;
+            m.set(0, l, link2_mass10);
+            m.set(1, l, link2_mass3);
+            m.set(2, l, link3_mass7);
+            m.set(3, l, link4_mass11);
+            m.set(4, l, link5_mass15);
+            m.set(5, l, link6_mass19);
+            m.set(6, l, link7_mass23);
+            m.set(7, l, link8_mass27);
+            m.set(8, l, link9_mass31);
+            m.set(9, l, link10_mass37);
+            m.set(10, l, link2_mass3);
+            m.set(11, l, link3_mass16);
+            m.set(12, l, link3_mass3);
+            m.set(13, l, link4_mass7);
+            m.set(14, l, link5_mass11);
+            m.set(15, l, link6_mass15);
+            m.set(16, l, link7_mass19);
+            m.set(17, l, link8_mass23);
+            m.set(18, l, link9_mass27);
+            m.set(19, l, link10_mass33);
+            m.set(20, l, link3_mass7);
+            m.set(21, l, link3_mass3);
+            m.set(22, l, link4_mass20);
+            m.set(23, l, link4_mass3);
+            m.set(24, l, link5_mass7);
+            m.set(25, l, link6_mass11);
+            m.set(26, l, link7_mass15);
+            m.set(27, l, link8_mass19);
+            m.set(28, l, link9_mass23);
+            m.set(29, l, link10_mass29);
+            m.set(30, l, link4_mass11);
+            m.set(31, l, link4_mass7);
+            m.set(32, l, link4_mass3);
+            m.set(33, l, link5_mass24);
+            m.set(34, l, link5_mass3);
+            m.set(35, l, link6_mass7);
+            m.set(36, l, link7_mass11);
+            m.set(37, l, link8_mass15);
+            m.set(38, l, link9_mass19);
+            m.set(39, l, link10_mass25);
+            m.set(40, l, link5_mass15);
+            m.set(41, l, link5_mass11);
+            m.set(42, l, link5_mass7);
+            m.set(43, l, link5_mass3);
+            m.set(44, l, link6_mass28);
+            m.set(45, l, link6_mass3);
+            m.set(46, l, link7_mass7);
+            m.set(47, l, link8_mass11);
+            m.set(48, l, link9_mass15);
+            m.set(49, l, link10_mass21);
+            m.set(50, l, link6_mass19);
+            m.set(51, l, link6_mass15);
+            m.set(52, l, link6_mass11);
+            m.set(53, l, link6_mass7);
+            m.set(54, l, link6_mass3);
+            m.set(55, l, link7_mass32);
+            m.set(56, l, link7_mass3);
+            m.set(57, l, link8_mass7);
+            m.set(58, l, link9_mass11);
+            m.set(59, l, link10_mass17);
+            m.set(60, l, link7_mass23);
+            m.set(61, l, link7_mass19);
+            m.set(62, l, link7_mass15);
+            m.set(63, l, link7_mass11);
+            m.set(64, l, link7_mass7);
+            m.set(65, l, link7_mass3);
+            m.set(66, l, link8_mass36);
+            m.set(67, l, link8_mass3);
+            m.set(68, l, link9_mass7);
+            m.set(69, l, link10_mass13);
+            m.set(70, l, link8_mass27);
+            m.set(71, l, link8_mass23);
+            m.set(72, l, link8_mass19);
+            m.set(73, l, link8_mass15);
+            m.set(74, l, link8_mass11);
+            m.set(75, l, link8_mass7);
+            m.set(76, l, link8_mass3);
+            m.set(77, l, link9_mass40);
+            m.set(78, l, link9_mass3);
+            m.set(79, l, link10_mass9);
+            m.set(80, l, link9_mass31);
+            m.set(81, l, link9_mass27);
+            m.set(82, l, link9_mass23);
+            m.set(83, l, link9_mass19);
+            m.set(84, l, link9_mass15);
+            m.set(85, l, link9_mass11);
+            m.set(86, l, link9_mass7);
+            m.set(87, l, link9_mass3);
+            m.set(88, l, link10_mass46);
+            m.set(89, l, link10_mass5);
+            m.set(90, l, link10_mass37);
+            m.set(91, l, link10_mass33);
+            m.set(92, l, link10_mass29);
+            m.set(93, l, link10_mass25);
+            m.set(94, l, link10_mass21);
+            m.set(95, l, link10_mass17);
+            m.set(96, l, link10_mass13);
+            m.set(97, l, link10_mass9);
+            m.set(98, l, link10_mass5);
+            m.set(99, l, 0.00835);
+        }
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
     /// 303 operations: 142 additions, 161 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn inverse_dynamics(&self, q: &[f64; 10], v: &[f64; 10], a: &[f64; 10], tau: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        let a_0 = a[0];
-        let a_1 = a[1];
-        let a_2 = a[2];
-        let a_3 = a[3];
-        let a_4 = a[4];
-        let a_5 = a[5];
-        let a_6 = a[6];
-        let a_7 = a[7];
-        let a_8 = a[8];
-        let a_9 = a[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        let link1_pose0 = 0.95 * link1_sin0;
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = a_0 * link2_pose1;
-        let link2_vel2 = link2_vel1 + 9.81;
-        let link2_vel3 = link2_pose1 * link2_vel0;
-        let link2_vel4 = a_0 * link2_pose2;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link2_pose2 * link2_vel0;
-        let link2_vel7 = link2_vel2 + link2_vel6;
-        let link2_vel8 = v_0 + v_1;
-        // link2: acceleration
-        let link2_acc0 = a_0 + a_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel8 * link2_vel8;
-        let link3_vel1 = link3_pose1 * link2_acc0;
-        let link3_vel2 = link2_vel7 + link3_vel1;
-        let link3_vel3 = link3_pose1 * link3_vel0;
-        let link3_vel4 = link2_vel5 + link3_vel3;
-        let link3_vel5 = link3_pose2 * link2_acc0;
-        let link3_vel6 = link3_vel4 - link3_vel5;
-        let link3_vel7 = link3_pose2 * link3_vel0;
-        let link3_vel8 = link3_vel2 + link3_vel7;
-        let link3_vel9 = v_2 + link2_vel8;
-        // link3: acceleration
-        let link3_acc0 = a_2 + link2_acc0;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel9 * link3_vel9;
-        let link4_vel1 = link4_pose1 * link3_acc0;
-        let link4_vel2 = link3_vel8 + link4_vel1;
-        let link4_vel3 = link4_pose1 * link4_vel0;
-        let link4_vel4 = link3_vel6 + link4_vel3;
-        let link4_vel5 = link4_pose2 * link3_acc0;
-        let link4_vel6 = link4_vel4 - link4_vel5;
-        let link4_vel7 = link4_pose2 * link4_vel0;
-        let link4_vel8 = link4_vel2 + link4_vel7;
-        let link4_vel9 = v_3 + link3_vel9;
-        // link4: acceleration
-        let link4_acc0 = a_3 + link3_acc0;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel9 * link4_vel9;
-        let link5_vel1 = link5_pose1 * link4_acc0;
-        let link5_vel2 = link4_vel8 + link5_vel1;
-        let link5_vel3 = link5_pose1 * link5_vel0;
-        let link5_vel4 = link4_vel6 + link5_vel3;
-        let link5_vel5 = link5_pose2 * link4_acc0;
-        let link5_vel6 = link5_vel4 - link5_vel5;
-        let link5_vel7 = link5_pose2 * link5_vel0;
-        let link5_vel8 = link5_vel2 + link5_vel7;
-        let link5_vel9 = v_4 + link4_vel9;
-        // link5: acceleration
-        let link5_acc0 = a_4 + link4_acc0;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel9 * link5_vel9;
-        let link6_vel1 = link6_pose1 * link5_acc0;
-        let link6_vel2 = link5_vel8 + link6_vel1;
-        let link6_vel3 = link6_pose1 * link6_vel0;
-        let link6_vel4 = link5_vel6 + link6_vel3;
-        let link6_vel5 = link6_pose2 * link5_acc0;
-        let link6_vel6 = link6_vel4 - link6_vel5;
-        let link6_vel7 = link6_pose2 * link6_vel0;
-        let link6_vel8 = link6_vel2 + link6_vel7;
-        let link6_vel9 = v_5 + link5_vel9;
-        // link6: acceleration
-        let link6_acc0 = a_5 + link5_acc0;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel9 * link6_vel9;
-        let link7_vel1 = link7_pose1 * link6_acc0;
-        let link7_vel2 = link6_vel8 + link7_vel1;
-        let link7_vel3 = link7_pose1 * link7_vel0;
-        let link7_vel4 = link6_vel6 + link7_vel3;
-        let link7_vel5 = link7_pose2 * link6_acc0;
-        let link7_vel6 = link7_vel4 - link7_vel5;
-        let link7_vel7 = link7_pose2 * link7_vel0;
-        let link7_vel8 = link7_vel2 + link7_vel7;
-        let link7_vel9 = v_6 + link6_vel9;
-        // link7: acceleration
-        let link7_acc0 = a_6 + link6_acc0;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel9 * link7_vel9;
-        let link8_vel1 = link8_pose1 * link7_acc0;
-        let link8_vel2 = link7_vel8 + link8_vel1;
-        let link8_vel3 = link8_pose1 * link8_vel0;
-        let link8_vel4 = link7_vel6 + link8_vel3;
-        let link8_vel5 = link8_pose2 * link7_acc0;
-        let link8_vel6 = link8_vel4 - link8_vel5;
-        let link8_vel7 = link8_pose2 * link8_vel0;
-        let link8_vel8 = link8_vel2 + link8_vel7;
-        let link8_vel9 = v_7 + link7_vel9;
-        // link8: acceleration
-        let link8_acc0 = a_7 + link7_acc0;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel9 * link8_vel9;
-        let link9_vel1 = link8_pose4 * link8_acc0;
-        let link9_vel2 = link8_vel8 + link9_vel1;
-        let link9_vel3 = link8_pose4 * link9_vel0;
-        let link9_vel4 = link8_vel6 + link9_vel3;
-        let link9_vel5 = link8_pose3 * link8_acc0;
-        let link9_vel6 = link9_vel4 - link9_vel5;
-        let link9_vel7 = link8_pose3 * link9_vel0;
-        let link9_vel8 = link9_vel2 + link9_vel7;
-        let link9_vel9 = v_8 + link8_vel9;
-        // link9: acceleration
-        let link9_acc0 = a_8 + link8_acc0;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel9 * link9_vel9;
-        let link10_vel1 = link10_pose1 * link9_acc0;
-        let link10_vel2 = link9_vel8 + link10_vel1;
-        let link10_vel3 = link10_pose1 * link10_vel0;
-        let link10_vel4 = link9_vel6 + link10_vel3;
-        let link10_vel5 = link10_pose2 * link9_acc0;
-        let link10_vel6 = link10_vel4 - link10_vel5;
-        let link10_vel7 = link10_pose2 * link10_vel0;
-        let link10_vel8 = link10_vel2 + link10_vel7;
-        let link10_vel9 = link10_sin0 * link10_vel8;
-        let link10_vel10 = link10_cos0 * link10_vel6;
-        let link10_vel11 = link10_vel9 - link10_vel10;
-        let link10_vel12 = v_9 + link9_vel9;
-        // link10: acceleration
-        let link10_acc0 = a_9 + link9_acc0;
-        // link1: gravity and wrenches
-        let link1_load0 = 0.23334999999999997 * a_0;
-        let link1_load1 = 9.81 * link1_pose0;
-        let link1_load2 = link1_load0 + link1_load1;
-        // link2: gravity and wrenches
-        let link2_load0 = link2_pose4 * link3_vel0;
-        let link2_load1 = link2_pose3 * link2_acc0;
-        let link2_load2 = link2_load0 - link2_load1;
-        let link2_load3 = link2_pose4 * link2_acc0;
-        let link2_load4 = link2_pose3 * link3_vel0;
-        let link2_load5 = link2_load3 + link2_load4;
-        let link2_load6 = 0.20834999999999998 * link2_acc0;
-        let link2_load7 = link2_pose4 * link2_vel7;
-        let link2_load8 = link2_pose3 * link2_vel5;
-        let link2_load9 = link2_load7 - link2_load8;
-        let link2_load10 = link2_load6 + link2_load9;
-        // link3: gravity and wrenches
-        let link3_load0 = link3_pose4 * link4_vel0;
-        let link3_load1 = link3_pose3 * link3_acc0;
-        let link3_load2 = link3_load0 - link3_load1;
-        let link3_load3 = link3_pose4 * link3_acc0;
-        let link3_load4 = link3_pose3 * link4_vel0;
-        let link3_load5 = link3_load3 + link3_load4;
-        let link3_load6 = 0.18334999999999999 * link3_acc0;
-        let link3_load7 = link3_pose4 * link3_vel8;
-        let link3_load8 = link3_pose3 * link3_vel6;
-        let link3_load9 = link3_load7 - link3_load8;
-        let link3_load10 = link3_load6 + link3_load9;
-        // link4: gravity and wrenches
-        let link4_load0 = link4_pose4 * link5_vel0;
-        let link4_load1 = link4_pose3 * link4_acc0;
-        let link4_load2 = link4_load0 - link4_load1;
-        let link4_load3 = link4_pose4 * link4_acc0;
-        let link4_load4 = link4_pose3 * link5_vel0;
-        let link4_load5 = link4_load3 + link4_load4;
-        let link4_load6 = 0.15835 * link4_acc0;
-        let link4_load7 = link4_pose4 * link4_vel8;
-        let link4_load8 = link4_pose3 * link4_vel6;
-        let link4_load9 = link4_load7 - link4_load8;
-        let link4_load10 = link4_load6 + link4_load9;
-        // link5: gravity and wrenches
-        let link5_load0 = link5_pose4 * link6_vel0;
-        let link5_load1 = link5_pose3 * link5_acc0;
-        let link5_load2 = link5_load0 - link5_load1;
-        let link5_load3 = link5_pose4 * link5_acc0;
-        let link5_load4 = link5_pose3 * link6_vel0;
-        let link5_load5 = link5_load3 + link5_load4;
-        let link5_load6 = 0.13335 * link5_acc0;
-        let link5_load7 = link5_pose4 * link5_vel8;
-        let link5_load8 = link5_pose3 * link5_vel6;
-        let link5_load9 = link5_load7 - link5_load8;
-        let link5_load10 = link5_load6 + link5_load9;
-        // link6: gravity and wrenches
-        let link6_load0 = link6_pose4 * link7_vel0;
-        let link6_load1 = link6_pose3 * link6_acc0;
-        let link6_load2 = link6_load0 - link6_load1;
-        let link6_load3 = link6_pose4 * link6_acc0;
-        let link6_load4 = link6_pose3 * link7_vel0;
-        let link6_load5 = link6_load3 + link6_load4;
-        let link6_load6 = 0.10835 * link6_acc0;
-        let link6_load7 = link6_pose4 * link6_vel8;
-        let link6_load8 = link6_pose3 * link6_vel6;
-        let link6_load9 = link6_load7 - link6_load8;
-        let link6_load10 = link6_load6 + link6_load9;
-        // link7: gravity and wrenches
-        let link7_load0 = link7_pose4 * link8_vel0;
-        let link7_load1 = link7_pose3 * link7_acc0;
-        let link7_load2 = link7_load0 - link7_load1;
-        let link7_load3 = link7_pose4 * link7_acc0;
-        let link7_load4 = link7_pose3 * link8_vel0;
-        let link7_load5 = link7_load3 + link7_load4;
-        let link7_load6 = 0.08335000000000001 * link7_acc0;
-        let link7_load7 = link7_pose4 * link7_vel8;
-        let link7_load8 = link7_pose3 * link7_vel6;
-        let link7_load9 = link7_load7 - link7_load8;
-        let link7_load10 = link7_load6 + link7_load9;
-        // link8: gravity and wrenches
-        let link8_load0 = link9_vel3 - link9_vel5;
-        let link8_load1 = link9_vel1 + link9_vel7;
-        let link8_load2 = 0.05835 * link8_acc0;
-        let link8_load3 = link8_pose4 * link8_vel8;
-        let link8_load4 = link8_pose3 * link8_vel6;
-        let link8_load5 = link8_load3 - link8_load4;
-        let link8_load6 = link8_load2 + link8_load5;
-        // link9: gravity and wrenches
-        let link9_load0 = link9_pose2 * link10_vel0;
-        let link9_load1 = link9_pose1 * link9_acc0;
-        let link9_load2 = link9_load0 - link9_load1;
-        let link9_load3 = link9_pose2 * link9_acc0;
-        let link9_load4 = link9_pose1 * link10_vel0;
-        let link9_load5 = link9_load3 + link9_load4;
-        let link9_load6 = 0.033350000000000005 * link9_acc0;
-        let link9_load7 = link9_pose2 * link9_vel8;
-        let link9_load8 = link9_pose1 * link9_vel6;
-        let link9_load9 = link9_load7 - link9_load8;
-        let link9_load10 = link9_load6 + link9_load9;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel12 * link10_vel12;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_acc0;
-        let link10_load3 = 0.00835 * link10_acc0;
-        let link10_load4 = 0.05 * link10_vel11;
-        let link10_load5 = link10_load3 + link10_load4;
-        let link10_load6 = link10_sin0 * link10_load1;
-        let link10_load7 = link10_cos0 * link10_load2;
-        let link10_load8 = link10_load6 - link10_load7;
-        let link10_load9 = link10_cos0 * link10_load1;
-        let link10_load10 = link10_sin0 * link10_load2;
-        let link10_load11 = link10_load9 + link10_load10;
-        let link10_load12 = link10_pose2 * link10_load8;
-        let link10_load13 = link10_load5 - link10_load12;
-        let link10_load14 = link10_pose1 * link10_load11;
-        let link10_load15 = link10_load13 + link10_load14;
-        let link10_load16 = link9_load2 + link10_load8;
-        let link10_load17 = link9_load5 + link10_load11;
-        let link10_load18 = link9_load10 + link10_load15;
-        // link9: gravity and wrenches
-        let link9_load11 = link8_pose3 * link10_load16;
-        let link9_load12 = link10_load18 - link9_load11;
-        let link9_load13 = link8_pose4 * link10_load17;
-        let link9_load14 = link9_load12 + link9_load13;
-        let link9_load15 = link8_load0 + link10_load16;
-        let link9_load16 = link8_load1 + link10_load17;
-        let link9_load17 = link8_load6 + link9_load14;
-        // link8: gravity and wrenches
-        let link8_load7 = link8_pose2 * link9_load15;
-        let link8_load8 = link9_load17 - link8_load7;
-        let link8_load9 = link8_pose1 * link9_load16;
-        let link8_load10 = link8_load8 + link8_load9;
-        let link8_load11 = link7_load2 + link9_load15;
-        let link8_load12 = link7_load5 + link9_load16;
-        let link8_load13 = link7_load10 + link8_load10;
-        // link7: gravity and wrenches
-        let link7_load11 = link7_pose2 * link8_load11;
-        let link7_load12 = link8_load13 - link7_load11;
-        let link7_load13 = link7_pose1 * link8_load12;
-        let link7_load14 = link7_load12 + link7_load13;
-        let link7_load15 = link6_load2 + link8_load11;
-        let link7_load16 = link6_load5 + link8_load12;
-        let link7_load17 = link6_load10 + link7_load14;
-        // link6: gravity and wrenches
-        let link6_load11 = link6_pose2 * link7_load15;
-        let link6_load12 = link7_load17 - link6_load11;
-        let link6_load13 = link6_pose1 * link7_load16;
-        let link6_load14 = link6_load12 + link6_load13;
-        let link6_load15 = link5_load2 + link7_load15;
-        let link6_load16 = link5_load5 + link7_load16;
-        let link6_load17 = link5_load10 + link6_load14;
-        // link5: gravity and wrenches
-        let link5_load11 = link5_pose2 * link6_load15;
-        let link5_load12 = link6_load17 - link5_load11;
-        let link5_load13 = link5_pose1 * link6_load16;
-        let link5_load14 = link5_load12 + link5_load13;
-        let link5_load15 = link4_load2 + link6_load15;
-        let link5_load16 = link4_load5 + link6_load16;
-        let link5_load17 = link4_load10 + link5_load14;
-        // link4: gravity and wrenches
-        let link4_load11 = link4_pose2 * link5_load15;
-        let link4_load12 = link5_load17 - link4_load11;
-        let link4_load13 = link4_pose1 * link5_load16;
-        let link4_load14 = link4_load12 + link4_load13;
-        let link4_load15 = link3_load2 + link5_load15;
-        let link4_load16 = link3_load5 + link5_load16;
-        let link4_load17 = link3_load10 + link4_load14;
-        // link3: gravity and wrenches
-        let link3_load11 = link3_pose2 * link4_load15;
-        let link3_load12 = link4_load17 - link3_load11;
-        let link3_load13 = link3_pose1 * link4_load16;
-        let link3_load14 = link3_load12 + link3_load13;
-        let link3_load15 = link2_load2 + link4_load15;
-        let link3_load16 = link2_load5 + link4_load16;
-        let link3_load17 = link2_load10 + link3_load14;
-        // link2: gravity and wrenches
-        let link2_load11 = link2_pose2 * link3_load15;
-        let link2_load12 = link3_load17 - link2_load11;
-        let link2_load13 = link2_pose1 * link3_load16;
-        let link2_load14 = link2_load12 + link2_load13;
-        let link2_load15 = link1_load2 + link2_load14;
-        tau[0] = link2_load15;
-        tau[1] = link3_load17;
-        tau[2] = link4_load17;
-        tau[3] = link5_load17;
-        tau[4] = link6_load17;
-        tau[5] = link7_load17;
-        tau[6] = link8_load13;
-        tau[7] = link9_load17;
-        tau[8] = link10_load18;
-        tau[9] = link10_load5;
+        Self::inverse_dynamics_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, a, tau);
+    }
+
+    #[inline(always)]
+    fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            let a_0 = a.get(0, l);
+            let a_1 = a.get(1, l);
+            let a_2 = a.get(2, l);
+            let a_3 = a.get(3, l);
+            let a_4 = a.get(4, l);
+            let a_5 = a.get(5, l);
+            let a_6 = a.get(6, l);
+            let a_7 = a.get(7, l);
+            let a_8 = a.get(8, l);
+            let a_9 = a.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            let link1_pose0 = 0.95 * link1_sin0;
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = a_0 * link2_pose1;
+            let link2_vel2 = link2_vel1 + 9.81;
+            let link2_vel3 = link2_pose1 * link2_vel0;
+            let link2_vel4 = a_0 * link2_pose2;
+            let link2_vel5 = link2_vel3 - link2_vel4;
+            let link2_vel6 = link2_pose2 * link2_vel0;
+            let link2_vel7 = link2_vel2 + link2_vel6;
+            let link2_vel8 = v_0 + v_1;
+            // link2: acceleration
+            let link2_acc0 = a_0 + a_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel8 * link2_vel8;
+            let link3_vel1 = link3_pose1 * link2_acc0;
+            let link3_vel2 = link2_vel7 + link3_vel1;
+            let link3_vel3 = link3_pose1 * link3_vel0;
+            let link3_vel4 = link2_vel5 + link3_vel3;
+            let link3_vel5 = link3_pose2 * link2_acc0;
+            let link3_vel6 = link3_vel4 - link3_vel5;
+            let link3_vel7 = link3_pose2 * link3_vel0;
+            let link3_vel8 = link3_vel2 + link3_vel7;
+            let link3_vel9 = v_2 + link2_vel8;
+            // link3: acceleration
+            let link3_acc0 = a_2 + link2_acc0;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel9 * link3_vel9;
+            let link4_vel1 = link4_pose1 * link3_acc0;
+            let link4_vel2 = link3_vel8 + link4_vel1;
+            let link4_vel3 = link4_pose1 * link4_vel0;
+            let link4_vel4 = link3_vel6 + link4_vel3;
+            let link4_vel5 = link4_pose2 * link3_acc0;
+            let link4_vel6 = link4_vel4 - link4_vel5;
+            let link4_vel7 = link4_pose2 * link4_vel0;
+            let link4_vel8 = link4_vel2 + link4_vel7;
+            let link4_vel9 = v_3 + link3_vel9;
+            // link4: acceleration
+            let link4_acc0 = a_3 + link3_acc0;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel9 * link4_vel9;
+            let link5_vel1 = link5_pose1 * link4_acc0;
+            let link5_vel2 = link4_vel8 + link5_vel1;
+            let link5_vel3 = link5_pose1 * link5_vel0;
+            let link5_vel4 = link4_vel6 + link5_vel3;
+            let link5_vel5 = link5_pose2 * link4_acc0;
+            let link5_vel6 = link5_vel4 - link5_vel5;
+            let link5_vel7 = link5_pose2 * link5_vel0;
+            let link5_vel8 = link5_vel2 + link5_vel7;
+            let link5_vel9 = v_4 + link4_vel9;
+            // link5: acceleration
+            let link5_acc0 = a_4 + link4_acc0;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel9 * link5_vel9;
+            let link6_vel1 = link6_pose1 * link5_acc0;
+            let link6_vel2 = link5_vel8 + link6_vel1;
+            let link6_vel3 = link6_pose1 * link6_vel0;
+            let link6_vel4 = link5_vel6 + link6_vel3;
+            let link6_vel5 = link6_pose2 * link5_acc0;
+            let link6_vel6 = link6_vel4 - link6_vel5;
+            let link6_vel7 = link6_pose2 * link6_vel0;
+            let link6_vel8 = link6_vel2 + link6_vel7;
+            let link6_vel9 = v_5 + link5_vel9;
+            // link6: acceleration
+            let link6_acc0 = a_5 + link5_acc0;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel9 * link6_vel9;
+            let link7_vel1 = link7_pose1 * link6_acc0;
+            let link7_vel2 = link6_vel8 + link7_vel1;
+            let link7_vel3 = link7_pose1 * link7_vel0;
+            let link7_vel4 = link6_vel6 + link7_vel3;
+            let link7_vel5 = link7_pose2 * link6_acc0;
+            let link7_vel6 = link7_vel4 - link7_vel5;
+            let link7_vel7 = link7_pose2 * link7_vel0;
+            let link7_vel8 = link7_vel2 + link7_vel7;
+            let link7_vel9 = v_6 + link6_vel9;
+            // link7: acceleration
+            let link7_acc0 = a_6 + link6_acc0;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel9 * link7_vel9;
+            let link8_vel1 = link8_pose1 * link7_acc0;
+            let link8_vel2 = link7_vel8 + link8_vel1;
+            let link8_vel3 = link8_pose1 * link8_vel0;
+            let link8_vel4 = link7_vel6 + link8_vel3;
+            let link8_vel5 = link8_pose2 * link7_acc0;
+            let link8_vel6 = link8_vel4 - link8_vel5;
+            let link8_vel7 = link8_pose2 * link8_vel0;
+            let link8_vel8 = link8_vel2 + link8_vel7;
+            let link8_vel9 = v_7 + link7_vel9;
+            // link8: acceleration
+            let link8_acc0 = a_7 + link7_acc0;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel9 * link8_vel9;
+            let link9_vel1 = link8_pose4 * link8_acc0;
+            let link9_vel2 = link8_vel8 + link9_vel1;
+            let link9_vel3 = link8_pose4 * link9_vel0;
+            let link9_vel4 = link8_vel6 + link9_vel3;
+            let link9_vel5 = link8_pose3 * link8_acc0;
+            let link9_vel6 = link9_vel4 - link9_vel5;
+            let link9_vel7 = link8_pose3 * link9_vel0;
+            let link9_vel8 = link9_vel2 + link9_vel7;
+            let link9_vel9 = v_8 + link8_vel9;
+            // link9: acceleration
+            let link9_acc0 = a_8 + link8_acc0;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel9 * link9_vel9;
+            let link10_vel1 = link10_pose1 * link9_acc0;
+            let link10_vel2 = link9_vel8 + link10_vel1;
+            let link10_vel3 = link10_pose1 * link10_vel0;
+            let link10_vel4 = link9_vel6 + link10_vel3;
+            let link10_vel5 = link10_pose2 * link9_acc0;
+            let link10_vel6 = link10_vel4 - link10_vel5;
+            let link10_vel7 = link10_pose2 * link10_vel0;
+            let link10_vel8 = link10_vel2 + link10_vel7;
+            let link10_vel9 = link10_sin0 * link10_vel8;
+            let link10_vel10 = link10_cos0 * link10_vel6;
+            let link10_vel11 = link10_vel9 - link10_vel10;
+            let link10_vel12 = v_9 + link9_vel9;
+            // link10: acceleration
+            let link10_acc0 = a_9 + link9_acc0;
+            // link1: gravity and wrenches
+            let link1_load0 = 0.23334999999999997 * a_0;
+            let link1_load1 = 9.81 * link1_pose0;
+            let link1_load2 = link1_load0 + link1_load1;
+            // link2: gravity and wrenches
+            let link2_load0 = link2_pose4 * link3_vel0;
+            let link2_load1 = link2_pose3 * link2_acc0;
+            let link2_load2 = link2_load0 - link2_load1;
+            let link2_load3 = link2_pose4 * link2_acc0;
+            let link2_load4 = link2_pose3 * link3_vel0;
+            let link2_load5 = link2_load3 + link2_load4;
+            let link2_load6 = 0.20834999999999998 * link2_acc0;
+            let link2_load7 = link2_pose4 * link2_vel7;
+            let link2_load8 = link2_pose3 * link2_vel5;
+            let link2_load9 = link2_load7 - link2_load8;
+            let link2_load10 = link2_load6 + link2_load9;
+            // link3: gravity and wrenches
+            let link3_load0 = link3_pose4 * link4_vel0;
+            let link3_load1 = link3_pose3 * link3_acc0;
+            let link3_load2 = link3_load0 - link3_load1;
+            let link3_load3 = link3_pose4 * link3_acc0;
+            let link3_load4 = link3_pose3 * link4_vel0;
+            let link3_load5 = link3_load3 + link3_load4;
+            let link3_load6 = 0.18334999999999999 * link3_acc0;
+            let link3_load7 = link3_pose4 * link3_vel8;
+            let link3_load8 = link3_pose3 * link3_vel6;
+            let link3_load9 = link3_load7 - link3_load8;
+            let link3_load10 = link3_load6 + link3_load9;
+            // link4: gravity and wrenches
+            let link4_load0 = link4_pose4 * link5_vel0;
+            let link4_load1 = link4_pose3 * link4_acc0;
+            let link4_load2 = link4_load0 - link4_load1;
+            let link4_load3 = link4_pose4 * link4_acc0;
+            let link4_load4 = link4_pose3 * link5_vel0;
+            let link4_load5 = link4_load3 + link4_load4;
+            let link4_load6 = 0.15835 * link4_acc0;
+            let link4_load7 = link4_pose4 * link4_vel8;
+            let link4_load8 = link4_pose3 * link4_vel6;
+            let link4_load9 = link4_load7 - link4_load8;
+            let link4_load10 = link4_load6 + link4_load9;
+            // link5: gravity and wrenches
+            let link5_load0 = link5_pose4 * link6_vel0;
+            let link5_load1 = link5_pose3 * link5_acc0;
+            let link5_load2 = link5_load0 - link5_load1;
+            let link5_load3 = link5_pose4 * link5_acc0;
+            let link5_load4 = link5_pose3 * link6_vel0;
+            let link5_load5 = link5_load3 + link5_load4;
+            let link5_load6 = 0.13335 * link5_acc0;
+            let link5_load7 = link5_pose4 * link5_vel8;
+            let link5_load8 = link5_pose3 * link5_vel6;
+            let link5_load9 = link5_load7 - link5_load8;
+            let link5_load10 = link5_load6 + link5_load9;
+            // link6: gravity and wrenches
+            let link6_load0 = link6_pose4 * link7_vel0;
+            let link6_load1 = link6_pose3 * link6_acc0;
+            let link6_load2 = link6_load0 - link6_load1;
+            let link6_load3 = link6_pose4 * link6_acc0;
+            let link6_load4 = link6_pose3 * link7_vel0;
+            let link6_load5 = link6_load3 + link6_load4;
+            let link6_load6 = 0.10835 * link6_acc0;
+            let link6_load7 = link6_pose4 * link6_vel8;
+            let link6_load8 = link6_pose3 * link6_vel6;
+            let link6_load9 = link6_load7 - link6_load8;
+            let link6_load10 = link6_load6 + link6_load9;
+            // link7: gravity and wrenches
+            let link7_load0 = link7_pose4 * link8_vel0;
+            let link7_load1 = link7_pose3 * link7_acc0;
+            let link7_load2 = link7_load0 - link7_load1;
+            let link7_load3 = link7_pose4 * link7_acc0;
+            let link7_load4 = link7_pose3 * link8_vel0;
+            let link7_load5 = link7_load3 + link7_load4;
+            let link7_load6 = 0.08335000000000001 * link7_acc0;
+            let link7_load7 = link7_pose4 * link7_vel8;
+            let link7_load8 = link7_pose3 * link7_vel6;
+            let link7_load9 = link7_load7 - link7_load8;
+            let link7_load10 = link7_load6 + link7_load9;
+            // link8: gravity and wrenches
+            let link8_load0 = link9_vel3 - link9_vel5;
+            let link8_load1 = link9_vel1 + link9_vel7;
+            let link8_load2 = 0.05835 * link8_acc0;
+            let link8_load3 = link8_pose4 * link8_vel8;
+            let link8_load4 = link8_pose3 * link8_vel6;
+            let link8_load5 = link8_load3 - link8_load4;
+            let link8_load6 = link8_load2 + link8_load5;
+            // link9: gravity and wrenches
+            let link9_load0 = link9_pose2 * link10_vel0;
+            let link9_load1 = link9_pose1 * link9_acc0;
+            let link9_load2 = link9_load0 - link9_load1;
+            let link9_load3 = link9_pose2 * link9_acc0;
+            let link9_load4 = link9_pose1 * link10_vel0;
+            let link9_load5 = link9_load3 + link9_load4;
+            let link9_load6 = 0.033350000000000005 * link9_acc0;
+            let link9_load7 = link9_pose2 * link9_vel8;
+            let link9_load8 = link9_pose1 * link9_vel6;
+            let link9_load9 = link9_load7 - link9_load8;
+            let link9_load10 = link9_load6 + link9_load9;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel12 * link10_vel12;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_acc0;
+            let link10_load3 = 0.00835 * link10_acc0;
+            let link10_load4 = 0.05 * link10_vel11;
+            let link10_load5 = link10_load3 + link10_load4;
+            let link10_load6 = link10_sin0 * link10_load1;
+            let link10_load7 = link10_cos0 * link10_load2;
+            let link10_load8 = link10_load6 - link10_load7;
+            let link10_load9 = link10_cos0 * link10_load1;
+            let link10_load10 = link10_sin0 * link10_load2;
+            let link10_load11 = link10_load9 + link10_load10;
+            let link10_load12 = link10_pose2 * link10_load8;
+            let link10_load13 = link10_load5 - link10_load12;
+            let link10_load14 = link10_pose1 * link10_load11;
+            let link10_load15 = link10_load13 + link10_load14;
+            let link10_load16 = link9_load2 + link10_load8;
+            let link10_load17 = link9_load5 + link10_load11;
+            let link10_load18 = link9_load10 + link10_load15;
+            // link9: gravity and wrenches
+            let link9_load11 = link8_pose3 * link10_load16;
+            let link9_load12 = link10_load18 - link9_load11;
+            let link9_load13 = link8_pose4 * link10_load17;
+            let link9_load14 = link9_load12 + link9_load13;
+            let link9_load15 = link8_load0 + link10_load16;
+            let link9_load16 = link8_load1 + link10_load17;
+            let link9_load17 = link8_load6 + link9_load14;
+            // link8: gravity and wrenches
+            let link8_load7 = link8_pose2 * link9_load15;
+            let link8_load8 = link9_load17 - link8_load7;
+            let link8_load9 = link8_pose1 * link9_load16;
+            let link8_load10 = link8_load8 + link8_load9;
+            let link8_load11 = link7_load2 + link9_load15;
+            let link8_load12 = link7_load5 + link9_load16;
+            let link8_load13 = link7_load10 + link8_load10;
+            // link7: gravity and wrenches
+            let link7_load11 = link7_pose2 * link8_load11;
+            let link7_load12 = link8_load13 - link7_load11;
+            let link7_load13 = link7_pose1 * link8_load12;
+            let link7_load14 = link7_load12 + link7_load13;
+            let link7_load15 = link6_load2 + link8_load11;
+            let link7_load16 = link6_load5 + link8_load12;
+            let link7_load17 = link6_load10 + link7_load14;
+            // link6: gravity and wrenches
+            let link6_load11 = link6_pose2 * link7_load15;
+            let link6_load12 = link7_load17 - link6_load11;
+            let link6_load13 = link6_pose1 * link7_load16;
+            let link6_load14 = link6_load12 + link6_load13;
+            let link6_load15 = link5_load2 + link7_load15;
+            let link6_load16 = link5_load5 + link7_load16;
+            let link6_load17 = link5_load10 + link6_load14;
+            // link5: gravity and wrenches
+            let link5_load11 = link5_pose2 * link6_load15;
+            let link5_load12 = link6_load17 - link5_load11;
+            let link5_load13 = link5_pose1 * link6_load16;
+            let link5_load14 = link5_load12 + link5_load13;
+            let link5_load15 = link4_load2 + link6_load15;
+            let link5_load16 = link4_load5 + link6_load16;
+            let link5_load17 = link4_load10 + link5_load14;
+            // link4: gravity and wrenches
+            let link4_load11 = link4_pose2 * link5_load15;
+            let link4_load12 = link5_load17 - link4_load11;
+            let link4_load13 = link4_pose1 * link5_load16;
+            let link4_load14 = link4_load12 + link4_load13;
+            let link4_load15 = link3_load2 + link5_load15;
+            let link4_load16 = link3_load5 + link5_load16;
+            let link4_load17 = link3_load10 + link4_load14;
+            // link3: gravity and wrenches
+            let link3_load11 = link3_pose2 * link4_load15;
+            let link3_load12 = link4_load17 - link3_load11;
+            let link3_load13 = link3_pose1 * link4_load16;
+            let link3_load14 = link3_load12 + link3_load13;
+            let link3_load15 = link2_load2 + link4_load15;
+            let link3_load16 = link2_load5 + link4_load16;
+            let link3_load17 = link2_load10 + link3_load14;
+            // link2: gravity and wrenches
+            let link2_load11 = link2_pose2 * link3_load15;
+            let link2_load12 = link3_load17 - link2_load11;
+            let link2_load13 = link2_pose1 * link3_load16;
+            let link2_load14 = link2_load12 + link2_load13;
+            let link2_load15 = link1_load2 + link2_load14;
+            tau.set(0, l, link2_load15);
+            tau.set(1, l, link3_load17);
+            tau.set(2, l, link4_load17);
+            tau.set(3, l, link5_load17);
+            tau.set(4, l, link6_load17);
+            tau.set(5, l, link7_load17);
+            tau.set(6, l, link8_load13);
+            tau.set(7, l, link9_load17);
+            tau.set(8, l, link10_load18);
+            tau.set(9, l, link10_load5);
+        }
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
     /// 203 operations: 87 additions, 116 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 10], v: &[f64; 10], h: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        let link1_pose0 = 0.95 * link1_sin0;
-        // link2: sine and cosine, rotation
-        let link2_pose0 = q_0 + q_1;
-        let link2_pose1 = 0.25 * link1_sin0;
-        let link2_pose2 = 0.25 * link1_cos0;
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(link2_pose0);
-        let link2_pose3 = 0.85 * link2_cos0;
-        let link2_pose4 = 0.85 * link2_sin0;
-        // link3: sine and cosine, rotation
-        let link3_pose0 = q_2 + link2_pose0;
-        let link3_pose1 = 0.25 * link2_sin0;
-        let link3_pose2 = 0.25 * link2_cos0;
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(link3_pose0);
-        let link3_pose3 = 0.75 * link3_cos0;
-        let link3_pose4 = 0.75 * link3_sin0;
-        // link4: sine and cosine, rotation
-        let link4_pose0 = q_3 + link3_pose0;
-        let link4_pose1 = 0.25 * link3_sin0;
-        let link4_pose2 = 0.25 * link3_cos0;
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(link4_pose0);
-        let link4_pose3 = 0.65 * link4_cos0;
-        let link4_pose4 = 0.65 * link4_sin0;
-        // link5: sine and cosine, rotation
-        let link5_pose0 = q_4 + link4_pose0;
-        let link5_pose1 = 0.25 * link4_sin0;
-        let link5_pose2 = 0.25 * link4_cos0;
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(link5_pose0);
-        let link5_pose3 = 0.55 * link5_cos0;
-        let link5_pose4 = 0.55 * link5_sin0;
-        // link6: sine and cosine, rotation
-        let link6_pose0 = q_5 + link5_pose0;
-        let link6_pose1 = 0.25 * link5_sin0;
-        let link6_pose2 = 0.25 * link5_cos0;
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(link6_pose0);
-        let link6_pose3 = 0.45 * link6_cos0;
-        let link6_pose4 = 0.45 * link6_sin0;
-        // link7: sine and cosine, rotation
-        let link7_pose0 = q_6 + link6_pose0;
-        let link7_pose1 = 0.25 * link6_sin0;
-        let link7_pose2 = 0.25 * link6_cos0;
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(link7_pose0);
-        let link7_pose3 = 0.35000000000000003 * link7_cos0;
-        let link7_pose4 = 0.35000000000000003 * link7_sin0;
-        // link8: sine and cosine, rotation
-        let link8_pose0 = q_7 + link7_pose0;
-        let link8_pose1 = 0.25 * link7_sin0;
-        let link8_pose2 = 0.25 * link7_cos0;
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(link8_pose0);
-        let link8_pose3 = 0.25 * link8_cos0;
-        let link8_pose4 = 0.25 * link8_sin0;
-        // link9: sine and cosine, rotation
-        let link9_pose0 = q_8 + link8_pose0;
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(link9_pose0);
-        let link9_pose1 = 0.15000000000000002 * link9_cos0;
-        let link9_pose2 = 0.15000000000000002 * link9_sin0;
-        // link10: sine and cosine, rotation
-        let link10_pose0 = q_9 + link9_pose0;
-        let link10_pose1 = 0.25 * link9_sin0;
-        let link10_pose2 = 0.25 * link9_cos0;
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(link10_pose0);
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = link2_pose1 * link2_vel0;
-        let link2_vel2 = link2_pose2 * link2_vel0;
-        let link2_vel3 = link2_vel2 + 9.81;
-        let link2_vel4 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel4 * link2_vel4;
-        let link3_vel1 = link3_pose1 * link3_vel0;
-        let link3_vel2 = link2_vel1 + link3_vel1;
-        let link3_vel3 = link3_pose2 * link3_vel0;
-        let link3_vel4 = link2_vel3 + link3_vel3;
-        let link3_vel5 = v_2 + link2_vel4;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel5 * link3_vel5;
-        let link4_vel1 = link4_pose1 * link4_vel0;
-        let link4_vel2 = link3_vel2 + link4_vel1;
-        let link4_vel3 = link4_pose2 * link4_vel0;
-        let link4_vel4 = link3_vel4 + link4_vel3;
-        let link4_vel5 = v_3 + link3_vel5;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel5 * link4_vel5;
-        let link5_vel1 = link5_pose1 * link5_vel0;
-        let link5_vel2 = link4_vel2 + link5_vel1;
-        let link5_vel3 = link5_pose2 * link5_vel0;
-        let link5_vel4 = link4_vel4 + link5_vel3;
-        let link5_vel5 = v_4 + link4_vel5;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel5 * link5_vel5;
-        let link6_vel1 = link6_pose1 * link6_vel0;
-        let link6_vel2 = link5_vel2 + link6_vel1;
-        let link6_vel3 = link6_pose2 * link6_vel0;
-        let link6_vel4 = link5_vel4 + link6_vel3;
-        let link6_vel5 = v_5 + link5_vel5;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel5 * link6_vel5;
-        let link7_vel1 = link7_pose1 * link7_vel0;
-        let link7_vel2 = link6_vel2 + link7_vel1;
-        let link7_vel3 = link7_pose2 * link7_vel0;
-        let link7_vel4 = link6_vel4 + link7_vel3;
-        let link7_vel5 = v_6 + link6_vel5;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel5 * link7_vel5;
-        let link8_vel1 = link8_pose1 * link8_vel0;
-        let link8_vel2 = link7_vel2 + link8_vel1;
-        let link8_vel3 = link8_pose2 * link8_vel0;
-        let link8_vel4 = link7_vel4 + link8_vel3;
-        let link8_vel5 = v_7 + link7_vel5;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel5 * link8_vel5;
-        let link9_vel1 = link8_pose4 * link9_vel0;
-        let link9_vel2 = link8_vel2 + link9_vel1;
-        let link9_vel3 = link8_pose3 * link9_vel0;
-        let link9_vel4 = link8_vel4 + link9_vel3;
-        let link9_vel5 = v_8 + link8_vel5;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel5 * link9_vel5;
-        let link10_vel1 = link10_pose1 * link10_vel0;
-        let link10_vel2 = link9_vel2 + link10_vel1;
-        let link10_vel3 = link10_pose2 * link10_vel0;
-        let link10_vel4 = link9_vel4 + link10_vel3;
-        let link10_vel5 = link10_sin0 * link10_vel4;
-        let link10_vel6 = link10_cos0 * link10_vel2;
-        let link10_vel7 = link10_vel5 - link10_vel6;
-        let link10_vel8 = v_9 + link9_vel5;
-        // link1: gravity and wrenches
-        let link1_load0 = 9.81 * link1_pose0;
-        // link2: gravity and wrenches
-        let link2_load0 = link2_pose4 * link3_vel0;
-        let link2_load1 = link2_pose3 * link3_vel0;
-        let link2_load2 = link2_pose4 * link2_vel3;
-        let link2_load3 = link2_pose3 * link2_vel1;
-        let link2_load4 = link2_load2 - link2_load3;
-        // link3: gravity and wrenches
-        let link3_load0 = link3_pose4 * link4_vel0;
-        let link3_load1 = link3_pose3 * link4_vel0;
-        let link3_load2 = link3_pose4 * link3_vel4;
-        let link3_load3 = link3_pose3 * link3_vel2;
-        let link3_load4 = link3_load2 - link3_load3;
-        // link4: gravity and wrenches
-        let link4_load0 = link4_pose4 * link5_vel0;
-        let link4_load1 = link4_pose3 * link5_vel0;
-        let link4_load2 = link4_pose4 * link4_vel4;
-        let link4_load3 = link4_pose3 * link4_vel2;
-        let link4_load4 = link4_load2 - link4_load3;
-        // link5: gravity and wrenches
-        let link5_load0 = link5_pose4 * link6_vel0;
-        let link5_load1 = link5_pose3 * link6_vel0;
-        let link5_load2 = link5_pose4 * link5_vel4;
-        let link5_load3 = link5_pose3 * link5_vel2;
-        let link5_load4 = link5_load2 - link5_load3;
-        // link6: gravity and wrenches
-        let link6_load0 = link6_pose4 * link7_vel0;
-        let link6_load1 = link6_pose3 * link7_vel0;
-        let link6_load2 = link6_pose4 * link6_vel4;
-        let link6_load3 = link6_pose3 * link6_vel2;
-        let link6_load4 = link6_load2 - link6_load3;
-        // link7: gravity and wrenches
-        let link7_load0 = link7_pose4 * link8_vel0;
-        let link7_load1 = link7_pose3 * link8_vel0;
-        let link7_load2 = link7_pose4 * link7_vel4;
-        let link7_load3 = link7_pose3 * link7_vel2;
-        let link7_load4 = link7_load2 - link7_load3;
-        // link8: gravity and wrenches
-        let link8_load0 = link8_pose4 * link8_vel4;
-        let link8_load1 = link8_pose3 * link8_vel2;
-        let link8_load2 = link8_load0 - link8_load1;
-        // link9: gravity and wrenches
-        let link9_load0 = link9_pose2 * link10_vel0;
-        let link9_load1 = link9_pose1 * link10_vel0;
-        let link9_load2 = link9_pose2 * link9_vel4;
-        let link9_load3 = link9_pose1 * link9_vel2;
-        let link9_load4 = link9_load2 - link9_load3;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel8 * link10_vel8;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_vel7;
-        let link10_load3 = link10_sin0 * link10_load1;
-        let link10_load4 = link10_cos0 * link10_load1;
-        let link10_load5 = link10_pose2 * link10_load3;
-        let link10_load6 = link10_load2 - link10_load5;
-        let link10_load7 = link10_pose1 * link10_load4;
-        let link10_load8 = link10_load6 + link10_load7;
-        let link10_load9 = link9_load0 + link10_load3;
-        let link10_load10 = link9_load1 + link10_load4;
-        let link10_load11 = link9_load4 + link10_load8;
-        // link9: gravity and wrenches
-        let link9_load5 = link8_pose3 * link10_load9;
-        let link9_load6 = link10_load11 - link9_load5;
-        let link9_load7 = link8_pose4 * link10_load10;
-        let link9_load8 = link9_load6 + link9_load7;
-        let link9_load9 = link9_vel1 + link10_load9;
-        let link9_load10 = link9_vel3 + link10_load10;
-        let link9_load11 = link8_load2 + link9_load8;
-        // link8: gravity and wrenches
-        let link8_load3 = link8_pose2 * link9_load9;
-        let link8_load4 = link9_load11 - link8_load3;
-        let link8_load5 = link8_pose1 * link9_load10;
-        let link8_load6 = link8_load4 + link8_load5;
-        let link8_load7 = link7_load0 + link9_load9;
-        let link8_load8 = link7_load1 + link9_load10;
-        let link8_load9 = link7_load4 + link8_load6;
-        // link7: gravity and wrenches
-        let link7_load5 = link7_pose2 * link8_load7;
-        let link7_load6 = link8_load9 - link7_load5;
-        let link7_load7 = link7_pose1 * link8_load8;
-        let link7_load8 = link7_load6 + link7_load7;
-        let link7_load9 = link6_load0 + link8_load7;
-        let link7_load10 = link6_load1 + link8_load8;
-        let link7_load11 = link6_load4 + link7_load8;
-        // link6: gravity and wrenches
-        let link6_load5 = link6_pose2 * link7_load9;
-        let link6_load6 = link7_load11 - link6_load5;
-        let link6_load7 = link6_pose1 * link7_load10;
-        let link6_load8 = link6_load6 + link6_load7;
-        let link6_load9 = link5_load0 + link7_load9;
-        let link6_load10 = link5_load1 + link7_load10;
-        let link6_load11 = link5_load4 + link6_load8;
-        // link5: gravity and wrenches
-        let link5_load5 = link5_pose2 * link6_load9;
-        let link5_load6 = link6_load11 - link5_load5;
-        let link5_load7 = link5_pose1 * link6_load10;
-        let link5_load8 = link5_load6 + link5_load7;
-        let link5_load9 = link4_load0 + link6_load9;
-        let link5_load10 = link4_load1 + link6_load10;
-        let link5_load11 = link4_load4 + link5_load8;
-        // link4: gravity and wrenches
-        let link4_load5 = link4_pose2 * link5_load9;
-        let link4_load6 = link5_load11 - link4_load5;
-        let link4_load7 = link4_pose1 * link5_load10;
-        let link4_load8 = link4_load6 + link4_load7;
-        let link4_load9 = link3_load0 + link5_load9;
-        let link4_load10 = link3_load1 + link5_load10;
-        let link4_load11 = link3_load4 + link4_load8;
-        // link3: gravity and wrenches
-        let link3_load5 = link3_pose2 * link4_load9;
-        let link3_load6 = link4_load11 - link3_load5;
-        let link3_load7 = link3_pose1 * link4_load10;
-        let link3_load8 = link3_load6 + link3_load7;
-        let link3_load9 = link2_load0 + link4_load9;
-        let link3_load10 = link2_load1 + link4_load10;
-        let link3_load11 = link2_load4 + link3_load8;
-        // link2: gravity and wrenches
-        let link2_load5 = link2_pose2 * link3_load9;
-        let link2_load6 = link3_load11 - link2_load5;
-        let link2_load7 = link2_pose1 * link3_load10;
-        let link2_load8 = link2_load6 + link2_load7;
-        let link2_load9 = link1_load0 + link2_load8;
-        h[0] = link2_load9;
-        h[1] = link3_load11;
-        h[2] = link4_load11;
-        h[3] = link5_load11;
-        h[4] = link6_load11;
-        h[5] = link7_load11;
-        h[6] = link8_load9;
-        h[7] = link9_load11;
-        h[8] = link10_load11;
-        h[9] = link10_load2;
+        Self::bias_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, h);
+    }
+
+    #[inline(always)]
+    fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            let link2_pose0 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose0;
+            let link4_pose0 = q_3 + link3_pose0;
+            let link5_pose0 = q_4 + link4_pose0;
+            let link6_pose0 = q_5 + link5_pose0;
+            let link7_pose0 = q_6 + link6_pose0;
+            let link8_pose0 = q_7 + link7_pose0;
+            let link9_pose0 = q_8 + link8_pose0;
+            let link10_pose0 = q_9 + link9_pose0;
+            angles[0][l] = q_0;
+            angles[1][l] = link2_pose0;
+            angles[2][l] = link3_pose0;
+            angles[3][l] = link4_pose0;
+            angles[4][l] = link5_pose0;
+            angles[5][l] = link6_pose0;
+            angles[6][l] = link7_pose0;
+            angles[7][l] = link8_pose0;
+            angles[8][l] = link9_pose0;
+            angles[9][l] = link10_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            let link1_pose0 = 0.95 * link1_sin0;
+            // link2: sine and cosine, rotation
+            let link2_pose1 = 0.25 * link1_sin0;
+            let link2_pose2 = 0.25 * link1_cos0;
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            let link2_pose3 = 0.85 * link2_cos0;
+            let link2_pose4 = 0.85 * link2_sin0;
+            // link3: sine and cosine, rotation
+            let link3_pose1 = 0.25 * link2_sin0;
+            let link3_pose2 = 0.25 * link2_cos0;
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            let link3_pose3 = 0.75 * link3_cos0;
+            let link3_pose4 = 0.75 * link3_sin0;
+            // link4: sine and cosine, rotation
+            let link4_pose1 = 0.25 * link3_sin0;
+            let link4_pose2 = 0.25 * link3_cos0;
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            let link4_pose3 = 0.65 * link4_cos0;
+            let link4_pose4 = 0.65 * link4_sin0;
+            // link5: sine and cosine, rotation
+            let link5_pose1 = 0.25 * link4_sin0;
+            let link5_pose2 = 0.25 * link4_cos0;
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            let link5_pose3 = 0.55 * link5_cos0;
+            let link5_pose4 = 0.55 * link5_sin0;
+            // link6: sine and cosine, rotation
+            let link6_pose1 = 0.25 * link5_sin0;
+            let link6_pose2 = 0.25 * link5_cos0;
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            let link6_pose3 = 0.45 * link6_cos0;
+            let link6_pose4 = 0.45 * link6_sin0;
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.25 * link6_sin0;
+            let link7_pose2 = 0.25 * link6_cos0;
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            let link7_pose3 = 0.35000000000000003 * link7_cos0;
+            let link7_pose4 = 0.35000000000000003 * link7_sin0;
+            // link8: sine and cosine, rotation
+            let link8_pose1 = 0.25 * link7_sin0;
+            let link8_pose2 = 0.25 * link7_cos0;
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            let link8_pose3 = 0.25 * link8_cos0;
+            let link8_pose4 = 0.25 * link8_sin0;
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            let link9_pose1 = 0.15000000000000002 * link9_cos0;
+            let link9_pose2 = 0.15000000000000002 * link9_sin0;
+            // link10: sine and cosine, rotation
+            let link10_pose1 = 0.25 * link9_sin0;
+            let link10_pose2 = 0.25 * link9_cos0;
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = link2_pose1 * link2_vel0;
+            let link2_vel2 = link2_pose2 * link2_vel0;
+            let link2_vel3 = link2_vel2 + 9.81;
+            let link2_vel4 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel4 * link2_vel4;
+            let link3_vel1 = link3_pose1 * link3_vel0;
+            let link3_vel2 = link2_vel1 + link3_vel1;
+            let link3_vel3 = link3_pose2 * link3_vel0;
+            let link3_vel4 = link2_vel3 + link3_vel3;
+            let link3_vel5 = v_2 + link2_vel4;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel5 * link3_vel5;
+            let link4_vel1 = link4_pose1 * link4_vel0;
+            let link4_vel2 = link3_vel2 + link4_vel1;
+            let link4_vel3 = link4_pose2 * link4_vel0;
+            let link4_vel4 = link3_vel4 + link4_vel3;
+            let link4_vel5 = v_3 + link3_vel5;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel5 * link4_vel5;
+            let link5_vel1 = link5_pose1 * link5_vel0;
+            let link5_vel2 = link4_vel2 + link5_vel1;
+            let link5_vel3 = link5_pose2 * link5_vel0;
+            let link5_vel4 = link4_vel4 + link5_vel3;
+            let link5_vel5 = v_4 + link4_vel5;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel5 * link5_vel5;
+            let link6_vel1 = link6_pose1 * link6_vel0;
+            let link6_vel2 = link5_vel2 + link6_vel1;
+            let link6_vel3 = link6_pose2 * link6_vel0;
+            let link6_vel4 = link5_vel4 + link6_vel3;
+            let link6_vel5 = v_5 + link5_vel5;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel5 * link6_vel5;
+            let link7_vel1 = link7_pose1 * link7_vel0;
+            let link7_vel2 = link6_vel2 + link7_vel1;
+            let link7_vel3 = link7_pose2 * link7_vel0;
+            let link7_vel4 = link6_vel4 + link7_vel3;
+            let link7_vel5 = v_6 + link6_vel5;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel5 * link7_vel5;
+            let link8_vel1 = link8_pose1 * link8_vel0;
+            let link8_vel2 = link7_vel2 + link8_vel1;
+            let link8_vel3 = link8_pose2 * link8_vel0;
+            let link8_vel4 = link7_vel4 + link8_vel3;
+            let link8_vel5 = v_7 + link7_vel5;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel5 * link8_vel5;
+            let link9_vel1 = link8_pose4 * link9_vel0;
+            let link9_vel2 = link8_vel2 + link9_vel1;
+            let link9_vel3 = link8_pose3 * link9_vel0;
+            let link9_vel4 = link8_vel4 + link9_vel3;
+            let link9_vel5 = v_8 + link8_vel5;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel5 * link9_vel5;
+            let link10_vel1 = link10_pose1 * link10_vel0;
+            let link10_vel2 = link9_vel2 + link10_vel1;
+            let link10_vel3 = link10_pose2 * link10_vel0;
+            let link10_vel4 = link9_vel4 + link10_vel3;
+            let link10_vel5 = link10_sin0 * link10_vel4;
+            let link10_vel6 = link10_cos0 * link10_vel2;
+            let link10_vel7 = link10_vel5 - link10_vel6;
+            let link10_vel8 = v_9 + link9_vel5;
+            // link1: gravity and wrenches
+            let link1_load0 = 9.81 * link1_pose0;
+            // link2: gravity and wrenches
+            let link2_load0 = link2_pose4 * link3_vel0;
+            let link2_load1 = link2_pose3 * link3_vel0;
+            let link2_load2 = link2_pose4 * link2_vel3;
+            let link2_load3 = link2_pose3 * link2_vel1;
+            let link2_load4 = link2_load2 - link2_load3;
+            // link3: gravity and wrenches
+            let link3_load0 = link3_pose4 * link4_vel0;
+            let link3_load1 = link3_pose3 * link4_vel0;
+            let link3_load2 = link3_pose4 * link3_vel4;
+            let link3_load3 = link3_pose3 * link3_vel2;
+            let link3_load4 = link3_load2 - link3_load3;
+            // link4: gravity and wrenches
+            let link4_load0 = link4_pose4 * link5_vel0;
+            let link4_load1 = link4_pose3 * link5_vel0;
+            let link4_load2 = link4_pose4 * link4_vel4;
+            let link4_load3 = link4_pose3 * link4_vel2;
+            let link4_load4 = link4_load2 - link4_load3;
+            // link5: gravity and wrenches
+            let link5_load0 = link5_pose4 * link6_vel0;
+            let link5_load1 = link5_pose3 * link6_vel0;
+            let link5_load2 = link5_pose4 * link5_vel4;
+            let link5_load3 = link5_pose3 * link5_vel2;
+            let link5_load4 = link5_load2 - link5_load3;
+            // link6: gravity and wrenches
+            let link6_load0 = link6_pose4 * link7_vel0;
+            let link6_load1 = link6_pose3 * link7_vel0;
+            let link6_load2 = link6_pose4 * link6_vel4;
+            let link6_load3 = link6_pose3 * link6_vel2;
+            let link6_load4 = link6_load2 - link6_load3;
+            // link7: gravity and wrenches
+            let link7_load0 = link7_pose4 * link8_vel0;
+            let link7_load1 = link7_pose3 * link8_vel0;
+            let link7_load2 = link7_pose4 * link7_vel4;
+            let link7_load3 = link7_pose3 * link7_vel2;
+            let link7_load4 = link7_load2 - link7_load3;
+            // link8: gravity and wrenches
+            let link8_load0 = link8_pose4 * link8_vel4;
+            let link8_load1 = link8_pose3 * link8_vel2;
+            let link8_load2 = link8_load0 - link8_load1;
+            // link9: gravity and wrenches
+            let link9_load0 = link9_pose2 * link10_vel0;
+            let link9_load1 = link9_pose1 * link10_vel0;
+            let link9_load2 = link9_pose2 * link9_vel4;
+            let link9_load3 = link9_pose1 * link9_vel2;
+            let link9_load4 = link9_load2 - link9_load3;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel8 * link10_vel8;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_vel7;
+            let link10_load3 = link10_sin0 * link10_load1;
+            let link10_load4 = link10_cos0 * link10_load1;
+            let link10_load5 = link10_pose2 * link10_load3;
+            let link10_load6 = link10_load2 - link10_load5;
+            let link10_load7 = link10_pose1 * link10_load4;
+            let link10_load8 = link10_load6 + link10_load7;
+            let link10_load9 = link9_load0 + link10_load3;
+            let link10_load10 = link9_load1 + link10_load4;
+            let link10_load11 = link9_load4 + link10_load8;
+            // link9: gravity and wrenches
+            let link9_load5 = link8_pose3 * link10_load9;
+            let link9_load6 = link10_load11 - link9_load5;
+            let link9_load7 = link8_pose4 * link10_load10;
+            let link9_load8 = link9_load6 + link9_load7;
+            let link9_load9 = link9_vel1 + link10_load9;
+            let link9_load10 = link9_vel3 + link10_load10;
+            let link9_load11 = link8_load2 + link9_load8;
+            // link8: gravity and wrenches
+            let link8_load3 = link8_pose2 * link9_load9;
+            let link8_load4 = link9_load11 - link8_load3;
+            let link8_load5 = link8_pose1 * link9_load10;
+            let link8_load6 = link8_load4 + link8_load5;
+            let link8_load7 = link7_load0 + link9_load9;
+            let link8_load8 = link7_load1 + link9_load10;
+            let link8_load9 = link7_load4 + link8_load6;
+            // link7: gravity and wrenches
+            let link7_load5 = link7_pose2 * link8_load7;
+            let link7_load6 = link8_load9 - link7_load5;
+            let link7_load7 = link7_pose1 * link8_load8;
+            let link7_load8 = link7_load6 + link7_load7;
+            let link7_load9 = link6_load0 + link8_load7;
+            let link7_load10 = link6_load1 + link8_load8;
+            let link7_load11 = link6_load4 + link7_load8;
+            // link6: gravity and wrenches
+            let link6_load5 = link6_pose2 * link7_load9;
+            let link6_load6 = link7_load11 - link6_load5;
+            let link6_load7 = link6_pose1 * link7_load10;
+            let link6_load8 = link6_load6 + link6_load7;
+            let link6_load9 = link5_load0 + link7_load9;
+            let link6_load10 = link5_load1 + link7_load10;
+            let link6_load11 = link5_load4 + link6_load8;
+            // link5: gravity and wrenches
+            let link5_load5 = link5_pose2 * link6_load9;
+            let link5_load6 = link6_load11 - link5_load5;
+            let link5_load7 = link5_pose1 * link6_load10;
+            let link5_load8 = link5_load6 + link5_load7;
+            let link5_load9 = link4_load0 + link6_load9;
+            let link5_load10 = link4_load1 + link6_load10;
+            let link5_load11 = link4_load4 + link5_load8;
+            // link4: gravity and wrenches
+            let link4_load5 = link4_pose2 * link5_load9;
+            let link4_load6 = link5_load11 - link4_load5;
+            let link4_load7 = link4_pose1 * link5_load10;
+            let link4_load8 = link4_load6 + link4_load7;
+            let link4_load9 = link3_load0 + link5_load9;
+            let link4_load10 = link3_load1 + link5_load10;
+            let link4_load11 = link3_load4 + link4_load8;
+            // link3: gravity and wrenches
+            let link3_load5 = link3_pose2 * link4_load9;
+            let link3_load6 = link4_load11 - link3_load5;
+            let link3_load7 = link3_pose1 * link4_load10;
+            let link3_load8 = link3_load6 + link3_load7;
+            let link3_load9 = link2_load0 + link4_load9;
+            let link3_load10 = link2_load1 + link4_load10;
+            let link3_load11 = link2_load4 + link3_load8;
+            // link2: gravity and wrenches
+            let link2_load5 = link2_pose2 * link3_load9;
+            let link2_load6 = link3_load11 - link2_load5;
+            let link2_load7 = link2_pose1 * link3_load10;
+            let link2_load8 = link2_load6 + link2_load7;
+            let link2_load9 = link1_load0 + link2_load8;
+            h.set(0, l, link2_load9);
+            h.set(1, l, link3_load11);
+            h.set(2, l, link4_load11);
+            h.set(3, l, link5_load11);
+            h.set(4, l, link6_load11);
+            h.set(5, l, link7_load11);
+            h.set(6, l, link8_load9);
+            h.set(7, l, link9_load11);
+            h.set(8, l, link10_load11);
+            h.set(9, l, link10_load2);
+        }
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
     #[inline]
     pub fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        qd[0] = v_0;
-        qd[1] = v_1;
-        qd[2] = v_2;
-        qd[3] = v_3;
-        qd[4] = v_4;
-        qd[5] = v_5;
-        qd[6] = v_6;
-        qd[7] = v_7;
-        qd[8] = v_8;
-        qd[9] = v_9;
+        Self::coordinate_rates_kernel::<::multibody::runtime::kernel::Plain, 1>(v, qd);
+    }
+
+    #[inline(always)]
+    fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            qd.set(0, l, v_0);
+            qd.set(1, l, v_1);
+            qd.set(2, l, v_2);
+            qd.set(3, l, v_3);
+            qd.set(4, l, v_4);
+            qd.set(5, l, v_5);
+            qd.set(6, l, v_6);
+            qd.set(7, l, v_7);
+            qd.set(8, l, v_8);
+            qd.set(9, l, v_9);
+        }
+    }
+
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> Chain10PlanarLanes<LANES> {
+        Chain10PlanarLanes { tau: self.tau.map(|x| [x; LANES]) }
+    }
+
+    /// Rates of any number of states, given as columns: `q[k][s]` is coordinate `k` of state `s`. Joint forces are a column each; the fields of
+    /// `self` are the same for all states. 8 states are computed at a time.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    pub fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        ::multibody::runtime::batch::run::<f64, 8, 10, 10, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
+            ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
+        })
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<0, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, tau, qd, pd,): (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)) {
+        Self::rates_kernel::<A, LANES>(q, p, tau, qd, pd);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<1, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, v,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::velocities_kernel::<A, LANES>(q, p, v);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<2, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, p,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::momenta_kernel::<A, LANES>(q, v, p);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, result);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<4, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, a,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::accelerations_kernel::<A, LANES>(q, v, tau, a);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<5, LANES, (&'a P0, &'a mut P1,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, m,): (&'a P0, &'a mut P1,)) {
+        Self::mass_matrix_kernel::<A, LANES>(q, m);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<6, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, a, tau,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::inverse_dynamics_kernel::<A, LANES>(q, v, a, tau);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<7, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, h,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_kernel::<A, LANES>(q, v, h);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<8, LANES, (&'a P0, &'a mut P1,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((v, qd,): (&'a P0, &'a mut P1,)) {
+        Self::coordinate_rates_kernel::<A, LANES>(v, qd);
+    }
+}
+
+/// `LANES` states of [`Chain10Planar`] at once, side by side in vector registers. In every array the last index is the lane:
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+#[derive(Clone, Debug, PartialEq)]
+#[rustfmt::skip]
+pub struct Chain10PlanarLanes<const LANES: usize> {
+    /// Joint forces, N m or N, one for each velocity.
+    pub tau: [[f64; LANES]; 10],
+}
+
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[rustfmt::skip]
+impl<const LANES: usize> Chain10PlanarLanes<LANES> {
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {
+        Chain10Planar::new().lanes()
+    }
+
+    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    #[inline]
+    pub fn rates(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10], qd: &mut [[f64; LANES]; 10], pd: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+    }
+
+    /// Velocities from momenta: `(q, p) → v`.
+    #[inline]
+    pub fn velocities(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10], v: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 1, LANES, f64, _>((q, p, v,));
+    }
+
+    /// Momenta from velocities: `p = M(q) v`.
+    #[inline]
+    pub fn momenta(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], p: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 2, LANES, f64, _>((q, v, p,));
+    }
+
+    /// Kinetic and potential energy, J.
+    #[inline]
+    pub fn energy(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10]) -> [[f64; LANES]; 2] {
+        let mut result = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 3, LANES, f64, _>((q, p, &mut result,));
+        result
+    }
+
+    /// Accelerations: `(q, v) → v̇`.
+    #[inline]
+    pub fn accelerations(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], a: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 4, LANES, f64, _>((q, v, &self.tau, a,));
+    }
+
+    /// Mass matrix, by rows.
+    #[inline]
+    pub fn mass_matrix(&self, q: &[[f64; LANES]; 10], m: &mut [[[f64; LANES]; 10]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 5, LANES, f64, _>((q, m.as_flattened_mut(),));
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], a: &[[f64; LANES]; 10], tau: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 6, LANES, f64, _>((q, v, a, tau,));
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    #[inline]
+    pub fn bias(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], h: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 7, LANES, f64, _>((q, v, h,));
+    }
+
+    /// Coordinate rates of given velocities: `q̇ = N(q) v`.
+    #[inline]
+    pub fn coordinate_rates(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], qd: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 8, LANES, f64, _>((v, qd,));
+    }
+}
+
+#[rustfmt::skip]
+impl<const LANES: usize> ::core::default::Default for Chain10PlanarLanes<LANES> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -3898,5 +5854,13 @@ impl ::multibody::runtime::System for Chain10Planar {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::batch::RatesBatch<f64, 10, 10, 10> for Chain10Planar {
+    fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        let _ = tau;
+        Self::rates_batch(self, q, p, tau, qd, pd)
     }
 }
