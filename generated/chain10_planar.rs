@@ -20,7 +20,7 @@
 //   velocities: 397 + 373 + 9 = 779; 0, 10
 //   momenta: 95 + 114 + 0 = 209; 0, 10
 //   energy: 415 + 387 + 9 = 811; 0, 10
-//   accelerations: 460 + 439 + 9 = 908; 0, 10
+//   accelerations: 459 + 441 + 9 = 909; 0, 10
 //   mass_matrix: 160 + 142 + 0 = 302; 0, 10
 //   inverse_dynamics: 142 + 161 + 0 = 303; 0, 10
 //   bias: 87 + 116 + 0 = 203; 0, 10
@@ -3324,7 +3324,7 @@ impl Chain10Planar {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 908 operations: 460 additions, 439 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 909 operations: 459 additions, 441 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
         Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
     }
@@ -3497,33 +3497,38 @@ impl Chain10Planar {
             let link8_inertia10 = link8_pose1 + link7_inertia8;
             let link8_inertia11 = link8_pose2 + link7_inertia9;
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia0 = 0.29940119760479045 * link10_cos0;
-            let link10_inertia1 = link10_cos0 * link10_inertia0;
-            let link10_inertia2 = link10_sin0 * link10_inertia0;
-            let link10_inertia3 = link10_inertia1 - 0.29940119760479045;
-            let link10_inertia4 = link10_pose2 * link10_inertia1;
-            let link10_inertia5 = link10_pose2 * link10_inertia2;
-            let link10_inertia6 = link10_pose2 * link10_inertia4;
-            let link10_inertia7 = link10_pose1 * link10_inertia2;
-            let link10_inertia8 = link10_inertia4 + link10_inertia7;
-            let link10_inertia9 = link10_pose1 * link10_inertia3;
-            let link10_inertia10 = link10_inertia5 - link10_inertia9;
-            let link10_inertia11 = link10_inertia5 + link10_inertia10;
-            let link10_inertia12 = link10_pose1 * link10_inertia11;
-            let link10_inertia13 = link10_inertia6 + link10_inertia12;
-            let link10_inertia14 = link9_pose1 - link10_inertia8;
-            let link10_inertia15 = link9_pose2 - link10_inertia10;
-            let link10_inertia16 = link10_inertia13 - 0.033350000000000005;
+            let link10_inertia0 = 0.05 * link10_cos0;
+            let link10_inertia1 = 0.05 * link10_sin0;
+            // link10: U, Mj, k and the reduced inertia M' (4.44)
+            let link10_pivot0 = 119.76047904191617 * link10_inertia0;
+            let link10_pivot1 = 119.76047904191617 * link10_inertia1;
+            let link10_pivot2 = link10_inertia0 * link10_pivot0;
+            let link10_pivot3 = link10_inertia0 * link10_pivot1;
+            let link10_pivot4 = link10_inertia1 * link10_pivot1;
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia2 = link10_pose2 * link10_pivot2;
+            let link10_inertia3 = link10_pose2 * link10_pivot3;
+            let link10_inertia4 = link10_pose2 * link10_inertia2;
+            let link10_inertia5 = link10_pose1 * link10_pivot3;
+            let link10_inertia6 = link10_inertia2 + link10_inertia5;
+            let link10_inertia7 = link10_pose1 * link10_pivot4;
+            let link10_inertia8 = link10_inertia3 + link10_inertia7;
+            let link10_inertia9 = link10_inertia3 + link10_inertia8;
+            let link10_inertia10 = link10_pose1 * link10_inertia9;
+            let link10_inertia11 = link10_inertia4 + link10_inertia10;
+            let link10_inertia12 = link9_pose1 - link10_inertia6;
+            let link10_inertia13 = link9_pose2 - link10_inertia8;
+            let link10_inertia14 = link10_inertia11 - 0.033350000000000005;
             // link9: U, Mj, k and the reduced inertia M' (4.44)
-            let link9_pivot0 = 1.0 / link10_inertia16;
-            let link9_pivot1 = link10_inertia14 * link9_pivot0;
-            let link9_pivot2 = link10_inertia15 * link9_pivot0;
-            let link9_pivot3 = link10_inertia14 * link9_pivot1;
-            let link9_pivot4 = link10_inertia1 - link9_pivot3;
-            let link9_pivot5 = link10_inertia14 * link9_pivot2;
-            let link9_pivot6 = link10_inertia2 - link9_pivot5;
-            let link9_pivot7 = link10_inertia15 * link9_pivot2;
-            let link9_pivot8 = link10_inertia3 + link9_pivot7;
+            let link9_pivot0 = 1.0 / link10_inertia14;
+            let link9_pivot1 = link10_inertia12 * link9_pivot0;
+            let link9_pivot2 = link10_inertia13 * link9_pivot0;
+            let link9_pivot3 = link10_inertia12 * link9_pivot1;
+            let link9_pivot4 = link10_pivot2 - link9_pivot3;
+            let link9_pivot5 = link10_inertia12 * link9_pivot2;
+            let link9_pivot6 = link10_pivot3 - link9_pivot5;
+            let link9_pivot7 = link10_inertia13 * link9_pivot2;
+            let link9_pivot8 = link10_pivot4 - link9_pivot7;
             // link9: inertia carried to the parent, M* (4.48)
             let link9_inertia0 = link8_pose3 * link9_pivot4;
             let link9_inertia1 = link8_pose3 * link9_pivot6;
@@ -3531,7 +3536,7 @@ impl Chain10Planar {
             let link9_inertia3 = link8_pose4 * link9_pivot6;
             let link9_inertia4 = link9_inertia0 + link9_inertia3;
             let link9_inertia5 = link8_pose4 * link9_pivot8;
-            let link9_inertia6 = link9_inertia1 - link9_inertia5;
+            let link9_inertia6 = link9_inertia1 + link9_inertia5;
             let link9_inertia7 = link9_inertia1 + link9_inertia6;
             let link9_inertia8 = link8_pose4 * link9_inertia7;
             let link9_inertia9 = link9_inertia2 + link9_inertia8;
@@ -3578,7 +3583,7 @@ impl Chain10Planar {
             let link8_inertia19 = link8_pose1 * link9_pivot6;
             let link8_inertia20 = link8_inertia13 - link8_inertia19;
             let link8_inertia21 = link8_pose1 * link9_pivot8;
-            let link8_inertia22 = link8_inertia15 + link8_inertia21;
+            let link8_inertia22 = link8_inertia15 - link8_inertia21;
             let link8_inertia23 = link8_inertia15 + link8_inertia22;
             let link8_inertia24 = link8_pose1 * link8_inertia23;
             let link8_inertia25 = link8_inertia18 - link8_inertia24;
@@ -3621,7 +3626,7 @@ impl Chain10Planar {
             let link7_inertia17 = link7_pose1 * link9_pivot6;
             let link7_inertia18 = link7_inertia11 - link7_inertia17;
             let link7_inertia19 = link7_pose1 * link9_pivot8;
-            let link7_inertia20 = link7_inertia13 + link7_inertia19;
+            let link7_inertia20 = link7_inertia13 - link7_inertia19;
             let link7_inertia21 = link7_inertia13 + link7_inertia20;
             let link7_inertia22 = link7_pose1 * link7_inertia21;
             let link7_inertia23 = link7_inertia16 - link7_inertia22;
@@ -3660,7 +3665,7 @@ impl Chain10Planar {
             let link6_inertia15 = link6_pose1 * link9_pivot6;
             let link6_inertia16 = link6_inertia9 - link6_inertia15;
             let link6_inertia17 = link6_pose1 * link9_pivot8;
-            let link6_inertia18 = link6_inertia11 + link6_inertia17;
+            let link6_inertia18 = link6_inertia11 - link6_inertia17;
             let link6_inertia19 = link6_inertia11 + link6_inertia18;
             let link6_inertia20 = link6_pose1 * link6_inertia19;
             let link6_inertia21 = link6_inertia14 - link6_inertia20;
@@ -3695,7 +3700,7 @@ impl Chain10Planar {
             let link5_inertia13 = link5_pose1 * link9_pivot6;
             let link5_inertia14 = link5_inertia7 - link5_inertia13;
             let link5_inertia15 = link5_pose1 * link9_pivot8;
-            let link5_inertia16 = link5_inertia9 + link5_inertia15;
+            let link5_inertia16 = link5_inertia9 - link5_inertia15;
             let link5_inertia17 = link5_inertia9 + link5_inertia16;
             let link5_inertia18 = link5_pose1 * link5_inertia17;
             let link5_inertia19 = link5_inertia12 - link5_inertia18;
@@ -3726,7 +3731,7 @@ impl Chain10Planar {
             let link4_inertia11 = link4_pose1 * link9_pivot6;
             let link4_inertia12 = link4_inertia5 - link4_inertia11;
             let link4_inertia13 = link4_pose1 * link9_pivot8;
-            let link4_inertia14 = link4_inertia7 + link4_inertia13;
+            let link4_inertia14 = link4_inertia7 - link4_inertia13;
             let link4_inertia15 = link4_inertia7 + link4_inertia14;
             let link4_inertia16 = link4_pose1 * link4_inertia15;
             let link4_inertia17 = link4_inertia10 - link4_inertia16;
@@ -3753,7 +3758,7 @@ impl Chain10Planar {
             let link3_inertia9 = link3_pose1 * link9_pivot6;
             let link3_inertia10 = link3_inertia3 - link3_inertia9;
             let link3_inertia11 = link3_pose1 * link9_pivot8;
-            let link3_inertia12 = link3_inertia5 + link3_inertia11;
+            let link3_inertia12 = link3_inertia5 - link3_inertia11;
             let link3_inertia13 = link3_inertia5 + link3_inertia12;
             let link3_inertia14 = link3_pose1 * link3_inertia13;
             let link3_inertia15 = link3_inertia8 - link3_inertia14;
@@ -3774,7 +3779,7 @@ impl Chain10Planar {
             let link2_inertia5 = link2_pose2 * link2_inertia4;
             let link2_inertia6 = link3_inertia18 - link2_inertia5;
             let link2_inertia7 = link2_pose1 * link9_pivot8;
-            let link2_inertia8 = link2_inertia3 + link2_inertia7;
+            let link2_inertia8 = link2_inertia3 - link2_inertia7;
             let link2_inertia9 = link2_inertia3 + link2_inertia8;
             let link2_inertia10 = link2_pose1 * link2_inertia9;
             let link2_inertia11 = link2_inertia6 - link2_inertia10;
@@ -4102,29 +4107,28 @@ impl Chain10Planar {
             let link10_load1 = 0.05 * link10_load0;
             let link10_load2 = 0.05 * link10_vel7;
             // link10: momentum remainder D, D' (4.45, 4.49)
-            let link10_rest0 = tau_9 - link10_load2;
-            let link10_rest1 = 119.76047904191617 * link10_rest0;
-            let link10_rest2 = 0.05 * link10_rest1;
-            let link10_rest3 = link10_sin0 * link10_load1;
-            let link10_rest4 = link10_cos0 * link10_rest2;
-            let link10_rest5 = link10_rest3 - link10_rest4;
-            let link10_rest6 = link10_cos0 * link10_load1;
-            let link10_rest7 = link10_sin0 * link10_rest2;
-            let link10_rest8 = link10_rest6 + link10_rest7;
-            let link10_rest9 = link10_pose2 * link10_rest5;
-            let link10_rest10 = tau_9 - link10_rest9;
-            let link10_rest11 = link10_pose1 * link10_rest8;
-            let link10_rest12 = link10_rest10 + link10_rest11;
-            let link10_rest13 = link9_load0 + link10_rest5;
-            let link10_rest14 = link9_load1 + link10_rest8;
-            let link10_rest15 = link9_load4 + link10_rest12;
+            let link10_rest0 = link10_sin0 * link10_load1;
+            let link10_rest1 = link10_cos0 * link10_load1;
+            let link10_rest2 = tau_9 - link10_load2;
+            let link10_rest3 = 119.76047904191617 * link10_rest2;
+            let link10_rest4 = link10_inertia0 * link10_rest3;
+            let link10_rest5 = link10_rest0 - link10_rest4;
+            let link10_rest6 = link10_inertia1 * link10_rest3;
+            let link10_rest7 = link10_rest1 + link10_rest6;
+            let link10_rest8 = link10_pose2 * link10_rest5;
+            let link10_rest9 = tau_9 - link10_rest8;
+            let link10_rest10 = link10_pose1 * link10_rest7;
+            let link10_rest11 = link10_rest9 + link10_rest10;
+            let link10_rest12 = link9_load0 + link10_rest5;
+            let link10_rest13 = link9_load1 + link10_rest7;
+            let link10_rest14 = link9_load4 + link10_rest11;
             // link9: momentum remainder D, D' (4.45, 4.49)
-            let link9_rest0 = tau_8 - link10_rest15;
+            let link9_rest0 = tau_8 - link10_rest14;
             let link9_rest1 = link9_pivot0 * link9_rest0;
-            let link9_rest2 = link10_inertia14 * link9_rest1;
-            let link9_rest3 = link10_rest13 + link9_rest2;
-            let link9_rest4 = link10_inertia15 * link9_rest1;
-            let link9_rest5 = link10_rest14 - link9_rest4;
+            let link9_rest2 = link10_inertia12 * link9_rest1;
+            let link9_rest3 = link10_rest12 + link9_rest2;
+            let link9_rest4 = link10_inertia13 * link9_rest1;
+            let link9_rest5 = link10_rest13 - link9_rest4;
             let link9_rest6 = link8_pose3 * link9_rest3;
             let link9_rest7 = tau_8 - link9_rest6;
             let link9_rest8 = link8_pose4 * link9_rest5;
@@ -4371,12 +4375,11 @@ impl Chain10Planar {
             let link10_acc1 = link9_acc1 + link10_acc0;
             let link10_acc2 = link10_pose2 * link9_acc7;
             let link10_acc3 = link9_acc3 + link10_acc2;
-            let link10_acc4 = link10_sin0 * link10_acc1;
-            let link10_acc5 = link10_cos0 * link10_acc3;
+            let link10_acc4 = link10_pivot0 * link10_acc3;
+            let link10_acc5 = link10_pivot1 * link10_acc1;
             let link10_acc6 = link10_acc4 + link10_acc5;
-            let link10_acc7 = 5.9880239520958085 * link10_acc6;
-            let link10_acc8 = link10_rest1 + link10_acc7;
-            let link10_acc9 = link9_acc7 + link10_acc8;
+            let link10_acc7 = link10_rest3 + link10_acc6;
+            let link10_acc8 = link9_acc7 + link10_acc7;
             a.set(0, l, -link1_rest71);
             a.set(1, l, -ground_acc1);
             a.set(2, l, -ground_acc5);
@@ -4386,7 +4389,7 @@ impl Chain10Planar {
             a.set(6, l, -ground_acc41);
             a.set(7, l, -ground_acc55);
             a.set(8, l, link9_acc8);
-            a.set(9, l, link10_acc9);
+            a.set(9, l, link10_acc8);
         }
     }
 

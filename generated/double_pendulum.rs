@@ -12,8 +12,8 @@
 //   velocities: 7 + 7 + 1 = 15; 0, 1
 //   momenta: 4 + 6 + 0 = 10; 0, 1
 //   energy: 10 + 14 + 1 = 25; 0, 2
-//   accelerations: 14 + 17 + 1 = 32; 0, 2
-//   reactions: 30 + 31 + 1 = 62; 0, 2
+//   accelerations: 11 + 17 + 1 = 29; 0, 2
+//   reactions: 27 + 31 + 1 = 59; 0, 2
 //   mass_matrix: 4 + 1 + 0 = 5; 0, 1
 //   frames: 6 + 6 + 0 = 12; 0, 2
 //   inverse_dynamics: 10 + 14 + 0 = 24; 0, 2
@@ -289,7 +289,7 @@ impl DoublePendulum {
     }
 
     /// Accelerations: `(q, v) → v̇`.
-    /// 32 operations: 14 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 29 operations: 11 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
@@ -318,15 +318,13 @@ impl DoublePendulum {
             let lower_cos0 = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
             let lower_inertia0 = 0.5 * lower_cos0;
-            let lower_inertia1 = lower_inertia0 + lower_inertia0;
-            let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
-            let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
-            let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
+            // lower: U, Mj, k and the reduced inertia M' (4.44)
+            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
+            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
-            let upper_pivot1 = lower_inertia4 * upper_pivot0;
-            let upper_pivot2 = lower_inertia3 - upper_pivot1;
-            let upper_pivot3 = 1.0 / upper_pivot2;
+            let upper_pivot0 = 1.0 / lower_inertia1;
             // upper: velocity and joint rate (4.40)
             let upper_vel0 = 9.81 * upper_cos0;
             let upper_vel1 = 9.81 * upper_sin0;
@@ -345,25 +343,26 @@ impl DoublePendulum {
             let lower_load2 = 0.5 * lower_vel4;
             // lower: momentum remainder D, D' (4.45, 4.49)
             let lower_rest0 = lower_sin0 * lower_load1;
-            let lower_rest1 = lower_load2 - lower_rest0;
-            let lower_rest2 = upper_load0 + lower_rest1;
+            let lower_rest1 = tau_1 - lower_load2;
+            let lower_rest2 = 2.9994001199760048 * lower_rest1;
+            let lower_rest3 = lower_inertia0 * lower_rest2;
+            let lower_rest4 = lower_rest0 - lower_rest3;
+            let lower_rest5 = tau_1 - lower_rest4;
+            let lower_rest6 = upper_load0 + lower_rest5;
             // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = tau_1 - lower_load2;
-            let upper_rest1 = 2.9994001199760048 * upper_rest0;
-            let upper_rest2 = lower_inertia4 * upper_rest1;
-            let upper_rest3 = lower_rest2 + upper_rest2;
-            let upper_rest4 = tau_0 - upper_rest3;
-            let upper_rest5 = upper_pivot3 * upper_rest4;
-            // upper: acceleration
-            let upper_acc0 = upper_pivot0 * upper_rest5;
-            let upper_acc1 = upper_rest1 - upper_acc0;
-            a.set(0, l, upper_rest5);
-            a.set(1, l, upper_acc1);
+            let upper_rest0 = tau_0 - lower_rest6;
+            let upper_rest1 = upper_pivot0 * upper_rest0;
+            // lower: acceleration
+            let lower_acc0 = lower_pivot0 * upper_rest1;
+            let lower_acc1 = lower_rest2 + lower_acc0;
+            let lower_acc2 = upper_rest1 + lower_acc1;
+            a.set(0, l, -upper_rest1);
+            a.set(1, l, lower_acc2);
         }
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
-    /// 62 operations: 30 additions, 31 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
+    /// 59 operations: 27 additions, 31 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
         Self::reactions_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, reactions.as_flattened_mut());
@@ -392,15 +391,13 @@ impl DoublePendulum {
             let lower_cos0 = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
             let lower_inertia0 = 0.5 * lower_cos0;
-            let lower_inertia1 = lower_inertia0 + lower_inertia0;
-            let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
-            let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
-            let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
+            // lower: U, Mj, k and the reduced inertia M' (4.44)
+            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
+            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
-            let upper_pivot1 = lower_inertia4 * upper_pivot0;
-            let upper_pivot2 = lower_inertia3 - upper_pivot1;
-            let upper_pivot3 = 1.0 / upper_pivot2;
+            let upper_pivot0 = 1.0 / lower_inertia1;
             // upper: velocity and joint rate (4.40)
             let upper_vel0 = 9.81 * upper_cos0;
             let upper_vel1 = 9.81 * upper_sin0;
@@ -420,48 +417,49 @@ impl DoublePendulum {
             let lower_load2 = 0.5 * lower_vel5;
             // lower: momentum remainder D, D' (4.45, 4.49)
             let lower_rest0 = lower_sin0 * lower_load1;
-            let lower_rest1 = lower_load2 - lower_rest0;
-            let lower_rest2 = upper_load0 + lower_rest1;
+            let lower_rest1 = tau_1 - lower_load2;
+            let lower_rest2 = 2.9994001199760048 * lower_rest1;
+            let lower_rest3 = lower_inertia0 * lower_rest2;
+            let lower_rest4 = lower_rest0 - lower_rest3;
+            let lower_rest5 = tau_1 - lower_rest4;
+            let lower_rest6 = upper_load0 + lower_rest5;
             // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = tau_1 - lower_load2;
-            let upper_rest1 = 2.9994001199760048 * upper_rest0;
-            let upper_rest2 = lower_inertia4 * upper_rest1;
-            let upper_rest3 = lower_rest2 + upper_rest2;
-            let upper_rest4 = tau_0 - upper_rest3;
-            let upper_rest5 = upper_pivot3 * upper_rest4;
-            // upper: acceleration
-            let upper_acc0 = upper_pivot0 * upper_rest5;
-            let upper_acc1 = upper_rest1 - upper_acc0;
+            let upper_rest0 = tau_0 - lower_rest6;
+            let upper_rest1 = upper_pivot0 * upper_rest0;
             // lower: acceleration
-            let lower_acc0 = upper_rest5 + upper_acc1;
+            let lower_acc0 = lower_pivot0 * upper_rest1;
+            let lower_acc1 = lower_rest2 + lower_acc0;
+            let lower_acc2 = upper_rest1 + lower_acc1;
             // lower: velocity and joint rate (4.40)
-            let lower_vel7 = upper_vel1 + upper_rest5;
+            let lower_vel7 = upper_vel1 - upper_rest1;
             let lower_vel8 = lower_sin0 * lower_vel7;
             let lower_vel9 = lower_vel2 - lower_vel8;
             let lower_vel10 = lower_cos0 * lower_vel7;
             let lower_vel11 = lower_vel4 + lower_vel10;
+            // lower: acceleration
+            let lower_acc3 = upper_rest1 - lower_acc2;
             // upper: gravity and wrenches
             let upper_load1 = 0.5 * lower_vel0;
             let upper_load2 = upper_vel0 + upper_load1;
-            let upper_load3 = 0.5 * upper_rest5;
-            let upper_load4 = upper_vel1 + upper_load3;
-            let upper_load5 = 0.33340000000000003 * upper_rest5;
+            let upper_load3 = 0.5 * upper_rest1;
+            let upper_load4 = upper_vel1 - upper_load3;
+            let upper_load5 = 0.33340000000000003 * upper_rest1;
             let upper_load6 = 0.5 * upper_vel1;
-            let upper_load7 = upper_load5 + upper_load6;
+            let upper_load7 = upper_load5 - upper_load6;
             // lower: gravity and wrenches
             let lower_load3 = lower_load1 + lower_vel9;
-            let lower_load4 = 0.5 * lower_acc0;
-            let lower_load5 = lower_vel11 + lower_load4;
-            let lower_load6 = 0.33340000000000003 * lower_acc0;
+            let lower_load4 = 0.5 * lower_acc3;
+            let lower_load5 = lower_vel11 - lower_load4;
+            let lower_load6 = 0.33340000000000003 * lower_acc3;
             let lower_load7 = 0.5 * lower_vel11;
-            let lower_load8 = lower_load6 + lower_load7;
+            let lower_load8 = lower_load6 - lower_load7;
             let lower_load9 = lower_cos0 * lower_load3;
             let lower_load10 = lower_sin0 * lower_load5;
             let lower_load11 = lower_load9 + lower_load10;
             let lower_load12 = lower_sin0 * lower_load3;
             let lower_load13 = lower_cos0 * lower_load5;
             let lower_load14 = lower_load12 - lower_load13;
-            let lower_load15 = lower_load8 - lower_load14;
+            let lower_load15 = lower_load8 + lower_load14;
             let lower_load16 = upper_load2 + lower_load11;
             let lower_load17 = lower_load14 - upper_load4;
             let lower_load18 = upper_load7 + lower_load15;
@@ -469,13 +467,13 @@ impl DoublePendulum {
             reactions.set(1, l, 0.0);
             reactions.set(2, l, lower_load16);
             reactions.set(3, l, 0.0);
-            reactions.set(4, l, lower_load18);
+            reactions.set(4, l, -lower_load18);
             reactions.set(5, l, 0.0);
             reactions.set(6, l, -lower_load5);
             reactions.set(7, l, 0.0);
             reactions.set(8, l, lower_load3);
             reactions.set(9, l, 0.0);
-            reactions.set(10, l, lower_load8);
+            reactions.set(10, l, -lower_load8);
             reactions.set(11, l, 0.0);
         }
     }
