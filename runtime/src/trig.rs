@@ -77,7 +77,9 @@ macro_rules! sincos {
         #[inline]
         pub fn $lanes<const N: usize>(x: [$float; N]) -> ([$float; N], [$float; N]) {
             let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-            $flat::<Plain>(&x, &mut sin, &mut cos);
+            if $flat::<Plain>(&x, &mut sin, &mut cos) {
+                $repair(&x, &mut sin, &mut cos);
+            }
             (sin, cos)
         }
 
@@ -90,7 +92,9 @@ macro_rules! sincos {
         impl Kernel<0, $width, (&[$float], &mut [$float], &mut [$float])> for $kernel_type {
             #[inline(always)]
             fn run<A: Arithmetic>((x, sin, cos): (&[$float], &mut [$float], &mut [$float])) {
-                $flat::<A>(x, sin, cos);
+                if $flat::<A>(x, sin, cos) {
+                    $repair(x, sin, cos);
+                }
             }
         }
 
@@ -110,13 +114,19 @@ macro_rules! sincos {
             x: &[[$float; L]; N],
         ) -> ([[$float; L]; N], [[$float; L]; N]) {
             let (mut sin, mut cos) = ([[0.0; L]; N], [[0.0; L]; N]);
-            $flat::<A>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut());
+            if $flat::<A>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut()) {
+                // Copies are lent, so that the arrays of the main path can stay in registers.
+                let (x, mut s, mut c) = (*x, sin, cos);
+                $repair(x.as_flattened(), s.as_flattened_mut(), c.as_flattened_mut());
+                (sin, cos) = (s, c);
+            }
             (sin, cos)
         }
 
-        /// Blocks as wide as the widest vectors; the rest in blocks of half that, and so on down.
+        /// The main path in blocks as wide as the widest vectors, the rest in narrower ones; whether there is an angle
+        /// beyond it.
         #[inline(always)]
-        fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
+        fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
             let mut large = false;
             let (mut xs, mut ss, mut cs) =
                 (x.chunks_exact($width), sin.chunks_exact_mut($width), cos.chunks_exact_mut($width));
@@ -124,17 +134,14 @@ macro_rules! sincos {
                 large |= $block::<A, $width>(x, s, c);
             }
             let (x_rest, s, c) = (xs.remainder(), ss.into_remainder(), cs.into_remainder());
-            large |= match x_rest.len() {
+            let rest = match x_rest.len() {
                 0 => false,
                 1 => $block::<A, 1>(x_rest, s, c),
-                2 => $block::<A, 2>(x_rest, s, c),
-                3 | 4 => $block::<A, 4>(x_rest, s, c),
+                2..=4 => $block::<A, 4>(x_rest, s, c),
                 5..=8 => $block::<A, 8>(x_rest, s, c),
                 _ => $block::<A, $width>(x_rest, s, c),
             };
-            if large {
-                $repair(x, sin, cos);
-            }
+            large | rest
         }
 
         /// Up to `W` angles on the main path; whether there is one beyond it.
@@ -186,10 +193,7 @@ macro_rules! sincos {
                 let w = n * $f2;
                 let b = a - w;
                 let lost = (a - b) - w;
-                let tail = A::$fma(n, $f3, -lost);
-                let y0 = b - tail;
-                let y1 = (b - y0) - tail;
-                return $kernel::<A>(y0, y1, shifted.to_bits());
+                return $kernel::<A>(b, A::$fma(-n, $f3, lost), shifted.to_bits());
             }
             // Exact: the product, and the difference by Sterbenz's lemma.
             let a = x - n * $p1;
@@ -200,21 +204,19 @@ macro_rules! sincos {
             let v = n * $p3;
             let c = b - v;
             let lost_c = (b - c) - v;
-            let tail = n * $p4 - (lost_b + lost_c);
-            let y0 = c - tail;
-            let y1 = (c - y0) - tail;
-            $kernel::<A>(y0, y1, shifted.to_bits())
+            $kernel::<A>(c, (lost_b + lost_c) - n * $p4, shifted.to_bits())
         }
 
-        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| <= π/4 and a little more, |y1| below an ulp of y0.
+        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| <= π/4 and a little more. `y1` is some ulps of `y0` at
+        /// most; where both are tiny it may be more.
         #[inline(always)]
         fn $kernel<A: Arithmetic>(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
             let z = y0 * y0;
             let sin = {
                 let ($zs, $fs) = (z, A::$fma);
-                let cube = z * y0;
-                let bend = A::$fma(z, A::$fma(-cube, $sin_tail, 0.5 * y1), -y1);
-                y0 - A::$fma(-cube, $s1, bend)
+                // Subtracted, so that the sine of -0 is -0.
+                let bend = A::$fma(0.5 * z, y1, -y1);
+                y0 - A::$fma(-(z * y0), A::$fma(z, $sin_tail, $s1), bend)
             };
             let cos = {
                 let ($zc, $fc) = (z, A::$fma);

@@ -2,7 +2,7 @@
 //! constants nor method with the code under test.
 //!
 //! The claim is one ulp. The bound here is tighter: half an ulp for the final rounding; about 0.3 for the operations
-//! before it (at |y| near π/4 the correction y³/6 is a tenth of y, and four of its roundings count), and in `f32` up to
+//! before it (at |y| near π/4 the correction y³/6 is a tenth of y, and five of its roundings count), and in `f32` up to
 //! 0.1 of that for a polynomial of relative error 2^-27.3.
 extern crate std;
 
@@ -11,7 +11,7 @@ use astro_float_num::{BigFloat, Consts, RoundingMode};
 use std::{eprintln, vec, vec::Vec};
 
 /// Largest error allowed anywhere, in ulp.
-const BOUND: f64 = 0.80;
+const BOUND: f64 = 0.85;
 
 /// As kernels compute where products are added without being rounded. (The crate's own type needs feature `std`.)
 #[derive(Clone, Copy)]
