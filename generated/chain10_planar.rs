@@ -131,6 +131,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 20];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -1130,27 +1131,47 @@ impl Chain10Planar {
             let link10_pdot12 = tau_7 - link8_pdot4;
             let link10_pdot13 = tau_8 + link9_pdot9;
             let link10_pdot14 = tau_9 + link10_pdot4;
-            qd.set(0, l, -link1_rest71);
-            qd.set(1, l, -ground_vel1);
-            qd.set(2, l, -ground_vel5);
-            qd.set(3, l, -ground_vel11);
-            qd.set(4, l, -ground_vel19);
-            qd.set(5, l, -ground_vel29);
-            qd.set(6, l, -ground_vel41);
-            qd.set(7, l, -ground_vel55);
-            qd.set(8, l, link9_vel8);
-            qd.set(9, l, link10_vel12);
-            pd.set(0, l, link10_pdot5);
-            pd.set(1, l, link10_pdot6);
-            pd.set(2, l, link10_pdot7);
-            pd.set(3, l, link10_pdot8);
-            pd.set(4, l, link10_pdot9);
-            pd.set(5, l, link10_pdot10);
-            pd.set(6, l, link10_pdot11);
-            pd.set(7, l, link10_pdot12);
-            pd.set(8, l, link10_pdot13);
-            pd.set(9, l, link10_pdot14);
+            results[0][l] = -link1_rest71;
+            results[1][l] = -ground_vel1;
+            results[2][l] = -ground_vel5;
+            results[3][l] = -ground_vel11;
+            results[4][l] = -ground_vel19;
+            results[5][l] = -ground_vel29;
+            results[6][l] = -ground_vel41;
+            results[7][l] = -ground_vel55;
+            results[8][l] = link9_vel8;
+            results[9][l] = link10_vel12;
+            results[10][l] = link10_pdot5;
+            results[11][l] = link10_pdot6;
+            results[12][l] = link10_pdot7;
+            results[13][l] = link10_pdot8;
+            results[14][l] = link10_pdot9;
+            results[15][l] = link10_pdot10;
+            results[16][l] = link10_pdot11;
+            results[17][l] = link10_pdot12;
+            results[18][l] = link10_pdot13;
+            results[19][l] = link10_pdot14;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
+        pd.give(0, &results[10]);
+        pd.give(1, &results[11]);
+        pd.give(2, &results[12]);
+        pd.give(3, &results[13]);
+        pd.give(4, &results[14]);
+        pd.give(5, &results[15]);
+        pd.give(6, &results[16]);
+        pd.give(7, &results[17]);
+        pd.give(8, &results[18]);
+        pd.give(9, &results[19]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -1194,6 +1215,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -2049,17 +2071,27 @@ impl Chain10Planar {
             let link10_vel7 = 5.9880239520958085 * link10_vel6;
             let link10_vel8 = link10_rest0 + link10_vel7;
             let link10_vel9 = link9_vel7 + link10_vel8;
-            v.set(0, l, -link1_rest71);
-            v.set(1, l, -ground_vel1);
-            v.set(2, l, -ground_vel5);
-            v.set(3, l, -ground_vel11);
-            v.set(4, l, -ground_vel19);
-            v.set(5, l, -ground_vel29);
-            v.set(6, l, -ground_vel41);
-            v.set(7, l, -ground_vel55);
-            v.set(8, l, link9_vel8);
-            v.set(9, l, link10_vel9);
+            results[0][l] = -link1_rest71;
+            results[1][l] = -ground_vel1;
+            results[2][l] = -ground_vel5;
+            results[3][l] = -ground_vel11;
+            results[4][l] = -ground_vel19;
+            results[5][l] = -ground_vel29;
+            results[6][l] = -ground_vel41;
+            results[7][l] = -ground_vel55;
+            results[8][l] = link9_vel8;
+            results[9][l] = link10_vel9;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
+        v.give(6, &results[6]);
+        v.give(7, &results[7]);
+        v.give(8, &results[8]);
+        v.give(9, &results[9]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2104,6 +2136,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2372,17 +2405,27 @@ impl Chain10Planar {
             let link2_mom9 = link2_pose1 * link3_mom12;
             let link2_mom10 = link2_mom8 + link2_mom9;
             let link2_mom11 = link1_mom0 + link2_mom10;
-            p.set(0, l, link2_mom11);
-            p.set(1, l, link3_mom13);
-            p.set(2, l, link4_mom13);
-            p.set(3, l, link5_mom13);
-            p.set(4, l, link6_mom13);
-            p.set(5, l, link7_mom13);
-            p.set(6, l, link8_mom11);
-            p.set(7, l, link9_mom13);
-            p.set(8, l, link10_mom12);
-            p.set(9, l, link10_mom3);
+            results[0][l] = link2_mom11;
+            results[1][l] = link3_mom13;
+            results[2][l] = link4_mom13;
+            results[3][l] = link5_mom13;
+            results[4][l] = link6_mom13;
+            results[5][l] = link7_mom13;
+            results[6][l] = link8_mom11;
+            results[7][l] = link9_mom13;
+            results[8][l] = link10_mom12;
+            results[9][l] = link10_mom3;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
+        p.give(6, &results[6]);
+        p.give(7, &results[7]);
+        p.give(8, &results[8]);
+        p.give(9, &results[9]);
     }
 
     /// Kinetic and potential energy, J.
@@ -2428,6 +2471,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -3318,9 +3362,11 @@ impl Chain10Planar {
             let link10_energy18 = 0.5 * link10_energy17;
             // ground: energy
             let ground_energy0 = 9.81 * link2_inertia12;
-            result.set(0, l, link10_energy18);
-            result.set(1, l, -ground_energy0);
+            results[0][l] = link10_energy18;
+            results[1][l] = -ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -3364,6 +3410,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -4380,17 +4427,27 @@ impl Chain10Planar {
             let link10_acc6 = link10_acc4 + link10_acc5;
             let link10_acc7 = link10_rest3 + link10_acc6;
             let link10_acc8 = link9_acc7 + link10_acc7;
-            a.set(0, l, -link1_rest71);
-            a.set(1, l, -ground_acc1);
-            a.set(2, l, -ground_acc5);
-            a.set(3, l, -ground_acc11);
-            a.set(4, l, -ground_acc19);
-            a.set(5, l, -ground_acc29);
-            a.set(6, l, -ground_acc41);
-            a.set(7, l, -ground_acc55);
-            a.set(8, l, link9_acc8);
-            a.set(9, l, link10_acc8);
+            results[0][l] = -link1_rest71;
+            results[1][l] = -ground_acc1;
+            results[2][l] = -ground_acc5;
+            results[3][l] = -ground_acc11;
+            results[4][l] = -ground_acc19;
+            results[5][l] = -ground_acc29;
+            results[6][l] = -ground_acc41;
+            results[7][l] = -ground_acc55;
+            results[8][l] = link9_acc8;
+            results[9][l] = link10_acc8;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
+        a.give(6, &results[6]);
+        a.give(7, &results[7]);
+        a.give(8, &results[8]);
+        a.give(9, &results[9]);
     }
 
     /// Mass matrix, by rows.
@@ -4434,6 +4491,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 100];
         for l in 0..LANES {
             // link1: sine and cosine, rotation
             let link1_sin0 = sines[0][l];
@@ -4767,107 +4825,207 @@ impl Chain10Planar {
             let link2_mass8 = link2_pose1 * link2_mass7;
             let link2_mass9 = link2_mass6 + link2_mass8;
             let link2_mass10 = link2_mass9 + 0.23334999999999997;
-            m.set(0, l, link2_mass10);
-            m.set(1, l, link2_mass3);
-            m.set(2, l, link3_mass7);
-            m.set(3, l, link4_mass11);
-            m.set(4, l, link5_mass15);
-            m.set(5, l, link6_mass19);
-            m.set(6, l, link7_mass23);
-            m.set(7, l, link8_mass27);
-            m.set(8, l, link9_mass31);
-            m.set(9, l, link10_mass37);
-            m.set(10, l, link2_mass3);
-            m.set(11, l, link3_mass16);
-            m.set(12, l, link3_mass3);
-            m.set(13, l, link4_mass7);
-            m.set(14, l, link5_mass11);
-            m.set(15, l, link6_mass15);
-            m.set(16, l, link7_mass19);
-            m.set(17, l, link8_mass23);
-            m.set(18, l, link9_mass27);
-            m.set(19, l, link10_mass33);
-            m.set(20, l, link3_mass7);
-            m.set(21, l, link3_mass3);
-            m.set(22, l, link4_mass20);
-            m.set(23, l, link4_mass3);
-            m.set(24, l, link5_mass7);
-            m.set(25, l, link6_mass11);
-            m.set(26, l, link7_mass15);
-            m.set(27, l, link8_mass19);
-            m.set(28, l, link9_mass23);
-            m.set(29, l, link10_mass29);
-            m.set(30, l, link4_mass11);
-            m.set(31, l, link4_mass7);
-            m.set(32, l, link4_mass3);
-            m.set(33, l, link5_mass24);
-            m.set(34, l, link5_mass3);
-            m.set(35, l, link6_mass7);
-            m.set(36, l, link7_mass11);
-            m.set(37, l, link8_mass15);
-            m.set(38, l, link9_mass19);
-            m.set(39, l, link10_mass25);
-            m.set(40, l, link5_mass15);
-            m.set(41, l, link5_mass11);
-            m.set(42, l, link5_mass7);
-            m.set(43, l, link5_mass3);
-            m.set(44, l, link6_mass28);
-            m.set(45, l, link6_mass3);
-            m.set(46, l, link7_mass7);
-            m.set(47, l, link8_mass11);
-            m.set(48, l, link9_mass15);
-            m.set(49, l, link10_mass21);
-            m.set(50, l, link6_mass19);
-            m.set(51, l, link6_mass15);
-            m.set(52, l, link6_mass11);
-            m.set(53, l, link6_mass7);
-            m.set(54, l, link6_mass3);
-            m.set(55, l, link7_mass32);
-            m.set(56, l, link7_mass3);
-            m.set(57, l, link8_mass7);
-            m.set(58, l, link9_mass11);
-            m.set(59, l, link10_mass17);
-            m.set(60, l, link7_mass23);
-            m.set(61, l, link7_mass19);
-            m.set(62, l, link7_mass15);
-            m.set(63, l, link7_mass11);
-            m.set(64, l, link7_mass7);
-            m.set(65, l, link7_mass3);
-            m.set(66, l, link8_mass36);
-            m.set(67, l, link8_mass3);
-            m.set(68, l, link9_mass7);
-            m.set(69, l, link10_mass13);
-            m.set(70, l, link8_mass27);
-            m.set(71, l, link8_mass23);
-            m.set(72, l, link8_mass19);
-            m.set(73, l, link8_mass15);
-            m.set(74, l, link8_mass11);
-            m.set(75, l, link8_mass7);
-            m.set(76, l, link8_mass3);
-            m.set(77, l, link9_mass40);
-            m.set(78, l, link9_mass3);
-            m.set(79, l, link10_mass9);
-            m.set(80, l, link9_mass31);
-            m.set(81, l, link9_mass27);
-            m.set(82, l, link9_mass23);
-            m.set(83, l, link9_mass19);
-            m.set(84, l, link9_mass15);
-            m.set(85, l, link9_mass11);
-            m.set(86, l, link9_mass7);
-            m.set(87, l, link9_mass3);
-            m.set(88, l, link10_mass46);
-            m.set(89, l, link10_mass5);
-            m.set(90, l, link10_mass37);
-            m.set(91, l, link10_mass33);
-            m.set(92, l, link10_mass29);
-            m.set(93, l, link10_mass25);
-            m.set(94, l, link10_mass21);
-            m.set(95, l, link10_mass17);
-            m.set(96, l, link10_mass13);
-            m.set(97, l, link10_mass9);
-            m.set(98, l, link10_mass5);
-            m.set(99, l, 0.00835);
+            results[0][l] = link2_mass10;
+            results[1][l] = link2_mass3;
+            results[2][l] = link3_mass7;
+            results[3][l] = link4_mass11;
+            results[4][l] = link5_mass15;
+            results[5][l] = link6_mass19;
+            results[6][l] = link7_mass23;
+            results[7][l] = link8_mass27;
+            results[8][l] = link9_mass31;
+            results[9][l] = link10_mass37;
+            results[10][l] = link2_mass3;
+            results[11][l] = link3_mass16;
+            results[12][l] = link3_mass3;
+            results[13][l] = link4_mass7;
+            results[14][l] = link5_mass11;
+            results[15][l] = link6_mass15;
+            results[16][l] = link7_mass19;
+            results[17][l] = link8_mass23;
+            results[18][l] = link9_mass27;
+            results[19][l] = link10_mass33;
+            results[20][l] = link3_mass7;
+            results[21][l] = link3_mass3;
+            results[22][l] = link4_mass20;
+            results[23][l] = link4_mass3;
+            results[24][l] = link5_mass7;
+            results[25][l] = link6_mass11;
+            results[26][l] = link7_mass15;
+            results[27][l] = link8_mass19;
+            results[28][l] = link9_mass23;
+            results[29][l] = link10_mass29;
+            results[30][l] = link4_mass11;
+            results[31][l] = link4_mass7;
+            results[32][l] = link4_mass3;
+            results[33][l] = link5_mass24;
+            results[34][l] = link5_mass3;
+            results[35][l] = link6_mass7;
+            results[36][l] = link7_mass11;
+            results[37][l] = link8_mass15;
+            results[38][l] = link9_mass19;
+            results[39][l] = link10_mass25;
+            results[40][l] = link5_mass15;
+            results[41][l] = link5_mass11;
+            results[42][l] = link5_mass7;
+            results[43][l] = link5_mass3;
+            results[44][l] = link6_mass28;
+            results[45][l] = link6_mass3;
+            results[46][l] = link7_mass7;
+            results[47][l] = link8_mass11;
+            results[48][l] = link9_mass15;
+            results[49][l] = link10_mass21;
+            results[50][l] = link6_mass19;
+            results[51][l] = link6_mass15;
+            results[52][l] = link6_mass11;
+            results[53][l] = link6_mass7;
+            results[54][l] = link6_mass3;
+            results[55][l] = link7_mass32;
+            results[56][l] = link7_mass3;
+            results[57][l] = link8_mass7;
+            results[58][l] = link9_mass11;
+            results[59][l] = link10_mass17;
+            results[60][l] = link7_mass23;
+            results[61][l] = link7_mass19;
+            results[62][l] = link7_mass15;
+            results[63][l] = link7_mass11;
+            results[64][l] = link7_mass7;
+            results[65][l] = link7_mass3;
+            results[66][l] = link8_mass36;
+            results[67][l] = link8_mass3;
+            results[68][l] = link9_mass7;
+            results[69][l] = link10_mass13;
+            results[70][l] = link8_mass27;
+            results[71][l] = link8_mass23;
+            results[72][l] = link8_mass19;
+            results[73][l] = link8_mass15;
+            results[74][l] = link8_mass11;
+            results[75][l] = link8_mass7;
+            results[76][l] = link8_mass3;
+            results[77][l] = link9_mass40;
+            results[78][l] = link9_mass3;
+            results[79][l] = link10_mass9;
+            results[80][l] = link9_mass31;
+            results[81][l] = link9_mass27;
+            results[82][l] = link9_mass23;
+            results[83][l] = link9_mass19;
+            results[84][l] = link9_mass15;
+            results[85][l] = link9_mass11;
+            results[86][l] = link9_mass7;
+            results[87][l] = link9_mass3;
+            results[88][l] = link10_mass46;
+            results[89][l] = link10_mass5;
+            results[90][l] = link10_mass37;
+            results[91][l] = link10_mass33;
+            results[92][l] = link10_mass29;
+            results[93][l] = link10_mass25;
+            results[94][l] = link10_mass21;
+            results[95][l] = link10_mass17;
+            results[96][l] = link10_mass13;
+            results[97][l] = link10_mass9;
+            results[98][l] = link10_mass5;
+            results[99][l] = 0.00835;
         }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
+        m.give(16, &results[16]);
+        m.give(17, &results[17]);
+        m.give(18, &results[18]);
+        m.give(19, &results[19]);
+        m.give(20, &results[20]);
+        m.give(21, &results[21]);
+        m.give(22, &results[22]);
+        m.give(23, &results[23]);
+        m.give(24, &results[24]);
+        m.give(25, &results[25]);
+        m.give(26, &results[26]);
+        m.give(27, &results[27]);
+        m.give(28, &results[28]);
+        m.give(29, &results[29]);
+        m.give(30, &results[30]);
+        m.give(31, &results[31]);
+        m.give(32, &results[32]);
+        m.give(33, &results[33]);
+        m.give(34, &results[34]);
+        m.give(35, &results[35]);
+        m.give(36, &results[36]);
+        m.give(37, &results[37]);
+        m.give(38, &results[38]);
+        m.give(39, &results[39]);
+        m.give(40, &results[40]);
+        m.give(41, &results[41]);
+        m.give(42, &results[42]);
+        m.give(43, &results[43]);
+        m.give(44, &results[44]);
+        m.give(45, &results[45]);
+        m.give(46, &results[46]);
+        m.give(47, &results[47]);
+        m.give(48, &results[48]);
+        m.give(49, &results[49]);
+        m.give(50, &results[50]);
+        m.give(51, &results[51]);
+        m.give(52, &results[52]);
+        m.give(53, &results[53]);
+        m.give(54, &results[54]);
+        m.give(55, &results[55]);
+        m.give(56, &results[56]);
+        m.give(57, &results[57]);
+        m.give(58, &results[58]);
+        m.give(59, &results[59]);
+        m.give(60, &results[60]);
+        m.give(61, &results[61]);
+        m.give(62, &results[62]);
+        m.give(63, &results[63]);
+        m.give(64, &results[64]);
+        m.give(65, &results[65]);
+        m.give(66, &results[66]);
+        m.give(67, &results[67]);
+        m.give(68, &results[68]);
+        m.give(69, &results[69]);
+        m.give(70, &results[70]);
+        m.give(71, &results[71]);
+        m.give(72, &results[72]);
+        m.give(73, &results[73]);
+        m.give(74, &results[74]);
+        m.give(75, &results[75]);
+        m.give(76, &results[76]);
+        m.give(77, &results[77]);
+        m.give(78, &results[78]);
+        m.give(79, &results[79]);
+        m.give(80, &results[80]);
+        m.give(81, &results[81]);
+        m.give(82, &results[82]);
+        m.give(83, &results[83]);
+        m.give(84, &results[84]);
+        m.give(85, &results[85]);
+        m.give(86, &results[86]);
+        m.give(87, &results[87]);
+        m.give(88, &results[88]);
+        m.give(89, &results[89]);
+        m.give(90, &results[90]);
+        m.give(91, &results[91]);
+        m.give(92, &results[92]);
+        m.give(93, &results[93]);
+        m.give(94, &results[94]);
+        m.give(95, &results[95]);
+        m.give(96, &results[96]);
+        m.give(97, &results[97]);
+        m.give(98, &results[98]);
+        m.give(99, &results[99]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
@@ -4911,6 +5069,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -5292,17 +5451,27 @@ impl Chain10Planar {
             let link2_load13 = link2_pose1 * link3_load16;
             let link2_load14 = link2_load12 + link2_load13;
             let link2_load15 = link1_load2 + link2_load14;
-            tau.set(0, l, link2_load15);
-            tau.set(1, l, link3_load17);
-            tau.set(2, l, link4_load17);
-            tau.set(3, l, link5_load17);
-            tau.set(4, l, link6_load17);
-            tau.set(5, l, link7_load17);
-            tau.set(6, l, link8_load13);
-            tau.set(7, l, link9_load17);
-            tau.set(8, l, link10_load18);
-            tau.set(9, l, link10_load5);
+            results[0][l] = link2_load15;
+            results[1][l] = link3_load17;
+            results[2][l] = link4_load17;
+            results[3][l] = link5_load17;
+            results[4][l] = link6_load17;
+            results[5][l] = link7_load17;
+            results[6][l] = link8_load13;
+            results[7][l] = link9_load17;
+            results[8][l] = link10_load18;
+            results[9][l] = link10_load5;
         }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
+        tau.give(4, &results[4]);
+        tau.give(5, &results[5]);
+        tau.give(6, &results[6]);
+        tau.give(7, &results[7]);
+        tau.give(8, &results[8]);
+        tau.give(9, &results[9]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
@@ -5347,6 +5516,7 @@ impl Chain10Planar {
             angles[9][l] = link10_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -5609,17 +5779,27 @@ impl Chain10Planar {
             let link2_load7 = link2_pose1 * link3_load10;
             let link2_load8 = link2_load6 + link2_load7;
             let link2_load9 = link1_load0 + link2_load8;
-            h.set(0, l, link2_load9);
-            h.set(1, l, link3_load11);
-            h.set(2, l, link4_load11);
-            h.set(3, l, link5_load11);
-            h.set(4, l, link6_load11);
-            h.set(5, l, link7_load11);
-            h.set(6, l, link8_load9);
-            h.set(7, l, link9_load11);
-            h.set(8, l, link10_load11);
-            h.set(9, l, link10_load2);
+            results[0][l] = link2_load9;
+            results[1][l] = link3_load11;
+            results[2][l] = link4_load11;
+            results[3][l] = link5_load11;
+            results[4][l] = link6_load11;
+            results[5][l] = link7_load11;
+            results[6][l] = link8_load9;
+            results[7][l] = link9_load11;
+            results[8][l] = link10_load11;
+            results[9][l] = link10_load2;
         }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
+        h.give(4, &results[4]);
+        h.give(5, &results[5]);
+        h.give(6, &results[6]);
+        h.give(7, &results[7]);
+        h.give(8, &results[8]);
+        h.give(9, &results[9]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -5630,6 +5810,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 10];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -5641,17 +5822,27 @@ impl Chain10Planar {
             let v_7 = v.get(7, l);
             let v_8 = v.get(8, l);
             let v_9 = v.get(9, l);
-            qd.set(0, l, v_0);
-            qd.set(1, l, v_1);
-            qd.set(2, l, v_2);
-            qd.set(3, l, v_3);
-            qd.set(4, l, v_4);
-            qd.set(5, l, v_5);
-            qd.set(6, l, v_6);
-            qd.set(7, l, v_7);
-            qd.set(8, l, v_8);
-            qd.set(9, l, v_9);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
+            results[6][l] = v_6;
+            results[7][l] = v_7;
+            results[8][l] = v_8;
+            results[9][l] = v_9;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -97,6 +97,7 @@ impl Chain6 {
             angles[5][l] = link6_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -1288,19 +1289,31 @@ impl Chain6 {
             let link6_pdot27 = tau_3 - link4_pdot21;
             let link6_pdot28 = tau_4 - link5_pdot33;
             let link6_pdot29 = tau_5 + link6_pdot23;
-            qd.set(0, l, -link1_rest35);
-            qd.set(1, l, -ground_vel1);
-            qd.set(2, l, -ground_vel5);
-            qd.set(3, l, -ground_vel11);
-            qd.set(4, l, -ground_vel19);
-            qd.set(5, l, ground_vel29);
-            pd.set(0, l, link6_pdot24);
-            pd.set(1, l, link6_pdot25);
-            pd.set(2, l, link6_pdot26);
-            pd.set(3, l, link6_pdot27);
-            pd.set(4, l, link6_pdot28);
-            pd.set(5, l, link6_pdot29);
+            results[0][l] = -link1_rest35;
+            results[1][l] = -ground_vel1;
+            results[2][l] = -ground_vel5;
+            results[3][l] = -ground_vel11;
+            results[4][l] = -ground_vel19;
+            results[5][l] = ground_vel29;
+            results[6][l] = link6_pdot24;
+            results[7][l] = link6_pdot25;
+            results[8][l] = link6_pdot26;
+            results[9][l] = link6_pdot27;
+            results[10][l] = link6_pdot28;
+            results[11][l] = link6_pdot29;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        pd.give(0, &results[6]);
+        pd.give(1, &results[7]);
+        pd.give(2, &results[8]);
+        pd.give(3, &results[9]);
+        pd.give(4, &results[10]);
+        pd.give(5, &results[11]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -1330,6 +1343,7 @@ impl Chain6 {
             angles[4][l] = link6_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -2065,13 +2079,19 @@ impl Chain6 {
             let ground_vel27 = ground_vel25 + ground_vel26;
             let ground_vel28 = ground_pivot12 * link1_rest35;
             let ground_vel29 = ground_vel27 - ground_vel28;
-            v.set(0, l, -link1_rest35);
-            v.set(1, l, -ground_vel1);
-            v.set(2, l, -ground_vel5);
-            v.set(3, l, -ground_vel11);
-            v.set(4, l, -ground_vel19);
-            v.set(5, l, ground_vel29);
+            results[0][l] = -link1_rest35;
+            results[1][l] = -ground_vel1;
+            results[2][l] = -ground_vel5;
+            results[3][l] = -ground_vel11;
+            results[4][l] = -ground_vel19;
+            results[5][l] = ground_vel29;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2101,6 +2121,7 @@ impl Chain6 {
             angles[4][l] = link6_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2566,13 +2587,19 @@ impl Chain6 {
             let link2_mom43 = 0.44503280942592394 * link2_mom39;
             let link2_mom44 = link2_mom42 - link2_mom43;
             let link2_mom45 = link1_mom0 - link2_mom44;
-            p.set(0, l, link2_mom45);
-            p.set(1, l, link3_mom63);
-            p.set(2, l, link4_mom63);
-            p.set(3, l, link5_mom63);
-            p.set(4, l, link6_mom48);
-            p.set(5, l, -link6_mom18);
+            results[0][l] = link2_mom45;
+            results[1][l] = link3_mom63;
+            results[2][l] = link4_mom63;
+            results[3][l] = link5_mom63;
+            results[4][l] = link6_mom48;
+            results[5][l] = -link6_mom18;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
     }
 
     /// Kinetic and potential energy, J.
@@ -2607,6 +2634,7 @@ impl Chain6 {
             angles[5][l] = link6_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -3376,9 +3404,11 @@ impl Chain6 {
             let link1_load6 = link1_load5 + 2.9362528394105003;
             // ground: energy
             let ground_energy0 = 9.81 * link1_load6;
-            result.set(0, l, link6_energy11);
-            result.set(1, l, ground_energy0);
+            results[0][l] = link6_energy11;
+            results[1][l] = ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -3411,6 +3441,7 @@ impl Chain6 {
             angles[5][l] = link6_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -4841,13 +4872,19 @@ impl Chain6 {
             let link5_acc17 = link5_vel17 - ground_acc19;
             // link6: acceleration
             let link6_acc10 = link6_vel17 + ground_acc29;
-            a.set(0, l, -link1_rest41);
-            a.set(1, l, -ground_acc1);
-            a.set(2, l, -link3_acc17);
-            a.set(3, l, link4_acc17);
-            a.set(4, l, link5_acc17);
-            a.set(5, l, link6_acc10);
+            results[0][l] = -link1_rest41;
+            results[1][l] = -ground_acc1;
+            results[2][l] = -link3_acc17;
+            results[3][l] = link4_acc17;
+            results[4][l] = link5_acc17;
+            results[5][l] = link6_acc10;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4858,6 +4895,7 @@ impl Chain6 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -4865,13 +4903,19 @@ impl Chain6 {
             let v_3 = v.get(3, l);
             let v_4 = v.get(4, l);
             let v_5 = v.get(5, l);
-            qd.set(0, l, v_0);
-            qd.set(1, l, v_1);
-            qd.set(2, l, v_2);
-            qd.set(3, l, v_3);
-            qd.set(4, l, v_4);
-            qd.set(5, l, v_5);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -81,6 +81,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -133,11 +134,15 @@ impl DoublePendulum {
             let lower_pdot3 = lower_pdot1 + lower_pdot2;
             let lower_pdot4 = tau_0 - upper_pdot2;
             let lower_pdot5 = tau_1 - lower_pdot3;
-            qd.set(0, l, upper_rest3);
-            qd.set(1, l, upper_vel1);
-            pd.set(0, l, lower_pdot4);
-            pd.set(1, l, lower_pdot5);
+            results[0][l] = upper_rest3;
+            results[1][l] = upper_vel1;
+            results[2][l] = lower_pdot4;
+            results[3][l] = lower_pdot5;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        pd.give(0, &results[2]);
+        pd.give(1, &results[3]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -155,6 +160,7 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -179,9 +185,11 @@ impl DoublePendulum {
             // upper: velocity and joint rate (4.40)
             let upper_vel0 = upper_pivot0 * upper_rest3;
             let upper_vel1 = upper_rest0 - upper_vel0;
-            v.set(0, l, upper_rest3);
-            v.set(1, l, upper_vel1);
+            results[0][l] = upper_rest3;
+            results[1][l] = upper_vel1;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -199,6 +207,7 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -217,9 +226,11 @@ impl DoublePendulum {
             let lower_mom4 = lower_cos0 * lower_mom1;
             let lower_mom5 = lower_mom3 + lower_mom4;
             let lower_mom6 = upper_mom0 + lower_mom5;
-            p.set(0, l, lower_mom6);
-            p.set(1, l, lower_mom3);
+            results[0][l] = lower_mom6;
+            results[1][l] = lower_mom3;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
     }
 
     /// Kinetic and potential energy, J.
@@ -241,6 +252,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -283,9 +295,11 @@ impl DoublePendulum {
             let lower_energy2 = 0.5 * lower_energy1;
             // ground: energy
             let ground_energy0 = 9.81 * upper_inertia2;
-            result.set(0, l, lower_energy2);
-            result.set(1, l, ground_energy0);
+            results[0][l] = lower_energy2;
+            results[1][l] = ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -305,6 +319,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -356,9 +371,11 @@ impl DoublePendulum {
             let lower_acc0 = lower_pivot0 * upper_rest1;
             let lower_acc1 = lower_rest2 + lower_acc0;
             let lower_acc2 = upper_rest1 + lower_acc1;
-            a.set(0, l, -upper_rest1);
-            a.set(1, l, lower_acc2);
+            results[0][l] = -upper_rest1;
+            results[1][l] = lower_acc2;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
@@ -378,6 +395,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -463,19 +481,31 @@ impl DoublePendulum {
             let lower_load16 = upper_load2 + lower_load11;
             let lower_load17 = lower_load14 - upper_load4;
             let lower_load18 = upper_load7 + lower_load15;
-            reactions.set(0, l, lower_load17);
-            reactions.set(1, l, 0.0);
-            reactions.set(2, l, lower_load16);
-            reactions.set(3, l, 0.0);
-            reactions.set(4, l, -lower_load18);
-            reactions.set(5, l, 0.0);
-            reactions.set(6, l, -lower_load5);
-            reactions.set(7, l, 0.0);
-            reactions.set(8, l, lower_load3);
-            reactions.set(9, l, 0.0);
-            reactions.set(10, l, -lower_load8);
-            reactions.set(11, l, 0.0);
+            results[0][l] = lower_load17;
+            results[1][l] = 0.0;
+            results[2][l] = lower_load16;
+            results[3][l] = 0.0;
+            results[4][l] = -lower_load18;
+            results[5][l] = 0.0;
+            results[6][l] = -lower_load5;
+            results[7][l] = 0.0;
+            results[8][l] = lower_load3;
+            results[9][l] = 0.0;
+            results[10][l] = -lower_load8;
+            results[11][l] = 0.0;
         }
+        reactions.give(0, &results[0]);
+        reactions.give(1, &results[1]);
+        reactions.give(2, &results[2]);
+        reactions.give(3, &results[3]);
+        reactions.give(4, &results[4]);
+        reactions.give(5, &results[5]);
+        reactions.give(6, &results[6]);
+        reactions.give(7, &results[7]);
+        reactions.give(8, &results[8]);
+        reactions.give(9, &results[9]);
+        reactions.give(10, &results[10]);
+        reactions.give(11, &results[11]);
     }
 
     /// Mass matrix, by rows.
@@ -493,6 +523,7 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_cos0 = cosines[0][l];
@@ -502,11 +533,15 @@ impl DoublePendulum {
             let lower_mass2 = lower_mass0 + lower_mass0;
             let lower_mass3 = lower_mass2 + 0.33340000000000003;
             let lower_mass4 = lower_mass3 + 1.3334000000000001;
-            m.set(0, l, lower_mass4);
-            m.set(1, l, lower_mass1);
-            m.set(2, l, lower_mass1);
-            m.set(3, l, 0.33340000000000003);
+            results[0][l] = lower_mass4;
+            results[1][l] = lower_mass1;
+            results[2][l] = lower_mass1;
+            results[3][l] = 0.33340000000000003;
         }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
     }
 
     /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
@@ -526,6 +561,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 54];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -549,61 +585,115 @@ impl DoublePendulum {
             let lower_place6 = upper_sin0 + lower_place2;
             let lower_place7 = upper_cos0 + lower_place5;
             let lower_place8 = lower_vel1 + lower_vel2;
-            rotation.set(0, l, upper_cos0);
-            rotation.set(1, l, 0.0);
-            rotation.set(2, l, upper_sin0);
-            rotation.set(3, l, 0.0);
-            rotation.set(4, l, 1.0);
-            rotation.set(5, l, 0.0);
-            rotation.set(6, l, -upper_sin0);
-            rotation.set(7, l, 0.0);
-            rotation.set(8, l, upper_cos0);
-            rotation.set(9, l, lower_place5);
-            rotation.set(10, l, 0.0);
-            rotation.set(11, l, lower_place2);
-            rotation.set(12, l, 0.0);
-            rotation.set(13, l, 1.0);
-            rotation.set(14, l, 0.0);
-            rotation.set(15, l, -lower_place2);
-            rotation.set(16, l, 0.0);
-            rotation.set(17, l, lower_place5);
-            rotation.set(18, l, lower_place5);
-            rotation.set(19, l, 0.0);
-            rotation.set(20, l, lower_place2);
-            rotation.set(21, l, 0.0);
-            rotation.set(22, l, 1.0);
-            rotation.set(23, l, 0.0);
-            rotation.set(24, l, -lower_place2);
-            rotation.set(25, l, 0.0);
-            rotation.set(26, l, lower_place5);
-            position.set(0, l, 0.0);
-            position.set(1, l, 0.0);
-            position.set(2, l, 0.0);
-            position.set(3, l, -upper_sin0);
-            position.set(4, l, 0.0);
-            position.set(5, l, -upper_cos0);
-            position.set(6, l, -lower_place6);
-            position.set(7, l, 0.0);
-            position.set(8, l, -lower_place7);
-            velocity.set(0, l, 0.0);
-            velocity.set(1, l, 0.0);
-            velocity.set(2, l, 0.0);
-            velocity.set(3, l, 0.0);
-            velocity.set(4, l, v_0);
-            velocity.set(5, l, 0.0);
-            velocity.set(6, l, -lower_vel1);
-            velocity.set(7, l, 0.0);
-            velocity.set(8, l, -lower_vel0);
-            velocity.set(9, l, 0.0);
-            velocity.set(10, l, lower_vel2);
-            velocity.set(11, l, 0.0);
-            velocity.set(12, l, -lower_place8);
-            velocity.set(13, l, 0.0);
-            velocity.set(14, l, -lower_vel0);
-            velocity.set(15, l, 0.0);
-            velocity.set(16, l, lower_vel2);
-            velocity.set(17, l, 0.0);
+            results[0][l] = upper_cos0;
+            results[1][l] = 0.0;
+            results[2][l] = upper_sin0;
+            results[3][l] = 0.0;
+            results[4][l] = 1.0;
+            results[5][l] = 0.0;
+            results[6][l] = -upper_sin0;
+            results[7][l] = 0.0;
+            results[8][l] = upper_cos0;
+            results[9][l] = lower_place5;
+            results[10][l] = 0.0;
+            results[11][l] = lower_place2;
+            results[12][l] = 0.0;
+            results[13][l] = 1.0;
+            results[14][l] = 0.0;
+            results[15][l] = -lower_place2;
+            results[16][l] = 0.0;
+            results[17][l] = lower_place5;
+            results[18][l] = lower_place5;
+            results[19][l] = 0.0;
+            results[20][l] = lower_place2;
+            results[21][l] = 0.0;
+            results[22][l] = 1.0;
+            results[23][l] = 0.0;
+            results[24][l] = -lower_place2;
+            results[25][l] = 0.0;
+            results[26][l] = lower_place5;
+            results[27][l] = 0.0;
+            results[28][l] = 0.0;
+            results[29][l] = 0.0;
+            results[30][l] = -upper_sin0;
+            results[31][l] = 0.0;
+            results[32][l] = -upper_cos0;
+            results[33][l] = -lower_place6;
+            results[34][l] = 0.0;
+            results[35][l] = -lower_place7;
+            results[36][l] = 0.0;
+            results[37][l] = 0.0;
+            results[38][l] = 0.0;
+            results[39][l] = 0.0;
+            results[40][l] = v_0;
+            results[41][l] = 0.0;
+            results[42][l] = -lower_vel1;
+            results[43][l] = 0.0;
+            results[44][l] = -lower_vel0;
+            results[45][l] = 0.0;
+            results[46][l] = lower_vel2;
+            results[47][l] = 0.0;
+            results[48][l] = -lower_place8;
+            results[49][l] = 0.0;
+            results[50][l] = -lower_vel0;
+            results[51][l] = 0.0;
+            results[52][l] = lower_vel2;
+            results[53][l] = 0.0;
         }
+        rotation.give(0, &results[0]);
+        rotation.give(1, &results[1]);
+        rotation.give(2, &results[2]);
+        rotation.give(3, &results[3]);
+        rotation.give(4, &results[4]);
+        rotation.give(5, &results[5]);
+        rotation.give(6, &results[6]);
+        rotation.give(7, &results[7]);
+        rotation.give(8, &results[8]);
+        rotation.give(9, &results[9]);
+        rotation.give(10, &results[10]);
+        rotation.give(11, &results[11]);
+        rotation.give(12, &results[12]);
+        rotation.give(13, &results[13]);
+        rotation.give(14, &results[14]);
+        rotation.give(15, &results[15]);
+        rotation.give(16, &results[16]);
+        rotation.give(17, &results[17]);
+        rotation.give(18, &results[18]);
+        rotation.give(19, &results[19]);
+        rotation.give(20, &results[20]);
+        rotation.give(21, &results[21]);
+        rotation.give(22, &results[22]);
+        rotation.give(23, &results[23]);
+        rotation.give(24, &results[24]);
+        rotation.give(25, &results[25]);
+        rotation.give(26, &results[26]);
+        position.give(0, &results[27]);
+        position.give(1, &results[28]);
+        position.give(2, &results[29]);
+        position.give(3, &results[30]);
+        position.give(4, &results[31]);
+        position.give(5, &results[32]);
+        position.give(6, &results[33]);
+        position.give(7, &results[34]);
+        position.give(8, &results[35]);
+        velocity.give(0, &results[36]);
+        velocity.give(1, &results[37]);
+        velocity.give(2, &results[38]);
+        velocity.give(3, &results[39]);
+        velocity.give(4, &results[40]);
+        velocity.give(5, &results[41]);
+        velocity.give(6, &results[42]);
+        velocity.give(7, &results[43]);
+        velocity.give(8, &results[44]);
+        velocity.give(9, &results[45]);
+        velocity.give(10, &results[46]);
+        velocity.give(11, &results[47]);
+        velocity.give(12, &results[48]);
+        velocity.give(13, &results[49]);
+        velocity.give(14, &results[50]);
+        velocity.give(15, &results[51]);
+        velocity.give(16, &results[52]);
+        velocity.give(17, &results[53]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
@@ -623,6 +713,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -663,9 +754,11 @@ impl DoublePendulum {
             let lower_load8 = lower_load6 - lower_load7;
             let lower_load9 = lower_load5 - lower_load8;
             let lower_load10 = upper_load2 + lower_load9;
-            tau.set(0, l, lower_load10);
-            tau.set(1, l, lower_load5);
+            results[0][l] = lower_load10;
+            results[1][l] = lower_load5;
         }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
@@ -685,6 +778,7 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -713,9 +807,11 @@ impl DoublePendulum {
             let lower_load3 = lower_sin0 * lower_load1;
             let lower_load4 = lower_load2 - lower_load3;
             let lower_load5 = upper_load0 + lower_load4;
-            h.set(0, l, lower_load5);
-            h.set(1, l, lower_load2);
+            results[0][l] = lower_load5;
+            results[1][l] = lower_load2;
         }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
     }
 
     /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
@@ -733,6 +829,7 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 36];
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_sin0 = sines[0][l];
@@ -746,43 +843,79 @@ impl DoublePendulum {
             let upper_jac3 = lower_sin0 * lower_jac0;
             let upper_jac4 = lower_sin0 * lower_cos0;
             let upper_jac5 = upper_jac4 - upper_jac3;
-            jacobian.set(0, l, 0.0);
-            jacobian.set(1, l, 0.0);
-            jacobian.set(2, l, 0.0);
-            jacobian.set(3, l, 0.0);
-            jacobian.set(4, l, 0.0);
-            jacobian.set(5, l, 0.0);
-            jacobian.set(6, l, 0.0);
-            jacobian.set(7, l, 0.0);
-            jacobian.set(8, l, 1.0);
-            jacobian.set(9, l, 0.0);
-            jacobian.set(10, l, 0.0);
-            jacobian.set(11, l, 0.0);
-            jacobian.set(12, l, -lower_cos0);
-            jacobian.set(13, l, 0.0);
-            jacobian.set(14, l, 0.0);
-            jacobian.set(15, l, 0.0);
-            jacobian.set(16, l, -lower_sin0);
-            jacobian.set(17, l, 0.0);
-            jacobian.set(18, l, 0.0);
-            jacobian.set(19, l, 0.0);
-            jacobian.set(20, l, 1.0);
-            jacobian.set(21, l, 1.0);
-            jacobian.set(22, l, 0.0);
-            jacobian.set(23, l, 0.0);
-            jacobian.set(24, l, -upper_jac2);
-            jacobian.set(25, l, -1.0);
-            jacobian.set(26, l, 0.0);
-            jacobian.set(27, l, 0.0);
-            jacobian.set(28, l, upper_jac5);
-            jacobian.set(29, l, 0.0);
-            jacobian.set(30, l, 0.0);
-            jacobian.set(31, l, 0.0);
-            jacobian.set(32, l, 1.0);
-            jacobian.set(33, l, 1.0);
-            jacobian.set(34, l, 0.0);
-            jacobian.set(35, l, 0.0);
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = 0.0;
+            results[7][l] = 0.0;
+            results[8][l] = 1.0;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = -lower_cos0;
+            results[13][l] = 0.0;
+            results[14][l] = 0.0;
+            results[15][l] = 0.0;
+            results[16][l] = -lower_sin0;
+            results[17][l] = 0.0;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 1.0;
+            results[21][l] = 1.0;
+            results[22][l] = 0.0;
+            results[23][l] = 0.0;
+            results[24][l] = -upper_jac2;
+            results[25][l] = -1.0;
+            results[26][l] = 0.0;
+            results[27][l] = 0.0;
+            results[28][l] = upper_jac5;
+            results[29][l] = 0.0;
+            results[30][l] = 0.0;
+            results[31][l] = 0.0;
+            results[32][l] = 1.0;
+            results[33][l] = 1.0;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0;
         }
+        jacobian.give(0, &results[0]);
+        jacobian.give(1, &results[1]);
+        jacobian.give(2, &results[2]);
+        jacobian.give(3, &results[3]);
+        jacobian.give(4, &results[4]);
+        jacobian.give(5, &results[5]);
+        jacobian.give(6, &results[6]);
+        jacobian.give(7, &results[7]);
+        jacobian.give(8, &results[8]);
+        jacobian.give(9, &results[9]);
+        jacobian.give(10, &results[10]);
+        jacobian.give(11, &results[11]);
+        jacobian.give(12, &results[12]);
+        jacobian.give(13, &results[13]);
+        jacobian.give(14, &results[14]);
+        jacobian.give(15, &results[15]);
+        jacobian.give(16, &results[16]);
+        jacobian.give(17, &results[17]);
+        jacobian.give(18, &results[18]);
+        jacobian.give(19, &results[19]);
+        jacobian.give(20, &results[20]);
+        jacobian.give(21, &results[21]);
+        jacobian.give(22, &results[22]);
+        jacobian.give(23, &results[23]);
+        jacobian.give(24, &results[24]);
+        jacobian.give(25, &results[25]);
+        jacobian.give(26, &results[26]);
+        jacobian.give(27, &results[27]);
+        jacobian.give(28, &results[28]);
+        jacobian.give(29, &results[29]);
+        jacobian.give(30, &results[30]);
+        jacobian.give(31, &results[31]);
+        jacobian.give(32, &results[32]);
+        jacobian.give(33, &results[33]);
+        jacobian.give(34, &results[34]);
+        jacobian.give(35, &results[35]);
     }
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
@@ -800,6 +933,7 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -814,25 +948,43 @@ impl DoublePendulum {
             // lower: acceleration
             let lower_acc0 = lower_vel3 * lower_vel3;
             let lower_acc1 = lower_vel1 + lower_acc0;
-            drift.set(0, l, 0.0);
-            drift.set(1, l, 0.0);
-            drift.set(2, l, 0.0);
-            drift.set(3, l, 0.0);
-            drift.set(4, l, 0.0);
-            drift.set(5, l, 0.0);
-            drift.set(6, l, -lower_vel2);
-            drift.set(7, l, 0.0);
-            drift.set(8, l, lower_vel1);
-            drift.set(9, l, 0.0);
-            drift.set(10, l, 0.0);
-            drift.set(11, l, 0.0);
-            drift.set(12, l, -lower_vel2);
-            drift.set(13, l, 0.0);
-            drift.set(14, l, lower_acc1);
-            drift.set(15, l, 0.0);
-            drift.set(16, l, 0.0);
-            drift.set(17, l, 0.0);
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = -lower_vel2;
+            results[7][l] = 0.0;
+            results[8][l] = lower_vel1;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = -lower_vel2;
+            results[13][l] = 0.0;
+            results[14][l] = lower_acc1;
+            results[15][l] = 0.0;
+            results[16][l] = 0.0;
+            results[17][l] = 0.0;
         }
+        drift.give(0, &results[0]);
+        drift.give(1, &results[1]);
+        drift.give(2, &results[2]);
+        drift.give(3, &results[3]);
+        drift.give(4, &results[4]);
+        drift.give(5, &results[5]);
+        drift.give(6, &results[6]);
+        drift.give(7, &results[7]);
+        drift.give(8, &results[8]);
+        drift.give(9, &results[9]);
+        drift.give(10, &results[10]);
+        drift.give(11, &results[11]);
+        drift.give(12, &results[12]);
+        drift.give(13, &results[13]);
+        drift.give(14, &results[14]);
+        drift.give(15, &results[15]);
+        drift.give(16, &results[16]);
+        drift.give(17, &results[17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -843,12 +995,15 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
-            qd.set(0, l, v_0);
-            qd.set(1, l, v_1);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

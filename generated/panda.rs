@@ -103,6 +103,7 @@ impl Panda {
             angles[5][l] = panda_link7_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 16];
         for l in 0..LANES {
             let q_7 = q.get(7, l);
             let p_0 = p.get(0, l);
@@ -1278,23 +1279,39 @@ impl Panda {
             let panda_rightfinger_pdot13 = tau_5 + panda_link6_pdot40;
             let panda_rightfinger_pdot14 = tau_6 + panda_link7_pdot36;
             let panda_rightfinger_pdot15 = tau_7 + panda_rightfinger_pdot7;
-            qd.set(0, l, panda_link1_rest1);
-            qd.set(1, l, -panda_link2_vel5);
-            qd.set(2, l, -panda_link3_vel22);
-            qd.set(3, l, -panda_link4_vel25);
-            qd.set(4, l, panda_link5_vel30);
-            qd.set(5, l, -panda_link6_vel22);
-            qd.set(6, l, -panda_link7_vel28);
-            qd.set(7, l, panda_link7_rest0);
-            pd.set(0, l, panda_rightfinger_pdot8);
-            pd.set(1, l, panda_rightfinger_pdot9);
-            pd.set(2, l, panda_rightfinger_pdot10);
-            pd.set(3, l, panda_rightfinger_pdot11);
-            pd.set(4, l, panda_rightfinger_pdot12);
-            pd.set(5, l, panda_rightfinger_pdot13);
-            pd.set(6, l, panda_rightfinger_pdot14);
-            pd.set(7, l, panda_rightfinger_pdot15);
+            results[0][l] = panda_link1_rest1;
+            results[1][l] = -panda_link2_vel5;
+            results[2][l] = -panda_link3_vel22;
+            results[3][l] = -panda_link4_vel25;
+            results[4][l] = panda_link5_vel30;
+            results[5][l] = -panda_link6_vel22;
+            results[6][l] = -panda_link7_vel28;
+            results[7][l] = panda_link7_rest0;
+            results[8][l] = panda_rightfinger_pdot8;
+            results[9][l] = panda_rightfinger_pdot9;
+            results[10][l] = panda_rightfinger_pdot10;
+            results[11][l] = panda_rightfinger_pdot11;
+            results[12][l] = panda_rightfinger_pdot12;
+            results[13][l] = panda_rightfinger_pdot13;
+            results[14][l] = panda_rightfinger_pdot14;
+            results[15][l] = panda_rightfinger_pdot15;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        pd.give(0, &results[8]);
+        pd.give(1, &results[9]);
+        pd.give(2, &results[10]);
+        pd.give(3, &results[11]);
+        pd.give(4, &results[12]);
+        pd.give(5, &results[13]);
+        pd.give(6, &results[14]);
+        pd.give(7, &results[15]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -1322,6 +1339,7 @@ impl Panda {
             angles[5][l] = panda_link7_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 8];
         for l in 0..LANES {
             let q_7 = q.get(7, l);
             let p_0 = p.get(0, l);
@@ -2162,15 +2180,23 @@ impl Panda {
             let panda_link7_vel24 = panda_link7_vel20 - panda_link7_vel23;
             let panda_link7_vel25 = panda_link7_rest1 - panda_link7_vel24;
             let panda_link7_vel26 = panda_link7_vel25 - panda_link6_vel11;
-            v.set(0, l, panda_link1_rest1);
-            v.set(1, l, -panda_link2_vel5);
-            v.set(2, l, -panda_link3_vel22);
-            v.set(3, l, panda_link4_vel25);
-            v.set(4, l, panda_link5_vel30);
-            v.set(5, l, -panda_link6_vel22);
-            v.set(6, l, panda_link7_vel26);
-            v.set(7, l, panda_link7_rest0);
+            results[0][l] = panda_link1_rest1;
+            results[1][l] = -panda_link2_vel5;
+            results[2][l] = -panda_link3_vel22;
+            results[3][l] = panda_link4_vel25;
+            results[4][l] = panda_link5_vel30;
+            results[5][l] = -panda_link6_vel22;
+            results[6][l] = panda_link7_vel26;
+            results[7][l] = panda_link7_rest0;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
+        v.give(6, &results[6]);
+        v.give(7, &results[7]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2198,6 +2224,7 @@ impl Panda {
             angles[5][l] = panda_link7_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 8];
         for l in 0..LANES {
             let q_7 = q.get(7, l);
             let v_0 = v.get(0, l);
@@ -2618,15 +2645,23 @@ impl Panda {
             let panda_link2_mom14 = panda_link2_cos0 * panda_link3_mom36;
             let panda_link2_mom15 = panda_link2_mom13 - panda_link2_mom14;
             let panda_link2_mom16 = panda_link1_mom0 + panda_link2_mom15;
-            p.set(0, l, panda_link2_mom16);
-            p.set(1, l, -panda_link3_mom37);
-            p.set(2, l, panda_link4_mom46);
-            p.set(3, l, -panda_link5_mom51);
-            p.set(4, l, panda_link6_mom43);
-            p.set(5, l, panda_link7_mom51);
-            p.set(6, l, -panda_leftfinger_mom10);
-            p.set(7, l, panda_leftfinger_mom3);
+            results[0][l] = panda_link2_mom16;
+            results[1][l] = -panda_link3_mom37;
+            results[2][l] = panda_link4_mom46;
+            results[3][l] = -panda_link5_mom51;
+            results[4][l] = panda_link6_mom43;
+            results[5][l] = panda_link7_mom51;
+            results[6][l] = -panda_leftfinger_mom10;
+            results[7][l] = panda_leftfinger_mom3;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
+        p.give(6, &results[6]);
+        p.give(7, &results[7]);
     }
 
     /// Kinetic and potential energy, J.
@@ -2656,6 +2691,7 @@ impl Panda {
             angles[5][l] = panda_link7_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let q_7 = q.get(7, l);
             let p_0 = p.get(0, l);
@@ -3569,9 +3605,11 @@ impl Panda {
             let panda_link1_load1 = panda_link1_load0 + 5.355075983920001;
             // ground: energy
             let ground_energy0 = 9.81 * panda_link1_load1;
-            result.set(0, l, panda_rightfinger_energy2);
-            result.set(1, l, ground_energy0);
+            results[0][l] = panda_rightfinger_energy2;
+            results[1][l] = ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -3599,6 +3637,7 @@ impl Panda {
             angles[5][l] = panda_link7_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
+        let mut results = [[0.0; LANES]; 8];
         for l in 0..LANES {
             let q_7 = q.get(7, l);
             let v_0 = v.get(0, l);
@@ -5022,15 +5061,23 @@ impl Panda {
             let panda_link6_acc33 = panda_link5_acc3 - panda_link6_acc32;
             // panda_link7: acceleration
             let panda_link7_acc45 = panda_link6_acc3 - panda_link7_acc44;
-            a.set(0, l, panda_link1_rest1);
-            a.set(1, l, -panda_link2_acc9);
-            a.set(2, l, panda_link3_acc40);
-            a.set(3, l, panda_link4_acc36);
-            a.set(4, l, panda_link5_acc48);
-            a.set(5, l, panda_link6_acc33);
-            a.set(6, l, panda_link7_acc45);
-            a.set(7, l, panda_link7_rest1);
+            results[0][l] = panda_link1_rest1;
+            results[1][l] = -panda_link2_acc9;
+            results[2][l] = panda_link3_acc40;
+            results[3][l] = panda_link4_acc36;
+            results[4][l] = panda_link5_acc48;
+            results[5][l] = panda_link6_acc33;
+            results[6][l] = panda_link7_acc45;
+            results[7][l] = panda_link7_rest1;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
+        a.give(6, &results[6]);
+        a.give(7, &results[7]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -5041,6 +5088,7 @@ impl Panda {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 8];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -5050,15 +5098,23 @@ impl Panda {
             let v_5 = v.get(5, l);
             let v_6 = v.get(6, l);
             let v_7 = v.get(7, l);
-            qd.set(0, l, v_0);
-            qd.set(1, l, v_1);
-            qd.set(2, l, v_2);
-            qd.set(3, l, v_3);
-            qd.set(4, l, v_4);
-            qd.set(5, l, v_5);
-            qd.set(6, l, v_6);
-            qd.set(7, l, v_7);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
+            results[6][l] = v_6;
+            results[7][l] = v_7;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -98,6 +98,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 13];
         for l in 0..LANES {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
@@ -410,20 +411,33 @@ impl Satellite {
             let bus_pdot39 = tau_3 + bus_pdot33;
             let bus_pdot40 = tau_4 + bus_pdot34;
             let bus_pdot41 = tau_5 + bus_pdot35;
-            qd.set(0, l, bus_rate4);
-            qd.set(1, l, bus_rate9);
-            qd.set(2, l, bus_rate14);
-            qd.set(3, l, -bus_rate26);
-            qd.set(4, l, bus_rate29);
-            qd.set(5, l, -bus_rate32);
-            qd.set(6, l, -bus_rate38);
-            pd.set(0, l, bus_pdot36);
-            pd.set(1, l, bus_pdot37);
-            pd.set(2, l, bus_pdot38);
-            pd.set(3, l, bus_pdot39);
-            pd.set(4, l, bus_pdot40);
-            pd.set(5, l, bus_pdot41);
+            results[0][l] = bus_rate4;
+            results[1][l] = bus_rate9;
+            results[2][l] = bus_rate14;
+            results[3][l] = -bus_rate26;
+            results[4][l] = bus_rate29;
+            results[5][l] = -bus_rate32;
+            results[6][l] = -bus_rate38;
+            results[7][l] = bus_pdot36;
+            results[8][l] = bus_pdot37;
+            results[9][l] = bus_pdot38;
+            results[10][l] = bus_pdot39;
+            results[11][l] = bus_pdot40;
+            results[12][l] = bus_pdot41;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        pd.give(0, &results[7]);
+        pd.give(1, &results[8]);
+        pd.give(2, &results[9]);
+        pd.give(3, &results[10]);
+        pd.give(4, &results[11]);
+        pd.give(5, &results[12]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -443,6 +457,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -631,13 +646,19 @@ impl Satellite {
             let bus_vel15 = 0.008695652173913038 * bus_rest28;
             let bus_vel16 = bus_vel14 - bus_vel15;
             let bus_vel17 = bus_rest1 - bus_vel16;
-            v.set(0, l, bus_vel17);
-            v.set(1, l, bus_vel13);
-            v.set(2, l, bus_vel9);
-            v.set(3, l, bus_vel5);
-            v.set(4, l, -bus_vel1);
-            v.set(5, l, -bus_rest28);
+            results[0][l] = bus_vel17;
+            results[1][l] = bus_vel13;
+            results[2][l] = bus_vel9;
+            results[3][l] = bus_vel5;
+            results[4][l] = -bus_vel1;
+            results[5][l] = -bus_rest28;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -657,6 +678,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -813,13 +835,19 @@ impl Satellite {
             let panel_left_mom30 = panel_right_mom29 - panel_left_mom24;
             let panel_left_mom31 = panel_right_mom30 - panel_left_mom26;
             let panel_left_mom32 = panel_left_mom22 - panel_right_mom31;
-            p.set(0, l, panel_left_mom27);
-            p.set(1, l, panel_left_mom28);
-            p.set(2, l, -panel_left_mom29);
-            p.set(3, l, panel_left_mom30);
-            p.set(4, l, panel_left_mom31);
-            p.set(5, l, panel_left_mom32);
+            results[0][l] = panel_left_mom27;
+            results[1][l] = panel_left_mom28;
+            results[2][l] = -panel_left_mom29;
+            results[3][l] = panel_left_mom30;
+            results[4][l] = panel_left_mom31;
+            results[5][l] = panel_left_mom32;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
     }
 
     /// Kinetic and potential energy, J.
@@ -841,6 +869,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -1077,9 +1106,11 @@ impl Satellite {
             let panel_right_energy5 = drive_v_1 * panel_right_energy4;
             let panel_right_energy6 = panel_left_energy7 + panel_right_energy5;
             let panel_right_energy7 = 0.5 * panel_right_energy6;
-            result.set(0, l, panel_right_energy7);
-            result.set(1, l, 0.0);
+            results[0][l] = panel_right_energy7;
+            results[1][l] = 0.0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -1098,6 +1129,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -1494,13 +1526,19 @@ impl Satellite {
             let bus_acc27 = bus_acc26 - bus_acc2;
             let bus_acc28 = bus_acc22 - bus_acc5;
             let bus_acc29 = bus_acc18 - bus_acc8;
-            a.set(0, l, bus_acc27);
-            a.set(1, l, bus_acc28);
-            a.set(2, l, bus_acc29);
-            a.set(3, l, bus_acc14);
-            a.set(4, l, -bus_acc10);
-            a.set(5, l, -bus_rest29);
+            results[0][l] = bus_acc27;
+            results[1][l] = bus_acc28;
+            results[2][l] = bus_acc29;
+            results[3][l] = bus_acc14;
+            results[4][l] = -bus_acc10;
+            results[5][l] = -bus_rest29;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
@@ -1519,6 +1557,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2181,25 +2220,43 @@ impl Satellite {
             let panel_right_react1 = panel_right_load57 + panel_right_react0;
             let panel_right_react2 = 0.6 * panel_right_load30;
             let panel_right_react3 = panel_right_load58 + panel_right_react2;
-            reactions.set(0, l, -panel_left_load83);
-            reactions.set(1, l, panel_left_load84);
-            reactions.set(2, l, panel_left_load85);
-            reactions.set(3, l, -panel_left_load86);
-            reactions.set(4, l, -panel_left_load87);
-            reactions.set(5, l, panel_left_load88);
-            reactions.set(6, l, -panel_left_load31);
-            reactions.set(7, l, panel_left_load41);
-            reactions.set(8, l, -panel_left_load36);
-            reactions.set(9, l, panel_left_react1);
-            reactions.set(10, l, -panel_left_load62);
-            reactions.set(11, l, -panel_left_react3);
-            reactions.set(12, l, -panel_right_load30);
-            reactions.set(13, l, panel_right_load39);
-            reactions.set(14, l, -panel_right_load35);
-            reactions.set(15, l, -panel_right_react1);
-            reactions.set(16, l, -panel_right_load59);
-            reactions.set(17, l, panel_right_react3);
+            results[0][l] = -panel_left_load83;
+            results[1][l] = panel_left_load84;
+            results[2][l] = panel_left_load85;
+            results[3][l] = -panel_left_load86;
+            results[4][l] = -panel_left_load87;
+            results[5][l] = panel_left_load88;
+            results[6][l] = -panel_left_load31;
+            results[7][l] = panel_left_load41;
+            results[8][l] = -panel_left_load36;
+            results[9][l] = panel_left_react1;
+            results[10][l] = -panel_left_load62;
+            results[11][l] = -panel_left_react3;
+            results[12][l] = -panel_right_load30;
+            results[13][l] = panel_right_load39;
+            results[14][l] = -panel_right_load35;
+            results[15][l] = -panel_right_react1;
+            results[16][l] = -panel_right_load59;
+            results[17][l] = panel_right_react3;
         }
+        reactions.give(0, &results[0]);
+        reactions.give(1, &results[1]);
+        reactions.give(2, &results[2]);
+        reactions.give(3, &results[3]);
+        reactions.give(4, &results[4]);
+        reactions.give(5, &results[5]);
+        reactions.give(6, &results[6]);
+        reactions.give(7, &results[7]);
+        reactions.give(8, &results[8]);
+        reactions.give(9, &results[9]);
+        reactions.give(10, &results[10]);
+        reactions.give(11, &results[11]);
+        reactions.give(12, &results[12]);
+        reactions.give(13, &results[13]);
+        reactions.give(14, &results[14]);
+        reactions.give(15, &results[15]);
+        reactions.give(16, &results[16]);
+        reactions.give(17, &results[17]);
     }
 
     /// Mass matrix, by rows.
@@ -2219,6 +2276,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 36];
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin0 = sines[0][l];
@@ -2290,43 +2348,79 @@ impl Satellite {
             let panel_left_mass28 = panel_right_mass28 + panel_left_mass22;
             let panel_left_mass29 = panel_left_mass7 - panel_right_mass29;
             let panel_left_mass30 = panel_right_mass30 + panel_left_mass16;
-            m.set(0, l, 138.0);
-            m.set(1, l, 0.0);
-            m.set(2, l, 0.0);
-            m.set(3, l, 0.0);
-            m.set(4, l, -panel_left_mass23);
-            m.set(5, l, 1.1999999999999993);
-            m.set(6, l, 0.0);
-            m.set(7, l, 138.0);
-            m.set(8, l, 0.0);
-            m.set(9, l, panel_left_mass23);
-            m.set(10, l, 0.0);
-            m.set(11, l, panel_left_mass24);
-            m.set(12, l, 0.0);
-            m.set(13, l, 0.0);
-            m.set(14, l, 138.0);
-            m.set(15, l, -1.1999999999999993);
-            m.set(16, l, -panel_left_mass24);
-            m.set(17, l, 0.0);
-            m.set(18, l, 0.0);
-            m.set(19, l, panel_left_mass23);
-            m.set(20, l, -1.1999999999999993);
-            m.set(21, l, panel_left_mass25);
-            m.set(22, l, panel_left_mass26);
-            m.set(23, l, panel_left_mass27);
-            m.set(24, l, -panel_left_mass23);
-            m.set(25, l, 0.0);
-            m.set(26, l, -panel_left_mass24);
-            m.set(27, l, panel_left_mass26);
-            m.set(28, l, -panel_left_mass28);
-            m.set(29, l, panel_left_mass29);
-            m.set(30, l, 1.1999999999999993);
-            m.set(31, l, panel_left_mass24);
-            m.set(32, l, 0.0);
-            m.set(33, l, panel_left_mass27);
-            m.set(34, l, panel_left_mass29);
-            m.set(35, l, -panel_left_mass30);
+            results[0][l] = 138.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = -panel_left_mass23;
+            results[5][l] = 1.1999999999999993;
+            results[6][l] = 0.0;
+            results[7][l] = 138.0;
+            results[8][l] = 0.0;
+            results[9][l] = panel_left_mass23;
+            results[10][l] = 0.0;
+            results[11][l] = panel_left_mass24;
+            results[12][l] = 0.0;
+            results[13][l] = 0.0;
+            results[14][l] = 138.0;
+            results[15][l] = -1.1999999999999993;
+            results[16][l] = -panel_left_mass24;
+            results[17][l] = 0.0;
+            results[18][l] = 0.0;
+            results[19][l] = panel_left_mass23;
+            results[20][l] = -1.1999999999999993;
+            results[21][l] = panel_left_mass25;
+            results[22][l] = panel_left_mass26;
+            results[23][l] = panel_left_mass27;
+            results[24][l] = -panel_left_mass23;
+            results[25][l] = 0.0;
+            results[26][l] = -panel_left_mass24;
+            results[27][l] = panel_left_mass26;
+            results[28][l] = -panel_left_mass28;
+            results[29][l] = panel_left_mass29;
+            results[30][l] = 1.1999999999999993;
+            results[31][l] = panel_left_mass24;
+            results[32][l] = 0.0;
+            results[33][l] = panel_left_mass27;
+            results[34][l] = panel_left_mass29;
+            results[35][l] = -panel_left_mass30;
         }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
+        m.give(16, &results[16]);
+        m.give(17, &results[17]);
+        m.give(18, &results[18]);
+        m.give(19, &results[19]);
+        m.give(20, &results[20]);
+        m.give(21, &results[21]);
+        m.give(22, &results[22]);
+        m.give(23, &results[23]);
+        m.give(24, &results[24]);
+        m.give(25, &results[25]);
+        m.give(26, &results[26]);
+        m.give(27, &results[27]);
+        m.give(28, &results[28]);
+        m.give(29, &results[29]);
+        m.give(30, &results[30]);
+        m.give(31, &results[31]);
+        m.give(32, &results[32]);
+        m.give(33, &results[33]);
+        m.give(34, &results[34]);
+        m.give(35, &results[35]);
     }
 
     /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
@@ -2346,6 +2440,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 54];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -2498,61 +2593,115 @@ impl Satellite {
             let panel_right_place22 = panel_right_vel2 + panel_right_place21;
             let panel_right_place23 = 0.6 * panel_right_vel8;
             let panel_right_place24 = panel_right_vel5 - panel_right_place23;
-            rotation.set(0, l, -bus_pose13);
-            rotation.set(1, l, bus_pose14);
-            rotation.set(2, l, bus_pose15);
-            rotation.set(3, l, bus_pose16);
-            rotation.set(4, l, -bus_pose18);
-            rotation.set(5, l, bus_pose19);
-            rotation.set(6, l, bus_pose20);
-            rotation.set(7, l, bus_pose21);
-            rotation.set(8, l, -bus_pose23);
-            rotation.set(9, l, -panel_left_place14);
-            rotation.set(10, l, bus_pose14);
-            rotation.set(11, l, panel_left_place17);
-            rotation.set(12, l, panel_left_place20);
-            rotation.set(13, l, -bus_pose18);
-            rotation.set(14, l, panel_left_place23);
-            rotation.set(15, l, panel_left_place26);
-            rotation.set(16, l, bus_pose21);
-            rotation.set(17, l, panel_left_place29);
-            rotation.set(18, l, -panel_right_place2);
-            rotation.set(19, l, bus_pose14);
-            rotation.set(20, l, panel_right_place5);
-            rotation.set(21, l, panel_right_place8);
-            rotation.set(22, l, -bus_pose18);
-            rotation.set(23, l, panel_right_place11);
-            rotation.set(24, l, panel_right_place14);
-            rotation.set(25, l, bus_pose21);
-            rotation.set(26, l, panel_right_place17);
-            position.set(0, l, q_0);
-            position.set(1, l, q_1);
-            position.set(2, l, q_2);
-            position.set(3, l, panel_left_place31);
-            position.set(4, l, panel_left_place33);
-            position.set(5, l, panel_left_place35);
-            position.set(6, l, panel_right_place18);
-            position.set(7, l, panel_right_place19);
-            position.set(8, l, panel_right_place20);
-            velocity.set(0, l, v_0);
-            velocity.set(1, l, v_1);
-            velocity.set(2, l, v_2);
-            velocity.set(3, l, v_3);
-            velocity.set(4, l, v_4);
-            velocity.set(5, l, v_5);
-            velocity.set(6, l, panel_left_place37);
-            velocity.set(7, l, panel_left_vel5);
-            velocity.set(8, l, panel_left_place39);
-            velocity.set(9, l, panel_left_vel16);
-            velocity.set(10, l, panel_left_vel20);
-            velocity.set(11, l, panel_left_vel19);
-            velocity.set(12, l, panel_right_place22);
-            velocity.set(13, l, panel_left_vel5);
-            velocity.set(14, l, panel_right_place24);
-            velocity.set(15, l, panel_right_vel8);
-            velocity.set(16, l, panel_right_vel12);
-            velocity.set(17, l, panel_right_vel11);
+            results[0][l] = -bus_pose13;
+            results[1][l] = bus_pose14;
+            results[2][l] = bus_pose15;
+            results[3][l] = bus_pose16;
+            results[4][l] = -bus_pose18;
+            results[5][l] = bus_pose19;
+            results[6][l] = bus_pose20;
+            results[7][l] = bus_pose21;
+            results[8][l] = -bus_pose23;
+            results[9][l] = -panel_left_place14;
+            results[10][l] = bus_pose14;
+            results[11][l] = panel_left_place17;
+            results[12][l] = panel_left_place20;
+            results[13][l] = -bus_pose18;
+            results[14][l] = panel_left_place23;
+            results[15][l] = panel_left_place26;
+            results[16][l] = bus_pose21;
+            results[17][l] = panel_left_place29;
+            results[18][l] = -panel_right_place2;
+            results[19][l] = bus_pose14;
+            results[20][l] = panel_right_place5;
+            results[21][l] = panel_right_place8;
+            results[22][l] = -bus_pose18;
+            results[23][l] = panel_right_place11;
+            results[24][l] = panel_right_place14;
+            results[25][l] = bus_pose21;
+            results[26][l] = panel_right_place17;
+            results[27][l] = q_0;
+            results[28][l] = q_1;
+            results[29][l] = q_2;
+            results[30][l] = panel_left_place31;
+            results[31][l] = panel_left_place33;
+            results[32][l] = panel_left_place35;
+            results[33][l] = panel_right_place18;
+            results[34][l] = panel_right_place19;
+            results[35][l] = panel_right_place20;
+            results[36][l] = v_0;
+            results[37][l] = v_1;
+            results[38][l] = v_2;
+            results[39][l] = v_3;
+            results[40][l] = v_4;
+            results[41][l] = v_5;
+            results[42][l] = panel_left_place37;
+            results[43][l] = panel_left_vel5;
+            results[44][l] = panel_left_place39;
+            results[45][l] = panel_left_vel16;
+            results[46][l] = panel_left_vel20;
+            results[47][l] = panel_left_vel19;
+            results[48][l] = panel_right_place22;
+            results[49][l] = panel_left_vel5;
+            results[50][l] = panel_right_place24;
+            results[51][l] = panel_right_vel8;
+            results[52][l] = panel_right_vel12;
+            results[53][l] = panel_right_vel11;
         }
+        rotation.give(0, &results[0]);
+        rotation.give(1, &results[1]);
+        rotation.give(2, &results[2]);
+        rotation.give(3, &results[3]);
+        rotation.give(4, &results[4]);
+        rotation.give(5, &results[5]);
+        rotation.give(6, &results[6]);
+        rotation.give(7, &results[7]);
+        rotation.give(8, &results[8]);
+        rotation.give(9, &results[9]);
+        rotation.give(10, &results[10]);
+        rotation.give(11, &results[11]);
+        rotation.give(12, &results[12]);
+        rotation.give(13, &results[13]);
+        rotation.give(14, &results[14]);
+        rotation.give(15, &results[15]);
+        rotation.give(16, &results[16]);
+        rotation.give(17, &results[17]);
+        rotation.give(18, &results[18]);
+        rotation.give(19, &results[19]);
+        rotation.give(20, &results[20]);
+        rotation.give(21, &results[21]);
+        rotation.give(22, &results[22]);
+        rotation.give(23, &results[23]);
+        rotation.give(24, &results[24]);
+        rotation.give(25, &results[25]);
+        rotation.give(26, &results[26]);
+        position.give(0, &results[27]);
+        position.give(1, &results[28]);
+        position.give(2, &results[29]);
+        position.give(3, &results[30]);
+        position.give(4, &results[31]);
+        position.give(5, &results[32]);
+        position.give(6, &results[33]);
+        position.give(7, &results[34]);
+        position.give(8, &results[35]);
+        velocity.give(0, &results[36]);
+        velocity.give(1, &results[37]);
+        velocity.give(2, &results[38]);
+        velocity.give(3, &results[39]);
+        velocity.give(4, &results[40]);
+        velocity.give(5, &results[41]);
+        velocity.give(6, &results[42]);
+        velocity.give(7, &results[43]);
+        velocity.give(8, &results[44]);
+        velocity.give(9, &results[45]);
+        velocity.give(10, &results[46]);
+        velocity.give(11, &results[47]);
+        velocity.give(12, &results[48]);
+        velocity.give(13, &results[49]);
+        velocity.give(14, &results[50]);
+        velocity.give(15, &results[51]);
+        velocity.give(16, &results[52]);
+        velocity.give(17, &results[53]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
@@ -2572,6 +2721,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2873,13 +3023,19 @@ impl Satellite {
             let panel_left_load49 = panel_right_load48 + panel_left_load43;
             let panel_left_load50 = panel_left_load45 - panel_right_load49;
             let panel_left_load51 = panel_left_load41 - panel_right_load50;
-            tau.set(0, l, -panel_left_load46);
-            tau.set(1, l, panel_left_load47);
-            tau.set(2, l, panel_left_load48);
-            tau.set(3, l, -panel_left_load49);
-            tau.set(4, l, panel_left_load50);
-            tau.set(5, l, panel_left_load51);
+            results[0][l] = -panel_left_load46;
+            results[1][l] = panel_left_load47;
+            results[2][l] = panel_left_load48;
+            results[3][l] = -panel_left_load49;
+            results[4][l] = panel_left_load50;
+            results[5][l] = panel_left_load51;
         }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
+        tau.give(4, &results[4]);
+        tau.give(5, &results[5]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
@@ -2899,6 +3055,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -3161,13 +3318,19 @@ impl Satellite {
             let panel_left_load49 = panel_left_load43 - panel_right_load48;
             let panel_left_load50 = panel_left_load45 - panel_right_load49;
             let panel_left_load51 = panel_right_load50 + panel_left_load41;
-            h.set(0, l, -panel_left_load46);
-            h.set(1, l, panel_left_load47);
-            h.set(2, l, panel_left_load48);
-            h.set(3, l, panel_left_load49);
-            h.set(4, l, panel_left_load50);
-            h.set(5, l, -panel_left_load51);
+            results[0][l] = -panel_left_load46;
+            results[1][l] = panel_left_load47;
+            results[2][l] = panel_left_load48;
+            results[3][l] = panel_left_load49;
+            results[4][l] = panel_left_load50;
+            results[5][l] = -panel_left_load51;
         }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
+        h.give(4, &results[4]);
+        h.give(5, &results[5]);
     }
 
     /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
@@ -3187,6 +3350,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 108];
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin0 = sines[0][l];
@@ -3211,115 +3375,223 @@ impl Satellite {
             let bus_jac13 = 0.05 * panel_right_sin0;
             let bus_jac14 = 0.1 * panel_right_cos0;
             let bus_jac15 = bus_jac13 - bus_jac14;
-            jacobian.set(0, l, 1.0);
-            jacobian.set(1, l, 0.0);
-            jacobian.set(2, l, 0.0);
-            jacobian.set(3, l, 0.0);
-            jacobian.set(4, l, 0.0);
-            jacobian.set(5, l, 0.0);
-            jacobian.set(6, l, 0.0);
-            jacobian.set(7, l, 1.0);
-            jacobian.set(8, l, 0.0);
-            jacobian.set(9, l, 0.0);
-            jacobian.set(10, l, 0.0);
-            jacobian.set(11, l, 0.0);
-            jacobian.set(12, l, 0.0);
-            jacobian.set(13, l, 0.0);
-            jacobian.set(14, l, 1.0);
-            jacobian.set(15, l, 0.0);
-            jacobian.set(16, l, 0.0);
-            jacobian.set(17, l, 0.0);
-            jacobian.set(18, l, 0.0);
-            jacobian.set(19, l, 0.0);
-            jacobian.set(20, l, 0.0);
-            jacobian.set(21, l, 1.0);
-            jacobian.set(22, l, 0.0);
-            jacobian.set(23, l, 0.0);
-            jacobian.set(24, l, 0.0);
-            jacobian.set(25, l, 0.0);
-            jacobian.set(26, l, 0.0);
-            jacobian.set(27, l, 0.0);
-            jacobian.set(28, l, 1.0);
-            jacobian.set(29, l, 0.0);
-            jacobian.set(30, l, 0.0);
-            jacobian.set(31, l, 0.0);
-            jacobian.set(32, l, 0.0);
-            jacobian.set(33, l, 0.0);
-            jacobian.set(34, l, 0.0);
-            jacobian.set(35, l, 1.0);
-            jacobian.set(36, l, panel_left_cos0);
-            jacobian.set(37, l, 0.0);
-            jacobian.set(38, l, -panel_left_sin0);
-            jacobian.set(39, l, -bus_jac0);
-            jacobian.set(40, l, bus_jac4);
-            jacobian.set(41, l, -bus_jac1);
-            jacobian.set(42, l, 0.0);
-            jacobian.set(43, l, 1.0);
-            jacobian.set(44, l, 0.0);
-            jacobian.set(45, l, -0.05);
-            jacobian.set(46, l, 0.0);
-            jacobian.set(47, l, 0.1);
-            jacobian.set(48, l, panel_left_sin0);
-            jacobian.set(49, l, 0.0);
-            jacobian.set(50, l, panel_left_cos0);
-            jacobian.set(51, l, bus_jac1);
-            jacobian.set(52, l, bus_jac7);
-            jacobian.set(53, l, -bus_jac0);
-            jacobian.set(54, l, 0.0);
-            jacobian.set(55, l, 0.0);
-            jacobian.set(56, l, 0.0);
-            jacobian.set(57, l, panel_left_cos0);
-            jacobian.set(58, l, 0.0);
-            jacobian.set(59, l, -panel_left_sin0);
-            jacobian.set(60, l, 0.0);
-            jacobian.set(61, l, 0.0);
-            jacobian.set(62, l, 0.0);
-            jacobian.set(63, l, 0.0);
-            jacobian.set(64, l, 1.0);
-            jacobian.set(65, l, 0.0);
-            jacobian.set(66, l, 0.0);
-            jacobian.set(67, l, 0.0);
-            jacobian.set(68, l, 0.0);
-            jacobian.set(69, l, panel_left_sin0);
-            jacobian.set(70, l, 0.0);
-            jacobian.set(71, l, panel_left_cos0);
-            jacobian.set(72, l, panel_right_cos0);
-            jacobian.set(73, l, 0.0);
-            jacobian.set(74, l, -panel_right_sin0);
-            jacobian.set(75, l, bus_jac8);
-            jacobian.set(76, l, bus_jac12);
-            jacobian.set(77, l, bus_jac9);
-            jacobian.set(78, l, 0.0);
-            jacobian.set(79, l, 1.0);
-            jacobian.set(80, l, 0.0);
-            jacobian.set(81, l, -0.05);
-            jacobian.set(82, l, 0.0);
-            jacobian.set(83, l, 0.1);
-            jacobian.set(84, l, panel_right_sin0);
-            jacobian.set(85, l, 0.0);
-            jacobian.set(86, l, panel_right_cos0);
-            jacobian.set(87, l, -bus_jac9);
-            jacobian.set(88, l, bus_jac15);
-            jacobian.set(89, l, bus_jac8);
-            jacobian.set(90, l, 0.0);
-            jacobian.set(91, l, 0.0);
-            jacobian.set(92, l, 0.0);
-            jacobian.set(93, l, panel_right_cos0);
-            jacobian.set(94, l, 0.0);
-            jacobian.set(95, l, -panel_right_sin0);
-            jacobian.set(96, l, 0.0);
-            jacobian.set(97, l, 0.0);
-            jacobian.set(98, l, 0.0);
-            jacobian.set(99, l, 0.0);
-            jacobian.set(100, l, 1.0);
-            jacobian.set(101, l, 0.0);
-            jacobian.set(102, l, 0.0);
-            jacobian.set(103, l, 0.0);
-            jacobian.set(104, l, 0.0);
-            jacobian.set(105, l, panel_right_sin0);
-            jacobian.set(106, l, 0.0);
-            jacobian.set(107, l, panel_right_cos0);
+            results[0][l] = 1.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = 0.0;
+            results[7][l] = 1.0;
+            results[8][l] = 0.0;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = 0.0;
+            results[13][l] = 0.0;
+            results[14][l] = 1.0;
+            results[15][l] = 0.0;
+            results[16][l] = 0.0;
+            results[17][l] = 0.0;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 0.0;
+            results[21][l] = 1.0;
+            results[22][l] = 0.0;
+            results[23][l] = 0.0;
+            results[24][l] = 0.0;
+            results[25][l] = 0.0;
+            results[26][l] = 0.0;
+            results[27][l] = 0.0;
+            results[28][l] = 1.0;
+            results[29][l] = 0.0;
+            results[30][l] = 0.0;
+            results[31][l] = 0.0;
+            results[32][l] = 0.0;
+            results[33][l] = 0.0;
+            results[34][l] = 0.0;
+            results[35][l] = 1.0;
+            results[36][l] = panel_left_cos0;
+            results[37][l] = 0.0;
+            results[38][l] = -panel_left_sin0;
+            results[39][l] = -bus_jac0;
+            results[40][l] = bus_jac4;
+            results[41][l] = -bus_jac1;
+            results[42][l] = 0.0;
+            results[43][l] = 1.0;
+            results[44][l] = 0.0;
+            results[45][l] = -0.05;
+            results[46][l] = 0.0;
+            results[47][l] = 0.1;
+            results[48][l] = panel_left_sin0;
+            results[49][l] = 0.0;
+            results[50][l] = panel_left_cos0;
+            results[51][l] = bus_jac1;
+            results[52][l] = bus_jac7;
+            results[53][l] = -bus_jac0;
+            results[54][l] = 0.0;
+            results[55][l] = 0.0;
+            results[56][l] = 0.0;
+            results[57][l] = panel_left_cos0;
+            results[58][l] = 0.0;
+            results[59][l] = -panel_left_sin0;
+            results[60][l] = 0.0;
+            results[61][l] = 0.0;
+            results[62][l] = 0.0;
+            results[63][l] = 0.0;
+            results[64][l] = 1.0;
+            results[65][l] = 0.0;
+            results[66][l] = 0.0;
+            results[67][l] = 0.0;
+            results[68][l] = 0.0;
+            results[69][l] = panel_left_sin0;
+            results[70][l] = 0.0;
+            results[71][l] = panel_left_cos0;
+            results[72][l] = panel_right_cos0;
+            results[73][l] = 0.0;
+            results[74][l] = -panel_right_sin0;
+            results[75][l] = bus_jac8;
+            results[76][l] = bus_jac12;
+            results[77][l] = bus_jac9;
+            results[78][l] = 0.0;
+            results[79][l] = 1.0;
+            results[80][l] = 0.0;
+            results[81][l] = -0.05;
+            results[82][l] = 0.0;
+            results[83][l] = 0.1;
+            results[84][l] = panel_right_sin0;
+            results[85][l] = 0.0;
+            results[86][l] = panel_right_cos0;
+            results[87][l] = -bus_jac9;
+            results[88][l] = bus_jac15;
+            results[89][l] = bus_jac8;
+            results[90][l] = 0.0;
+            results[91][l] = 0.0;
+            results[92][l] = 0.0;
+            results[93][l] = panel_right_cos0;
+            results[94][l] = 0.0;
+            results[95][l] = -panel_right_sin0;
+            results[96][l] = 0.0;
+            results[97][l] = 0.0;
+            results[98][l] = 0.0;
+            results[99][l] = 0.0;
+            results[100][l] = 1.0;
+            results[101][l] = 0.0;
+            results[102][l] = 0.0;
+            results[103][l] = 0.0;
+            results[104][l] = 0.0;
+            results[105][l] = panel_right_sin0;
+            results[106][l] = 0.0;
+            results[107][l] = panel_right_cos0;
         }
+        jacobian.give(0, &results[0]);
+        jacobian.give(1, &results[1]);
+        jacobian.give(2, &results[2]);
+        jacobian.give(3, &results[3]);
+        jacobian.give(4, &results[4]);
+        jacobian.give(5, &results[5]);
+        jacobian.give(6, &results[6]);
+        jacobian.give(7, &results[7]);
+        jacobian.give(8, &results[8]);
+        jacobian.give(9, &results[9]);
+        jacobian.give(10, &results[10]);
+        jacobian.give(11, &results[11]);
+        jacobian.give(12, &results[12]);
+        jacobian.give(13, &results[13]);
+        jacobian.give(14, &results[14]);
+        jacobian.give(15, &results[15]);
+        jacobian.give(16, &results[16]);
+        jacobian.give(17, &results[17]);
+        jacobian.give(18, &results[18]);
+        jacobian.give(19, &results[19]);
+        jacobian.give(20, &results[20]);
+        jacobian.give(21, &results[21]);
+        jacobian.give(22, &results[22]);
+        jacobian.give(23, &results[23]);
+        jacobian.give(24, &results[24]);
+        jacobian.give(25, &results[25]);
+        jacobian.give(26, &results[26]);
+        jacobian.give(27, &results[27]);
+        jacobian.give(28, &results[28]);
+        jacobian.give(29, &results[29]);
+        jacobian.give(30, &results[30]);
+        jacobian.give(31, &results[31]);
+        jacobian.give(32, &results[32]);
+        jacobian.give(33, &results[33]);
+        jacobian.give(34, &results[34]);
+        jacobian.give(35, &results[35]);
+        jacobian.give(36, &results[36]);
+        jacobian.give(37, &results[37]);
+        jacobian.give(38, &results[38]);
+        jacobian.give(39, &results[39]);
+        jacobian.give(40, &results[40]);
+        jacobian.give(41, &results[41]);
+        jacobian.give(42, &results[42]);
+        jacobian.give(43, &results[43]);
+        jacobian.give(44, &results[44]);
+        jacobian.give(45, &results[45]);
+        jacobian.give(46, &results[46]);
+        jacobian.give(47, &results[47]);
+        jacobian.give(48, &results[48]);
+        jacobian.give(49, &results[49]);
+        jacobian.give(50, &results[50]);
+        jacobian.give(51, &results[51]);
+        jacobian.give(52, &results[52]);
+        jacobian.give(53, &results[53]);
+        jacobian.give(54, &results[54]);
+        jacobian.give(55, &results[55]);
+        jacobian.give(56, &results[56]);
+        jacobian.give(57, &results[57]);
+        jacobian.give(58, &results[58]);
+        jacobian.give(59, &results[59]);
+        jacobian.give(60, &results[60]);
+        jacobian.give(61, &results[61]);
+        jacobian.give(62, &results[62]);
+        jacobian.give(63, &results[63]);
+        jacobian.give(64, &results[64]);
+        jacobian.give(65, &results[65]);
+        jacobian.give(66, &results[66]);
+        jacobian.give(67, &results[67]);
+        jacobian.give(68, &results[68]);
+        jacobian.give(69, &results[69]);
+        jacobian.give(70, &results[70]);
+        jacobian.give(71, &results[71]);
+        jacobian.give(72, &results[72]);
+        jacobian.give(73, &results[73]);
+        jacobian.give(74, &results[74]);
+        jacobian.give(75, &results[75]);
+        jacobian.give(76, &results[76]);
+        jacobian.give(77, &results[77]);
+        jacobian.give(78, &results[78]);
+        jacobian.give(79, &results[79]);
+        jacobian.give(80, &results[80]);
+        jacobian.give(81, &results[81]);
+        jacobian.give(82, &results[82]);
+        jacobian.give(83, &results[83]);
+        jacobian.give(84, &results[84]);
+        jacobian.give(85, &results[85]);
+        jacobian.give(86, &results[86]);
+        jacobian.give(87, &results[87]);
+        jacobian.give(88, &results[88]);
+        jacobian.give(89, &results[89]);
+        jacobian.give(90, &results[90]);
+        jacobian.give(91, &results[91]);
+        jacobian.give(92, &results[92]);
+        jacobian.give(93, &results[93]);
+        jacobian.give(94, &results[94]);
+        jacobian.give(95, &results[95]);
+        jacobian.give(96, &results[96]);
+        jacobian.give(97, &results[97]);
+        jacobian.give(98, &results[98]);
+        jacobian.give(99, &results[99]);
+        jacobian.give(100, &results[100]);
+        jacobian.give(101, &results[101]);
+        jacobian.give(102, &results[102]);
+        jacobian.give(103, &results[103]);
+        jacobian.give(104, &results[104]);
+        jacobian.give(105, &results[105]);
+        jacobian.give(106, &results[106]);
+        jacobian.give(107, &results[107]);
     }
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
@@ -3339,6 +3611,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -3448,25 +3721,43 @@ impl Satellite {
             let panel_right_acc12 = panel_right_vel11 + panel_right_acc11;
             let panel_right_acc13 = 0.6 * panel_right_acc8;
             let panel_right_acc14 = panel_left_vel15 + panel_right_acc13;
-            drift.set(0, l, bus_acc2);
-            drift.set(1, l, bus_acc5);
-            drift.set(2, l, bus_acc8);
-            drift.set(3, l, 0.0);
-            drift.set(4, l, 0.0);
-            drift.set(5, l, 0.0);
-            drift.set(6, l, panel_left_acc10);
-            drift.set(7, l, panel_left_acc14);
-            drift.set(8, l, panel_left_acc12);
-            drift.set(9, l, -panel_left_acc0);
-            drift.set(10, l, drive_a_0);
-            drift.set(11, l, panel_left_acc1);
-            drift.set(12, l, panel_right_acc10);
-            drift.set(13, l, panel_right_acc14);
-            drift.set(14, l, panel_right_acc12);
-            drift.set(15, l, -panel_right_acc0);
-            drift.set(16, l, drive_a_1);
-            drift.set(17, l, panel_right_acc1);
+            results[0][l] = bus_acc2;
+            results[1][l] = bus_acc5;
+            results[2][l] = bus_acc8;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = panel_left_acc10;
+            results[7][l] = panel_left_acc14;
+            results[8][l] = panel_left_acc12;
+            results[9][l] = -panel_left_acc0;
+            results[10][l] = drive_a_0;
+            results[11][l] = panel_left_acc1;
+            results[12][l] = panel_right_acc10;
+            results[13][l] = panel_right_acc14;
+            results[14][l] = panel_right_acc12;
+            results[15][l] = -panel_right_acc0;
+            results[16][l] = drive_a_1;
+            results[17][l] = panel_right_acc1;
         }
+        drift.give(0, &results[0]);
+        drift.give(1, &results[1]);
+        drift.give(2, &results[2]);
+        drift.give(3, &results[3]);
+        drift.give(4, &results[4]);
+        drift.give(5, &results[5]);
+        drift.give(6, &results[6]);
+        drift.give(7, &results[7]);
+        drift.give(8, &results[8]);
+        drift.give(9, &results[9]);
+        drift.give(10, &results[10]);
+        drift.give(11, &results[11]);
+        drift.give(12, &results[12]);
+        drift.give(13, &results[13]);
+        drift.give(14, &results[14]);
+        drift.give(15, &results[15]);
+        drift.give(16, &results[16]);
+        drift.give(17, &results[17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -3478,6 +3769,7 @@ impl Satellite {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 7];
         for l in 0..LANES {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
@@ -3553,14 +3845,21 @@ impl Satellite {
             let bus_rate60 = q_5 * v_5;
             let bus_rate61 = bus_rate59 + bus_rate60;
             let bus_rate62 = 0.5 * bus_rate61;
-            qd.set(0, l, bus_rate28);
-            qd.set(1, l, bus_rate33);
-            qd.set(2, l, bus_rate38);
-            qd.set(3, l, bus_rate50);
-            qd.set(4, l, bus_rate53);
-            qd.set(5, l, bus_rate56);
-            qd.set(6, l, -bus_rate62);
+            results[0][l] = bus_rate28;
+            results[1][l] = bus_rate33;
+            results[2][l] = bus_rate38;
+            results[3][l] = bus_rate50;
+            results[4][l] = bus_rate53;
+            results[5][l] = bus_rate56;
+            results[6][l] = -bus_rate62;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -142,6 +142,7 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
+        let mut results = [[0.0; LANES]; 37];
         for l in 0..LANES {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
@@ -2463,44 +2464,81 @@ impl Solo12 {
             let hr_lower_leg_pdot27 = tau_15 + hr_shoulder_pdot45;
             let hr_lower_leg_pdot28 = tau_16 + hr_upper_leg_pdot35;
             let hr_lower_leg_pdot29 = tau_17 + hr_lower_leg_pdot11;
-            qd.set(0, l, base_link_rate4);
-            qd.set(1, l, -base_link_rate9);
-            qd.set(2, l, base_link_rate14);
-            qd.set(3, l, base_link_rate26);
-            qd.set(4, l, base_link_rate29);
-            qd.set(5, l, -base_link_rate32);
-            qd.set(6, l, -base_link_rate38);
-            qd.set(7, l, -fl_shoulder_vel14);
-            qd.set(8, l, fl_upper_leg_vel8);
-            qd.set(9, l, fl_upper_leg_vel18);
-            qd.set(10, l, -fr_shoulder_vel12);
-            qd.set(11, l, fr_upper_leg_vel8);
-            qd.set(12, l, fr_upper_leg_vel18);
-            qd.set(13, l, -hl_shoulder_vel10);
-            qd.set(14, l, hl_upper_leg_vel8);
-            qd.set(15, l, hl_upper_leg_vel18);
-            qd.set(16, l, -hr_shoulder_vel10);
-            qd.set(17, l, hr_upper_leg_vel8);
-            qd.set(18, l, hr_upper_leg_vel18);
-            pd.set(0, l, hr_lower_leg_pdot12);
-            pd.set(1, l, hr_lower_leg_pdot13);
-            pd.set(2, l, hr_lower_leg_pdot14);
-            pd.set(3, l, hr_lower_leg_pdot15);
-            pd.set(4, l, hr_lower_leg_pdot16);
-            pd.set(5, l, hr_lower_leg_pdot17);
-            pd.set(6, l, hr_lower_leg_pdot18);
-            pd.set(7, l, hr_lower_leg_pdot19);
-            pd.set(8, l, hr_lower_leg_pdot20);
-            pd.set(9, l, hr_lower_leg_pdot21);
-            pd.set(10, l, hr_lower_leg_pdot22);
-            pd.set(11, l, hr_lower_leg_pdot23);
-            pd.set(12, l, hr_lower_leg_pdot24);
-            pd.set(13, l, hr_lower_leg_pdot25);
-            pd.set(14, l, hr_lower_leg_pdot26);
-            pd.set(15, l, hr_lower_leg_pdot27);
-            pd.set(16, l, hr_lower_leg_pdot28);
-            pd.set(17, l, hr_lower_leg_pdot29);
+            results[0][l] = base_link_rate4;
+            results[1][l] = -base_link_rate9;
+            results[2][l] = base_link_rate14;
+            results[3][l] = base_link_rate26;
+            results[4][l] = base_link_rate29;
+            results[5][l] = -base_link_rate32;
+            results[6][l] = -base_link_rate38;
+            results[7][l] = -fl_shoulder_vel14;
+            results[8][l] = fl_upper_leg_vel8;
+            results[9][l] = fl_upper_leg_vel18;
+            results[10][l] = -fr_shoulder_vel12;
+            results[11][l] = fr_upper_leg_vel8;
+            results[12][l] = fr_upper_leg_vel18;
+            results[13][l] = -hl_shoulder_vel10;
+            results[14][l] = hl_upper_leg_vel8;
+            results[15][l] = hl_upper_leg_vel18;
+            results[16][l] = -hr_shoulder_vel10;
+            results[17][l] = hr_upper_leg_vel8;
+            results[18][l] = hr_upper_leg_vel18;
+            results[19][l] = hr_lower_leg_pdot12;
+            results[20][l] = hr_lower_leg_pdot13;
+            results[21][l] = hr_lower_leg_pdot14;
+            results[22][l] = hr_lower_leg_pdot15;
+            results[23][l] = hr_lower_leg_pdot16;
+            results[24][l] = hr_lower_leg_pdot17;
+            results[25][l] = hr_lower_leg_pdot18;
+            results[26][l] = hr_lower_leg_pdot19;
+            results[27][l] = hr_lower_leg_pdot20;
+            results[28][l] = hr_lower_leg_pdot21;
+            results[29][l] = hr_lower_leg_pdot22;
+            results[30][l] = hr_lower_leg_pdot23;
+            results[31][l] = hr_lower_leg_pdot24;
+            results[32][l] = hr_lower_leg_pdot25;
+            results[33][l] = hr_lower_leg_pdot26;
+            results[34][l] = hr_lower_leg_pdot27;
+            results[35][l] = hr_lower_leg_pdot28;
+            results[36][l] = hr_lower_leg_pdot29;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
+        qd.give(10, &results[10]);
+        qd.give(11, &results[11]);
+        qd.give(12, &results[12]);
+        qd.give(13, &results[13]);
+        qd.give(14, &results[14]);
+        qd.give(15, &results[15]);
+        qd.give(16, &results[16]);
+        qd.give(17, &results[17]);
+        qd.give(18, &results[18]);
+        pd.give(0, &results[19]);
+        pd.give(1, &results[20]);
+        pd.give(2, &results[21]);
+        pd.give(3, &results[22]);
+        pd.give(4, &results[23]);
+        pd.give(5, &results[24]);
+        pd.give(6, &results[25]);
+        pd.give(7, &results[26]);
+        pd.give(8, &results[27]);
+        pd.give(9, &results[28]);
+        pd.give(10, &results[29]);
+        pd.give(11, &results[30]);
+        pd.give(12, &results[31]);
+        pd.give(13, &results[32]);
+        pd.give(14, &results[33]);
+        pd.give(15, &results[34]);
+        pd.give(16, &results[35]);
+        pd.give(17, &results[36]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -2543,6 +2581,7 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -4157,25 +4196,43 @@ impl Solo12 {
             let hr_upper_leg_vel16 = hr_upper_leg_vel14 - hr_upper_leg_vel15;
             let hr_upper_leg_vel17 = hr_upper_leg_vel11 - hr_upper_leg_vel16;
             let hr_upper_leg_vel18 = hr_upper_leg_rest0 - hr_upper_leg_vel17;
-            v.set(0, l, -base_link_vel29);
-            v.set(1, l, -base_link_vel19);
-            v.set(2, l, -base_link_vel11);
-            v.set(3, l, base_link_vel5);
-            v.set(4, l, -base_link_vel1);
-            v.set(5, l, base_link_rest41);
-            v.set(6, l, -fl_shoulder_vel14);
-            v.set(7, l, fl_upper_leg_vel8);
-            v.set(8, l, fl_upper_leg_vel18);
-            v.set(9, l, -fr_shoulder_vel12);
-            v.set(10, l, fr_upper_leg_vel8);
-            v.set(11, l, fr_upper_leg_vel18);
-            v.set(12, l, -hl_shoulder_vel10);
-            v.set(13, l, hl_upper_leg_vel8);
-            v.set(14, l, hl_upper_leg_vel18);
-            v.set(15, l, -hr_shoulder_vel10);
-            v.set(16, l, hr_upper_leg_vel8);
-            v.set(17, l, hr_upper_leg_vel18);
+            results[0][l] = -base_link_vel29;
+            results[1][l] = -base_link_vel19;
+            results[2][l] = -base_link_vel11;
+            results[3][l] = base_link_vel5;
+            results[4][l] = -base_link_vel1;
+            results[5][l] = base_link_rest41;
+            results[6][l] = -fl_shoulder_vel14;
+            results[7][l] = fl_upper_leg_vel8;
+            results[8][l] = fl_upper_leg_vel18;
+            results[9][l] = -fr_shoulder_vel12;
+            results[10][l] = fr_upper_leg_vel8;
+            results[11][l] = fr_upper_leg_vel18;
+            results[12][l] = -hl_shoulder_vel10;
+            results[13][l] = hl_upper_leg_vel8;
+            results[14][l] = hl_upper_leg_vel18;
+            results[15][l] = -hr_shoulder_vel10;
+            results[16][l] = hr_upper_leg_vel8;
+            results[17][l] = hr_upper_leg_vel18;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
+        v.give(6, &results[6]);
+        v.give(7, &results[7]);
+        v.give(8, &results[8]);
+        v.give(9, &results[9]);
+        v.give(10, &results[10]);
+        v.give(11, &results[11]);
+        v.give(12, &results[12]);
+        v.give(13, &results[13]);
+        v.give(14, &results[14]);
+        v.give(15, &results[15]);
+        v.give(16, &results[16]);
+        v.give(17, &results[17]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -4218,6 +4275,7 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -4955,25 +5013,43 @@ impl Solo12 {
             let fl_shoulder_mom34 = fr_shoulder_mom34 + fl_shoulder_mom28;
             let fl_shoulder_mom35 = fr_shoulder_mom35 + fl_shoulder_mom24;
             let fl_shoulder_mom36 = fr_shoulder_mom36 - fl_shoulder_mom30;
-            p.set(0, l, fl_shoulder_mom31);
-            p.set(1, l, fl_shoulder_mom32);
-            p.set(2, l, fl_shoulder_mom33);
-            p.set(3, l, fl_shoulder_mom34);
-            p.set(4, l, fl_shoulder_mom35);
-            p.set(5, l, fl_shoulder_mom36);
-            p.set(6, l, fl_upper_leg_mom32);
-            p.set(7, l, -fl_lower_leg_mom32);
-            p.set(8, l, -fl_lower_leg_mom10);
-            p.set(9, l, -fr_upper_leg_mom32);
-            p.set(10, l, fr_lower_leg_mom32);
-            p.set(11, l, fr_lower_leg_mom10);
-            p.set(12, l, -hl_upper_leg_mom32);
-            p.set(13, l, -hl_lower_leg_mom32);
-            p.set(14, l, -hl_lower_leg_mom10);
-            p.set(15, l, hr_upper_leg_mom32);
-            p.set(16, l, hr_lower_leg_mom32);
-            p.set(17, l, hr_lower_leg_mom10);
+            results[0][l] = fl_shoulder_mom31;
+            results[1][l] = fl_shoulder_mom32;
+            results[2][l] = fl_shoulder_mom33;
+            results[3][l] = fl_shoulder_mom34;
+            results[4][l] = fl_shoulder_mom35;
+            results[5][l] = fl_shoulder_mom36;
+            results[6][l] = fl_upper_leg_mom32;
+            results[7][l] = -fl_lower_leg_mom32;
+            results[8][l] = -fl_lower_leg_mom10;
+            results[9][l] = -fr_upper_leg_mom32;
+            results[10][l] = fr_lower_leg_mom32;
+            results[11][l] = fr_lower_leg_mom10;
+            results[12][l] = -hl_upper_leg_mom32;
+            results[13][l] = -hl_lower_leg_mom32;
+            results[14][l] = -hl_lower_leg_mom10;
+            results[15][l] = hr_upper_leg_mom32;
+            results[16][l] = hr_lower_leg_mom32;
+            results[17][l] = hr_lower_leg_mom10;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
+        p.give(6, &results[6]);
+        p.give(7, &results[7]);
+        p.give(8, &results[8]);
+        p.give(9, &results[9]);
+        p.give(10, &results[10]);
+        p.give(11, &results[11]);
+        p.give(12, &results[12]);
+        p.give(13, &results[13]);
+        p.give(14, &results[14]);
+        p.give(15, &results[15]);
+        p.give(16, &results[16]);
+        p.give(17, &results[17]);
     }
 
     /// Kinetic and potential energy, J.
@@ -5018,6 +5094,7 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let q_2 = q.get(2, l);
             let q_3 = q.get(3, l);
@@ -6736,9 +6813,11 @@ impl Solo12 {
             let base_link_load6 = base_link_load4 + base_link_load5;
             // ground: energy
             let ground_energy0 = 9.81 * base_link_load6;
-            result.set(0, l, -hr_lower_leg_energy8);
-            result.set(1, l, ground_energy0);
+            results[0][l] = -hr_lower_leg_energy8;
+            results[1][l] = ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -6781,6 +6860,7 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
+        let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
@@ -9372,25 +9452,43 @@ impl Solo12 {
             let hl_upper_leg_acc28 = hl_shoulder_acc1 - hl_upper_leg_acc17;
             // HR_UPPER_LEG: acceleration
             let hr_upper_leg_acc28 = hr_shoulder_acc1 - hr_upper_leg_acc17;
-            a.set(0, l, -base_link_acc42);
-            a.set(1, l, -base_link_acc43);
-            a.set(2, l, base_link_acc44);
-            a.set(3, l, base_link_acc17);
-            a.set(4, l, -base_link_acc13);
-            a.set(5, l, base_link_rest41);
-            a.set(6, l, -fl_shoulder_acc29);
-            a.set(7, l, fl_upper_leg_acc28);
-            a.set(8, l, fl_upper_leg_acc27);
-            a.set(9, l, -fr_shoulder_acc27);
-            a.set(10, l, fr_upper_leg_acc28);
-            a.set(11, l, fr_upper_leg_acc27);
-            a.set(12, l, -hl_shoulder_acc25);
-            a.set(13, l, hl_upper_leg_acc28);
-            a.set(14, l, hl_upper_leg_acc27);
-            a.set(15, l, -hr_shoulder_acc25);
-            a.set(16, l, hr_upper_leg_acc28);
-            a.set(17, l, hr_upper_leg_acc27);
+            results[0][l] = -base_link_acc42;
+            results[1][l] = -base_link_acc43;
+            results[2][l] = base_link_acc44;
+            results[3][l] = base_link_acc17;
+            results[4][l] = -base_link_acc13;
+            results[5][l] = base_link_rest41;
+            results[6][l] = -fl_shoulder_acc29;
+            results[7][l] = fl_upper_leg_acc28;
+            results[8][l] = fl_upper_leg_acc27;
+            results[9][l] = -fr_shoulder_acc27;
+            results[10][l] = fr_upper_leg_acc28;
+            results[11][l] = fr_upper_leg_acc27;
+            results[12][l] = -hl_shoulder_acc25;
+            results[13][l] = hl_upper_leg_acc28;
+            results[14][l] = hl_upper_leg_acc27;
+            results[15][l] = -hr_shoulder_acc25;
+            results[16][l] = hr_upper_leg_acc28;
+            results[17][l] = hr_upper_leg_acc27;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
+        a.give(6, &results[6]);
+        a.give(7, &results[7]);
+        a.give(8, &results[8]);
+        a.give(9, &results[9]);
+        a.give(10, &results[10]);
+        a.give(11, &results[11]);
+        a.give(12, &results[12]);
+        a.give(13, &results[13]);
+        a.give(14, &results[14]);
+        a.give(15, &results[15]);
+        a.give(16, &results[16]);
+        a.give(17, &results[17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -9402,6 +9500,7 @@ impl Solo12 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 19];
         for l in 0..LANES {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
@@ -9489,26 +9588,45 @@ impl Solo12 {
             let base_link_rate60 = q_5 * v_5;
             let base_link_rate61 = base_link_rate59 + base_link_rate60;
             let base_link_rate62 = 0.5 * base_link_rate61;
-            qd.set(0, l, base_link_rate28);
-            qd.set(1, l, base_link_rate33);
-            qd.set(2, l, base_link_rate38);
-            qd.set(3, l, base_link_rate50);
-            qd.set(4, l, base_link_rate53);
-            qd.set(5, l, base_link_rate56);
-            qd.set(6, l, -base_link_rate62);
-            qd.set(7, l, v_6);
-            qd.set(8, l, v_7);
-            qd.set(9, l, v_8);
-            qd.set(10, l, v_9);
-            qd.set(11, l, v_10);
-            qd.set(12, l, v_11);
-            qd.set(13, l, v_12);
-            qd.set(14, l, v_13);
-            qd.set(15, l, v_14);
-            qd.set(16, l, v_15);
-            qd.set(17, l, v_16);
-            qd.set(18, l, v_17);
+            results[0][l] = base_link_rate28;
+            results[1][l] = base_link_rate33;
+            results[2][l] = base_link_rate38;
+            results[3][l] = base_link_rate50;
+            results[4][l] = base_link_rate53;
+            results[5][l] = base_link_rate56;
+            results[6][l] = -base_link_rate62;
+            results[7][l] = v_6;
+            results[8][l] = v_7;
+            results[9][l] = v_8;
+            results[10][l] = v_9;
+            results[11][l] = v_10;
+            results[12][l] = v_11;
+            results[13][l] = v_12;
+            results[14][l] = v_13;
+            results[15][l] = v_14;
+            results[16][l] = v_15;
+            results[17][l] = v_16;
+            results[18][l] = v_17;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
+        qd.give(10, &results[10]);
+        qd.give(11, &results[11]);
+        qd.give(12, &results[12]);
+        qd.give(13, &results[13]);
+        qd.give(14, &results[14]);
+        qd.give(15, &results[15]);
+        qd.give(16, &results[16]);
+        qd.give(17, &results[17]);
+        qd.give(18, &results[18]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -78,6 +78,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 9];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -239,16 +240,25 @@ impl SphericalPendulum {
             let tail_pdot19 = tau_1 + bob_pdot15;
             let tail_pdot20 = tau_2 - bob_pdot16;
             let tail_pdot21 = tau_3 - tail_pdot17;
-            qd.set(0, l, -bob_rate11);
-            qd.set(1, l, bob_rate14);
-            qd.set(2, l, -bob_rate17);
-            qd.set(3, l, -bob_rate23);
-            qd.set(4, l, tail_vel4);
-            pd.set(0, l, tail_pdot18);
-            pd.set(1, l, tail_pdot19);
-            pd.set(2, l, tail_pdot20);
-            pd.set(3, l, tail_pdot21);
+            results[0][l] = -bob_rate11;
+            results[1][l] = bob_rate14;
+            results[2][l] = -bob_rate17;
+            results[3][l] = -bob_rate23;
+            results[4][l] = tail_vel4;
+            results[5][l] = tail_pdot18;
+            results[6][l] = tail_pdot19;
+            results[7][l] = tail_pdot20;
+            results[8][l] = tail_pdot21;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        pd.give(0, &results[5]);
+        pd.give(1, &results[6]);
+        pd.give(2, &results[7]);
+        pd.give(3, &results[8]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -267,6 +277,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -327,11 +338,15 @@ impl SphericalPendulum {
             let tail_vel1 = tail_pivot0 * tail_vel0;
             let tail_vel2 = tail_rest0 + tail_vel1;
             let tail_vel3 = bob_rest3 + tail_vel2;
-            v.set(0, l, bob_vel1);
-            v.set(1, l, -bob_rest3);
-            v.set(2, l, -bob_rest5);
-            v.set(3, l, tail_vel3);
+            results[0][l] = bob_vel1;
+            results[1][l] = -bob_rest3;
+            results[2][l] = -bob_rest5;
+            results[3][l] = tail_vel3;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -350,6 +365,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -399,11 +415,15 @@ impl SphericalPendulum {
             let tail_mom22 = bob_mom0 - tail_mom19;
             let tail_mom23 = bob_mom1 + tail_mom21;
             let tail_mom24 = bob_mom2 + tail_mom17;
-            p.set(0, l, tail_mom22);
-            p.set(1, l, tail_mom23);
-            p.set(2, l, tail_mom24);
-            p.set(3, l, tail_mom10);
+            results[0][l] = tail_mom22;
+            results[1][l] = tail_mom23;
+            results[2][l] = tail_mom24;
+            results[3][l] = tail_mom10;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
     }
 
     /// Kinetic and potential energy, J.
@@ -424,6 +444,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -517,9 +538,11 @@ impl SphericalPendulum {
             let bob_load3 = bob_load2 + 3.4;
             // ground: energy
             let ground_energy0 = 9.81 * bob_load3;
-            result.set(0, l, tail_energy2);
-            result.set(1, l, ground_energy0);
+            results[0][l] = tail_energy2;
+            results[1][l] = ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -538,6 +561,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -705,11 +729,15 @@ impl SphericalPendulum {
             let tail_acc7 = tail_pivot0 * tail_acc6;
             let tail_acc8 = tail_rest10 + tail_acc7;
             let tail_acc9 = bob_rest5 + tail_acc8;
-            a.set(0, l, bob_acc1);
-            a.set(1, l, -bob_rest5);
-            a.set(2, l, -bob_rest7);
-            a.set(3, l, tail_acc9);
+            results[0][l] = bob_acc1;
+            results[1][l] = -bob_rest5;
+            results[2][l] = -bob_rest7;
+            results[3][l] = tail_acc9;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
@@ -728,6 +756,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -1004,19 +1033,31 @@ impl SphericalPendulum {
             let tail_react9 = 0.9950371902099892 * tail_load39;
             let tail_react10 = 0.09950371902099892 * tail_load50;
             let tail_react11 = tail_react9 + tail_react10;
-            reactions.set(0, l, tail_load68);
-            reactions.set(1, l, tail_load69);
-            reactions.set(2, l, tail_load70);
-            reactions.set(3, l, tail_load71);
-            reactions.set(4, l, -tail_load72);
-            reactions.set(5, l, tail_load73);
-            reactions.set(6, l, -tail_react2);
-            reactions.set(7, l, tail_load34);
-            reactions.set(8, l, tail_react5);
-            reactions.set(9, l, tail_react8);
-            reactions.set(10, l, -tail_load51);
-            reactions.set(11, l, tail_react11);
+            results[0][l] = tail_load68;
+            results[1][l] = tail_load69;
+            results[2][l] = tail_load70;
+            results[3][l] = tail_load71;
+            results[4][l] = -tail_load72;
+            results[5][l] = tail_load73;
+            results[6][l] = -tail_react2;
+            results[7][l] = tail_load34;
+            results[8][l] = tail_react5;
+            results[9][l] = tail_react8;
+            results[10][l] = -tail_load51;
+            results[11][l] = tail_react11;
         }
+        reactions.give(0, &results[0]);
+        reactions.give(1, &results[1]);
+        reactions.give(2, &results[2]);
+        reactions.give(3, &results[3]);
+        reactions.give(4, &results[4]);
+        reactions.give(5, &results[5]);
+        reactions.give(6, &results[6]);
+        reactions.give(7, &results[7]);
+        reactions.give(8, &results[8]);
+        reactions.give(9, &results[9]);
+        reactions.give(10, &results[10]);
+        reactions.give(11, &results[11]);
     }
 
     /// Mass matrix, by rows.
@@ -1035,6 +1076,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 16];
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
@@ -1064,23 +1106,39 @@ impl SphericalPendulum {
             let tail_mass21 = tail_mass19 + 0.6101920792079208;
             let tail_mass22 = 0.5770000000000001 - tail_mass20;
             let tail_mass23 = 0.0401920792079208 - tail_mass14;
-            m.set(0, l, tail_mass21);
-            m.set(1, l, 0.0);
-            m.set(2, l, tail_mass16);
-            m.set(3, l, 0.0);
-            m.set(4, l, 0.0);
-            m.set(5, l, tail_mass22);
-            m.set(6, l, 0.0);
-            m.set(7, l, tail_mass3);
-            m.set(8, l, tail_mass16);
-            m.set(9, l, 0.0);
-            m.set(10, l, tail_mass23);
-            m.set(11, l, 0.0);
-            m.set(12, l, 0.0);
-            m.set(13, l, tail_mass3);
-            m.set(14, l, 0.0);
-            m.set(15, l, 0.027700000000000002);
+            results[0][l] = tail_mass21;
+            results[1][l] = 0.0;
+            results[2][l] = tail_mass16;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = tail_mass22;
+            results[6][l] = 0.0;
+            results[7][l] = tail_mass3;
+            results[8][l] = tail_mass16;
+            results[9][l] = 0.0;
+            results[10][l] = tail_mass23;
+            results[11][l] = 0.0;
+            results[12][l] = 0.0;
+            results[13][l] = tail_mass3;
+            results[14][l] = 0.0;
+            results[15][l] = 0.027700000000000002;
         }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
     }
 
     /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
@@ -1099,6 +1157,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 36];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -1201,43 +1260,79 @@ impl SphericalPendulum {
             let tail_place49 = 0.9950371902099892 * tail_vel6;
             let tail_place50 = 0.09950371902099892 * tail_vel9;
             let tail_place51 = tail_place50 - tail_place49;
-            rotation.set(0, l, -bob_pose13);
-            rotation.set(1, l, bob_pose14);
-            rotation.set(2, l, bob_pose15);
-            rotation.set(3, l, bob_pose16);
-            rotation.set(4, l, bob_pose18);
-            rotation.set(5, l, bob_pose19);
-            rotation.set(6, l, bob_pose20);
-            rotation.set(7, l, bob_pose21);
-            rotation.set(8, l, -bob_pose23);
-            rotation.set(9, l, tail_place24);
-            rotation.set(10, l, bob_pose14);
-            rotation.set(11, l, tail_place27);
-            rotation.set(12, l, tail_place30);
-            rotation.set(13, l, bob_pose18);
-            rotation.set(14, l, tail_place33);
-            rotation.set(15, l, tail_place36);
-            rotation.set(16, l, bob_pose21);
-            rotation.set(17, l, -tail_place39);
-            position.set(0, l, 0.0);
-            position.set(1, l, 0.0);
-            position.set(2, l, 2.0);
-            position.set(3, l, -tail_place0);
-            position.set(4, l, -tail_place1);
-            position.set(5, l, tail_place3);
-            velocity.set(0, l, 0.0);
-            velocity.set(1, l, 0.0);
-            velocity.set(2, l, 0.0);
-            velocity.set(3, l, v_0);
-            velocity.set(4, l, v_1);
-            velocity.set(5, l, v_2);
-            velocity.set(6, l, -tail_place42);
-            velocity.set(7, l, tail_vel1);
-            velocity.set(8, l, tail_place45);
-            velocity.set(9, l, tail_place48);
-            velocity.set(10, l, tail_vel10);
-            velocity.set(11, l, tail_place51);
+            results[0][l] = -bob_pose13;
+            results[1][l] = bob_pose14;
+            results[2][l] = bob_pose15;
+            results[3][l] = bob_pose16;
+            results[4][l] = bob_pose18;
+            results[5][l] = bob_pose19;
+            results[6][l] = bob_pose20;
+            results[7][l] = bob_pose21;
+            results[8][l] = -bob_pose23;
+            results[9][l] = tail_place24;
+            results[10][l] = bob_pose14;
+            results[11][l] = tail_place27;
+            results[12][l] = tail_place30;
+            results[13][l] = bob_pose18;
+            results[14][l] = tail_place33;
+            results[15][l] = tail_place36;
+            results[16][l] = bob_pose21;
+            results[17][l] = -tail_place39;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 2.0;
+            results[21][l] = -tail_place0;
+            results[22][l] = -tail_place1;
+            results[23][l] = tail_place3;
+            results[24][l] = 0.0;
+            results[25][l] = 0.0;
+            results[26][l] = 0.0;
+            results[27][l] = v_0;
+            results[28][l] = v_1;
+            results[29][l] = v_2;
+            results[30][l] = -tail_place42;
+            results[31][l] = tail_vel1;
+            results[32][l] = tail_place45;
+            results[33][l] = tail_place48;
+            results[34][l] = tail_vel10;
+            results[35][l] = tail_place51;
         }
+        rotation.give(0, &results[0]);
+        rotation.give(1, &results[1]);
+        rotation.give(2, &results[2]);
+        rotation.give(3, &results[3]);
+        rotation.give(4, &results[4]);
+        rotation.give(5, &results[5]);
+        rotation.give(6, &results[6]);
+        rotation.give(7, &results[7]);
+        rotation.give(8, &results[8]);
+        rotation.give(9, &results[9]);
+        rotation.give(10, &results[10]);
+        rotation.give(11, &results[11]);
+        rotation.give(12, &results[12]);
+        rotation.give(13, &results[13]);
+        rotation.give(14, &results[14]);
+        rotation.give(15, &results[15]);
+        rotation.give(16, &results[16]);
+        rotation.give(17, &results[17]);
+        position.give(0, &results[18]);
+        position.give(1, &results[19]);
+        position.give(2, &results[20]);
+        position.give(3, &results[21]);
+        position.give(4, &results[22]);
+        position.give(5, &results[23]);
+        velocity.give(0, &results[24]);
+        velocity.give(1, &results[25]);
+        velocity.give(2, &results[26]);
+        velocity.give(3, &results[27]);
+        velocity.give(4, &results[28]);
+        velocity.give(5, &results[29]);
+        velocity.give(6, &results[30]);
+        velocity.give(7, &results[31]);
+        velocity.give(8, &results[32]);
+        velocity.give(9, &results[33]);
+        velocity.give(10, &results[34]);
+        velocity.give(11, &results[35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
@@ -1256,6 +1351,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -1389,11 +1485,15 @@ impl SphericalPendulum {
             let tail_load40 = bob_load12 - tail_load37;
             let tail_load41 = bob_load13 + tail_load39;
             let tail_load42 = bob_load9 + tail_load35;
-            tau.set(0, l, tail_load40);
-            tau.set(1, l, tail_load41);
-            tau.set(2, l, tail_load42);
-            tau.set(3, l, tail_load26);
+            results[0][l] = tail_load40;
+            results[1][l] = tail_load41;
+            results[2][l] = tail_load42;
+            results[3][l] = tail_load26;
         }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
@@ -1412,6 +1512,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -1521,11 +1622,15 @@ impl SphericalPendulum {
             let tail_load37 = tail_load34 - bob_load6;
             let tail_load38 = bob_load7 - tail_load36;
             let tail_load39 = bob_load3 + tail_load32;
-            h.set(0, l, tail_load37);
-            h.set(1, l, tail_load38);
-            h.set(2, l, -tail_load39);
-            h.set(3, l, -tail_load23);
+            results[0][l] = tail_load37;
+            results[1][l] = tail_load38;
+            results[2][l] = -tail_load39;
+            results[3][l] = -tail_load23;
         }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
     }
 
     /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
@@ -1544,6 +1649,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 48];
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
@@ -1558,55 +1664,103 @@ impl SphericalPendulum {
             // bob: Jacobian
             let bob_jac0 = 0.8 * tail_jac2;
             let bob_jac1 = 0.8 * tail_jac5;
-            jacobian.set(0, l, 0.0);
-            jacobian.set(1, l, 0.0);
-            jacobian.set(2, l, 0.0);
-            jacobian.set(3, l, 0.0);
-            jacobian.set(4, l, 0.0);
-            jacobian.set(5, l, 0.0);
-            jacobian.set(6, l, 0.0);
-            jacobian.set(7, l, 0.0);
-            jacobian.set(8, l, 0.0);
-            jacobian.set(9, l, 0.0);
-            jacobian.set(10, l, 0.0);
-            jacobian.set(11, l, 0.0);
-            jacobian.set(12, l, 1.0);
-            jacobian.set(13, l, 0.0);
-            jacobian.set(14, l, 0.0);
-            jacobian.set(15, l, 0.0);
-            jacobian.set(16, l, 0.0);
-            jacobian.set(17, l, 1.0);
-            jacobian.set(18, l, 0.0);
-            jacobian.set(19, l, 0.0);
-            jacobian.set(20, l, 0.0);
-            jacobian.set(21, l, 0.0);
-            jacobian.set(22, l, 1.0);
-            jacobian.set(23, l, 0.0);
-            jacobian.set(24, l, 0.0);
-            jacobian.set(25, l, -bob_jac0);
-            jacobian.set(26, l, 0.0);
-            jacobian.set(27, l, 0.0);
-            jacobian.set(28, l, 0.8);
-            jacobian.set(29, l, 0.0);
-            jacobian.set(30, l, 0.0);
-            jacobian.set(31, l, 0.0);
-            jacobian.set(32, l, 0.0);
-            jacobian.set(33, l, -bob_jac1);
-            jacobian.set(34, l, 0.0);
-            jacobian.set(35, l, 0.0);
-            jacobian.set(36, l, tail_jac2);
-            jacobian.set(37, l, 0.0);
-            jacobian.set(38, l, -tail_jac5);
-            jacobian.set(39, l, 0.0);
-            jacobian.set(40, l, 0.0);
-            jacobian.set(41, l, 1.0);
-            jacobian.set(42, l, 0.0);
-            jacobian.set(43, l, 1.0);
-            jacobian.set(44, l, tail_jac5);
-            jacobian.set(45, l, 0.0);
-            jacobian.set(46, l, tail_jac2);
-            jacobian.set(47, l, 0.0);
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = 0.0;
+            results[7][l] = 0.0;
+            results[8][l] = 0.0;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = 1.0;
+            results[13][l] = 0.0;
+            results[14][l] = 0.0;
+            results[15][l] = 0.0;
+            results[16][l] = 0.0;
+            results[17][l] = 1.0;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 0.0;
+            results[21][l] = 0.0;
+            results[22][l] = 1.0;
+            results[23][l] = 0.0;
+            results[24][l] = 0.0;
+            results[25][l] = -bob_jac0;
+            results[26][l] = 0.0;
+            results[27][l] = 0.0;
+            results[28][l] = 0.8;
+            results[29][l] = 0.0;
+            results[30][l] = 0.0;
+            results[31][l] = 0.0;
+            results[32][l] = 0.0;
+            results[33][l] = -bob_jac1;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0;
+            results[36][l] = tail_jac2;
+            results[37][l] = 0.0;
+            results[38][l] = -tail_jac5;
+            results[39][l] = 0.0;
+            results[40][l] = 0.0;
+            results[41][l] = 1.0;
+            results[42][l] = 0.0;
+            results[43][l] = 1.0;
+            results[44][l] = tail_jac5;
+            results[45][l] = 0.0;
+            results[46][l] = tail_jac2;
+            results[47][l] = 0.0;
         }
+        jacobian.give(0, &results[0]);
+        jacobian.give(1, &results[1]);
+        jacobian.give(2, &results[2]);
+        jacobian.give(3, &results[3]);
+        jacobian.give(4, &results[4]);
+        jacobian.give(5, &results[5]);
+        jacobian.give(6, &results[6]);
+        jacobian.give(7, &results[7]);
+        jacobian.give(8, &results[8]);
+        jacobian.give(9, &results[9]);
+        jacobian.give(10, &results[10]);
+        jacobian.give(11, &results[11]);
+        jacobian.give(12, &results[12]);
+        jacobian.give(13, &results[13]);
+        jacobian.give(14, &results[14]);
+        jacobian.give(15, &results[15]);
+        jacobian.give(16, &results[16]);
+        jacobian.give(17, &results[17]);
+        jacobian.give(18, &results[18]);
+        jacobian.give(19, &results[19]);
+        jacobian.give(20, &results[20]);
+        jacobian.give(21, &results[21]);
+        jacobian.give(22, &results[22]);
+        jacobian.give(23, &results[23]);
+        jacobian.give(24, &results[24]);
+        jacobian.give(25, &results[25]);
+        jacobian.give(26, &results[26]);
+        jacobian.give(27, &results[27]);
+        jacobian.give(28, &results[28]);
+        jacobian.give(29, &results[29]);
+        jacobian.give(30, &results[30]);
+        jacobian.give(31, &results[31]);
+        jacobian.give(32, &results[32]);
+        jacobian.give(33, &results[33]);
+        jacobian.give(34, &results[34]);
+        jacobian.give(35, &results[35]);
+        jacobian.give(36, &results[36]);
+        jacobian.give(37, &results[37]);
+        jacobian.give(38, &results[38]);
+        jacobian.give(39, &results[39]);
+        jacobian.give(40, &results[40]);
+        jacobian.give(41, &results[41]);
+        jacobian.give(42, &results[42]);
+        jacobian.give(43, &results[43]);
+        jacobian.give(44, &results[44]);
+        jacobian.give(45, &results[45]);
+        jacobian.give(46, &results[46]);
+        jacobian.give(47, &results[47]);
     }
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
@@ -1625,6 +1779,7 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -1669,19 +1824,31 @@ impl SphericalPendulum {
             let tail_acc11 = 0.9950371902099892 * tail_vel16;
             let tail_acc12 = 0.09950371902099892 * tail_vel19;
             let tail_acc13 = tail_acc11 + tail_acc12;
-            drift.set(0, l, 0.0);
-            drift.set(1, l, 0.0);
-            drift.set(2, l, 0.0);
-            drift.set(3, l, 0.0);
-            drift.set(4, l, 0.0);
-            drift.set(5, l, 0.0);
-            drift.set(6, l, tail_acc10);
-            drift.set(7, l, -tail_vel6);
-            drift.set(8, l, tail_acc13);
-            drift.set(9, l, tail_acc4);
-            drift.set(10, l, 0.0);
-            drift.set(11, l, tail_acc7);
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = tail_acc10;
+            results[7][l] = -tail_vel6;
+            results[8][l] = tail_acc13;
+            results[9][l] = tail_acc4;
+            results[10][l] = 0.0;
+            results[11][l] = tail_acc7;
         }
+        drift.give(0, &results[0]);
+        drift.give(1, &results[1]);
+        drift.give(2, &results[2]);
+        drift.give(3, &results[3]);
+        drift.give(4, &results[4]);
+        drift.give(5, &results[5]);
+        drift.give(6, &results[6]);
+        drift.give(7, &results[7]);
+        drift.give(8, &results[8]);
+        drift.give(9, &results[9]);
+        drift.give(10, &results[10]);
+        drift.give(11, &results[11]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1693,6 +1860,7 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 5];
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -1727,12 +1895,17 @@ impl SphericalPendulum {
             let bob_rate21 = q_2 * v_2;
             let bob_rate22 = bob_rate20 + bob_rate21;
             let bob_rate23 = 0.5 * bob_rate22;
-            qd.set(0, l, bob_rate11);
-            qd.set(1, l, bob_rate14);
-            qd.set(2, l, bob_rate17);
-            qd.set(3, l, -bob_rate23);
-            qd.set(4, l, v_3);
+            results[0][l] = bob_rate11;
+            results[1][l] = bob_rate14;
+            results[2][l] = bob_rate17;
+            results[3][l] = -bob_rate23;
+            results[4][l] = v_3;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -95,6 +95,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -419,19 +420,31 @@ impl Ur5 {
             let wrist_3_link_pdot10 = tau_3 - wrist_1_link_pdot6;
             let wrist_3_link_pdot11 = tau_4 - wrist_2_link_pdot7;
             let wrist_3_link_pdot12 = tau_5 + wrist_3_link_pdot7;
-            qd.set(0, l, shoulder_link_rest19);
-            qd.set(1, l, ground_vel1);
-            qd.set(2, l, ground_vel5);
-            qd.set(3, l, ground_vel11);
-            qd.set(4, l, wrist_2_link_vel4);
-            qd.set(5, l, wrist_3_link_vel0);
-            pd.set(0, l, tau_0);
-            pd.set(1, l, wrist_3_link_pdot8);
-            pd.set(2, l, wrist_3_link_pdot9);
-            pd.set(3, l, wrist_3_link_pdot10);
-            pd.set(4, l, wrist_3_link_pdot11);
-            pd.set(5, l, wrist_3_link_pdot12);
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_vel1;
+            results[2][l] = ground_vel5;
+            results[3][l] = ground_vel11;
+            results[4][l] = wrist_2_link_vel4;
+            results[5][l] = wrist_3_link_vel0;
+            results[6][l] = tau_0;
+            results[7][l] = wrist_3_link_pdot8;
+            results[8][l] = wrist_3_link_pdot9;
+            results[9][l] = wrist_3_link_pdot10;
+            results[10][l] = wrist_3_link_pdot11;
+            results[11][l] = wrist_3_link_pdot12;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        pd.give(0, &results[6]);
+        pd.give(1, &results[7]);
+        pd.give(2, &results[8]);
+        pd.give(3, &results[9]);
+        pd.give(4, &results[10]);
+        pd.give(5, &results[11]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
@@ -459,6 +472,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -669,13 +683,19 @@ impl Ur5 {
             let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
             // wrist_3_link: velocity and joint rate (4.40)
             let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
-            v.set(0, l, shoulder_link_rest19);
-            v.set(1, l, ground_vel1);
-            v.set(2, l, ground_vel5);
-            v.set(3, l, ground_vel11);
-            v.set(4, l, wrist_2_link_vel4);
-            v.set(5, l, wrist_3_link_vel0);
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_vel1;
+            results[2][l] = ground_vel5;
+            results[3][l] = ground_vel11;
+            results[4][l] = wrist_2_link_vel4;
+            results[5][l] = wrist_3_link_vel0;
         }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -703,6 +723,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -853,13 +874,19 @@ impl Ur5 {
             let forearm_link_mom22 = upper_arm_link_mom5 + forearm_link_mom20;
             // upper_arm_link: momentum
             let upper_arm_link_mom6 = shoulder_link_mom0 - forearm_link_mom21;
-            p.set(0, l, upper_arm_link_mom6);
-            p.set(1, l, forearm_link_mom22);
-            p.set(2, l, wrist_1_link_mom25);
-            p.set(3, l, wrist_2_link_mom9);
-            p.set(4, l, wrist_3_link_mom5);
-            p.set(5, l, wrist_3_link_mom1);
+            results[0][l] = upper_arm_link_mom6;
+            results[1][l] = forearm_link_mom22;
+            results[2][l] = wrist_1_link_mom25;
+            results[3][l] = wrist_2_link_mom9;
+            results[4][l] = wrist_3_link_mom5;
+            results[5][l] = wrist_3_link_mom1;
         }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
     }
 
     /// Kinetic and potential energy, J.
@@ -889,6 +916,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
             let p_0 = p.get(0, l);
             let p_1 = p.get(1, l);
@@ -1119,9 +1147,11 @@ impl Ur5 {
             let shoulder_link_load0 = forearm_link_inertia7 - 1.5151591301;
             // ground: energy
             let ground_energy0 = 9.81 * shoulder_link_load0;
-            result.set(0, l, wrist_3_link_energy10);
-            result.set(1, l, -ground_energy0);
+            results[0][l] = wrist_3_link_energy10;
+            results[1][l] = -ground_energy0;
         }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
@@ -1148,6 +1178,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -1554,13 +1585,19 @@ impl Ur5 {
             let wrist_2_link_acc14 = wrist_2_link_acc10 - wrist_1_link_acc3;
             // wrist_3_link: acceleration
             let wrist_3_link_acc5 = wrist_2_link_acc3 + wrist_3_link_acc4;
-            a.set(0, l, shoulder_link_rest19);
-            a.set(1, l, ground_acc1);
-            a.set(2, l, ground_acc5);
-            a.set(3, l, ground_acc11);
-            a.set(4, l, wrist_2_link_acc14);
-            a.set(5, l, wrist_3_link_acc5);
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_acc1;
+            results[2][l] = ground_acc5;
+            results[3][l] = ground_acc11;
+            results[4][l] = wrist_2_link_acc14;
+            results[5][l] = wrist_3_link_acc5;
         }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
     }
 
     /// Mass matrix, by rows.
@@ -1588,6 +1625,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 36];
         for l in 0..LANES {
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
@@ -1700,43 +1738,79 @@ impl Ur5 {
             let upper_arm_link_mass0 = forearm_link_mass11 - forearm_link_mass13;
             let upper_arm_link_mass1 = forearm_link_mass13 + upper_arm_link_mass0;
             let upper_arm_link_mass2 = 2.7644263025275 - upper_arm_link_mass1;
-            m.set(0, l, upper_arm_link_mass2);
-            m.set(1, l, forearm_link_mass12);
-            m.set(2, l, wrist_1_link_mass32);
-            m.set(3, l, wrist_1_link_mass6);
-            m.set(4, l, wrist_2_link_mass4);
-            m.set(5, l, -wrist_3_link_mass2);
-            m.set(6, l, forearm_link_mass12);
-            m.set(7, l, -forearm_link_mass13);
-            m.set(8, l, forearm_link_mass3);
-            m.set(9, l, -wrist_1_link_mass14);
-            m.set(10, l, wrist_2_link_mass1);
-            m.set(11, l, wrist_3_link_mass1);
-            m.set(12, l, wrist_1_link_mass32);
-            m.set(13, l, forearm_link_mass3);
-            m.set(14, l, -wrist_1_link_mass33);
-            m.set(15, l, -wrist_1_link_mass10);
-            m.set(16, l, wrist_2_link_mass1);
-            m.set(17, l, wrist_3_link_mass1);
-            m.set(18, l, wrist_1_link_mass6);
-            m.set(19, l, -wrist_1_link_mass14);
-            m.set(20, l, -wrist_1_link_mass10);
-            m.set(21, l, -wrist_2_link_mass15);
-            m.set(22, l, wrist_2_link_mass1);
-            m.set(23, l, wrist_3_link_mass1);
-            m.set(24, l, wrist_2_link_mass4);
-            m.set(25, l, wrist_2_link_mass1);
-            m.set(26, l, wrist_2_link_mass1);
-            m.set(27, l, wrist_2_link_mass1);
-            m.set(28, l, -wrist_3_link_mass11);
-            m.set(29, l, 0.0);
-            m.set(30, l, -wrist_3_link_mass2);
-            m.set(31, l, wrist_3_link_mass1);
-            m.set(32, l, wrist_3_link_mass1);
-            m.set(33, l, wrist_3_link_mass1);
-            m.set(34, l, 0.0);
-            m.set(35, l, 0.0171364731454);
+            results[0][l] = upper_arm_link_mass2;
+            results[1][l] = forearm_link_mass12;
+            results[2][l] = wrist_1_link_mass32;
+            results[3][l] = wrist_1_link_mass6;
+            results[4][l] = wrist_2_link_mass4;
+            results[5][l] = -wrist_3_link_mass2;
+            results[6][l] = forearm_link_mass12;
+            results[7][l] = -forearm_link_mass13;
+            results[8][l] = forearm_link_mass3;
+            results[9][l] = -wrist_1_link_mass14;
+            results[10][l] = wrist_2_link_mass1;
+            results[11][l] = wrist_3_link_mass1;
+            results[12][l] = wrist_1_link_mass32;
+            results[13][l] = forearm_link_mass3;
+            results[14][l] = -wrist_1_link_mass33;
+            results[15][l] = -wrist_1_link_mass10;
+            results[16][l] = wrist_2_link_mass1;
+            results[17][l] = wrist_3_link_mass1;
+            results[18][l] = wrist_1_link_mass6;
+            results[19][l] = -wrist_1_link_mass14;
+            results[20][l] = -wrist_1_link_mass10;
+            results[21][l] = -wrist_2_link_mass15;
+            results[22][l] = wrist_2_link_mass1;
+            results[23][l] = wrist_3_link_mass1;
+            results[24][l] = wrist_2_link_mass4;
+            results[25][l] = wrist_2_link_mass1;
+            results[26][l] = wrist_2_link_mass1;
+            results[27][l] = wrist_2_link_mass1;
+            results[28][l] = -wrist_3_link_mass11;
+            results[29][l] = 0.0;
+            results[30][l] = -wrist_3_link_mass2;
+            results[31][l] = wrist_3_link_mass1;
+            results[32][l] = wrist_3_link_mass1;
+            results[33][l] = wrist_3_link_mass1;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0171364731454;
         }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
+        m.give(16, &results[16]);
+        m.give(17, &results[17]);
+        m.give(18, &results[18]);
+        m.give(19, &results[19]);
+        m.give(20, &results[20]);
+        m.give(21, &results[21]);
+        m.give(22, &results[22]);
+        m.give(23, &results[23]);
+        m.give(24, &results[24]);
+        m.give(25, &results[25]);
+        m.give(26, &results[26]);
+        m.give(27, &results[27]);
+        m.give(28, &results[28]);
+        m.give(29, &results[29]);
+        m.give(30, &results[30]);
+        m.give(31, &results[31]);
+        m.give(32, &results[32]);
+        m.give(33, &results[33]);
+        m.give(34, &results[34]);
+        m.give(35, &results[35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
@@ -1764,6 +1838,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2054,13 +2129,19 @@ impl Ur5 {
             let forearm_link_load36 = upper_arm_link_load13 + forearm_link_load34;
             // upper_arm_link: gravity and wrenches
             let upper_arm_link_load14 = shoulder_link_load0 - forearm_link_load35;
-            tau.set(0, l, upper_arm_link_load14);
-            tau.set(1, l, forearm_link_load36);
-            tau.set(2, l, wrist_1_link_load40);
-            tau.set(3, l, wrist_2_link_load16);
-            tau.set(4, l, wrist_3_link_load16);
-            tau.set(5, l, wrist_3_link_load7);
+            results[0][l] = upper_arm_link_load14;
+            results[1][l] = forearm_link_load36;
+            results[2][l] = wrist_1_link_load40;
+            results[3][l] = wrist_2_link_load16;
+            results[4][l] = wrist_3_link_load16;
+            results[5][l] = wrist_3_link_load7;
         }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
+        tau.give(4, &results[4]);
+        tau.give(5, &results[5]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
@@ -2088,6 +2169,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2315,13 +2397,19 @@ impl Ur5 {
             let forearm_link_load20 = forearm_link_load16 - forearm_link_load19;
             let forearm_link_load21 = upper_arm_link_load2 + forearm_link_load18;
             let forearm_link_load22 = upper_arm_link_load5 + forearm_link_load20;
-            h.set(0, l, -forearm_link_load21);
-            h.set(1, l, forearm_link_load22);
-            h.set(2, l, wrist_1_link_load37);
-            h.set(3, l, -wrist_2_link_load16);
-            h.set(4, l, wrist_3_link_load16);
-            h.set(5, l, -wrist_3_link_load7);
+            results[0][l] = -forearm_link_load21;
+            results[1][l] = forearm_link_load22;
+            results[2][l] = wrist_1_link_load37;
+            results[3][l] = -wrist_2_link_load16;
+            results[4][l] = wrist_3_link_load16;
+            results[5][l] = -wrist_3_link_load7;
         }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
+        h.give(4, &results[4]);
+        h.give(5, &results[5]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -2332,6 +2420,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
             let v_0 = v.get(0, l);
             let v_1 = v.get(1, l);
@@ -2339,13 +2428,19 @@ impl Ur5 {
             let v_3 = v.get(3, l);
             let v_4 = v.get(4, l);
             let v_5 = v.get(5, l);
-            qd.set(0, l, v_0);
-            qd.set(1, l, v_1);
-            qd.set(2, l, v_2);
-            qd.set(3, l, v_3);
-            qd.set(4, l, v_4);
-            qd.set(5, l, v_5);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
         }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -26,7 +26,9 @@ pub fn source(options: &Options) -> String {
     let values: String = fields.iter().map(|(f, _, value)| format!("{f}: {value},")).collect();
     let lane_fields: String = fields
         .iter()
-        .map(|(f, ty, _)| format!("#[doc = \"\"] pub {f}: {},", ty.replacen(&format!("{t};"), &format!("[{t}; LANES];"), 1)))
+        .map(|(f, ty, _)| {
+            format!("#[doc = \"\"] pub {f}: {},", ty.replacen(&format!("{t};"), &format!("[{t}; LANES];"), 1))
+        })
         .collect();
     let lane_values: String =
         fields.iter().map(|(f, _, value)| format!("{f}: {},", value.replacen("0.0;", "[0.0; LANES];", 1))).collect();

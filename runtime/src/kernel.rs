@@ -79,6 +79,16 @@ pub trait Read<T> {
 pub trait Write<T> {
     /// Sets number `k` of lane `l`.
     fn set(&mut self, k: usize, l: usize, x: T);
+    /// Sets number `k` of all lanes.
+    #[inline(always)]
+    fn give<const L: usize>(&mut self, k: usize, x: &[T; L])
+    where
+        T: Copy,
+    {
+        for l in 0..L {
+            self.set(k, l, x[l]);
+        }
+    }
 }
 
 macro_rules! places {

@@ -110,7 +110,8 @@ pub struct {name}Lanes<const LANES: usize> {{",
         let declarations: Vec<String> = declared(kernel.signature).iter().map(|p| p.lanes_declaration(t)).collect();
         let returns = returned.map_or(String::new(), |p| format!(" -> {}", nested(&p.dims, &lane)));
         let _ = writeln!(out, "\n{}", kernel.signature.doc);
-        let _ = writeln!(out, "    #[inline]\n    pub fn {}(&self, {}){returns} {{", kernel.name, declarations.join(", "));
+        let _ =
+            writeln!(out, "    #[inline]\n    pub fn {}(&self, {}){returns} {{", kernel.name, declarations.join(", "));
         if let Some(port) = returned {
             let _ = writeln!(out, "        let mut {} = {};", port.name, nested(&port.dims, "[0.0; LANES]"));
         }
@@ -169,9 +170,7 @@ pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel
             {rt}::kernel::call_lanes::<Self, {}, {width}, {t}, _>({ports});
         }})
     }}",
-        plan.dims.nq,
-        plan.dims.nv,
-        kernel.id
+        plan.dims.nq, plan.dims.nv, kernel.id
     );
 }
 

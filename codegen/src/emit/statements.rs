@@ -124,7 +124,10 @@ impl<'a> Body<'a> {
         );
         let arguments: Vec<&str> = self.ports.iter().map(|p| p.argument.as_str()).collect();
         let call = match self.chooses() {
-            true => format!("{rt}::kernel::call::<Self, {id}, _>(({}))", arguments.iter().map(|a| format!("{a}, ")).collect::<String>().trim_end()),
+            true => format!(
+                "{rt}::kernel::call::<Self, {id}, _>(({}))",
+                arguments.iter().map(|a| format!("{a}, ")).collect::<String>().trim_end()
+            ),
             false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
         };
         match self.ports.iter().find(|p| p.returned) {
@@ -144,10 +147,14 @@ impl<'a> Body<'a> {
             self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
         );
         self.write_sines(out);
+        let n = self.group.program.outputs.len();
+        if n > 0 {
+            let _ = writeln!(out, "        let mut results = [[0.0; LANES]; {n}];");
+        }
         let _ = writeln!(out, "        for l in 0..LANES {{");
         self.write_steps(out, &self.angles.after, true);
         self.write_results(out);
-        let _ = writeln!(out, "        }}\n    }}");
+        let _ = writeln!(out, "    }}");
     }
 
     /// Sines and cosines of all angles that are known from the start.
@@ -233,10 +240,10 @@ impl<'a> Body<'a> {
         }
     }
 
+    /// Results are gathered first: the loop over lanes writes nowhere else, so that the compiler need not ask at run time
+    /// whether what it writes is also read.
     fn write_results(&self, out: &mut String) {
-        let places = self.ports.iter().filter(|p| p.mutable);
-        let places = places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (&p.name, k)));
-        for ((name, k), output) in places.zip(&self.group.program.outputs) {
+        for (k, output) in self.group.program.outputs.iter().enumerate() {
             let value = match output {
                 Output::Const(x) => {
                     let sign = if *x < 0.0 { "-" } else { "" };
@@ -244,7 +251,13 @@ impl<'a> Body<'a> {
                 }
                 Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, self.names[id]),
             };
-            let _ = writeln!(out, "            {name}.set({k}, l, {value});");
+            let _ = writeln!(out, "            results[{k}][l] = {value};");
+        }
+        let _ = writeln!(out, "        }}");
+        let places = self.ports.iter().filter(|p| p.mutable);
+        let places = places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (&p.name, k)));
+        for (result, (name, k)) in places.enumerate() {
+            let _ = writeln!(out, "        {name}.give({k}, &results[{result}]);");
         }
     }
 }

@@ -148,11 +148,12 @@ impl Function {
                     let (array, k) = self.place(&a.left);
                     Step::Set(array, k, self.number(&a.right))
                 }
-                // qd.set(0, l, x);
-                Stmt::Expr(Expr::MethodCall(call), Some(_)) if call.method == "set" => {
-                    assert_eq!(path(&call.args[1]), "l");
-                    let array = self.array(path(&call.receiver));
-                    Step::Set(array, literal(&call.args[0]) as usize, self.number(&call.args[2]))
+                // qd.give(0, &results[4]);
+                Stmt::Expr(Expr::MethodCall(call), Some(_)) if call.method == "give" => {
+                    let Expr::Reference(result) = &call.args[1] else { panic!("results are lent") };
+                    let Expr::Index(result) = &*result.expr else { panic!("a result") };
+                    let result = Number::Item(self.array(path(&result.expr)), literal(&result.index) as usize);
+                    Step::Set(self.array(path(&call.receiver)), literal(&call.args[0]) as usize, result)
                 }
                 // for l in 0..LANES { .. }
                 Stmt::Expr(Expr::ForLoop(all), None) => {
@@ -230,7 +231,9 @@ impl Function {
             Expr::Paren(p) => self.number(&p.expr),
             Expr::Path(_) => {
                 let name = path(e);
-                Number::Local(*self.locals.last().and_then(|l| l.get(&name)).unwrap_or_else(|| panic!("{name} is not defined")))
+                Number::Local(
+                    *self.locals.last().and_then(|l| l.get(&name)).unwrap_or_else(|| panic!("{name} is not defined")),
+                )
             }
             Expr::Index(_) => {
                 let (array, k) = self.place(e);
