@@ -93,4214 +93,4824 @@ impl Chain10Planar {
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
     /// 738 operations: 320 additions, 409 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        let tau_6 = self.tau[6];
-        let tau_7 = self.tau[7];
-        let tau_8 = self.tau[8];
-        let tau_9 = self.tau[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_sin0;
-        let link10_inertia1 = 0.05 * link10_cos0;
-        let link10_inertia2 = link10_inertia1 + link10_inertia1;
-        let link10_inertia3 = 0.25 * link10_inertia2;
-        let link10_inertia4 = link10_inertia3 + 0.00835;
-        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
-        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
-        let link10_inertia7 = 0.25 * link10_inertia1;
-        let link10_inertia8 = link10_inertia7 + 0.00835;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_cos0 * link10_inertia0;
-        let link9_inertia1 = link9_sin0 * link10_inertia5;
-        let link9_inertia2 = link9_inertia0 + link9_inertia1;
-        let link9_inertia3 = link9_sin0 * link10_inertia0;
-        let link9_inertia4 = link9_cos0 * link10_inertia5;
-        let link9_inertia5 = link9_inertia3 - link9_inertia4;
-        let link9_inertia6 = link9_sin0 * link10_inertia1;
-        let link9_inertia7 = link9_inertia0 + link9_inertia6;
-        let link9_inertia8 = link9_cos0 * link10_inertia1;
-        let link9_inertia9 = link9_inertia3 - link9_inertia8;
-        let link9_inertia10 = link9_inertia5 + link9_inertia5;
-        let link9_inertia11 = 0.25 * link9_inertia10;
-        let link9_inertia12 = link10_inertia6 - link9_inertia11;
-        let link9_inertia13 = link9_inertia5 - 0.25;
-        let link9_inertia14 = link9_inertia12 + 0.05835;
-        let link9_inertia15 = 0.25 * link9_inertia9;
-        let link9_inertia16 = link10_inertia8 - link9_inertia15;
-        let link9_inertia17 = 0.25 * link9_inertia5;
-        let link9_inertia18 = link10_inertia6 - link9_inertia17;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_cos0 * link9_inertia2;
-        let link8_inertia1 = link8_sin0 * link9_inertia13;
-        let link8_inertia2 = link8_inertia0 - link8_inertia1;
-        let link8_inertia3 = link8_sin0 * link9_inertia2;
-        let link8_inertia4 = link8_cos0 * link9_inertia13;
-        let link8_inertia5 = link8_inertia3 + link8_inertia4;
-        let link8_inertia6 = link8_inertia5 + link8_inertia5;
-        let link8_inertia7 = 0.25 * link8_inertia6;
-        let link8_inertia8 = link9_inertia14 - link8_inertia7;
-        let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
-        let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
-        let link8_inertia11 = link8_cos0 * link9_inertia7;
-        let link8_inertia12 = link8_sin0 * link9_inertia9;
-        let link8_inertia13 = link8_inertia11 - link8_inertia12;
-        let link8_inertia14 = link8_sin0 * link9_inertia7;
-        let link8_inertia15 = link8_cos0 * link9_inertia9;
-        let link8_inertia16 = link8_inertia14 + link8_inertia15;
-        let link8_inertia17 = 0.25 * link8_inertia16;
-        let link8_inertia18 = link9_inertia16 - link8_inertia17;
-        let link8_inertia19 = link8_sin0 * link9_inertia5;
-        let link8_inertia20 = link8_inertia0 - link8_inertia19;
-        let link8_inertia21 = link8_cos0 * link9_inertia5;
-        let link8_inertia22 = link8_inertia3 + link8_inertia21;
-        let link8_inertia23 = 0.25 * link8_inertia22;
-        let link8_inertia24 = link9_inertia18 - link8_inertia23;
-        let link8_inertia25 = 0.25 * link8_inertia5;
-        let link8_inertia26 = link9_inertia14 - link8_inertia25;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_cos0 * link8_inertia2;
-        let link7_inertia1 = link7_sin0 * link8_inertia9;
-        let link7_inertia2 = link7_inertia0 - link7_inertia1;
-        let link7_inertia3 = link7_sin0 * link8_inertia2;
-        let link7_inertia4 = link7_cos0 * link8_inertia9;
-        let link7_inertia5 = link7_inertia3 + link7_inertia4;
-        let link7_inertia6 = link7_cos0 * link8_inertia13;
-        let link7_inertia7 = link7_sin0 * link8_inertia16;
-        let link7_inertia8 = link7_inertia6 - link7_inertia7;
-        let link7_inertia9 = link7_sin0 * link8_inertia13;
-        let link7_inertia10 = link7_cos0 * link8_inertia16;
-        let link7_inertia11 = link7_inertia9 + link7_inertia10;
-        let link7_inertia12 = link7_cos0 * link8_inertia20;
-        let link7_inertia13 = link7_sin0 * link8_inertia22;
-        let link7_inertia14 = link7_inertia12 - link7_inertia13;
-        let link7_inertia15 = link7_sin0 * link8_inertia20;
-        let link7_inertia16 = link7_cos0 * link8_inertia22;
-        let link7_inertia17 = link7_inertia15 + link7_inertia16;
-        let link7_inertia18 = link7_sin0 * link8_inertia5;
-        let link7_inertia19 = link7_inertia0 - link7_inertia18;
-        let link7_inertia20 = link7_cos0 * link8_inertia5;
-        let link7_inertia21 = link7_inertia3 + link7_inertia20;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 119.76047904191617 * link7_inertia8;
-        let link7_pivot1 = 119.76047904191617 * link7_inertia11;
-        let link7_pivot2 = 119.76047904191617 * link8_inertia18;
-        let link7_pivot3 = link7_inertia8 * link7_pivot0;
-        let link7_pivot4 = link7_inertia8 * link7_pivot1;
-        let link7_pivot5 = link7_inertia8 * link7_pivot2;
-        let link7_pivot6 = link7_inertia2 - link7_pivot5;
-        let link7_pivot7 = link7_inertia11 * link7_pivot1;
-        let link7_pivot8 = link7_inertia11 * link7_pivot2;
-        let link7_pivot9 = link7_inertia5 - link7_pivot8;
-        let link7_pivot10 = link8_inertia18 * link7_pivot2;
-        let link7_pivot11 = link8_inertia10 - link7_pivot10;
-        let link7_pivot12 = link10_inertia8 * link7_pivot0;
-        let link7_pivot13 = link10_inertia8 * link7_pivot1;
-        let link7_pivot14 = link10_inertia8 * link7_pivot2;
-        let link7_pivot15 = link7_inertia14 - link7_pivot12;
-        let link7_pivot16 = link7_inertia17 - link7_pivot13;
-        let link7_pivot17 = link8_inertia24 - link7_pivot14;
-        let link7_pivot18 = 119.76047904191617 * link10_inertia8;
-        let link7_pivot19 = link10_inertia8 * link7_pivot18;
-        let link7_pivot20 = link10_inertia6 - link7_pivot19;
-        let link7_pivot21 = 119.76047904191617 * link9_inertia16;
-        let link7_pivot22 = link10_inertia8 * link7_pivot21;
-        let link7_pivot23 = link9_inertia18 - link7_pivot22;
-        let link7_pivot24 = link9_inertia16 * link7_pivot0;
-        let link7_pivot25 = link9_inertia16 * link7_pivot1;
-        let link7_pivot26 = link9_inertia16 * link7_pivot2;
-        let link7_pivot27 = link7_inertia19 - link7_pivot24;
-        let link7_pivot28 = link7_inertia21 - link7_pivot25;
-        let link7_pivot29 = link8_inertia26 - link7_pivot26;
-        let link7_pivot30 = link9_inertia16 * link7_pivot21;
-        let link7_pivot31 = link9_inertia14 - link7_pivot30;
-        let link7_pivot32 = 1.0 / link7_pivot20;
-        let link7_pivot33 = link7_pivot15 * link7_pivot32;
-        let link7_pivot34 = link7_pivot16 * link7_pivot32;
-        let link7_pivot35 = link7_pivot17 * link7_pivot32;
-        let link7_pivot36 = link7_pivot15 * link7_pivot33;
-        let link7_pivot37 = link7_pivot3 + link7_pivot36;
-        let link7_pivot38 = link7_pivot15 * link7_pivot34;
-        let link7_pivot39 = link7_pivot4 + link7_pivot38;
-        let link7_pivot40 = link7_pivot15 * link7_pivot35;
-        let link7_pivot41 = link7_pivot6 - link7_pivot40;
-        let link7_pivot42 = link7_pivot16 * link7_pivot34;
-        let link7_pivot43 = link7_pivot7 + link7_pivot42;
-        let link7_pivot44 = link7_pivot16 * link7_pivot35;
-        let link7_pivot45 = link7_pivot9 - link7_pivot44;
-        let link7_pivot46 = link7_pivot17 * link7_pivot35;
-        let link7_pivot47 = link7_pivot11 - link7_pivot46;
-        let link7_pivot48 = link7_pivot23 * link7_pivot33;
-        let link7_pivot49 = link7_pivot23 * link7_pivot34;
-        let link7_pivot50 = link7_pivot23 * link7_pivot35;
-        let link7_pivot51 = link7_pivot27 - link7_pivot48;
-        let link7_pivot52 = link7_pivot28 - link7_pivot49;
-        let link7_pivot53 = link7_pivot29 - link7_pivot50;
-        let link7_pivot54 = link7_pivot23 * link7_pivot32;
-        let link7_pivot55 = link7_pivot23 * link7_pivot54;
-        let link7_pivot56 = link7_pivot31 - link7_pivot55;
-        let link7_pivot57 = 1.0 / link7_pivot56;
-        let link7_pivot58 = link7_pivot51 * link7_pivot57;
-        let link7_pivot59 = link7_pivot52 * link7_pivot57;
-        let link7_pivot60 = link7_pivot53 * link7_pivot57;
-        let link7_pivot61 = link7_pivot51 * link7_pivot58;
-        let link7_pivot62 = link7_pivot37 + link7_pivot61;
-        let link7_pivot63 = link7_pivot51 * link7_pivot59;
-        let link7_pivot64 = link7_pivot39 + link7_pivot63;
-        let link7_pivot65 = link7_pivot51 * link7_pivot60;
-        let link7_pivot66 = link7_pivot41 - link7_pivot65;
-        let link7_pivot67 = link7_pivot52 * link7_pivot59;
-        let link7_pivot68 = link7_pivot43 + link7_pivot67;
-        let link7_pivot69 = link7_pivot52 * link7_pivot60;
-        let link7_pivot70 = link7_pivot45 - link7_pivot69;
-        let link7_pivot71 = link7_pivot53 * link7_pivot60;
-        let link7_pivot72 = link7_pivot47 - link7_pivot71;
-        let link7_pivot73 = 1.0 / link7_pivot72;
-        let link7_pivot74 = link7_pivot66 * link7_pivot73;
-        let link7_pivot75 = link7_pivot70 * link7_pivot73;
-        let link7_pivot76 = link7_pivot66 * link7_pivot74;
-        let link7_pivot77 = link7_pivot62 + link7_pivot76;
-        let link7_pivot78 = link7_pivot66 * link7_pivot75;
-        let link7_pivot79 = link7_pivot64 + link7_pivot78;
-        let link7_pivot80 = link7_pivot70 * link7_pivot75;
-        let link7_pivot81 = link7_pivot68 + link7_pivot80;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia22 = 0.25 * link7_pivot79;
-        let link7_inertia23 = 0.25 * link7_pivot81;
-        let link7_inertia24 = 0.25 * link7_inertia23;
-        let link7_inertia25 = link7_inertia5 - 0.45;
-        let link7_inertia26 = link7_inertia23 - 0.45;
-        let link7_inertia27 = link7_inertia24 - 0.10835;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link7_pivot77 - link7_pivot81;
-        let link6_inertia1 = link6_sin0 * link6_inertia0;
-        let link6_inertia2 = link6_cos0 + link6_cos0;
-        let link6_inertia3 = link7_pivot79 * link6_inertia2;
-        let link6_inertia4 = link6_inertia1 + link6_inertia3;
-        let link6_inertia5 = link6_sin0 * link6_inertia4;
-        let link6_inertia6 = link6_cos0 * link6_inertia4;
-        let link6_inertia7 = link7_pivot79 - link6_inertia6;
-        let link6_inertia8 = link7_pivot77 - link6_inertia5;
-        let link6_inertia9 = link7_pivot81 + link6_inertia5;
-        let link6_inertia10 = link6_cos0 * link7_inertia2;
-        let link6_inertia11 = link6_sin0 * link7_inertia25;
-        let link6_inertia12 = link6_inertia10 - link6_inertia11;
-        let link6_inertia13 = link6_sin0 * link7_inertia2;
-        let link6_inertia14 = link6_cos0 * link7_inertia25;
-        let link6_inertia15 = link6_inertia13 + link6_inertia14;
-        let link6_inertia16 = link6_cos0 * link7_inertia22;
-        let link6_inertia17 = link6_sin0 * link7_inertia26;
-        let link6_inertia18 = link6_inertia16 - link6_inertia17;
-        let link6_inertia19 = link6_sin0 * link7_inertia22;
-        let link6_inertia20 = link6_cos0 * link7_inertia26;
-        let link6_inertia21 = link6_inertia19 + link6_inertia20;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia27;
-        let link6_pivot1 = link6_inertia18 * link6_pivot0;
-        let link6_pivot2 = link6_inertia21 * link6_pivot0;
-        let link6_pivot3 = link6_inertia18 * link6_pivot1;
-        let link6_pivot4 = link6_inertia8 - link6_pivot3;
-        let link6_pivot5 = link6_inertia18 * link6_pivot2;
-        let link6_pivot6 = link6_inertia7 + link6_pivot5;
-        let link6_pivot7 = link6_inertia21 * link6_pivot2;
-        let link6_pivot8 = link6_inertia9 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia22 = 0.25 * link6_pivot6;
-        let link6_inertia23 = 0.25 * link6_pivot8;
-        let link6_inertia24 = 0.25 * link6_inertia23;
-        let link6_inertia25 = link6_inertia15 - 0.55;
-        let link6_inertia26 = link6_inertia23 - 0.55;
-        let link6_inertia27 = link6_inertia24 - 0.13335;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link6_pivot4 - link6_pivot8;
-        let link5_inertia1 = link5_sin0 * link5_inertia0;
-        let link5_inertia2 = link5_cos0 + link5_cos0;
-        let link5_inertia3 = link6_pivot6 * link5_inertia2;
-        let link5_inertia4 = link5_inertia1 - link5_inertia3;
-        let link5_inertia5 = link5_sin0 * link5_inertia4;
-        let link5_inertia6 = link5_cos0 * link5_inertia4;
-        let link5_inertia7 = link6_pivot6 + link5_inertia6;
-        let link5_inertia8 = link6_pivot4 - link5_inertia5;
-        let link5_inertia9 = link6_pivot8 + link5_inertia5;
-        let link5_inertia10 = link5_cos0 * link6_inertia12;
-        let link5_inertia11 = link5_sin0 * link6_inertia25;
-        let link5_inertia12 = link5_inertia10 - link5_inertia11;
-        let link5_inertia13 = link5_sin0 * link6_inertia12;
-        let link5_inertia14 = link5_cos0 * link6_inertia25;
-        let link5_inertia15 = link5_inertia13 + link5_inertia14;
-        let link5_inertia16 = link5_cos0 * link6_inertia22;
-        let link5_inertia17 = link5_sin0 * link6_inertia26;
-        let link5_inertia18 = link5_inertia16 + link5_inertia17;
-        let link5_inertia19 = link5_sin0 * link6_inertia22;
-        let link5_inertia20 = link5_cos0 * link6_inertia26;
-        let link5_inertia21 = link5_inertia19 - link5_inertia20;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia27;
-        let link5_pivot1 = link5_inertia18 * link5_pivot0;
-        let link5_pivot2 = link5_inertia21 * link5_pivot0;
-        let link5_pivot3 = link5_inertia18 * link5_pivot1;
-        let link5_pivot4 = link5_inertia8 - link5_pivot3;
-        let link5_pivot5 = link5_inertia18 * link5_pivot2;
-        let link5_pivot6 = link5_inertia7 - link5_pivot5;
-        let link5_pivot7 = link5_inertia21 * link5_pivot2;
-        let link5_pivot8 = link5_inertia9 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia22 = 0.25 * link5_pivot6;
-        let link5_inertia23 = 0.25 * link5_pivot8;
-        let link5_inertia24 = 0.25 * link5_inertia23;
-        let link5_inertia25 = link5_inertia15 - 0.65;
-        let link5_inertia26 = link5_inertia23 - 0.65;
-        let link5_inertia27 = link5_inertia24 - 0.15835;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link5_pivot4 - link5_pivot8;
-        let link4_inertia1 = link4_sin0 * link4_inertia0;
-        let link4_inertia2 = link4_cos0 + link4_cos0;
-        let link4_inertia3 = link5_pivot6 * link4_inertia2;
-        let link4_inertia4 = link4_inertia1 + link4_inertia3;
-        let link4_inertia5 = link4_sin0 * link4_inertia4;
-        let link4_inertia6 = link4_cos0 * link4_inertia4;
-        let link4_inertia7 = link5_pivot6 - link4_inertia6;
-        let link4_inertia8 = link5_pivot4 - link4_inertia5;
-        let link4_inertia9 = link5_pivot8 + link4_inertia5;
-        let link4_inertia10 = link4_cos0 * link5_inertia12;
-        let link4_inertia11 = link4_sin0 * link5_inertia25;
-        let link4_inertia12 = link4_inertia10 - link4_inertia11;
-        let link4_inertia13 = link4_sin0 * link5_inertia12;
-        let link4_inertia14 = link4_cos0 * link5_inertia25;
-        let link4_inertia15 = link4_inertia13 + link4_inertia14;
-        let link4_inertia16 = link4_cos0 * link5_inertia22;
-        let link4_inertia17 = link4_sin0 * link5_inertia26;
-        let link4_inertia18 = link4_inertia16 - link4_inertia17;
-        let link4_inertia19 = link4_sin0 * link5_inertia22;
-        let link4_inertia20 = link4_cos0 * link5_inertia26;
-        let link4_inertia21 = link4_inertia19 + link4_inertia20;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia27;
-        let link4_pivot1 = link4_inertia18 * link4_pivot0;
-        let link4_pivot2 = link4_inertia21 * link4_pivot0;
-        let link4_pivot3 = link4_inertia18 * link4_pivot1;
-        let link4_pivot4 = link4_inertia8 - link4_pivot3;
-        let link4_pivot5 = link4_inertia18 * link4_pivot2;
-        let link4_pivot6 = link4_inertia7 + link4_pivot5;
-        let link4_pivot7 = link4_inertia21 * link4_pivot2;
-        let link4_pivot8 = link4_inertia9 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia22 = 0.25 * link4_pivot6;
-        let link4_inertia23 = 0.25 * link4_pivot8;
-        let link4_inertia24 = 0.25 * link4_inertia23;
-        let link4_inertia25 = link4_inertia15 - 0.75;
-        let link4_inertia26 = link4_inertia23 - 0.75;
-        let link4_inertia27 = link4_inertia24 - 0.18334999999999999;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link4_pivot4 - link4_pivot8;
-        let link3_inertia1 = link3_sin0 * link3_inertia0;
-        let link3_inertia2 = link3_cos0 + link3_cos0;
-        let link3_inertia3 = link4_pivot6 * link3_inertia2;
-        let link3_inertia4 = link3_inertia1 - link3_inertia3;
-        let link3_inertia5 = link3_sin0 * link3_inertia4;
-        let link3_inertia6 = link3_cos0 * link3_inertia4;
-        let link3_inertia7 = link4_pivot6 + link3_inertia6;
-        let link3_inertia8 = link4_pivot4 - link3_inertia5;
-        let link3_inertia9 = link4_pivot8 + link3_inertia5;
-        let link3_inertia10 = link3_cos0 * link4_inertia12;
-        let link3_inertia11 = link3_sin0 * link4_inertia25;
-        let link3_inertia12 = link3_inertia10 - link3_inertia11;
-        let link3_inertia13 = link3_sin0 * link4_inertia12;
-        let link3_inertia14 = link3_cos0 * link4_inertia25;
-        let link3_inertia15 = link3_inertia13 + link3_inertia14;
-        let link3_inertia16 = link3_cos0 * link4_inertia22;
-        let link3_inertia17 = link3_sin0 * link4_inertia26;
-        let link3_inertia18 = link3_inertia16 + link3_inertia17;
-        let link3_inertia19 = link3_sin0 * link4_inertia22;
-        let link3_inertia20 = link3_cos0 * link4_inertia26;
-        let link3_inertia21 = link3_inertia19 - link3_inertia20;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia27;
-        let link3_pivot1 = link3_inertia18 * link3_pivot0;
-        let link3_pivot2 = link3_inertia21 * link3_pivot0;
-        let link3_pivot3 = link3_inertia18 * link3_pivot1;
-        let link3_pivot4 = link3_inertia8 - link3_pivot3;
-        let link3_pivot5 = link3_inertia18 * link3_pivot2;
-        let link3_pivot6 = link3_inertia7 - link3_pivot5;
-        let link3_pivot7 = link3_inertia21 * link3_pivot2;
-        let link3_pivot8 = link3_inertia9 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia22 = 0.25 * link3_pivot6;
-        let link3_inertia23 = 0.25 * link3_pivot8;
-        let link3_inertia24 = 0.25 * link3_inertia23;
-        let link3_inertia25 = link3_inertia15 - 0.85;
-        let link3_inertia26 = link3_inertia23 - 0.85;
-        let link3_inertia27 = link3_inertia24 - 0.20834999999999998;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link3_pivot4 - link3_pivot8;
-        let link2_inertia1 = link2_sin0 * link2_inertia0;
-        let link2_inertia2 = link2_cos0 + link2_cos0;
-        let link2_inertia3 = link3_pivot6 * link2_inertia2;
-        let link2_inertia4 = link2_inertia1 + link2_inertia3;
-        let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link2_cos0 * link2_inertia4;
-        let link2_inertia7 = link3_pivot6 - link2_inertia6;
-        let link2_inertia8 = link3_pivot8 + link2_inertia5;
-        let link2_inertia9 = link2_cos0 * link3_inertia12;
-        let link2_inertia10 = link2_sin0 * link3_inertia25;
-        let link2_inertia11 = link2_inertia9 - link2_inertia10;
-        let link2_inertia12 = link2_sin0 * link3_inertia12;
-        let link2_inertia13 = link2_cos0 * link3_inertia25;
-        let link2_inertia14 = link2_inertia12 + link2_inertia13;
-        let link2_inertia15 = link2_cos0 * link3_inertia22;
-        let link2_inertia16 = link2_sin0 * link3_inertia26;
-        let link2_inertia17 = link2_inertia15 - link2_inertia16;
-        let link2_inertia18 = link2_sin0 * link3_inertia22;
-        let link2_inertia19 = link2_cos0 * link3_inertia26;
-        let link2_inertia20 = link2_inertia18 + link2_inertia19;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = 1.0 / link3_inertia27;
-        let link2_pivot1 = link2_inertia20 * link2_pivot0;
-        let link2_pivot2 = link2_inertia17 * link2_pivot1;
-        let link2_pivot3 = link2_inertia7 + link2_pivot2;
-        let link2_pivot4 = link2_inertia20 * link2_pivot1;
-        let link2_pivot5 = link2_inertia8 - link2_pivot4;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia21 = 0.25 * link2_pivot5;
-        let link2_inertia22 = 0.25 * link2_inertia21;
-        let link2_inertia23 = link2_inertia14 - 0.95;
-        let link2_inertia24 = link2_inertia22 - 0.23334999999999997;
-        // link1: U, Mj, k and the reduced inertia M' (4.44)
-        let link1_pivot0 = 1.0 / link2_inertia24;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = 119.76047904191617 * p_9;
-        let link7_rest1 = link10_inertia8 * link7_rest0;
-        let link7_rest2 = link9_inertia16 * link7_rest0;
-        let link7_rest3 = link7_inertia8 * link7_rest0;
-        let link7_rest4 = link7_inertia11 * link7_rest0;
-        let link7_rest5 = link8_inertia18 * link7_rest0;
-        let link7_rest6 = p_8 - link7_rest1;
-        let link7_rest7 = link7_pivot32 * link7_rest6;
-        let link7_rest8 = link7_pivot23 * link7_rest7;
-        let link7_rest9 = link7_rest2 + link7_rest8;
-        let link7_rest10 = link7_pivot15 * link7_rest7;
-        let link7_rest11 = link7_pivot16 * link7_rest7;
-        let link7_rest12 = link7_pivot17 * link7_rest7;
-        let link7_rest13 = link7_rest3 + link7_rest10;
-        let link7_rest14 = link7_rest4 + link7_rest11;
-        let link7_rest15 = link7_rest5 + link7_rest12;
-        let link7_rest16 = p_7 - link7_rest9;
-        let link7_rest17 = link7_pivot57 * link7_rest16;
-        let link7_rest18 = link7_pivot51 * link7_rest17;
-        let link7_rest19 = link7_pivot52 * link7_rest17;
-        let link7_rest20 = link7_pivot53 * link7_rest17;
-        let link7_rest21 = link7_rest13 + link7_rest18;
-        let link7_rest22 = link7_rest14 + link7_rest19;
-        let link7_rest23 = link7_rest15 + link7_rest20;
-        let link7_rest24 = p_6 - link7_rest23;
-        let link7_rest25 = link7_pivot73 * link7_rest24;
-        let link7_rest26 = link7_pivot66 * link7_rest25;
-        let link7_rest27 = link7_rest21 + link7_rest26;
-        let link7_rest28 = link7_pivot70 * link7_rest25;
-        let link7_rest29 = link7_rest22 + link7_rest28;
-        let link7_rest30 = 0.25 * link7_rest29;
-        let link7_rest31 = p_6 - link7_rest30;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = link6_cos0 * link7_rest27;
-        let link6_rest1 = link6_sin0 * link7_rest29;
-        let link6_rest2 = link6_rest0 - link6_rest1;
-        let link6_rest3 = link6_sin0 * link7_rest27;
-        let link6_rest4 = link6_cos0 * link7_rest29;
-        let link6_rest5 = link6_rest3 + link6_rest4;
-        let link6_rest6 = p_5 - link7_rest31;
-        let link6_rest7 = link6_pivot0 * link6_rest6;
-        let link6_rest8 = link6_inertia18 * link6_rest7;
-        let link6_rest9 = link6_rest2 - link6_rest8;
-        let link6_rest10 = link6_inertia21 * link6_rest7;
-        let link6_rest11 = link6_rest5 - link6_rest10;
-        let link6_rest12 = 0.25 * link6_rest11;
-        let link6_rest13 = p_5 - link6_rest12;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = link5_cos0 * link6_rest9;
-        let link5_rest1 = link5_sin0 * link6_rest11;
-        let link5_rest2 = link5_rest0 - link5_rest1;
-        let link5_rest3 = link5_sin0 * link6_rest9;
-        let link5_rest4 = link5_cos0 * link6_rest11;
-        let link5_rest5 = link5_rest3 + link5_rest4;
-        let link5_rest6 = p_4 - link6_rest13;
-        let link5_rest7 = link5_pivot0 * link5_rest6;
-        let link5_rest8 = link5_inertia18 * link5_rest7;
-        let link5_rest9 = link5_rest2 + link5_rest8;
-        let link5_rest10 = link5_inertia21 * link5_rest7;
-        let link5_rest11 = link5_rest5 + link5_rest10;
-        let link5_rest12 = 0.25 * link5_rest11;
-        let link5_rest13 = p_4 - link5_rest12;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = link4_cos0 * link5_rest9;
-        let link4_rest1 = link4_sin0 * link5_rest11;
-        let link4_rest2 = link4_rest0 - link4_rest1;
-        let link4_rest3 = link4_sin0 * link5_rest9;
-        let link4_rest4 = link4_cos0 * link5_rest11;
-        let link4_rest5 = link4_rest3 + link4_rest4;
-        let link4_rest6 = p_3 - link5_rest13;
-        let link4_rest7 = link4_pivot0 * link4_rest6;
-        let link4_rest8 = link4_inertia18 * link4_rest7;
-        let link4_rest9 = link4_rest2 - link4_rest8;
-        let link4_rest10 = link4_inertia21 * link4_rest7;
-        let link4_rest11 = link4_rest5 - link4_rest10;
-        let link4_rest12 = 0.25 * link4_rest11;
-        let link4_rest13 = p_3 - link4_rest12;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = link3_cos0 * link4_rest9;
-        let link3_rest1 = link3_sin0 * link4_rest11;
-        let link3_rest2 = link3_rest0 - link3_rest1;
-        let link3_rest3 = link3_sin0 * link4_rest9;
-        let link3_rest4 = link3_cos0 * link4_rest11;
-        let link3_rest5 = link3_rest3 + link3_rest4;
-        let link3_rest6 = p_2 - link4_rest13;
-        let link3_rest7 = link3_pivot0 * link3_rest6;
-        let link3_rest8 = link3_inertia18 * link3_rest7;
-        let link3_rest9 = link3_rest2 + link3_rest8;
-        let link3_rest10 = link3_inertia21 * link3_rest7;
-        let link3_rest11 = link3_rest5 + link3_rest10;
-        let link3_rest12 = 0.25 * link3_rest11;
-        let link3_rest13 = p_2 - link3_rest12;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_cos0 * link3_rest9;
-        let link2_rest1 = link2_sin0 * link3_rest11;
-        let link2_rest2 = link2_rest0 - link2_rest1;
-        let link2_rest3 = link2_sin0 * link3_rest9;
-        let link2_rest4 = link2_cos0 * link3_rest11;
-        let link2_rest5 = link2_rest3 + link2_rest4;
-        let link2_rest6 = p_1 - link3_rest13;
-        let link2_rest7 = link2_pivot0 * link2_rest6;
-        let link2_rest8 = link2_inertia17 * link2_rest7;
-        let link2_rest9 = link2_rest2 - link2_rest8;
-        let link2_rest10 = link2_inertia20 * link2_rest7;
-        let link2_rest11 = link2_rest5 - link2_rest10;
-        let link2_rest12 = 0.25 * link2_rest11;
-        let link2_rest13 = p_1 - link2_rest12;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_0 - link2_rest13;
-        let link1_rest1 = link1_pivot0 * link1_rest0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = 0.25 * link1_rest1;
-        let link2_vel1 = link2_pivot1 * link2_vel0;
-        let link2_vel2 = link2_rest7 - link2_vel1;
-        let link2_vel3 = link1_rest1 - link2_vel2;
-        let link2_vel4 = link2_sin0 * link2_vel0;
-        let link2_vel5 = link2_cos0 * link2_vel0;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel2;
-        let link3_vel1 = link2_vel5 + link3_vel0;
-        let link3_vel2 = link3_pivot1 * link2_vel4;
-        let link3_vel3 = link3_pivot2 * link3_vel1;
-        let link3_vel4 = link3_vel2 + link3_vel3;
-        let link3_vel5 = link3_rest7 + link3_vel4;
-        let link3_vel6 = link2_vel2 - link3_vel5;
-        let link3_vel7 = link3_cos0 * link2_vel4;
-        let link3_vel8 = link3_sin0 * link3_vel1;
-        let link3_vel9 = link3_vel7 + link3_vel8;
-        let link3_vel10 = link3_cos0 * link3_vel1;
-        let link3_vel11 = link3_sin0 * link2_vel4;
-        let link3_vel12 = link3_vel10 - link3_vel11;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel5;
-        let link4_vel1 = link3_vel12 + link4_vel0;
-        let link4_vel2 = link4_pivot1 * link3_vel9;
-        let link4_vel3 = link4_pivot2 * link4_vel1;
-        let link4_vel4 = link4_vel2 + link4_vel3;
-        let link4_vel5 = link4_rest7 - link4_vel4;
-        let link4_vel6 = link3_vel5 - link4_vel5;
-        let link4_vel7 = link4_cos0 * link3_vel9;
-        let link4_vel8 = link4_sin0 * link4_vel1;
-        let link4_vel9 = link4_vel7 + link4_vel8;
-        let link4_vel10 = link4_cos0 * link4_vel1;
-        let link4_vel11 = link4_sin0 * link3_vel9;
-        let link4_vel12 = link4_vel10 - link4_vel11;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel5;
-        let link5_vel1 = link4_vel12 + link5_vel0;
-        let link5_vel2 = link5_pivot1 * link4_vel9;
-        let link5_vel3 = link5_pivot2 * link5_vel1;
-        let link5_vel4 = link5_vel2 + link5_vel3;
-        let link5_vel5 = link5_rest7 + link5_vel4;
-        let link5_vel6 = link4_vel5 - link5_vel5;
-        let link5_vel7 = link5_cos0 * link4_vel9;
-        let link5_vel8 = link5_sin0 * link5_vel1;
-        let link5_vel9 = link5_vel7 + link5_vel8;
-        let link5_vel10 = link5_cos0 * link5_vel1;
-        let link5_vel11 = link5_sin0 * link4_vel9;
-        let link5_vel12 = link5_vel10 - link5_vel11;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel5;
-        let link6_vel1 = link5_vel12 + link6_vel0;
-        let link6_vel2 = link6_pivot1 * link5_vel9;
-        let link6_vel3 = link6_pivot2 * link6_vel1;
-        let link6_vel4 = link6_vel2 + link6_vel3;
-        let link6_vel5 = link6_rest7 - link6_vel4;
-        let link6_vel6 = link5_vel5 - link6_vel5;
-        let link6_vel7 = link6_cos0 * link5_vel9;
-        let link6_vel8 = link6_sin0 * link6_vel1;
-        let link6_vel9 = link6_vel7 + link6_vel8;
-        let link6_vel10 = link6_cos0 * link6_vel1;
-        let link6_vel11 = link6_sin0 * link5_vel9;
-        let link6_vel12 = link6_vel10 - link6_vel11;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel5;
-        let link7_vel1 = link6_vel12 + link7_vel0;
-        let link7_vel2 = link7_pivot74 * link6_vel9;
-        let link7_vel3 = link7_pivot75 * link7_vel1;
-        let link7_vel4 = link7_vel2 + link7_vel3;
-        let link7_vel5 = link7_rest25 - link7_vel4;
-        let link7_vel6 = link6_vel5 + link7_vel5;
-        let link7_vel7 = link7_pivot58 * link6_vel9;
-        let link7_vel8 = link7_pivot59 * link7_vel1;
-        let link7_vel9 = link7_vel7 + link7_vel8;
-        let link7_vel10 = link7_pivot60 * link7_vel5;
-        let link7_vel11 = link7_vel9 + link7_vel10;
-        let link7_vel12 = link7_rest17 - link7_vel11;
-        let link7_vel13 = link7_pivot33 * link6_vel9;
-        let link7_vel14 = link7_pivot34 * link7_vel1;
-        let link7_vel15 = link7_vel13 + link7_vel14;
-        let link7_vel16 = link7_pivot35 * link7_vel5;
-        let link7_vel17 = link7_vel15 + link7_vel16;
-        let link7_vel18 = link7_rest7 - link7_vel17;
-        let link7_vel19 = link7_pivot54 * link7_vel12;
-        let link7_vel20 = link7_vel18 - link7_vel19;
-        let link7_vel21 = link7_pivot0 * link6_vel9;
-        let link7_vel22 = link7_pivot1 * link7_vel1;
-        let link7_vel23 = link7_vel21 + link7_vel22;
-        let link7_vel24 = link7_pivot2 * link7_vel5;
-        let link7_vel25 = link7_vel23 + link7_vel24;
-        let link7_vel26 = link7_rest0 - link7_vel25;
-        let link7_vel27 = link7_pivot18 * link7_vel20;
-        let link7_vel28 = link7_vel26 - link7_vel27;
-        let link7_vel29 = link7_pivot21 * link7_vel12;
-        let link7_vel30 = link7_vel28 - link7_vel29;
-        let link7_vel31 = link7_cos0 * link6_vel9;
-        let link7_vel32 = link7_sin0 * link7_vel1;
-        let link7_vel33 = link7_vel31 + link7_vel32;
-        let link7_vel34 = link7_cos0 * link7_vel1;
-        let link7_vel35 = link7_sin0 * link6_vel9;
-        let link7_vel36 = link7_vel34 - link7_vel35;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = 0.25 * link7_vel5;
-        let link8_vel1 = link7_vel36 - link8_vel0;
-        let link8_vel2 = link8_cos0 * link7_vel33;
-        let link8_vel3 = link8_sin0 * link8_vel1;
-        let link8_vel4 = link8_vel2 + link8_vel3;
-        let link8_vel5 = link8_cos0 * link8_vel1;
-        let link8_vel6 = link8_sin0 * link7_vel33;
-        let link8_vel7 = link8_vel5 - link8_vel6;
-        let link8_vel8 = link7_vel5 + link7_vel12;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = 0.25 * link8_vel8;
-        let link9_vel1 = link8_vel7 - link9_vel0;
-        let link9_vel2 = link7_vel20 + link8_vel8;
-        let link9_vel3 = link9_cos0 * link8_vel4;
-        let link9_vel4 = link9_sin0 * link9_vel1;
-        let link9_vel5 = link9_vel3 + link9_vel4;
-        let link9_vel6 = link9_cos0 * link9_vel1;
-        let link9_vel7 = link9_sin0 * link8_vel4;
-        let link9_vel8 = link9_vel6 - link9_vel7;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = 0.25 * link9_vel2;
-        let link10_vel1 = link9_vel8 - link10_vel0;
-        let link10_vel2 = link7_vel30 + link9_vel2;
-        // link1: gravity and wrenches
-        let link1_load0 = 9.81 * link1_cos0;
-        let link1_load1 = 9.81 * link1_sin0;
-        // link2: gravity and wrenches
-        let link2_load0 = link2_cos0 * link1_load0;
-        let link2_load1 = link2_sin0 * link1_load1;
-        let link2_load2 = link2_load0 - link2_load1;
-        let link2_load3 = link2_cos0 * link1_load1;
-        let link2_load4 = link2_sin0 * link1_load0;
-        let link2_load5 = link2_load3 + link2_load4;
-        // link3: gravity and wrenches
-        let link3_load0 = link3_cos0 * link2_load2;
-        let link3_load1 = link3_sin0 * link2_load5;
-        let link3_load2 = link3_load0 - link3_load1;
-        let link3_load3 = link3_cos0 * link2_load5;
-        let link3_load4 = link3_sin0 * link2_load2;
-        let link3_load5 = link3_load3 + link3_load4;
-        // link4: gravity and wrenches
-        let link4_load0 = link4_cos0 * link3_load2;
-        let link4_load1 = link4_sin0 * link3_load5;
-        let link4_load2 = link4_load0 - link4_load1;
-        let link4_load3 = link4_cos0 * link3_load5;
-        let link4_load4 = link4_sin0 * link3_load2;
-        let link4_load5 = link4_load3 + link4_load4;
-        // link5: gravity and wrenches
-        let link5_load0 = link5_cos0 * link4_load2;
-        let link5_load1 = link5_sin0 * link4_load5;
-        let link5_load2 = link5_load0 - link5_load1;
-        let link5_load3 = link5_cos0 * link4_load5;
-        let link5_load4 = link5_sin0 * link4_load2;
-        let link5_load5 = link5_load3 + link5_load4;
-        // link6: gravity and wrenches
-        let link6_load0 = link6_cos0 * link5_load2;
-        let link6_load1 = link6_sin0 * link5_load5;
-        let link6_load2 = link6_load0 - link6_load1;
-        let link6_load3 = link6_cos0 * link5_load5;
-        let link6_load4 = link6_sin0 * link5_load2;
-        let link6_load5 = link6_load3 + link6_load4;
-        // link7: gravity and wrenches
-        let link7_load0 = link7_cos0 * link6_load2;
-        let link7_load1 = link7_sin0 * link6_load5;
-        let link7_load2 = link7_load0 - link7_load1;
-        let link7_load3 = link7_cos0 * link6_load5;
-        let link7_load4 = link7_sin0 * link6_load2;
-        let link7_load5 = link7_load3 + link7_load4;
-        // link8: gravity and wrenches
-        let link8_load0 = link8_cos0 * link7_load2;
-        let link8_load1 = link8_sin0 * link7_load5;
-        let link8_load2 = link8_load0 - link8_load1;
-        let link8_load3 = link8_cos0 * link7_load5;
-        let link8_load4 = link8_sin0 * link7_load2;
-        let link8_load5 = link8_load3 + link8_load4;
-        // link9: gravity and wrenches
-        let link9_load0 = link9_cos0 * link8_load2;
-        let link9_load1 = link9_sin0 * link8_load5;
-        let link9_load2 = link9_load0 - link9_load1;
-        let link9_load3 = link9_cos0 * link8_load5;
-        let link9_load4 = link9_sin0 * link8_load2;
-        let link9_load5 = link9_load3 + link9_load4;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_cos0 * link9_load5;
-        let link10_load1 = link10_sin0 * link9_load2;
-        let link10_load2 = link10_load0 + link10_load1;
-        // link1: momentum rate (4.36)
-        let link1_pdot0 = link2_inertia23 * link1_load1;
-        let link1_pdot1 = link2_inertia11 * link1_load0;
-        let link1_pdot2 = link1_pdot0 - link1_pdot1;
-        // link2: momentum rate (4.36)
-        let link2_pdot0 = link2_pivot3 * link2_vel0;
-        let link2_pdot1 = link2_rest9 + link2_pdot0;
-        let link2_pdot2 = link2_vel0 * link2_pdot1;
-        let link2_pdot3 = link3_inertia25 * link2_load5;
-        let link2_pdot4 = link3_inertia12 * link2_load2;
-        let link2_pdot5 = link2_pdot3 - link2_pdot4;
-        let link2_pdot6 = link2_pdot2 + link2_pdot5;
-        // link3: momentum rate (4.36)
-        let link3_pdot0 = link3_pivot6 * link2_vel4;
-        let link3_pdot1 = link2_inertia0 * link3_vel1;
-        let link3_pdot2 = link3_pdot0 - link3_pdot1;
-        let link3_pdot3 = link3_rest11 - link3_pdot2;
-        let link3_pdot4 = link3_pivot6 * link3_vel1;
-        let link3_pdot5 = link3_rest9 - link3_pdot4;
-        let link3_pdot6 = link2_vel4 * link3_pdot3;
-        let link3_pdot7 = link3_vel1 * link3_pdot5;
-        let link3_pdot8 = link3_pdot6 - link3_pdot7;
-        let link3_pdot9 = link4_inertia25 * link3_load5;
-        let link3_pdot10 = link4_inertia12 * link3_load2;
-        let link3_pdot11 = link3_pdot9 - link3_pdot10;
-        let link3_pdot12 = link3_pdot8 - link3_pdot11;
-        // link4: momentum rate (4.36)
-        let link4_pdot0 = link4_pivot6 * link3_vel9;
-        let link4_pdot1 = link3_inertia0 * link4_vel1;
-        let link4_pdot2 = link4_pdot0 + link4_pdot1;
-        let link4_pdot3 = link4_rest11 + link4_pdot2;
-        let link4_pdot4 = link4_pivot6 * link4_vel1;
-        let link4_pdot5 = link4_rest9 + link4_pdot4;
-        let link4_pdot6 = link3_vel9 * link4_pdot3;
-        let link4_pdot7 = link4_vel1 * link4_pdot5;
-        let link4_pdot8 = link4_pdot6 - link4_pdot7;
-        let link4_pdot9 = link5_inertia25 * link4_load5;
-        let link4_pdot10 = link5_inertia12 * link4_load2;
-        let link4_pdot11 = link4_pdot9 - link4_pdot10;
-        let link4_pdot12 = link4_pdot8 - link4_pdot11;
-        // link5: momentum rate (4.36)
-        let link5_pdot0 = link5_pivot6 * link4_vel9;
-        let link5_pdot1 = link4_inertia0 * link5_vel1;
-        let link5_pdot2 = link5_pdot0 - link5_pdot1;
-        let link5_pdot3 = link5_rest11 - link5_pdot2;
-        let link5_pdot4 = link5_pivot6 * link5_vel1;
-        let link5_pdot5 = link5_rest9 - link5_pdot4;
-        let link5_pdot6 = link4_vel9 * link5_pdot3;
-        let link5_pdot7 = link5_vel1 * link5_pdot5;
-        let link5_pdot8 = link5_pdot6 - link5_pdot7;
-        let link5_pdot9 = link6_inertia25 * link5_load5;
-        let link5_pdot10 = link6_inertia12 * link5_load2;
-        let link5_pdot11 = link5_pdot9 - link5_pdot10;
-        let link5_pdot12 = link5_pdot8 - link5_pdot11;
-        // link6: momentum rate (4.36)
-        let link6_pdot0 = link6_pivot6 * link5_vel9;
-        let link6_pdot1 = link5_inertia0 * link6_vel1;
-        let link6_pdot2 = link6_pdot0 + link6_pdot1;
-        let link6_pdot3 = link6_rest11 + link6_pdot2;
-        let link6_pdot4 = link6_pivot6 * link6_vel1;
-        let link6_pdot5 = link6_rest9 + link6_pdot4;
-        let link6_pdot6 = link5_vel9 * link6_pdot3;
-        let link6_pdot7 = link6_vel1 * link6_pdot5;
-        let link6_pdot8 = link6_pdot6 - link6_pdot7;
-        let link6_pdot9 = link7_inertia25 * link6_load5;
-        let link6_pdot10 = link7_inertia2 * link6_load2;
-        let link6_pdot11 = link6_pdot9 - link6_pdot10;
-        let link6_pdot12 = link6_pdot8 - link6_pdot11;
-        // link7: momentum rate (4.36)
-        let link7_pdot0 = link7_pivot79 * link6_vel9;
-        let link7_pdot1 = link6_inertia0 * link7_vel1;
-        let link7_pdot2 = link7_pdot0 - link7_pdot1;
-        let link7_pdot3 = link7_rest29 - link7_pdot2;
-        let link7_pdot4 = link7_pivot79 * link7_vel1;
-        let link7_pdot5 = link7_rest27 - link7_pdot4;
-        let link7_pdot6 = link6_vel9 * link7_pdot3;
-        let link7_pdot7 = link7_vel1 * link7_pdot5;
-        let link7_pdot8 = link7_pdot6 - link7_pdot7;
-        let link7_pdot9 = link8_inertia9 * link7_load5;
-        let link7_pdot10 = link8_inertia2 * link7_load2;
-        let link7_pdot11 = link7_pdot9 - link7_pdot10;
-        let link7_pdot12 = link7_pdot8 - link7_pdot11;
-        // link8: momentum rate (4.36)
-        let link8_pdot0 = link9_inertia7 * link7_vel30;
-        let link8_pdot1 = link9_inertia9 * link7_vel30;
-        let link8_pdot2 = link9_inertia2 * link7_vel20;
-        let link8_pdot3 = link9_inertia5 * link7_vel20;
-        let link8_pdot4 = link8_pdot0 + link8_pdot2;
-        let link8_pdot5 = link8_pdot1 + link8_pdot3;
-        let link8_pdot6 = link9_inertia13 * link8_vel8;
-        let link8_pdot7 = link8_pdot5 + link8_pdot6;
-        let link8_pdot8 = link9_inertia2 * link8_vel8;
-        let link8_pdot9 = link8_pdot4 + link8_pdot8;
-        let link8_pdot10 = link8_vel4 * link8_pdot7;
-        let link8_pdot11 = link8_vel7 * link8_pdot9;
-        let link8_pdot12 = link8_pdot10 - link8_pdot11;
-        let link8_pdot13 = link9_inertia13 * link8_load5;
-        let link8_pdot14 = link9_inertia2 * link8_load2;
-        let link8_pdot15 = link8_pdot13 - link8_pdot14;
-        let link8_pdot16 = link8_pdot12 - link8_pdot15;
-        // link9: momentum rate (4.36)
-        let link9_pdot0 = link9_inertia5 * link9_vel2;
-        let link9_pdot1 = link8_pdot1 + link9_pdot0;
-        let link9_pdot2 = link9_inertia2 * link9_vel2;
-        let link9_pdot3 = link8_pdot0 + link9_pdot2;
-        let link9_pdot4 = link8_vel4 * link9_pdot1;
-        let link9_pdot5 = link9_vel1 * link9_pdot3;
-        let link9_pdot6 = link9_pdot4 - link9_pdot5;
-        let link9_pdot7 = link10_inertia5 * link9_load5;
-        let link9_pdot8 = link10_inertia0 * link9_load2;
-        let link9_pdot9 = link9_pdot7 + link9_pdot8;
-        let link9_pdot10 = link9_pdot6 + link9_pdot9;
-        // link10: momentum rate (4.36)
-        let link10_pdot0 = link10_inertia1 * link10_vel2;
-        let link10_pdot1 = link10_inertia0 * link10_vel2;
-        let link10_pdot2 = link9_vel5 * link10_pdot0;
-        let link10_pdot3 = link10_vel1 * link10_pdot1;
-        let link10_pdot4 = link10_pdot2 + link10_pdot3;
-        let link10_pdot5 = 0.05 * link10_load2;
-        let link10_pdot6 = link10_pdot4 - link10_pdot5;
-        let link10_pdot7 = tau_0 + link1_pdot2;
-        let link10_pdot8 = tau_1 + link2_pdot6;
-        let link10_pdot9 = tau_2 - link3_pdot12;
-        let link10_pdot10 = tau_3 - link4_pdot12;
-        let link10_pdot11 = tau_4 - link5_pdot12;
-        let link10_pdot12 = tau_5 - link6_pdot12;
-        let link10_pdot13 = tau_6 - link7_pdot12;
-        let link10_pdot14 = tau_7 - link8_pdot16;
-        let link10_pdot15 = tau_8 - link9_pdot10;
-        let link10_pdot16 = tau_9 + link10_pdot6;
-        qd[0] = -link1_rest1;
-        qd[1] = link2_vel3;
-        qd[2] = link3_vel6;
-        qd[3] = link4_vel6;
-        qd[4] = link5_vel6;
-        qd[5] = link6_vel6;
-        qd[6] = link7_vel6;
-        qd[7] = link7_vel12;
-        qd[8] = link7_vel20;
-        qd[9] = link7_vel30;
-        pd[0] = link10_pdot7;
-        pd[1] = link10_pdot8;
-        pd[2] = link10_pdot9;
-        pd[3] = link10_pdot10;
-        pd[4] = link10_pdot11;
-        pd[5] = link10_pdot12;
-        pd[6] = link10_pdot13;
-        pd[7] = link10_pdot14;
-        pd[8] = link10_pdot15;
-        pd[9] = link10_pdot16;
+        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+    }
+
+    #[inline(always)]
+    fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+            angles[2][l] = q_2;
+            angles[3][l] = q_3;
+            angles[4][l] = q_4;
+            angles[5][l] = q_5;
+            angles[6][l] = q_6;
+            angles[7][l] = q_7;
+            angles[8][l] = q_8;
+            angles[9][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 20];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            let tau_6 = tau.get(6, l);
+            let tau_7 = tau.get(7, l);
+            let tau_8 = tau.get(8, l);
+            let tau_9 = tau.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.05 * link10_sin0;
+            let link10_inertia1 = 0.05 * link10_cos0;
+            let link10_inertia2 = link10_inertia1 + link10_inertia1;
+            let link10_inertia3 = 0.25 * link10_inertia2;
+            let link10_inertia4 = link10_inertia3 + 0.00835;
+            let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+            let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+            let link10_inertia7 = 0.25 * link10_inertia1;
+            let link10_inertia8 = link10_inertia7 + 0.00835;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link9_cos0 * link10_inertia0;
+            let link9_inertia1 = link9_sin0 * link10_inertia5;
+            let link9_inertia2 = link9_inertia0 + link9_inertia1;
+            let link9_inertia3 = link9_sin0 * link10_inertia0;
+            let link9_inertia4 = link9_cos0 * link10_inertia5;
+            let link9_inertia5 = link9_inertia3 - link9_inertia4;
+            let link9_inertia6 = link9_sin0 * link10_inertia1;
+            let link9_inertia7 = link9_inertia0 + link9_inertia6;
+            let link9_inertia8 = link9_cos0 * link10_inertia1;
+            let link9_inertia9 = link9_inertia3 - link9_inertia8;
+            let link9_inertia10 = link9_inertia5 + link9_inertia5;
+            let link9_inertia11 = 0.25 * link9_inertia10;
+            let link9_inertia12 = link10_inertia6 - link9_inertia11;
+            let link9_inertia13 = link9_inertia5 - 0.25;
+            let link9_inertia14 = link9_inertia12 + 0.05835;
+            let link9_inertia15 = 0.25 * link9_inertia9;
+            let link9_inertia16 = link10_inertia8 - link9_inertia15;
+            let link9_inertia17 = 0.25 * link9_inertia5;
+            let link9_inertia18 = link10_inertia6 - link9_inertia17;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link8_cos0 * link9_inertia2;
+            let link8_inertia1 = link8_sin0 * link9_inertia13;
+            let link8_inertia2 = link8_inertia0 - link8_inertia1;
+            let link8_inertia3 = link8_sin0 * link9_inertia2;
+            let link8_inertia4 = link8_cos0 * link9_inertia13;
+            let link8_inertia5 = link8_inertia3 + link8_inertia4;
+            let link8_inertia6 = link8_inertia5 + link8_inertia5;
+            let link8_inertia7 = 0.25 * link8_inertia6;
+            let link8_inertia8 = link9_inertia14 - link8_inertia7;
+            let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
+            let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
+            let link8_inertia11 = link8_cos0 * link9_inertia7;
+            let link8_inertia12 = link8_sin0 * link9_inertia9;
+            let link8_inertia13 = link8_inertia11 - link8_inertia12;
+            let link8_inertia14 = link8_sin0 * link9_inertia7;
+            let link8_inertia15 = link8_cos0 * link9_inertia9;
+            let link8_inertia16 = link8_inertia14 + link8_inertia15;
+            let link8_inertia17 = 0.25 * link8_inertia16;
+            let link8_inertia18 = link9_inertia16 - link8_inertia17;
+            let link8_inertia19 = link8_sin0 * link9_inertia5;
+            let link8_inertia20 = link8_inertia0 - link8_inertia19;
+            let link8_inertia21 = link8_cos0 * link9_inertia5;
+            let link8_inertia22 = link8_inertia3 + link8_inertia21;
+            let link8_inertia23 = 0.25 * link8_inertia22;
+            let link8_inertia24 = link9_inertia18 - link8_inertia23;
+            let link8_inertia25 = 0.25 * link8_inertia5;
+            let link8_inertia26 = link9_inertia14 - link8_inertia25;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link7_cos0 * link8_inertia2;
+            let link7_inertia1 = link7_sin0 * link8_inertia9;
+            let link7_inertia2 = link7_inertia0 - link7_inertia1;
+            let link7_inertia3 = link7_sin0 * link8_inertia2;
+            let link7_inertia4 = link7_cos0 * link8_inertia9;
+            let link7_inertia5 = link7_inertia3 + link7_inertia4;
+            let link7_inertia6 = link7_cos0 * link8_inertia13;
+            let link7_inertia7 = link7_sin0 * link8_inertia16;
+            let link7_inertia8 = link7_inertia6 - link7_inertia7;
+            let link7_inertia9 = link7_sin0 * link8_inertia13;
+            let link7_inertia10 = link7_cos0 * link8_inertia16;
+            let link7_inertia11 = link7_inertia9 + link7_inertia10;
+            let link7_inertia12 = link7_cos0 * link8_inertia20;
+            let link7_inertia13 = link7_sin0 * link8_inertia22;
+            let link7_inertia14 = link7_inertia12 - link7_inertia13;
+            let link7_inertia15 = link7_sin0 * link8_inertia20;
+            let link7_inertia16 = link7_cos0 * link8_inertia22;
+            let link7_inertia17 = link7_inertia15 + link7_inertia16;
+            let link7_inertia18 = link7_sin0 * link8_inertia5;
+            let link7_inertia19 = link7_inertia0 - link7_inertia18;
+            let link7_inertia20 = link7_cos0 * link8_inertia5;
+            let link7_inertia21 = link7_inertia3 + link7_inertia20;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = 119.76047904191617 * link7_inertia8;
+            let link7_pivot1 = 119.76047904191617 * link7_inertia11;
+            let link7_pivot2 = 119.76047904191617 * link8_inertia18;
+            let link7_pivot3 = link7_inertia8 * link7_pivot0;
+            let link7_pivot4 = link7_inertia8 * link7_pivot1;
+            let link7_pivot5 = link7_inertia8 * link7_pivot2;
+            let link7_pivot6 = link7_inertia2 - link7_pivot5;
+            let link7_pivot7 = link7_inertia11 * link7_pivot1;
+            let link7_pivot8 = link7_inertia11 * link7_pivot2;
+            let link7_pivot9 = link7_inertia5 - link7_pivot8;
+            let link7_pivot10 = link8_inertia18 * link7_pivot2;
+            let link7_pivot11 = link8_inertia10 - link7_pivot10;
+            let link7_pivot12 = link10_inertia8 * link7_pivot0;
+            let link7_pivot13 = link10_inertia8 * link7_pivot1;
+            let link7_pivot14 = link10_inertia8 * link7_pivot2;
+            let link7_pivot15 = link7_inertia14 - link7_pivot12;
+            let link7_pivot16 = link7_inertia17 - link7_pivot13;
+            let link7_pivot17 = link8_inertia24 - link7_pivot14;
+            let link7_pivot18 = 119.76047904191617 * link10_inertia8;
+            let link7_pivot19 = link10_inertia8 * link7_pivot18;
+            let link7_pivot20 = link10_inertia6 - link7_pivot19;
+            let link7_pivot21 = 119.76047904191617 * link9_inertia16;
+            let link7_pivot22 = link10_inertia8 * link7_pivot21;
+            let link7_pivot23 = link9_inertia18 - link7_pivot22;
+            let link7_pivot24 = link9_inertia16 * link7_pivot0;
+            let link7_pivot25 = link9_inertia16 * link7_pivot1;
+            let link7_pivot26 = link9_inertia16 * link7_pivot2;
+            let link7_pivot27 = link7_inertia19 - link7_pivot24;
+            let link7_pivot28 = link7_inertia21 - link7_pivot25;
+            let link7_pivot29 = link8_inertia26 - link7_pivot26;
+            let link7_pivot30 = link9_inertia16 * link7_pivot21;
+            let link7_pivot31 = link9_inertia14 - link7_pivot30;
+            let link7_pivot32 = 1.0 / link7_pivot20;
+            let link7_pivot33 = link7_pivot15 * link7_pivot32;
+            let link7_pivot34 = link7_pivot16 * link7_pivot32;
+            let link7_pivot35 = link7_pivot17 * link7_pivot32;
+            let link7_pivot36 = link7_pivot15 * link7_pivot33;
+            let link7_pivot37 = link7_pivot3 + link7_pivot36;
+            let link7_pivot38 = link7_pivot15 * link7_pivot34;
+            let link7_pivot39 = link7_pivot4 + link7_pivot38;
+            let link7_pivot40 = link7_pivot15 * link7_pivot35;
+            let link7_pivot41 = link7_pivot6 - link7_pivot40;
+            let link7_pivot42 = link7_pivot16 * link7_pivot34;
+            let link7_pivot43 = link7_pivot7 + link7_pivot42;
+            let link7_pivot44 = link7_pivot16 * link7_pivot35;
+            let link7_pivot45 = link7_pivot9 - link7_pivot44;
+            let link7_pivot46 = link7_pivot17 * link7_pivot35;
+            let link7_pivot47 = link7_pivot11 - link7_pivot46;
+            let link7_pivot48 = link7_pivot23 * link7_pivot33;
+            let link7_pivot49 = link7_pivot23 * link7_pivot34;
+            let link7_pivot50 = link7_pivot23 * link7_pivot35;
+            let link7_pivot51 = link7_pivot27 - link7_pivot48;
+            let link7_pivot52 = link7_pivot28 - link7_pivot49;
+            let link7_pivot53 = link7_pivot29 - link7_pivot50;
+            let link7_pivot54 = link7_pivot23 * link7_pivot32;
+            let link7_pivot55 = link7_pivot23 * link7_pivot54;
+            let link7_pivot56 = link7_pivot31 - link7_pivot55;
+            let link7_pivot57 = 1.0 / link7_pivot56;
+            let link7_pivot58 = link7_pivot51 * link7_pivot57;
+            let link7_pivot59 = link7_pivot52 * link7_pivot57;
+            let link7_pivot60 = link7_pivot53 * link7_pivot57;
+            let link7_pivot61 = link7_pivot51 * link7_pivot58;
+            let link7_pivot62 = link7_pivot37 + link7_pivot61;
+            let link7_pivot63 = link7_pivot51 * link7_pivot59;
+            let link7_pivot64 = link7_pivot39 + link7_pivot63;
+            let link7_pivot65 = link7_pivot51 * link7_pivot60;
+            let link7_pivot66 = link7_pivot41 - link7_pivot65;
+            let link7_pivot67 = link7_pivot52 * link7_pivot59;
+            let link7_pivot68 = link7_pivot43 + link7_pivot67;
+            let link7_pivot69 = link7_pivot52 * link7_pivot60;
+            let link7_pivot70 = link7_pivot45 - link7_pivot69;
+            let link7_pivot71 = link7_pivot53 * link7_pivot60;
+            let link7_pivot72 = link7_pivot47 - link7_pivot71;
+            let link7_pivot73 = 1.0 / link7_pivot72;
+            let link7_pivot74 = link7_pivot66 * link7_pivot73;
+            let link7_pivot75 = link7_pivot70 * link7_pivot73;
+            let link7_pivot76 = link7_pivot66 * link7_pivot74;
+            let link7_pivot77 = link7_pivot62 + link7_pivot76;
+            let link7_pivot78 = link7_pivot66 * link7_pivot75;
+            let link7_pivot79 = link7_pivot64 + link7_pivot78;
+            let link7_pivot80 = link7_pivot70 * link7_pivot75;
+            let link7_pivot81 = link7_pivot68 + link7_pivot80;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia22 = 0.25 * link7_pivot79;
+            let link7_inertia23 = 0.25 * link7_pivot81;
+            let link7_inertia24 = 0.25 * link7_inertia23;
+            let link7_inertia25 = link7_inertia5 - 0.45;
+            let link7_inertia26 = link7_inertia23 - 0.45;
+            let link7_inertia27 = link7_inertia24 - 0.10835;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link7_pivot77 - link7_pivot81;
+            let link6_inertia1 = link6_sin0 * link6_inertia0;
+            let link6_inertia2 = link6_cos0 + link6_cos0;
+            let link6_inertia3 = link7_pivot79 * link6_inertia2;
+            let link6_inertia4 = link6_inertia1 + link6_inertia3;
+            let link6_inertia5 = link6_sin0 * link6_inertia4;
+            let link6_inertia6 = link6_cos0 * link6_inertia4;
+            let link6_inertia7 = link7_pivot79 - link6_inertia6;
+            let link6_inertia8 = link7_pivot77 - link6_inertia5;
+            let link6_inertia9 = link7_pivot81 + link6_inertia5;
+            let link6_inertia10 = link6_cos0 * link7_inertia2;
+            let link6_inertia11 = link6_sin0 * link7_inertia25;
+            let link6_inertia12 = link6_inertia10 - link6_inertia11;
+            let link6_inertia13 = link6_sin0 * link7_inertia2;
+            let link6_inertia14 = link6_cos0 * link7_inertia25;
+            let link6_inertia15 = link6_inertia13 + link6_inertia14;
+            let link6_inertia16 = link6_cos0 * link7_inertia22;
+            let link6_inertia17 = link6_sin0 * link7_inertia26;
+            let link6_inertia18 = link6_inertia16 - link6_inertia17;
+            let link6_inertia19 = link6_sin0 * link7_inertia22;
+            let link6_inertia20 = link6_cos0 * link7_inertia26;
+            let link6_inertia21 = link6_inertia19 + link6_inertia20;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = 1.0 / link7_inertia27;
+            let link6_pivot1 = link6_inertia18 * link6_pivot0;
+            let link6_pivot2 = link6_inertia21 * link6_pivot0;
+            let link6_pivot3 = link6_inertia18 * link6_pivot1;
+            let link6_pivot4 = link6_inertia8 - link6_pivot3;
+            let link6_pivot5 = link6_inertia18 * link6_pivot2;
+            let link6_pivot6 = link6_inertia7 + link6_pivot5;
+            let link6_pivot7 = link6_inertia21 * link6_pivot2;
+            let link6_pivot8 = link6_inertia9 - link6_pivot7;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia22 = 0.25 * link6_pivot6;
+            let link6_inertia23 = 0.25 * link6_pivot8;
+            let link6_inertia24 = 0.25 * link6_inertia23;
+            let link6_inertia25 = link6_inertia15 - 0.55;
+            let link6_inertia26 = link6_inertia23 - 0.55;
+            let link6_inertia27 = link6_inertia24 - 0.13335;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link6_pivot4 - link6_pivot8;
+            let link5_inertia1 = link5_sin0 * link5_inertia0;
+            let link5_inertia2 = link5_cos0 + link5_cos0;
+            let link5_inertia3 = link6_pivot6 * link5_inertia2;
+            let link5_inertia4 = link5_inertia1 - link5_inertia3;
+            let link5_inertia5 = link5_sin0 * link5_inertia4;
+            let link5_inertia6 = link5_cos0 * link5_inertia4;
+            let link5_inertia7 = link6_pivot6 + link5_inertia6;
+            let link5_inertia8 = link6_pivot4 - link5_inertia5;
+            let link5_inertia9 = link6_pivot8 + link5_inertia5;
+            let link5_inertia10 = link5_cos0 * link6_inertia12;
+            let link5_inertia11 = link5_sin0 * link6_inertia25;
+            let link5_inertia12 = link5_inertia10 - link5_inertia11;
+            let link5_inertia13 = link5_sin0 * link6_inertia12;
+            let link5_inertia14 = link5_cos0 * link6_inertia25;
+            let link5_inertia15 = link5_inertia13 + link5_inertia14;
+            let link5_inertia16 = link5_cos0 * link6_inertia22;
+            let link5_inertia17 = link5_sin0 * link6_inertia26;
+            let link5_inertia18 = link5_inertia16 + link5_inertia17;
+            let link5_inertia19 = link5_sin0 * link6_inertia22;
+            let link5_inertia20 = link5_cos0 * link6_inertia26;
+            let link5_inertia21 = link5_inertia19 - link5_inertia20;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = 1.0 / link6_inertia27;
+            let link5_pivot1 = link5_inertia18 * link5_pivot0;
+            let link5_pivot2 = link5_inertia21 * link5_pivot0;
+            let link5_pivot3 = link5_inertia18 * link5_pivot1;
+            let link5_pivot4 = link5_inertia8 - link5_pivot3;
+            let link5_pivot5 = link5_inertia18 * link5_pivot2;
+            let link5_pivot6 = link5_inertia7 - link5_pivot5;
+            let link5_pivot7 = link5_inertia21 * link5_pivot2;
+            let link5_pivot8 = link5_inertia9 - link5_pivot7;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia22 = 0.25 * link5_pivot6;
+            let link5_inertia23 = 0.25 * link5_pivot8;
+            let link5_inertia24 = 0.25 * link5_inertia23;
+            let link5_inertia25 = link5_inertia15 - 0.65;
+            let link5_inertia26 = link5_inertia23 - 0.65;
+            let link5_inertia27 = link5_inertia24 - 0.15835;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link5_pivot4 - link5_pivot8;
+            let link4_inertia1 = link4_sin0 * link4_inertia0;
+            let link4_inertia2 = link4_cos0 + link4_cos0;
+            let link4_inertia3 = link5_pivot6 * link4_inertia2;
+            let link4_inertia4 = link4_inertia1 + link4_inertia3;
+            let link4_inertia5 = link4_sin0 * link4_inertia4;
+            let link4_inertia6 = link4_cos0 * link4_inertia4;
+            let link4_inertia7 = link5_pivot6 - link4_inertia6;
+            let link4_inertia8 = link5_pivot4 - link4_inertia5;
+            let link4_inertia9 = link5_pivot8 + link4_inertia5;
+            let link4_inertia10 = link4_cos0 * link5_inertia12;
+            let link4_inertia11 = link4_sin0 * link5_inertia25;
+            let link4_inertia12 = link4_inertia10 - link4_inertia11;
+            let link4_inertia13 = link4_sin0 * link5_inertia12;
+            let link4_inertia14 = link4_cos0 * link5_inertia25;
+            let link4_inertia15 = link4_inertia13 + link4_inertia14;
+            let link4_inertia16 = link4_cos0 * link5_inertia22;
+            let link4_inertia17 = link4_sin0 * link5_inertia26;
+            let link4_inertia18 = link4_inertia16 - link4_inertia17;
+            let link4_inertia19 = link4_sin0 * link5_inertia22;
+            let link4_inertia20 = link4_cos0 * link5_inertia26;
+            let link4_inertia21 = link4_inertia19 + link4_inertia20;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = 1.0 / link5_inertia27;
+            let link4_pivot1 = link4_inertia18 * link4_pivot0;
+            let link4_pivot2 = link4_inertia21 * link4_pivot0;
+            let link4_pivot3 = link4_inertia18 * link4_pivot1;
+            let link4_pivot4 = link4_inertia8 - link4_pivot3;
+            let link4_pivot5 = link4_inertia18 * link4_pivot2;
+            let link4_pivot6 = link4_inertia7 + link4_pivot5;
+            let link4_pivot7 = link4_inertia21 * link4_pivot2;
+            let link4_pivot8 = link4_inertia9 - link4_pivot7;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia22 = 0.25 * link4_pivot6;
+            let link4_inertia23 = 0.25 * link4_pivot8;
+            let link4_inertia24 = 0.25 * link4_inertia23;
+            let link4_inertia25 = link4_inertia15 - 0.75;
+            let link4_inertia26 = link4_inertia23 - 0.75;
+            let link4_inertia27 = link4_inertia24 - 0.18334999999999999;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link4_pivot4 - link4_pivot8;
+            let link3_inertia1 = link3_sin0 * link3_inertia0;
+            let link3_inertia2 = link3_cos0 + link3_cos0;
+            let link3_inertia3 = link4_pivot6 * link3_inertia2;
+            let link3_inertia4 = link3_inertia1 - link3_inertia3;
+            let link3_inertia5 = link3_sin0 * link3_inertia4;
+            let link3_inertia6 = link3_cos0 * link3_inertia4;
+            let link3_inertia7 = link4_pivot6 + link3_inertia6;
+            let link3_inertia8 = link4_pivot4 - link3_inertia5;
+            let link3_inertia9 = link4_pivot8 + link3_inertia5;
+            let link3_inertia10 = link3_cos0 * link4_inertia12;
+            let link3_inertia11 = link3_sin0 * link4_inertia25;
+            let link3_inertia12 = link3_inertia10 - link3_inertia11;
+            let link3_inertia13 = link3_sin0 * link4_inertia12;
+            let link3_inertia14 = link3_cos0 * link4_inertia25;
+            let link3_inertia15 = link3_inertia13 + link3_inertia14;
+            let link3_inertia16 = link3_cos0 * link4_inertia22;
+            let link3_inertia17 = link3_sin0 * link4_inertia26;
+            let link3_inertia18 = link3_inertia16 + link3_inertia17;
+            let link3_inertia19 = link3_sin0 * link4_inertia22;
+            let link3_inertia20 = link3_cos0 * link4_inertia26;
+            let link3_inertia21 = link3_inertia19 - link3_inertia20;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = 1.0 / link4_inertia27;
+            let link3_pivot1 = link3_inertia18 * link3_pivot0;
+            let link3_pivot2 = link3_inertia21 * link3_pivot0;
+            let link3_pivot3 = link3_inertia18 * link3_pivot1;
+            let link3_pivot4 = link3_inertia8 - link3_pivot3;
+            let link3_pivot5 = link3_inertia18 * link3_pivot2;
+            let link3_pivot6 = link3_inertia7 - link3_pivot5;
+            let link3_pivot7 = link3_inertia21 * link3_pivot2;
+            let link3_pivot8 = link3_inertia9 - link3_pivot7;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia22 = 0.25 * link3_pivot6;
+            let link3_inertia23 = 0.25 * link3_pivot8;
+            let link3_inertia24 = 0.25 * link3_inertia23;
+            let link3_inertia25 = link3_inertia15 - 0.85;
+            let link3_inertia26 = link3_inertia23 - 0.85;
+            let link3_inertia27 = link3_inertia24 - 0.20834999999999998;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link3_pivot4 - link3_pivot8;
+            let link2_inertia1 = link2_sin0 * link2_inertia0;
+            let link2_inertia2 = link2_cos0 + link2_cos0;
+            let link2_inertia3 = link3_pivot6 * link2_inertia2;
+            let link2_inertia4 = link2_inertia1 + link2_inertia3;
+            let link2_inertia5 = link2_sin0 * link2_inertia4;
+            let link2_inertia6 = link2_cos0 * link2_inertia4;
+            let link2_inertia7 = link3_pivot6 - link2_inertia6;
+            let link2_inertia8 = link3_pivot8 + link2_inertia5;
+            let link2_inertia9 = link2_cos0 * link3_inertia12;
+            let link2_inertia10 = link2_sin0 * link3_inertia25;
+            let link2_inertia11 = link2_inertia9 - link2_inertia10;
+            let link2_inertia12 = link2_sin0 * link3_inertia12;
+            let link2_inertia13 = link2_cos0 * link3_inertia25;
+            let link2_inertia14 = link2_inertia12 + link2_inertia13;
+            let link2_inertia15 = link2_cos0 * link3_inertia22;
+            let link2_inertia16 = link2_sin0 * link3_inertia26;
+            let link2_inertia17 = link2_inertia15 - link2_inertia16;
+            let link2_inertia18 = link2_sin0 * link3_inertia22;
+            let link2_inertia19 = link2_cos0 * link3_inertia26;
+            let link2_inertia20 = link2_inertia18 + link2_inertia19;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = 1.0 / link3_inertia27;
+            let link2_pivot1 = link2_inertia20 * link2_pivot0;
+            let link2_pivot2 = link2_inertia17 * link2_pivot1;
+            let link2_pivot3 = link2_inertia7 + link2_pivot2;
+            let link2_pivot4 = link2_inertia20 * link2_pivot1;
+            let link2_pivot5 = link2_inertia8 - link2_pivot4;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia21 = 0.25 * link2_pivot5;
+            let link2_inertia22 = 0.25 * link2_inertia21;
+            let link2_inertia23 = link2_inertia14 - 0.95;
+            let link2_inertia24 = link2_inertia22 - 0.23334999999999997;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = 1.0 / link2_inertia24;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = 119.76047904191617 * p_9;
+            let link7_rest1 = link10_inertia8 * link7_rest0;
+            let link7_rest2 = link9_inertia16 * link7_rest0;
+            let link7_rest3 = link7_inertia8 * link7_rest0;
+            let link7_rest4 = link7_inertia11 * link7_rest0;
+            let link7_rest5 = link8_inertia18 * link7_rest0;
+            let link7_rest6 = p_8 - link7_rest1;
+            let link7_rest7 = link7_pivot32 * link7_rest6;
+            let link7_rest8 = link7_pivot23 * link7_rest7;
+            let link7_rest9 = link7_rest2 + link7_rest8;
+            let link7_rest10 = link7_pivot15 * link7_rest7;
+            let link7_rest11 = link7_pivot16 * link7_rest7;
+            let link7_rest12 = link7_pivot17 * link7_rest7;
+            let link7_rest13 = link7_rest3 + link7_rest10;
+            let link7_rest14 = link7_rest4 + link7_rest11;
+            let link7_rest15 = link7_rest5 + link7_rest12;
+            let link7_rest16 = p_7 - link7_rest9;
+            let link7_rest17 = link7_pivot57 * link7_rest16;
+            let link7_rest18 = link7_pivot51 * link7_rest17;
+            let link7_rest19 = link7_pivot52 * link7_rest17;
+            let link7_rest20 = link7_pivot53 * link7_rest17;
+            let link7_rest21 = link7_rest13 + link7_rest18;
+            let link7_rest22 = link7_rest14 + link7_rest19;
+            let link7_rest23 = link7_rest15 + link7_rest20;
+            let link7_rest24 = p_6 - link7_rest23;
+            let link7_rest25 = link7_pivot73 * link7_rest24;
+            let link7_rest26 = link7_pivot66 * link7_rest25;
+            let link7_rest27 = link7_rest21 + link7_rest26;
+            let link7_rest28 = link7_pivot70 * link7_rest25;
+            let link7_rest29 = link7_rest22 + link7_rest28;
+            let link7_rest30 = 0.25 * link7_rest29;
+            let link7_rest31 = p_6 - link7_rest30;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_cos0 * link7_rest27;
+            let link6_rest1 = link6_sin0 * link7_rest29;
+            let link6_rest2 = link6_rest0 - link6_rest1;
+            let link6_rest3 = link6_sin0 * link7_rest27;
+            let link6_rest4 = link6_cos0 * link7_rest29;
+            let link6_rest5 = link6_rest3 + link6_rest4;
+            let link6_rest6 = p_5 - link7_rest31;
+            let link6_rest7 = link6_pivot0 * link6_rest6;
+            let link6_rest8 = link6_inertia18 * link6_rest7;
+            let link6_rest9 = link6_rest2 - link6_rest8;
+            let link6_rest10 = link6_inertia21 * link6_rest7;
+            let link6_rest11 = link6_rest5 - link6_rest10;
+            let link6_rest12 = 0.25 * link6_rest11;
+            let link6_rest13 = p_5 - link6_rest12;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_cos0 * link6_rest9;
+            let link5_rest1 = link5_sin0 * link6_rest11;
+            let link5_rest2 = link5_rest0 - link5_rest1;
+            let link5_rest3 = link5_sin0 * link6_rest9;
+            let link5_rest4 = link5_cos0 * link6_rest11;
+            let link5_rest5 = link5_rest3 + link5_rest4;
+            let link5_rest6 = p_4 - link6_rest13;
+            let link5_rest7 = link5_pivot0 * link5_rest6;
+            let link5_rest8 = link5_inertia18 * link5_rest7;
+            let link5_rest9 = link5_rest2 + link5_rest8;
+            let link5_rest10 = link5_inertia21 * link5_rest7;
+            let link5_rest11 = link5_rest5 + link5_rest10;
+            let link5_rest12 = 0.25 * link5_rest11;
+            let link5_rest13 = p_4 - link5_rest12;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_cos0 * link5_rest9;
+            let link4_rest1 = link4_sin0 * link5_rest11;
+            let link4_rest2 = link4_rest0 - link4_rest1;
+            let link4_rest3 = link4_sin0 * link5_rest9;
+            let link4_rest4 = link4_cos0 * link5_rest11;
+            let link4_rest5 = link4_rest3 + link4_rest4;
+            let link4_rest6 = p_3 - link5_rest13;
+            let link4_rest7 = link4_pivot0 * link4_rest6;
+            let link4_rest8 = link4_inertia18 * link4_rest7;
+            let link4_rest9 = link4_rest2 - link4_rest8;
+            let link4_rest10 = link4_inertia21 * link4_rest7;
+            let link4_rest11 = link4_rest5 - link4_rest10;
+            let link4_rest12 = 0.25 * link4_rest11;
+            let link4_rest13 = p_3 - link4_rest12;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_cos0 * link4_rest9;
+            let link3_rest1 = link3_sin0 * link4_rest11;
+            let link3_rest2 = link3_rest0 - link3_rest1;
+            let link3_rest3 = link3_sin0 * link4_rest9;
+            let link3_rest4 = link3_cos0 * link4_rest11;
+            let link3_rest5 = link3_rest3 + link3_rest4;
+            let link3_rest6 = p_2 - link4_rest13;
+            let link3_rest7 = link3_pivot0 * link3_rest6;
+            let link3_rest8 = link3_inertia18 * link3_rest7;
+            let link3_rest9 = link3_rest2 + link3_rest8;
+            let link3_rest10 = link3_inertia21 * link3_rest7;
+            let link3_rest11 = link3_rest5 + link3_rest10;
+            let link3_rest12 = 0.25 * link3_rest11;
+            let link3_rest13 = p_2 - link3_rest12;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_cos0 * link3_rest9;
+            let link2_rest1 = link2_sin0 * link3_rest11;
+            let link2_rest2 = link2_rest0 - link2_rest1;
+            let link2_rest3 = link2_sin0 * link3_rest9;
+            let link2_rest4 = link2_cos0 * link3_rest11;
+            let link2_rest5 = link2_rest3 + link2_rest4;
+            let link2_rest6 = p_1 - link3_rest13;
+            let link2_rest7 = link2_pivot0 * link2_rest6;
+            let link2_rest8 = link2_inertia17 * link2_rest7;
+            let link2_rest9 = link2_rest2 - link2_rest8;
+            let link2_rest10 = link2_inertia20 * link2_rest7;
+            let link2_rest11 = link2_rest5 - link2_rest10;
+            let link2_rest12 = 0.25 * link2_rest11;
+            let link2_rest13 = p_1 - link2_rest12;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_0 - link2_rest13;
+            let link1_rest1 = link1_pivot0 * link1_rest0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = 0.25 * link1_rest1;
+            let link2_vel1 = link2_pivot1 * link2_vel0;
+            let link2_vel2 = link2_rest7 - link2_vel1;
+            let link2_vel3 = link1_rest1 - link2_vel2;
+            let link2_vel4 = link2_sin0 * link2_vel0;
+            let link2_vel5 = link2_cos0 * link2_vel0;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = 0.25 * link2_vel2;
+            let link3_vel1 = link2_vel5 + link3_vel0;
+            let link3_vel2 = link3_pivot1 * link2_vel4;
+            let link3_vel3 = link3_pivot2 * link3_vel1;
+            let link3_vel4 = link3_vel2 + link3_vel3;
+            let link3_vel5 = link3_rest7 + link3_vel4;
+            let link3_vel6 = link2_vel2 - link3_vel5;
+            let link3_vel7 = link3_cos0 * link2_vel4;
+            let link3_vel8 = link3_sin0 * link3_vel1;
+            let link3_vel9 = link3_vel7 + link3_vel8;
+            let link3_vel10 = link3_cos0 * link3_vel1;
+            let link3_vel11 = link3_sin0 * link2_vel4;
+            let link3_vel12 = link3_vel10 - link3_vel11;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = 0.25 * link3_vel5;
+            let link4_vel1 = link3_vel12 + link4_vel0;
+            let link4_vel2 = link4_pivot1 * link3_vel9;
+            let link4_vel3 = link4_pivot2 * link4_vel1;
+            let link4_vel4 = link4_vel2 + link4_vel3;
+            let link4_vel5 = link4_rest7 - link4_vel4;
+            let link4_vel6 = link3_vel5 - link4_vel5;
+            let link4_vel7 = link4_cos0 * link3_vel9;
+            let link4_vel8 = link4_sin0 * link4_vel1;
+            let link4_vel9 = link4_vel7 + link4_vel8;
+            let link4_vel10 = link4_cos0 * link4_vel1;
+            let link4_vel11 = link4_sin0 * link3_vel9;
+            let link4_vel12 = link4_vel10 - link4_vel11;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = 0.25 * link4_vel5;
+            let link5_vel1 = link4_vel12 + link5_vel0;
+            let link5_vel2 = link5_pivot1 * link4_vel9;
+            let link5_vel3 = link5_pivot2 * link5_vel1;
+            let link5_vel4 = link5_vel2 + link5_vel3;
+            let link5_vel5 = link5_rest7 + link5_vel4;
+            let link5_vel6 = link4_vel5 - link5_vel5;
+            let link5_vel7 = link5_cos0 * link4_vel9;
+            let link5_vel8 = link5_sin0 * link5_vel1;
+            let link5_vel9 = link5_vel7 + link5_vel8;
+            let link5_vel10 = link5_cos0 * link5_vel1;
+            let link5_vel11 = link5_sin0 * link4_vel9;
+            let link5_vel12 = link5_vel10 - link5_vel11;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = 0.25 * link5_vel5;
+            let link6_vel1 = link5_vel12 + link6_vel0;
+            let link6_vel2 = link6_pivot1 * link5_vel9;
+            let link6_vel3 = link6_pivot2 * link6_vel1;
+            let link6_vel4 = link6_vel2 + link6_vel3;
+            let link6_vel5 = link6_rest7 - link6_vel4;
+            let link6_vel6 = link5_vel5 - link6_vel5;
+            let link6_vel7 = link6_cos0 * link5_vel9;
+            let link6_vel8 = link6_sin0 * link6_vel1;
+            let link6_vel9 = link6_vel7 + link6_vel8;
+            let link6_vel10 = link6_cos0 * link6_vel1;
+            let link6_vel11 = link6_sin0 * link5_vel9;
+            let link6_vel12 = link6_vel10 - link6_vel11;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = 0.25 * link6_vel5;
+            let link7_vel1 = link6_vel12 + link7_vel0;
+            let link7_vel2 = link7_pivot74 * link6_vel9;
+            let link7_vel3 = link7_pivot75 * link7_vel1;
+            let link7_vel4 = link7_vel2 + link7_vel3;
+            let link7_vel5 = link7_rest25 - link7_vel4;
+            let link7_vel6 = link6_vel5 + link7_vel5;
+            let link7_vel7 = link7_pivot58 * link6_vel9;
+            let link7_vel8 = link7_pivot59 * link7_vel1;
+            let link7_vel9 = link7_vel7 + link7_vel8;
+            let link7_vel10 = link7_pivot60 * link7_vel5;
+            let link7_vel11 = link7_vel9 + link7_vel10;
+            let link7_vel12 = link7_rest17 - link7_vel11;
+            let link7_vel13 = link7_pivot33 * link6_vel9;
+            let link7_vel14 = link7_pivot34 * link7_vel1;
+            let link7_vel15 = link7_vel13 + link7_vel14;
+            let link7_vel16 = link7_pivot35 * link7_vel5;
+            let link7_vel17 = link7_vel15 + link7_vel16;
+            let link7_vel18 = link7_rest7 - link7_vel17;
+            let link7_vel19 = link7_pivot54 * link7_vel12;
+            let link7_vel20 = link7_vel18 - link7_vel19;
+            let link7_vel21 = link7_pivot0 * link6_vel9;
+            let link7_vel22 = link7_pivot1 * link7_vel1;
+            let link7_vel23 = link7_vel21 + link7_vel22;
+            let link7_vel24 = link7_pivot2 * link7_vel5;
+            let link7_vel25 = link7_vel23 + link7_vel24;
+            let link7_vel26 = link7_rest0 - link7_vel25;
+            let link7_vel27 = link7_pivot18 * link7_vel20;
+            let link7_vel28 = link7_vel26 - link7_vel27;
+            let link7_vel29 = link7_pivot21 * link7_vel12;
+            let link7_vel30 = link7_vel28 - link7_vel29;
+            let link7_vel31 = link7_cos0 * link6_vel9;
+            let link7_vel32 = link7_sin0 * link7_vel1;
+            let link7_vel33 = link7_vel31 + link7_vel32;
+            let link7_vel34 = link7_cos0 * link7_vel1;
+            let link7_vel35 = link7_sin0 * link6_vel9;
+            let link7_vel36 = link7_vel34 - link7_vel35;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = 0.25 * link7_vel5;
+            let link8_vel1 = link7_vel36 - link8_vel0;
+            let link8_vel2 = link8_cos0 * link7_vel33;
+            let link8_vel3 = link8_sin0 * link8_vel1;
+            let link8_vel4 = link8_vel2 + link8_vel3;
+            let link8_vel5 = link8_cos0 * link8_vel1;
+            let link8_vel6 = link8_sin0 * link7_vel33;
+            let link8_vel7 = link8_vel5 - link8_vel6;
+            let link8_vel8 = link7_vel5 + link7_vel12;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = 0.25 * link8_vel8;
+            let link9_vel1 = link8_vel7 - link9_vel0;
+            let link9_vel2 = link7_vel20 + link8_vel8;
+            let link9_vel3 = link9_cos0 * link8_vel4;
+            let link9_vel4 = link9_sin0 * link9_vel1;
+            let link9_vel5 = link9_vel3 + link9_vel4;
+            let link9_vel6 = link9_cos0 * link9_vel1;
+            let link9_vel7 = link9_sin0 * link8_vel4;
+            let link9_vel8 = link9_vel6 - link9_vel7;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = 0.25 * link9_vel2;
+            let link10_vel1 = link9_vel8 - link10_vel0;
+            let link10_vel2 = link7_vel30 + link9_vel2;
+            // link1: gravity and wrenches
+            let link1_load0 = 9.81 * link1_cos0;
+            let link1_load1 = 9.81 * link1_sin0;
+            // link2: gravity and wrenches
+            let link2_load0 = link2_cos0 * link1_load0;
+            let link2_load1 = link2_sin0 * link1_load1;
+            let link2_load2 = link2_load0 - link2_load1;
+            let link2_load3 = link2_cos0 * link1_load1;
+            let link2_load4 = link2_sin0 * link1_load0;
+            let link2_load5 = link2_load3 + link2_load4;
+            // link3: gravity and wrenches
+            let link3_load0 = link3_cos0 * link2_load2;
+            let link3_load1 = link3_sin0 * link2_load5;
+            let link3_load2 = link3_load0 - link3_load1;
+            let link3_load3 = link3_cos0 * link2_load5;
+            let link3_load4 = link3_sin0 * link2_load2;
+            let link3_load5 = link3_load3 + link3_load4;
+            // link4: gravity and wrenches
+            let link4_load0 = link4_cos0 * link3_load2;
+            let link4_load1 = link4_sin0 * link3_load5;
+            let link4_load2 = link4_load0 - link4_load1;
+            let link4_load3 = link4_cos0 * link3_load5;
+            let link4_load4 = link4_sin0 * link3_load2;
+            let link4_load5 = link4_load3 + link4_load4;
+            // link5: gravity and wrenches
+            let link5_load0 = link5_cos0 * link4_load2;
+            let link5_load1 = link5_sin0 * link4_load5;
+            let link5_load2 = link5_load0 - link5_load1;
+            let link5_load3 = link5_cos0 * link4_load5;
+            let link5_load4 = link5_sin0 * link4_load2;
+            let link5_load5 = link5_load3 + link5_load4;
+            // link6: gravity and wrenches
+            let link6_load0 = link6_cos0 * link5_load2;
+            let link6_load1 = link6_sin0 * link5_load5;
+            let link6_load2 = link6_load0 - link6_load1;
+            let link6_load3 = link6_cos0 * link5_load5;
+            let link6_load4 = link6_sin0 * link5_load2;
+            let link6_load5 = link6_load3 + link6_load4;
+            // link7: gravity and wrenches
+            let link7_load0 = link7_cos0 * link6_load2;
+            let link7_load1 = link7_sin0 * link6_load5;
+            let link7_load2 = link7_load0 - link7_load1;
+            let link7_load3 = link7_cos0 * link6_load5;
+            let link7_load4 = link7_sin0 * link6_load2;
+            let link7_load5 = link7_load3 + link7_load4;
+            // link8: gravity and wrenches
+            let link8_load0 = link8_cos0 * link7_load2;
+            let link8_load1 = link8_sin0 * link7_load5;
+            let link8_load2 = link8_load0 - link8_load1;
+            let link8_load3 = link8_cos0 * link7_load5;
+            let link8_load4 = link8_sin0 * link7_load2;
+            let link8_load5 = link8_load3 + link8_load4;
+            // link9: gravity and wrenches
+            let link9_load0 = link9_cos0 * link8_load2;
+            let link9_load1 = link9_sin0 * link8_load5;
+            let link9_load2 = link9_load0 - link9_load1;
+            let link9_load3 = link9_cos0 * link8_load5;
+            let link9_load4 = link9_sin0 * link8_load2;
+            let link9_load5 = link9_load3 + link9_load4;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_cos0 * link9_load5;
+            let link10_load1 = link10_sin0 * link9_load2;
+            let link10_load2 = link10_load0 + link10_load1;
+            // link1: momentum rate (4.36)
+            let link1_pdot0 = link2_inertia23 * link1_load1;
+            let link1_pdot1 = link2_inertia11 * link1_load0;
+            let link1_pdot2 = link1_pdot0 - link1_pdot1;
+            // link2: momentum rate (4.36)
+            let link2_pdot0 = link2_pivot3 * link2_vel0;
+            let link2_pdot1 = link2_rest9 + link2_pdot0;
+            let link2_pdot2 = link2_vel0 * link2_pdot1;
+            let link2_pdot3 = link3_inertia25 * link2_load5;
+            let link2_pdot4 = link3_inertia12 * link2_load2;
+            let link2_pdot5 = link2_pdot3 - link2_pdot4;
+            let link2_pdot6 = link2_pdot2 + link2_pdot5;
+            // link3: momentum rate (4.36)
+            let link3_pdot0 = link3_pivot6 * link2_vel4;
+            let link3_pdot1 = link2_inertia0 * link3_vel1;
+            let link3_pdot2 = link3_pdot0 - link3_pdot1;
+            let link3_pdot3 = link3_rest11 - link3_pdot2;
+            let link3_pdot4 = link3_pivot6 * link3_vel1;
+            let link3_pdot5 = link3_rest9 - link3_pdot4;
+            let link3_pdot6 = link2_vel4 * link3_pdot3;
+            let link3_pdot7 = link3_vel1 * link3_pdot5;
+            let link3_pdot8 = link3_pdot6 - link3_pdot7;
+            let link3_pdot9 = link4_inertia25 * link3_load5;
+            let link3_pdot10 = link4_inertia12 * link3_load2;
+            let link3_pdot11 = link3_pdot9 - link3_pdot10;
+            let link3_pdot12 = link3_pdot8 - link3_pdot11;
+            // link4: momentum rate (4.36)
+            let link4_pdot0 = link4_pivot6 * link3_vel9;
+            let link4_pdot1 = link3_inertia0 * link4_vel1;
+            let link4_pdot2 = link4_pdot0 + link4_pdot1;
+            let link4_pdot3 = link4_rest11 + link4_pdot2;
+            let link4_pdot4 = link4_pivot6 * link4_vel1;
+            let link4_pdot5 = link4_rest9 + link4_pdot4;
+            let link4_pdot6 = link3_vel9 * link4_pdot3;
+            let link4_pdot7 = link4_vel1 * link4_pdot5;
+            let link4_pdot8 = link4_pdot6 - link4_pdot7;
+            let link4_pdot9 = link5_inertia25 * link4_load5;
+            let link4_pdot10 = link5_inertia12 * link4_load2;
+            let link4_pdot11 = link4_pdot9 - link4_pdot10;
+            let link4_pdot12 = link4_pdot8 - link4_pdot11;
+            // link5: momentum rate (4.36)
+            let link5_pdot0 = link5_pivot6 * link4_vel9;
+            let link5_pdot1 = link4_inertia0 * link5_vel1;
+            let link5_pdot2 = link5_pdot0 - link5_pdot1;
+            let link5_pdot3 = link5_rest11 - link5_pdot2;
+            let link5_pdot4 = link5_pivot6 * link5_vel1;
+            let link5_pdot5 = link5_rest9 - link5_pdot4;
+            let link5_pdot6 = link4_vel9 * link5_pdot3;
+            let link5_pdot7 = link5_vel1 * link5_pdot5;
+            let link5_pdot8 = link5_pdot6 - link5_pdot7;
+            let link5_pdot9 = link6_inertia25 * link5_load5;
+            let link5_pdot10 = link6_inertia12 * link5_load2;
+            let link5_pdot11 = link5_pdot9 - link5_pdot10;
+            let link5_pdot12 = link5_pdot8 - link5_pdot11;
+            // link6: momentum rate (4.36)
+            let link6_pdot0 = link6_pivot6 * link5_vel9;
+            let link6_pdot1 = link5_inertia0 * link6_vel1;
+            let link6_pdot2 = link6_pdot0 + link6_pdot1;
+            let link6_pdot3 = link6_rest11 + link6_pdot2;
+            let link6_pdot4 = link6_pivot6 * link6_vel1;
+            let link6_pdot5 = link6_rest9 + link6_pdot4;
+            let link6_pdot6 = link5_vel9 * link6_pdot3;
+            let link6_pdot7 = link6_vel1 * link6_pdot5;
+            let link6_pdot8 = link6_pdot6 - link6_pdot7;
+            let link6_pdot9 = link7_inertia25 * link6_load5;
+            let link6_pdot10 = link7_inertia2 * link6_load2;
+            let link6_pdot11 = link6_pdot9 - link6_pdot10;
+            let link6_pdot12 = link6_pdot8 - link6_pdot11;
+            // link7: momentum rate (4.36)
+            let link7_pdot0 = link7_pivot79 * link6_vel9;
+            let link7_pdot1 = link6_inertia0 * link7_vel1;
+            let link7_pdot2 = link7_pdot0 - link7_pdot1;
+            let link7_pdot3 = link7_rest29 - link7_pdot2;
+            let link7_pdot4 = link7_pivot79 * link7_vel1;
+            let link7_pdot5 = link7_rest27 - link7_pdot4;
+            let link7_pdot6 = link6_vel9 * link7_pdot3;
+            let link7_pdot7 = link7_vel1 * link7_pdot5;
+            let link7_pdot8 = link7_pdot6 - link7_pdot7;
+            let link7_pdot9 = link8_inertia9 * link7_load5;
+            let link7_pdot10 = link8_inertia2 * link7_load2;
+            let link7_pdot11 = link7_pdot9 - link7_pdot10;
+            let link7_pdot12 = link7_pdot8 - link7_pdot11;
+            // link8: momentum rate (4.36)
+            let link8_pdot0 = link9_inertia7 * link7_vel30;
+            let link8_pdot1 = link9_inertia9 * link7_vel30;
+            let link8_pdot2 = link9_inertia2 * link7_vel20;
+            let link8_pdot3 = link9_inertia5 * link7_vel20;
+            let link8_pdot4 = link8_pdot0 + link8_pdot2;
+            let link8_pdot5 = link8_pdot1 + link8_pdot3;
+            let link8_pdot6 = link9_inertia13 * link8_vel8;
+            let link8_pdot7 = link8_pdot5 + link8_pdot6;
+            let link8_pdot8 = link9_inertia2 * link8_vel8;
+            let link8_pdot9 = link8_pdot4 + link8_pdot8;
+            let link8_pdot10 = link8_vel4 * link8_pdot7;
+            let link8_pdot11 = link8_vel7 * link8_pdot9;
+            let link8_pdot12 = link8_pdot10 - link8_pdot11;
+            let link8_pdot13 = link9_inertia13 * link8_load5;
+            let link8_pdot14 = link9_inertia2 * link8_load2;
+            let link8_pdot15 = link8_pdot13 - link8_pdot14;
+            let link8_pdot16 = link8_pdot12 - link8_pdot15;
+            // link9: momentum rate (4.36)
+            let link9_pdot0 = link9_inertia5 * link9_vel2;
+            let link9_pdot1 = link8_pdot1 + link9_pdot0;
+            let link9_pdot2 = link9_inertia2 * link9_vel2;
+            let link9_pdot3 = link8_pdot0 + link9_pdot2;
+            let link9_pdot4 = link8_vel4 * link9_pdot1;
+            let link9_pdot5 = link9_vel1 * link9_pdot3;
+            let link9_pdot6 = link9_pdot4 - link9_pdot5;
+            let link9_pdot7 = link10_inertia5 * link9_load5;
+            let link9_pdot8 = link10_inertia0 * link9_load2;
+            let link9_pdot9 = link9_pdot7 + link9_pdot8;
+            let link9_pdot10 = link9_pdot6 + link9_pdot9;
+            // link10: momentum rate (4.36)
+            let link10_pdot0 = link10_inertia1 * link10_vel2;
+            let link10_pdot1 = link10_inertia0 * link10_vel2;
+            let link10_pdot2 = link9_vel5 * link10_pdot0;
+            let link10_pdot3 = link10_vel1 * link10_pdot1;
+            let link10_pdot4 = link10_pdot2 + link10_pdot3;
+            let link10_pdot5 = 0.05 * link10_load2;
+            let link10_pdot6 = link10_pdot4 - link10_pdot5;
+            let link10_pdot7 = tau_0 + link1_pdot2;
+            let link10_pdot8 = tau_1 + link2_pdot6;
+            let link10_pdot9 = tau_2 - link3_pdot12;
+            let link10_pdot10 = tau_3 - link4_pdot12;
+            let link10_pdot11 = tau_4 - link5_pdot12;
+            let link10_pdot12 = tau_5 - link6_pdot12;
+            let link10_pdot13 = tau_6 - link7_pdot12;
+            let link10_pdot14 = tau_7 - link8_pdot16;
+            let link10_pdot15 = tau_8 - link9_pdot10;
+            let link10_pdot16 = tau_9 + link10_pdot6;
+            results[0][l] = -link1_rest1;
+            results[1][l] = link2_vel3;
+            results[2][l] = link3_vel6;
+            results[3][l] = link4_vel6;
+            results[4][l] = link5_vel6;
+            results[5][l] = link6_vel6;
+            results[6][l] = link7_vel6;
+            results[7][l] = link7_vel12;
+            results[8][l] = link7_vel20;
+            results[9][l] = link7_vel30;
+            results[10][l] = link10_pdot7;
+            results[11][l] = link10_pdot8;
+            results[12][l] = link10_pdot9;
+            results[13][l] = link10_pdot10;
+            results[14][l] = link10_pdot11;
+            results[15][l] = link10_pdot12;
+            results[16][l] = link10_pdot13;
+            results[17][l] = link10_pdot14;
+            results[18][l] = link10_pdot15;
+            results[19][l] = link10_pdot16;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
+        pd.give(0, &results[10]);
+        pd.give(1, &results[11]);
+        pd.give(2, &results[12]);
+        pd.give(3, &results[13]);
+        pd.give(4, &results[14]);
+        pd.give(5, &results[15]);
+        pd.give(6, &results[16]);
+        pd.give(7, &results[17]);
+        pd.give(8, &results[18]);
+        pd.give(9, &results[19]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 490 operations: 212 additions, 269 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_sin0;
-        let link10_inertia1 = 0.05 * link10_cos0;
-        let link10_inertia2 = link10_inertia1 + link10_inertia1;
-        let link10_inertia3 = 0.25 * link10_inertia2;
-        let link10_inertia4 = link10_inertia3 + 0.00835;
-        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
-        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
-        let link10_inertia7 = 0.25 * link10_inertia1;
-        let link10_inertia8 = link10_inertia7 + 0.00835;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_cos0 * link10_inertia0;
-        let link9_inertia1 = link9_sin0 * link10_inertia5;
-        let link9_inertia2 = link9_inertia0 + link9_inertia1;
-        let link9_inertia3 = link9_sin0 * link10_inertia0;
-        let link9_inertia4 = link9_cos0 * link10_inertia5;
-        let link9_inertia5 = link9_inertia3 - link9_inertia4;
-        let link9_inertia6 = link9_sin0 * link10_inertia1;
-        let link9_inertia7 = link9_inertia0 + link9_inertia6;
-        let link9_inertia8 = link9_cos0 * link10_inertia1;
-        let link9_inertia9 = link9_inertia3 - link9_inertia8;
-        let link9_inertia10 = link9_inertia5 + link9_inertia5;
-        let link9_inertia11 = 0.25 * link9_inertia10;
-        let link9_inertia12 = link10_inertia6 - link9_inertia11;
-        let link9_inertia13 = link9_inertia5 - 0.25;
-        let link9_inertia14 = link9_inertia12 + 0.05835;
-        let link9_inertia15 = 0.25 * link9_inertia9;
-        let link9_inertia16 = link10_inertia8 - link9_inertia15;
-        let link9_inertia17 = 0.25 * link9_inertia5;
-        let link9_inertia18 = link10_inertia6 - link9_inertia17;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_cos0 * link9_inertia2;
-        let link8_inertia1 = link8_sin0 * link9_inertia13;
-        let link8_inertia2 = link8_inertia0 - link8_inertia1;
-        let link8_inertia3 = link8_sin0 * link9_inertia2;
-        let link8_inertia4 = link8_cos0 * link9_inertia13;
-        let link8_inertia5 = link8_inertia3 + link8_inertia4;
-        let link8_inertia6 = link8_inertia5 + link8_inertia5;
-        let link8_inertia7 = 0.25 * link8_inertia6;
-        let link8_inertia8 = link9_inertia14 - link8_inertia7;
-        let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
-        let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
-        let link8_inertia11 = link8_cos0 * link9_inertia7;
-        let link8_inertia12 = link8_sin0 * link9_inertia9;
-        let link8_inertia13 = link8_inertia11 - link8_inertia12;
-        let link8_inertia14 = link8_sin0 * link9_inertia7;
-        let link8_inertia15 = link8_cos0 * link9_inertia9;
-        let link8_inertia16 = link8_inertia14 + link8_inertia15;
-        let link8_inertia17 = 0.25 * link8_inertia16;
-        let link8_inertia18 = link9_inertia16 - link8_inertia17;
-        let link8_inertia19 = link8_sin0 * link9_inertia5;
-        let link8_inertia20 = link8_inertia0 - link8_inertia19;
-        let link8_inertia21 = link8_cos0 * link9_inertia5;
-        let link8_inertia22 = link8_inertia3 + link8_inertia21;
-        let link8_inertia23 = 0.25 * link8_inertia22;
-        let link8_inertia24 = link9_inertia18 - link8_inertia23;
-        let link8_inertia25 = 0.25 * link8_inertia5;
-        let link8_inertia26 = link9_inertia14 - link8_inertia25;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_cos0 * link8_inertia2;
-        let link7_inertia1 = link7_sin0 * link8_inertia9;
-        let link7_inertia2 = link7_inertia0 - link7_inertia1;
-        let link7_inertia3 = link7_sin0 * link8_inertia2;
-        let link7_inertia4 = link7_cos0 * link8_inertia9;
-        let link7_inertia5 = link7_inertia3 + link7_inertia4;
-        let link7_inertia6 = link7_cos0 * link8_inertia13;
-        let link7_inertia7 = link7_sin0 * link8_inertia16;
-        let link7_inertia8 = link7_inertia6 - link7_inertia7;
-        let link7_inertia9 = link7_sin0 * link8_inertia13;
-        let link7_inertia10 = link7_cos0 * link8_inertia16;
-        let link7_inertia11 = link7_inertia9 + link7_inertia10;
-        let link7_inertia12 = link7_cos0 * link8_inertia20;
-        let link7_inertia13 = link7_sin0 * link8_inertia22;
-        let link7_inertia14 = link7_inertia12 - link7_inertia13;
-        let link7_inertia15 = link7_sin0 * link8_inertia20;
-        let link7_inertia16 = link7_cos0 * link8_inertia22;
-        let link7_inertia17 = link7_inertia15 + link7_inertia16;
-        let link7_inertia18 = link7_sin0 * link8_inertia5;
-        let link7_inertia19 = link7_inertia0 - link7_inertia18;
-        let link7_inertia20 = link7_cos0 * link8_inertia5;
-        let link7_inertia21 = link7_inertia3 + link7_inertia20;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 119.76047904191617 * link7_inertia8;
-        let link7_pivot1 = 119.76047904191617 * link7_inertia11;
-        let link7_pivot2 = 119.76047904191617 * link8_inertia18;
-        let link7_pivot3 = link7_inertia8 * link7_pivot0;
-        let link7_pivot4 = link7_inertia8 * link7_pivot1;
-        let link7_pivot5 = link7_inertia8 * link7_pivot2;
-        let link7_pivot6 = link7_inertia2 - link7_pivot5;
-        let link7_pivot7 = link7_inertia11 * link7_pivot1;
-        let link7_pivot8 = link7_inertia11 * link7_pivot2;
-        let link7_pivot9 = link7_inertia5 - link7_pivot8;
-        let link7_pivot10 = link8_inertia18 * link7_pivot2;
-        let link7_pivot11 = link8_inertia10 - link7_pivot10;
-        let link7_pivot12 = link10_inertia8 * link7_pivot0;
-        let link7_pivot13 = link10_inertia8 * link7_pivot1;
-        let link7_pivot14 = link10_inertia8 * link7_pivot2;
-        let link7_pivot15 = link7_inertia14 - link7_pivot12;
-        let link7_pivot16 = link7_inertia17 - link7_pivot13;
-        let link7_pivot17 = link8_inertia24 - link7_pivot14;
-        let link7_pivot18 = 119.76047904191617 * link10_inertia8;
-        let link7_pivot19 = link10_inertia8 * link7_pivot18;
-        let link7_pivot20 = link10_inertia6 - link7_pivot19;
-        let link7_pivot21 = 119.76047904191617 * link9_inertia16;
-        let link7_pivot22 = link10_inertia8 * link7_pivot21;
-        let link7_pivot23 = link9_inertia18 - link7_pivot22;
-        let link7_pivot24 = link9_inertia16 * link7_pivot0;
-        let link7_pivot25 = link9_inertia16 * link7_pivot1;
-        let link7_pivot26 = link9_inertia16 * link7_pivot2;
-        let link7_pivot27 = link7_inertia19 - link7_pivot24;
-        let link7_pivot28 = link7_inertia21 - link7_pivot25;
-        let link7_pivot29 = link8_inertia26 - link7_pivot26;
-        let link7_pivot30 = link9_inertia16 * link7_pivot21;
-        let link7_pivot31 = link9_inertia14 - link7_pivot30;
-        let link7_pivot32 = 1.0 / link7_pivot20;
-        let link7_pivot33 = link7_pivot15 * link7_pivot32;
-        let link7_pivot34 = link7_pivot16 * link7_pivot32;
-        let link7_pivot35 = link7_pivot17 * link7_pivot32;
-        let link7_pivot36 = link7_pivot15 * link7_pivot33;
-        let link7_pivot37 = link7_pivot3 + link7_pivot36;
-        let link7_pivot38 = link7_pivot15 * link7_pivot34;
-        let link7_pivot39 = link7_pivot4 + link7_pivot38;
-        let link7_pivot40 = link7_pivot15 * link7_pivot35;
-        let link7_pivot41 = link7_pivot6 - link7_pivot40;
-        let link7_pivot42 = link7_pivot16 * link7_pivot34;
-        let link7_pivot43 = link7_pivot7 + link7_pivot42;
-        let link7_pivot44 = link7_pivot16 * link7_pivot35;
-        let link7_pivot45 = link7_pivot9 - link7_pivot44;
-        let link7_pivot46 = link7_pivot17 * link7_pivot35;
-        let link7_pivot47 = link7_pivot11 - link7_pivot46;
-        let link7_pivot48 = link7_pivot23 * link7_pivot33;
-        let link7_pivot49 = link7_pivot23 * link7_pivot34;
-        let link7_pivot50 = link7_pivot23 * link7_pivot35;
-        let link7_pivot51 = link7_pivot27 - link7_pivot48;
-        let link7_pivot52 = link7_pivot28 - link7_pivot49;
-        let link7_pivot53 = link7_pivot29 - link7_pivot50;
-        let link7_pivot54 = link7_pivot23 * link7_pivot32;
-        let link7_pivot55 = link7_pivot23 * link7_pivot54;
-        let link7_pivot56 = link7_pivot31 - link7_pivot55;
-        let link7_pivot57 = 1.0 / link7_pivot56;
-        let link7_pivot58 = link7_pivot51 * link7_pivot57;
-        let link7_pivot59 = link7_pivot52 * link7_pivot57;
-        let link7_pivot60 = link7_pivot53 * link7_pivot57;
-        let link7_pivot61 = link7_pivot51 * link7_pivot58;
-        let link7_pivot62 = link7_pivot37 + link7_pivot61;
-        let link7_pivot63 = link7_pivot51 * link7_pivot59;
-        let link7_pivot64 = link7_pivot39 + link7_pivot63;
-        let link7_pivot65 = link7_pivot51 * link7_pivot60;
-        let link7_pivot66 = link7_pivot41 - link7_pivot65;
-        let link7_pivot67 = link7_pivot52 * link7_pivot59;
-        let link7_pivot68 = link7_pivot43 + link7_pivot67;
-        let link7_pivot69 = link7_pivot52 * link7_pivot60;
-        let link7_pivot70 = link7_pivot45 - link7_pivot69;
-        let link7_pivot71 = link7_pivot53 * link7_pivot60;
-        let link7_pivot72 = link7_pivot47 - link7_pivot71;
-        let link7_pivot73 = 1.0 / link7_pivot72;
-        let link7_pivot74 = link7_pivot66 * link7_pivot73;
-        let link7_pivot75 = link7_pivot70 * link7_pivot73;
-        let link7_pivot76 = link7_pivot66 * link7_pivot74;
-        let link7_pivot77 = link7_pivot62 + link7_pivot76;
-        let link7_pivot78 = link7_pivot66 * link7_pivot75;
-        let link7_pivot79 = link7_pivot64 + link7_pivot78;
-        let link7_pivot80 = link7_pivot70 * link7_pivot75;
-        let link7_pivot81 = link7_pivot68 + link7_pivot80;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia22 = 0.25 * link7_pivot79;
-        let link7_inertia23 = 0.25 * link7_pivot81;
-        let link7_inertia24 = 0.25 * link7_inertia23;
-        let link7_inertia25 = link7_inertia23 - 0.45;
-        let link7_inertia26 = link7_inertia24 - 0.10835;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link7_pivot77 - link7_pivot81;
-        let link6_inertia1 = link6_sin0 * link6_inertia0;
-        let link6_inertia2 = link6_cos0 + link6_cos0;
-        let link6_inertia3 = link7_pivot79 * link6_inertia2;
-        let link6_inertia4 = link6_inertia1 + link6_inertia3;
-        let link6_inertia5 = link6_sin0 * link6_inertia4;
-        let link6_inertia6 = link6_cos0 * link6_inertia4;
-        let link6_inertia7 = link7_pivot79 - link6_inertia6;
-        let link6_inertia8 = link7_pivot77 - link6_inertia5;
-        let link6_inertia9 = link7_pivot81 + link6_inertia5;
-        let link6_inertia10 = link6_cos0 * link7_inertia22;
-        let link6_inertia11 = link6_sin0 * link7_inertia25;
-        let link6_inertia12 = link6_inertia10 - link6_inertia11;
-        let link6_inertia13 = link6_sin0 * link7_inertia22;
-        let link6_inertia14 = link6_cos0 * link7_inertia25;
-        let link6_inertia15 = link6_inertia13 + link6_inertia14;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia26;
-        let link6_pivot1 = link6_inertia12 * link6_pivot0;
-        let link6_pivot2 = link6_inertia15 * link6_pivot0;
-        let link6_pivot3 = link6_inertia12 * link6_pivot1;
-        let link6_pivot4 = link6_inertia8 - link6_pivot3;
-        let link6_pivot5 = link6_inertia12 * link6_pivot2;
-        let link6_pivot6 = link6_inertia7 + link6_pivot5;
-        let link6_pivot7 = link6_inertia15 * link6_pivot2;
-        let link6_pivot8 = link6_inertia9 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia16 = 0.25 * link6_pivot6;
-        let link6_inertia17 = 0.25 * link6_pivot8;
-        let link6_inertia18 = 0.25 * link6_inertia17;
-        let link6_inertia19 = link6_inertia17 - 0.55;
-        let link6_inertia20 = link6_inertia18 - 0.13335;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link6_pivot4 - link6_pivot8;
-        let link5_inertia1 = link5_sin0 * link5_inertia0;
-        let link5_inertia2 = link5_cos0 + link5_cos0;
-        let link5_inertia3 = link6_pivot6 * link5_inertia2;
-        let link5_inertia4 = link5_inertia1 - link5_inertia3;
-        let link5_inertia5 = link5_sin0 * link5_inertia4;
-        let link5_inertia6 = link5_cos0 * link5_inertia4;
-        let link5_inertia7 = link6_pivot6 + link5_inertia6;
-        let link5_inertia8 = link6_pivot4 - link5_inertia5;
-        let link5_inertia9 = link6_pivot8 + link5_inertia5;
-        let link5_inertia10 = link5_cos0 * link6_inertia16;
-        let link5_inertia11 = link5_sin0 * link6_inertia19;
-        let link5_inertia12 = link5_inertia10 + link5_inertia11;
-        let link5_inertia13 = link5_sin0 * link6_inertia16;
-        let link5_inertia14 = link5_cos0 * link6_inertia19;
-        let link5_inertia15 = link5_inertia13 - link5_inertia14;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia20;
-        let link5_pivot1 = link5_inertia12 * link5_pivot0;
-        let link5_pivot2 = link5_inertia15 * link5_pivot0;
-        let link5_pivot3 = link5_inertia12 * link5_pivot1;
-        let link5_pivot4 = link5_inertia8 - link5_pivot3;
-        let link5_pivot5 = link5_inertia12 * link5_pivot2;
-        let link5_pivot6 = link5_inertia7 - link5_pivot5;
-        let link5_pivot7 = link5_inertia15 * link5_pivot2;
-        let link5_pivot8 = link5_inertia9 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia16 = 0.25 * link5_pivot6;
-        let link5_inertia17 = 0.25 * link5_pivot8;
-        let link5_inertia18 = 0.25 * link5_inertia17;
-        let link5_inertia19 = link5_inertia17 - 0.65;
-        let link5_inertia20 = link5_inertia18 - 0.15835;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link5_pivot4 - link5_pivot8;
-        let link4_inertia1 = link4_sin0 * link4_inertia0;
-        let link4_inertia2 = link4_cos0 + link4_cos0;
-        let link4_inertia3 = link5_pivot6 * link4_inertia2;
-        let link4_inertia4 = link4_inertia1 + link4_inertia3;
-        let link4_inertia5 = link4_sin0 * link4_inertia4;
-        let link4_inertia6 = link4_cos0 * link4_inertia4;
-        let link4_inertia7 = link5_pivot6 - link4_inertia6;
-        let link4_inertia8 = link5_pivot4 - link4_inertia5;
-        let link4_inertia9 = link5_pivot8 + link4_inertia5;
-        let link4_inertia10 = link4_cos0 * link5_inertia16;
-        let link4_inertia11 = link4_sin0 * link5_inertia19;
-        let link4_inertia12 = link4_inertia10 - link4_inertia11;
-        let link4_inertia13 = link4_sin0 * link5_inertia16;
-        let link4_inertia14 = link4_cos0 * link5_inertia19;
-        let link4_inertia15 = link4_inertia13 + link4_inertia14;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia20;
-        let link4_pivot1 = link4_inertia12 * link4_pivot0;
-        let link4_pivot2 = link4_inertia15 * link4_pivot0;
-        let link4_pivot3 = link4_inertia12 * link4_pivot1;
-        let link4_pivot4 = link4_inertia8 - link4_pivot3;
-        let link4_pivot5 = link4_inertia12 * link4_pivot2;
-        let link4_pivot6 = link4_inertia7 + link4_pivot5;
-        let link4_pivot7 = link4_inertia15 * link4_pivot2;
-        let link4_pivot8 = link4_inertia9 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia16 = 0.25 * link4_pivot6;
-        let link4_inertia17 = 0.25 * link4_pivot8;
-        let link4_inertia18 = 0.25 * link4_inertia17;
-        let link4_inertia19 = link4_inertia17 - 0.75;
-        let link4_inertia20 = link4_inertia18 - 0.18334999999999999;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link4_pivot4 - link4_pivot8;
-        let link3_inertia1 = link3_sin0 * link3_inertia0;
-        let link3_inertia2 = link3_cos0 + link3_cos0;
-        let link3_inertia3 = link4_pivot6 * link3_inertia2;
-        let link3_inertia4 = link3_inertia1 - link3_inertia3;
-        let link3_inertia5 = link3_sin0 * link3_inertia4;
-        let link3_inertia6 = link3_cos0 * link3_inertia4;
-        let link3_inertia7 = link4_pivot6 + link3_inertia6;
-        let link3_inertia8 = link4_pivot4 - link3_inertia5;
-        let link3_inertia9 = link4_pivot8 + link3_inertia5;
-        let link3_inertia10 = link3_cos0 * link4_inertia16;
-        let link3_inertia11 = link3_sin0 * link4_inertia19;
-        let link3_inertia12 = link3_inertia10 + link3_inertia11;
-        let link3_inertia13 = link3_sin0 * link4_inertia16;
-        let link3_inertia14 = link3_cos0 * link4_inertia19;
-        let link3_inertia15 = link3_inertia13 - link3_inertia14;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia20;
-        let link3_pivot1 = link3_inertia12 * link3_pivot0;
-        let link3_pivot2 = link3_inertia15 * link3_pivot0;
-        let link3_pivot3 = link3_inertia12 * link3_pivot1;
-        let link3_pivot4 = link3_inertia8 - link3_pivot3;
-        let link3_pivot5 = link3_inertia12 * link3_pivot2;
-        let link3_pivot6 = link3_inertia7 - link3_pivot5;
-        let link3_pivot7 = link3_inertia15 * link3_pivot2;
-        let link3_pivot8 = link3_inertia9 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia16 = 0.25 * link3_pivot6;
-        let link3_inertia17 = 0.25 * link3_pivot8;
-        let link3_inertia18 = 0.25 * link3_inertia17;
-        let link3_inertia19 = link3_inertia17 - 0.85;
-        let link3_inertia20 = link3_inertia18 - 0.20834999999999998;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link3_pivot4 - link3_pivot8;
-        let link2_inertia1 = link2_sin0 * link2_inertia0;
-        let link2_inertia2 = link2_cos0 + link2_cos0;
-        let link2_inertia3 = link3_pivot6 * link2_inertia2;
-        let link2_inertia4 = link2_inertia1 + link2_inertia3;
-        let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link3_pivot8 + link2_inertia5;
-        let link2_inertia7 = link2_sin0 * link3_inertia16;
-        let link2_inertia8 = link2_cos0 * link3_inertia19;
-        let link2_inertia9 = link2_inertia7 + link2_inertia8;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = 1.0 / link3_inertia20;
-        let link2_pivot1 = link2_inertia9 * link2_pivot0;
-        let link2_pivot2 = link2_inertia9 * link2_pivot1;
-        let link2_pivot3 = link2_inertia6 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia10 = 0.25 * link2_pivot3;
-        let link2_inertia11 = 0.25 * link2_inertia10;
-        let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
-        // link1: U, Mj, k and the reduced inertia M' (4.44)
-        let link1_pivot0 = 1.0 / link2_inertia12;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = 119.76047904191617 * p_9;
-        let link7_rest1 = link10_inertia8 * link7_rest0;
-        let link7_rest2 = link9_inertia16 * link7_rest0;
-        let link7_rest3 = link7_inertia8 * link7_rest0;
-        let link7_rest4 = link7_inertia11 * link7_rest0;
-        let link7_rest5 = link8_inertia18 * link7_rest0;
-        let link7_rest6 = p_8 - link7_rest1;
-        let link7_rest7 = link7_pivot32 * link7_rest6;
-        let link7_rest8 = link7_pivot23 * link7_rest7;
-        let link7_rest9 = link7_rest2 + link7_rest8;
-        let link7_rest10 = link7_pivot15 * link7_rest7;
-        let link7_rest11 = link7_pivot16 * link7_rest7;
-        let link7_rest12 = link7_pivot17 * link7_rest7;
-        let link7_rest13 = link7_rest3 + link7_rest10;
-        let link7_rest14 = link7_rest4 + link7_rest11;
-        let link7_rest15 = link7_rest5 + link7_rest12;
-        let link7_rest16 = p_7 - link7_rest9;
-        let link7_rest17 = link7_pivot57 * link7_rest16;
-        let link7_rest18 = link7_pivot51 * link7_rest17;
-        let link7_rest19 = link7_pivot52 * link7_rest17;
-        let link7_rest20 = link7_pivot53 * link7_rest17;
-        let link7_rest21 = link7_rest13 + link7_rest18;
-        let link7_rest22 = link7_rest14 + link7_rest19;
-        let link7_rest23 = link7_rest15 + link7_rest20;
-        let link7_rest24 = p_6 - link7_rest23;
-        let link7_rest25 = link7_pivot73 * link7_rest24;
-        let link7_rest26 = link7_pivot66 * link7_rest25;
-        let link7_rest27 = link7_rest21 + link7_rest26;
-        let link7_rest28 = link7_pivot70 * link7_rest25;
-        let link7_rest29 = link7_rest22 + link7_rest28;
-        let link7_rest30 = 0.25 * link7_rest29;
-        let link7_rest31 = p_6 - link7_rest30;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = link6_cos0 * link7_rest27;
-        let link6_rest1 = link6_sin0 * link7_rest29;
-        let link6_rest2 = link6_rest0 - link6_rest1;
-        let link6_rest3 = link6_sin0 * link7_rest27;
-        let link6_rest4 = link6_cos0 * link7_rest29;
-        let link6_rest5 = link6_rest3 + link6_rest4;
-        let link6_rest6 = p_5 - link7_rest31;
-        let link6_rest7 = link6_pivot0 * link6_rest6;
-        let link6_rest8 = link6_inertia12 * link6_rest7;
-        let link6_rest9 = link6_rest2 - link6_rest8;
-        let link6_rest10 = link6_inertia15 * link6_rest7;
-        let link6_rest11 = link6_rest5 - link6_rest10;
-        let link6_rest12 = 0.25 * link6_rest11;
-        let link6_rest13 = p_5 - link6_rest12;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = link5_cos0 * link6_rest9;
-        let link5_rest1 = link5_sin0 * link6_rest11;
-        let link5_rest2 = link5_rest0 - link5_rest1;
-        let link5_rest3 = link5_sin0 * link6_rest9;
-        let link5_rest4 = link5_cos0 * link6_rest11;
-        let link5_rest5 = link5_rest3 + link5_rest4;
-        let link5_rest6 = p_4 - link6_rest13;
-        let link5_rest7 = link5_pivot0 * link5_rest6;
-        let link5_rest8 = link5_inertia12 * link5_rest7;
-        let link5_rest9 = link5_rest2 + link5_rest8;
-        let link5_rest10 = link5_inertia15 * link5_rest7;
-        let link5_rest11 = link5_rest5 + link5_rest10;
-        let link5_rest12 = 0.25 * link5_rest11;
-        let link5_rest13 = p_4 - link5_rest12;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = link4_cos0 * link5_rest9;
-        let link4_rest1 = link4_sin0 * link5_rest11;
-        let link4_rest2 = link4_rest0 - link4_rest1;
-        let link4_rest3 = link4_sin0 * link5_rest9;
-        let link4_rest4 = link4_cos0 * link5_rest11;
-        let link4_rest5 = link4_rest3 + link4_rest4;
-        let link4_rest6 = p_3 - link5_rest13;
-        let link4_rest7 = link4_pivot0 * link4_rest6;
-        let link4_rest8 = link4_inertia12 * link4_rest7;
-        let link4_rest9 = link4_rest2 - link4_rest8;
-        let link4_rest10 = link4_inertia15 * link4_rest7;
-        let link4_rest11 = link4_rest5 - link4_rest10;
-        let link4_rest12 = 0.25 * link4_rest11;
-        let link4_rest13 = p_3 - link4_rest12;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = link3_cos0 * link4_rest9;
-        let link3_rest1 = link3_sin0 * link4_rest11;
-        let link3_rest2 = link3_rest0 - link3_rest1;
-        let link3_rest3 = link3_sin0 * link4_rest9;
-        let link3_rest4 = link3_cos0 * link4_rest11;
-        let link3_rest5 = link3_rest3 + link3_rest4;
-        let link3_rest6 = p_2 - link4_rest13;
-        let link3_rest7 = link3_pivot0 * link3_rest6;
-        let link3_rest8 = link3_inertia12 * link3_rest7;
-        let link3_rest9 = link3_rest2 + link3_rest8;
-        let link3_rest10 = link3_inertia15 * link3_rest7;
-        let link3_rest11 = link3_rest5 + link3_rest10;
-        let link3_rest12 = 0.25 * link3_rest11;
-        let link3_rest13 = p_2 - link3_rest12;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_sin0 * link3_rest9;
-        let link2_rest1 = link2_cos0 * link3_rest11;
-        let link2_rest2 = link2_rest0 + link2_rest1;
-        let link2_rest3 = p_1 - link3_rest13;
-        let link2_rest4 = link2_pivot0 * link2_rest3;
-        let link2_rest5 = link2_inertia9 * link2_rest4;
-        let link2_rest6 = link2_rest2 - link2_rest5;
-        let link2_rest7 = 0.25 * link2_rest6;
-        let link2_rest8 = p_1 - link2_rest7;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_0 - link2_rest8;
-        let link1_rest1 = link1_pivot0 * link1_rest0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = 0.25 * link1_rest1;
-        let link2_vel1 = link2_pivot1 * link2_vel0;
-        let link2_vel2 = link2_rest4 - link2_vel1;
-        let link2_vel3 = link1_rest1 - link2_vel2;
-        let link2_vel4 = link2_sin0 * link2_vel0;
-        let link2_vel5 = link2_cos0 * link2_vel0;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel2;
-        let link3_vel1 = link2_vel5 + link3_vel0;
-        let link3_vel2 = link3_pivot1 * link2_vel4;
-        let link3_vel3 = link3_pivot2 * link3_vel1;
-        let link3_vel4 = link3_vel2 + link3_vel3;
-        let link3_vel5 = link3_rest7 + link3_vel4;
-        let link3_vel6 = link2_vel2 - link3_vel5;
-        let link3_vel7 = link3_cos0 * link2_vel4;
-        let link3_vel8 = link3_sin0 * link3_vel1;
-        let link3_vel9 = link3_vel7 + link3_vel8;
-        let link3_vel10 = link3_cos0 * link3_vel1;
-        let link3_vel11 = link3_sin0 * link2_vel4;
-        let link3_vel12 = link3_vel10 - link3_vel11;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel5;
-        let link4_vel1 = link3_vel12 + link4_vel0;
-        let link4_vel2 = link4_pivot1 * link3_vel9;
-        let link4_vel3 = link4_pivot2 * link4_vel1;
-        let link4_vel4 = link4_vel2 + link4_vel3;
-        let link4_vel5 = link4_rest7 - link4_vel4;
-        let link4_vel6 = link3_vel5 - link4_vel5;
-        let link4_vel7 = link4_cos0 * link3_vel9;
-        let link4_vel8 = link4_sin0 * link4_vel1;
-        let link4_vel9 = link4_vel7 + link4_vel8;
-        let link4_vel10 = link4_cos0 * link4_vel1;
-        let link4_vel11 = link4_sin0 * link3_vel9;
-        let link4_vel12 = link4_vel10 - link4_vel11;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel5;
-        let link5_vel1 = link4_vel12 + link5_vel0;
-        let link5_vel2 = link5_pivot1 * link4_vel9;
-        let link5_vel3 = link5_pivot2 * link5_vel1;
-        let link5_vel4 = link5_vel2 + link5_vel3;
-        let link5_vel5 = link5_rest7 + link5_vel4;
-        let link5_vel6 = link4_vel5 - link5_vel5;
-        let link5_vel7 = link5_cos0 * link4_vel9;
-        let link5_vel8 = link5_sin0 * link5_vel1;
-        let link5_vel9 = link5_vel7 + link5_vel8;
-        let link5_vel10 = link5_cos0 * link5_vel1;
-        let link5_vel11 = link5_sin0 * link4_vel9;
-        let link5_vel12 = link5_vel10 - link5_vel11;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel5;
-        let link6_vel1 = link5_vel12 + link6_vel0;
-        let link6_vel2 = link6_pivot1 * link5_vel9;
-        let link6_vel3 = link6_pivot2 * link6_vel1;
-        let link6_vel4 = link6_vel2 + link6_vel3;
-        let link6_vel5 = link6_rest7 - link6_vel4;
-        let link6_vel6 = link5_vel5 - link6_vel5;
-        let link6_vel7 = link6_cos0 * link5_vel9;
-        let link6_vel8 = link6_sin0 * link6_vel1;
-        let link6_vel9 = link6_vel7 + link6_vel8;
-        let link6_vel10 = link6_cos0 * link6_vel1;
-        let link6_vel11 = link6_sin0 * link5_vel9;
-        let link6_vel12 = link6_vel10 - link6_vel11;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel5;
-        let link7_vel1 = link6_vel12 + link7_vel0;
-        let link7_vel2 = link7_pivot74 * link6_vel9;
-        let link7_vel3 = link7_pivot75 * link7_vel1;
-        let link7_vel4 = link7_vel2 + link7_vel3;
-        let link7_vel5 = link7_rest25 - link7_vel4;
-        let link7_vel6 = link6_vel5 + link7_vel5;
-        let link7_vel7 = link7_pivot58 * link6_vel9;
-        let link7_vel8 = link7_pivot59 * link7_vel1;
-        let link7_vel9 = link7_vel7 + link7_vel8;
-        let link7_vel10 = link7_pivot60 * link7_vel5;
-        let link7_vel11 = link7_vel9 + link7_vel10;
-        let link7_vel12 = link7_rest17 - link7_vel11;
-        let link7_vel13 = link7_pivot33 * link6_vel9;
-        let link7_vel14 = link7_pivot34 * link7_vel1;
-        let link7_vel15 = link7_vel13 + link7_vel14;
-        let link7_vel16 = link7_pivot35 * link7_vel5;
-        let link7_vel17 = link7_vel15 + link7_vel16;
-        let link7_vel18 = link7_rest7 - link7_vel17;
-        let link7_vel19 = link7_pivot54 * link7_vel12;
-        let link7_vel20 = link7_vel18 - link7_vel19;
-        let link7_vel21 = link7_pivot0 * link6_vel9;
-        let link7_vel22 = link7_pivot1 * link7_vel1;
-        let link7_vel23 = link7_vel21 + link7_vel22;
-        let link7_vel24 = link7_pivot2 * link7_vel5;
-        let link7_vel25 = link7_vel23 + link7_vel24;
-        let link7_vel26 = link7_rest0 - link7_vel25;
-        let link7_vel27 = link7_pivot18 * link7_vel20;
-        let link7_vel28 = link7_vel26 - link7_vel27;
-        let link7_vel29 = link7_pivot21 * link7_vel12;
-        let link7_vel30 = link7_vel28 - link7_vel29;
-        v[0] = -link1_rest1;
-        v[1] = link2_vel3;
-        v[2] = link3_vel6;
-        v[3] = link4_vel6;
-        v[4] = link5_vel6;
-        v[5] = link6_vel6;
-        v[6] = link7_vel6;
-        v[7] = link7_vel12;
-        v[8] = link7_vel20;
-        v[9] = link7_vel30;
+        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+    }
+
+    #[inline(always)]
+    fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 9];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_1;
+            angles[1][l] = q_2;
+            angles[2][l] = q_3;
+            angles[3][l] = q_4;
+            angles[4][l] = q_5;
+            angles[5][l] = q_6;
+            angles[6][l] = q_7;
+            angles[7][l] = q_8;
+            angles[8][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[0][l];
+            let link2_cos0 = cosines[0][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[1][l];
+            let link3_cos0 = cosines[1][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[2][l];
+            let link4_cos0 = cosines[2][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[3][l];
+            let link5_cos0 = cosines[3][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[4][l];
+            let link6_cos0 = cosines[4][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[5][l];
+            let link7_cos0 = cosines[5][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[6][l];
+            let link8_cos0 = cosines[6][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[7][l];
+            let link9_cos0 = cosines[7][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[8][l];
+            let link10_cos0 = cosines[8][l];
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.05 * link10_sin0;
+            let link10_inertia1 = 0.05 * link10_cos0;
+            let link10_inertia2 = link10_inertia1 + link10_inertia1;
+            let link10_inertia3 = 0.25 * link10_inertia2;
+            let link10_inertia4 = link10_inertia3 + 0.00835;
+            let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+            let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+            let link10_inertia7 = 0.25 * link10_inertia1;
+            let link10_inertia8 = link10_inertia7 + 0.00835;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link9_cos0 * link10_inertia0;
+            let link9_inertia1 = link9_sin0 * link10_inertia5;
+            let link9_inertia2 = link9_inertia0 + link9_inertia1;
+            let link9_inertia3 = link9_sin0 * link10_inertia0;
+            let link9_inertia4 = link9_cos0 * link10_inertia5;
+            let link9_inertia5 = link9_inertia3 - link9_inertia4;
+            let link9_inertia6 = link9_sin0 * link10_inertia1;
+            let link9_inertia7 = link9_inertia0 + link9_inertia6;
+            let link9_inertia8 = link9_cos0 * link10_inertia1;
+            let link9_inertia9 = link9_inertia3 - link9_inertia8;
+            let link9_inertia10 = link9_inertia5 + link9_inertia5;
+            let link9_inertia11 = 0.25 * link9_inertia10;
+            let link9_inertia12 = link10_inertia6 - link9_inertia11;
+            let link9_inertia13 = link9_inertia5 - 0.25;
+            let link9_inertia14 = link9_inertia12 + 0.05835;
+            let link9_inertia15 = 0.25 * link9_inertia9;
+            let link9_inertia16 = link10_inertia8 - link9_inertia15;
+            let link9_inertia17 = 0.25 * link9_inertia5;
+            let link9_inertia18 = link10_inertia6 - link9_inertia17;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link8_cos0 * link9_inertia2;
+            let link8_inertia1 = link8_sin0 * link9_inertia13;
+            let link8_inertia2 = link8_inertia0 - link8_inertia1;
+            let link8_inertia3 = link8_sin0 * link9_inertia2;
+            let link8_inertia4 = link8_cos0 * link9_inertia13;
+            let link8_inertia5 = link8_inertia3 + link8_inertia4;
+            let link8_inertia6 = link8_inertia5 + link8_inertia5;
+            let link8_inertia7 = 0.25 * link8_inertia6;
+            let link8_inertia8 = link9_inertia14 - link8_inertia7;
+            let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
+            let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
+            let link8_inertia11 = link8_cos0 * link9_inertia7;
+            let link8_inertia12 = link8_sin0 * link9_inertia9;
+            let link8_inertia13 = link8_inertia11 - link8_inertia12;
+            let link8_inertia14 = link8_sin0 * link9_inertia7;
+            let link8_inertia15 = link8_cos0 * link9_inertia9;
+            let link8_inertia16 = link8_inertia14 + link8_inertia15;
+            let link8_inertia17 = 0.25 * link8_inertia16;
+            let link8_inertia18 = link9_inertia16 - link8_inertia17;
+            let link8_inertia19 = link8_sin0 * link9_inertia5;
+            let link8_inertia20 = link8_inertia0 - link8_inertia19;
+            let link8_inertia21 = link8_cos0 * link9_inertia5;
+            let link8_inertia22 = link8_inertia3 + link8_inertia21;
+            let link8_inertia23 = 0.25 * link8_inertia22;
+            let link8_inertia24 = link9_inertia18 - link8_inertia23;
+            let link8_inertia25 = 0.25 * link8_inertia5;
+            let link8_inertia26 = link9_inertia14 - link8_inertia25;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link7_cos0 * link8_inertia2;
+            let link7_inertia1 = link7_sin0 * link8_inertia9;
+            let link7_inertia2 = link7_inertia0 - link7_inertia1;
+            let link7_inertia3 = link7_sin0 * link8_inertia2;
+            let link7_inertia4 = link7_cos0 * link8_inertia9;
+            let link7_inertia5 = link7_inertia3 + link7_inertia4;
+            let link7_inertia6 = link7_cos0 * link8_inertia13;
+            let link7_inertia7 = link7_sin0 * link8_inertia16;
+            let link7_inertia8 = link7_inertia6 - link7_inertia7;
+            let link7_inertia9 = link7_sin0 * link8_inertia13;
+            let link7_inertia10 = link7_cos0 * link8_inertia16;
+            let link7_inertia11 = link7_inertia9 + link7_inertia10;
+            let link7_inertia12 = link7_cos0 * link8_inertia20;
+            let link7_inertia13 = link7_sin0 * link8_inertia22;
+            let link7_inertia14 = link7_inertia12 - link7_inertia13;
+            let link7_inertia15 = link7_sin0 * link8_inertia20;
+            let link7_inertia16 = link7_cos0 * link8_inertia22;
+            let link7_inertia17 = link7_inertia15 + link7_inertia16;
+            let link7_inertia18 = link7_sin0 * link8_inertia5;
+            let link7_inertia19 = link7_inertia0 - link7_inertia18;
+            let link7_inertia20 = link7_cos0 * link8_inertia5;
+            let link7_inertia21 = link7_inertia3 + link7_inertia20;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = 119.76047904191617 * link7_inertia8;
+            let link7_pivot1 = 119.76047904191617 * link7_inertia11;
+            let link7_pivot2 = 119.76047904191617 * link8_inertia18;
+            let link7_pivot3 = link7_inertia8 * link7_pivot0;
+            let link7_pivot4 = link7_inertia8 * link7_pivot1;
+            let link7_pivot5 = link7_inertia8 * link7_pivot2;
+            let link7_pivot6 = link7_inertia2 - link7_pivot5;
+            let link7_pivot7 = link7_inertia11 * link7_pivot1;
+            let link7_pivot8 = link7_inertia11 * link7_pivot2;
+            let link7_pivot9 = link7_inertia5 - link7_pivot8;
+            let link7_pivot10 = link8_inertia18 * link7_pivot2;
+            let link7_pivot11 = link8_inertia10 - link7_pivot10;
+            let link7_pivot12 = link10_inertia8 * link7_pivot0;
+            let link7_pivot13 = link10_inertia8 * link7_pivot1;
+            let link7_pivot14 = link10_inertia8 * link7_pivot2;
+            let link7_pivot15 = link7_inertia14 - link7_pivot12;
+            let link7_pivot16 = link7_inertia17 - link7_pivot13;
+            let link7_pivot17 = link8_inertia24 - link7_pivot14;
+            let link7_pivot18 = 119.76047904191617 * link10_inertia8;
+            let link7_pivot19 = link10_inertia8 * link7_pivot18;
+            let link7_pivot20 = link10_inertia6 - link7_pivot19;
+            let link7_pivot21 = 119.76047904191617 * link9_inertia16;
+            let link7_pivot22 = link10_inertia8 * link7_pivot21;
+            let link7_pivot23 = link9_inertia18 - link7_pivot22;
+            let link7_pivot24 = link9_inertia16 * link7_pivot0;
+            let link7_pivot25 = link9_inertia16 * link7_pivot1;
+            let link7_pivot26 = link9_inertia16 * link7_pivot2;
+            let link7_pivot27 = link7_inertia19 - link7_pivot24;
+            let link7_pivot28 = link7_inertia21 - link7_pivot25;
+            let link7_pivot29 = link8_inertia26 - link7_pivot26;
+            let link7_pivot30 = link9_inertia16 * link7_pivot21;
+            let link7_pivot31 = link9_inertia14 - link7_pivot30;
+            let link7_pivot32 = 1.0 / link7_pivot20;
+            let link7_pivot33 = link7_pivot15 * link7_pivot32;
+            let link7_pivot34 = link7_pivot16 * link7_pivot32;
+            let link7_pivot35 = link7_pivot17 * link7_pivot32;
+            let link7_pivot36 = link7_pivot15 * link7_pivot33;
+            let link7_pivot37 = link7_pivot3 + link7_pivot36;
+            let link7_pivot38 = link7_pivot15 * link7_pivot34;
+            let link7_pivot39 = link7_pivot4 + link7_pivot38;
+            let link7_pivot40 = link7_pivot15 * link7_pivot35;
+            let link7_pivot41 = link7_pivot6 - link7_pivot40;
+            let link7_pivot42 = link7_pivot16 * link7_pivot34;
+            let link7_pivot43 = link7_pivot7 + link7_pivot42;
+            let link7_pivot44 = link7_pivot16 * link7_pivot35;
+            let link7_pivot45 = link7_pivot9 - link7_pivot44;
+            let link7_pivot46 = link7_pivot17 * link7_pivot35;
+            let link7_pivot47 = link7_pivot11 - link7_pivot46;
+            let link7_pivot48 = link7_pivot23 * link7_pivot33;
+            let link7_pivot49 = link7_pivot23 * link7_pivot34;
+            let link7_pivot50 = link7_pivot23 * link7_pivot35;
+            let link7_pivot51 = link7_pivot27 - link7_pivot48;
+            let link7_pivot52 = link7_pivot28 - link7_pivot49;
+            let link7_pivot53 = link7_pivot29 - link7_pivot50;
+            let link7_pivot54 = link7_pivot23 * link7_pivot32;
+            let link7_pivot55 = link7_pivot23 * link7_pivot54;
+            let link7_pivot56 = link7_pivot31 - link7_pivot55;
+            let link7_pivot57 = 1.0 / link7_pivot56;
+            let link7_pivot58 = link7_pivot51 * link7_pivot57;
+            let link7_pivot59 = link7_pivot52 * link7_pivot57;
+            let link7_pivot60 = link7_pivot53 * link7_pivot57;
+            let link7_pivot61 = link7_pivot51 * link7_pivot58;
+            let link7_pivot62 = link7_pivot37 + link7_pivot61;
+            let link7_pivot63 = link7_pivot51 * link7_pivot59;
+            let link7_pivot64 = link7_pivot39 + link7_pivot63;
+            let link7_pivot65 = link7_pivot51 * link7_pivot60;
+            let link7_pivot66 = link7_pivot41 - link7_pivot65;
+            let link7_pivot67 = link7_pivot52 * link7_pivot59;
+            let link7_pivot68 = link7_pivot43 + link7_pivot67;
+            let link7_pivot69 = link7_pivot52 * link7_pivot60;
+            let link7_pivot70 = link7_pivot45 - link7_pivot69;
+            let link7_pivot71 = link7_pivot53 * link7_pivot60;
+            let link7_pivot72 = link7_pivot47 - link7_pivot71;
+            let link7_pivot73 = 1.0 / link7_pivot72;
+            let link7_pivot74 = link7_pivot66 * link7_pivot73;
+            let link7_pivot75 = link7_pivot70 * link7_pivot73;
+            let link7_pivot76 = link7_pivot66 * link7_pivot74;
+            let link7_pivot77 = link7_pivot62 + link7_pivot76;
+            let link7_pivot78 = link7_pivot66 * link7_pivot75;
+            let link7_pivot79 = link7_pivot64 + link7_pivot78;
+            let link7_pivot80 = link7_pivot70 * link7_pivot75;
+            let link7_pivot81 = link7_pivot68 + link7_pivot80;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia22 = 0.25 * link7_pivot79;
+            let link7_inertia23 = 0.25 * link7_pivot81;
+            let link7_inertia24 = 0.25 * link7_inertia23;
+            let link7_inertia25 = link7_inertia23 - 0.45;
+            let link7_inertia26 = link7_inertia24 - 0.10835;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link7_pivot77 - link7_pivot81;
+            let link6_inertia1 = link6_sin0 * link6_inertia0;
+            let link6_inertia2 = link6_cos0 + link6_cos0;
+            let link6_inertia3 = link7_pivot79 * link6_inertia2;
+            let link6_inertia4 = link6_inertia1 + link6_inertia3;
+            let link6_inertia5 = link6_sin0 * link6_inertia4;
+            let link6_inertia6 = link6_cos0 * link6_inertia4;
+            let link6_inertia7 = link7_pivot79 - link6_inertia6;
+            let link6_inertia8 = link7_pivot77 - link6_inertia5;
+            let link6_inertia9 = link7_pivot81 + link6_inertia5;
+            let link6_inertia10 = link6_cos0 * link7_inertia22;
+            let link6_inertia11 = link6_sin0 * link7_inertia25;
+            let link6_inertia12 = link6_inertia10 - link6_inertia11;
+            let link6_inertia13 = link6_sin0 * link7_inertia22;
+            let link6_inertia14 = link6_cos0 * link7_inertia25;
+            let link6_inertia15 = link6_inertia13 + link6_inertia14;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = 1.0 / link7_inertia26;
+            let link6_pivot1 = link6_inertia12 * link6_pivot0;
+            let link6_pivot2 = link6_inertia15 * link6_pivot0;
+            let link6_pivot3 = link6_inertia12 * link6_pivot1;
+            let link6_pivot4 = link6_inertia8 - link6_pivot3;
+            let link6_pivot5 = link6_inertia12 * link6_pivot2;
+            let link6_pivot6 = link6_inertia7 + link6_pivot5;
+            let link6_pivot7 = link6_inertia15 * link6_pivot2;
+            let link6_pivot8 = link6_inertia9 - link6_pivot7;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia16 = 0.25 * link6_pivot6;
+            let link6_inertia17 = 0.25 * link6_pivot8;
+            let link6_inertia18 = 0.25 * link6_inertia17;
+            let link6_inertia19 = link6_inertia17 - 0.55;
+            let link6_inertia20 = link6_inertia18 - 0.13335;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link6_pivot4 - link6_pivot8;
+            let link5_inertia1 = link5_sin0 * link5_inertia0;
+            let link5_inertia2 = link5_cos0 + link5_cos0;
+            let link5_inertia3 = link6_pivot6 * link5_inertia2;
+            let link5_inertia4 = link5_inertia1 - link5_inertia3;
+            let link5_inertia5 = link5_sin0 * link5_inertia4;
+            let link5_inertia6 = link5_cos0 * link5_inertia4;
+            let link5_inertia7 = link6_pivot6 + link5_inertia6;
+            let link5_inertia8 = link6_pivot4 - link5_inertia5;
+            let link5_inertia9 = link6_pivot8 + link5_inertia5;
+            let link5_inertia10 = link5_cos0 * link6_inertia16;
+            let link5_inertia11 = link5_sin0 * link6_inertia19;
+            let link5_inertia12 = link5_inertia10 + link5_inertia11;
+            let link5_inertia13 = link5_sin0 * link6_inertia16;
+            let link5_inertia14 = link5_cos0 * link6_inertia19;
+            let link5_inertia15 = link5_inertia13 - link5_inertia14;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = 1.0 / link6_inertia20;
+            let link5_pivot1 = link5_inertia12 * link5_pivot0;
+            let link5_pivot2 = link5_inertia15 * link5_pivot0;
+            let link5_pivot3 = link5_inertia12 * link5_pivot1;
+            let link5_pivot4 = link5_inertia8 - link5_pivot3;
+            let link5_pivot5 = link5_inertia12 * link5_pivot2;
+            let link5_pivot6 = link5_inertia7 - link5_pivot5;
+            let link5_pivot7 = link5_inertia15 * link5_pivot2;
+            let link5_pivot8 = link5_inertia9 - link5_pivot7;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia16 = 0.25 * link5_pivot6;
+            let link5_inertia17 = 0.25 * link5_pivot8;
+            let link5_inertia18 = 0.25 * link5_inertia17;
+            let link5_inertia19 = link5_inertia17 - 0.65;
+            let link5_inertia20 = link5_inertia18 - 0.15835;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link5_pivot4 - link5_pivot8;
+            let link4_inertia1 = link4_sin0 * link4_inertia0;
+            let link4_inertia2 = link4_cos0 + link4_cos0;
+            let link4_inertia3 = link5_pivot6 * link4_inertia2;
+            let link4_inertia4 = link4_inertia1 + link4_inertia3;
+            let link4_inertia5 = link4_sin0 * link4_inertia4;
+            let link4_inertia6 = link4_cos0 * link4_inertia4;
+            let link4_inertia7 = link5_pivot6 - link4_inertia6;
+            let link4_inertia8 = link5_pivot4 - link4_inertia5;
+            let link4_inertia9 = link5_pivot8 + link4_inertia5;
+            let link4_inertia10 = link4_cos0 * link5_inertia16;
+            let link4_inertia11 = link4_sin0 * link5_inertia19;
+            let link4_inertia12 = link4_inertia10 - link4_inertia11;
+            let link4_inertia13 = link4_sin0 * link5_inertia16;
+            let link4_inertia14 = link4_cos0 * link5_inertia19;
+            let link4_inertia15 = link4_inertia13 + link4_inertia14;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = 1.0 / link5_inertia20;
+            let link4_pivot1 = link4_inertia12 * link4_pivot0;
+            let link4_pivot2 = link4_inertia15 * link4_pivot0;
+            let link4_pivot3 = link4_inertia12 * link4_pivot1;
+            let link4_pivot4 = link4_inertia8 - link4_pivot3;
+            let link4_pivot5 = link4_inertia12 * link4_pivot2;
+            let link4_pivot6 = link4_inertia7 + link4_pivot5;
+            let link4_pivot7 = link4_inertia15 * link4_pivot2;
+            let link4_pivot8 = link4_inertia9 - link4_pivot7;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia16 = 0.25 * link4_pivot6;
+            let link4_inertia17 = 0.25 * link4_pivot8;
+            let link4_inertia18 = 0.25 * link4_inertia17;
+            let link4_inertia19 = link4_inertia17 - 0.75;
+            let link4_inertia20 = link4_inertia18 - 0.18334999999999999;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link4_pivot4 - link4_pivot8;
+            let link3_inertia1 = link3_sin0 * link3_inertia0;
+            let link3_inertia2 = link3_cos0 + link3_cos0;
+            let link3_inertia3 = link4_pivot6 * link3_inertia2;
+            let link3_inertia4 = link3_inertia1 - link3_inertia3;
+            let link3_inertia5 = link3_sin0 * link3_inertia4;
+            let link3_inertia6 = link3_cos0 * link3_inertia4;
+            let link3_inertia7 = link4_pivot6 + link3_inertia6;
+            let link3_inertia8 = link4_pivot4 - link3_inertia5;
+            let link3_inertia9 = link4_pivot8 + link3_inertia5;
+            let link3_inertia10 = link3_cos0 * link4_inertia16;
+            let link3_inertia11 = link3_sin0 * link4_inertia19;
+            let link3_inertia12 = link3_inertia10 + link3_inertia11;
+            let link3_inertia13 = link3_sin0 * link4_inertia16;
+            let link3_inertia14 = link3_cos0 * link4_inertia19;
+            let link3_inertia15 = link3_inertia13 - link3_inertia14;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = 1.0 / link4_inertia20;
+            let link3_pivot1 = link3_inertia12 * link3_pivot0;
+            let link3_pivot2 = link3_inertia15 * link3_pivot0;
+            let link3_pivot3 = link3_inertia12 * link3_pivot1;
+            let link3_pivot4 = link3_inertia8 - link3_pivot3;
+            let link3_pivot5 = link3_inertia12 * link3_pivot2;
+            let link3_pivot6 = link3_inertia7 - link3_pivot5;
+            let link3_pivot7 = link3_inertia15 * link3_pivot2;
+            let link3_pivot8 = link3_inertia9 - link3_pivot7;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia16 = 0.25 * link3_pivot6;
+            let link3_inertia17 = 0.25 * link3_pivot8;
+            let link3_inertia18 = 0.25 * link3_inertia17;
+            let link3_inertia19 = link3_inertia17 - 0.85;
+            let link3_inertia20 = link3_inertia18 - 0.20834999999999998;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link3_pivot4 - link3_pivot8;
+            let link2_inertia1 = link2_sin0 * link2_inertia0;
+            let link2_inertia2 = link2_cos0 + link2_cos0;
+            let link2_inertia3 = link3_pivot6 * link2_inertia2;
+            let link2_inertia4 = link2_inertia1 + link2_inertia3;
+            let link2_inertia5 = link2_sin0 * link2_inertia4;
+            let link2_inertia6 = link3_pivot8 + link2_inertia5;
+            let link2_inertia7 = link2_sin0 * link3_inertia16;
+            let link2_inertia8 = link2_cos0 * link3_inertia19;
+            let link2_inertia9 = link2_inertia7 + link2_inertia8;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = 1.0 / link3_inertia20;
+            let link2_pivot1 = link2_inertia9 * link2_pivot0;
+            let link2_pivot2 = link2_inertia9 * link2_pivot1;
+            let link2_pivot3 = link2_inertia6 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia10 = 0.25 * link2_pivot3;
+            let link2_inertia11 = 0.25 * link2_inertia10;
+            let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = 1.0 / link2_inertia12;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = 119.76047904191617 * p_9;
+            let link7_rest1 = link10_inertia8 * link7_rest0;
+            let link7_rest2 = link9_inertia16 * link7_rest0;
+            let link7_rest3 = link7_inertia8 * link7_rest0;
+            let link7_rest4 = link7_inertia11 * link7_rest0;
+            let link7_rest5 = link8_inertia18 * link7_rest0;
+            let link7_rest6 = p_8 - link7_rest1;
+            let link7_rest7 = link7_pivot32 * link7_rest6;
+            let link7_rest8 = link7_pivot23 * link7_rest7;
+            let link7_rest9 = link7_rest2 + link7_rest8;
+            let link7_rest10 = link7_pivot15 * link7_rest7;
+            let link7_rest11 = link7_pivot16 * link7_rest7;
+            let link7_rest12 = link7_pivot17 * link7_rest7;
+            let link7_rest13 = link7_rest3 + link7_rest10;
+            let link7_rest14 = link7_rest4 + link7_rest11;
+            let link7_rest15 = link7_rest5 + link7_rest12;
+            let link7_rest16 = p_7 - link7_rest9;
+            let link7_rest17 = link7_pivot57 * link7_rest16;
+            let link7_rest18 = link7_pivot51 * link7_rest17;
+            let link7_rest19 = link7_pivot52 * link7_rest17;
+            let link7_rest20 = link7_pivot53 * link7_rest17;
+            let link7_rest21 = link7_rest13 + link7_rest18;
+            let link7_rest22 = link7_rest14 + link7_rest19;
+            let link7_rest23 = link7_rest15 + link7_rest20;
+            let link7_rest24 = p_6 - link7_rest23;
+            let link7_rest25 = link7_pivot73 * link7_rest24;
+            let link7_rest26 = link7_pivot66 * link7_rest25;
+            let link7_rest27 = link7_rest21 + link7_rest26;
+            let link7_rest28 = link7_pivot70 * link7_rest25;
+            let link7_rest29 = link7_rest22 + link7_rest28;
+            let link7_rest30 = 0.25 * link7_rest29;
+            let link7_rest31 = p_6 - link7_rest30;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_cos0 * link7_rest27;
+            let link6_rest1 = link6_sin0 * link7_rest29;
+            let link6_rest2 = link6_rest0 - link6_rest1;
+            let link6_rest3 = link6_sin0 * link7_rest27;
+            let link6_rest4 = link6_cos0 * link7_rest29;
+            let link6_rest5 = link6_rest3 + link6_rest4;
+            let link6_rest6 = p_5 - link7_rest31;
+            let link6_rest7 = link6_pivot0 * link6_rest6;
+            let link6_rest8 = link6_inertia12 * link6_rest7;
+            let link6_rest9 = link6_rest2 - link6_rest8;
+            let link6_rest10 = link6_inertia15 * link6_rest7;
+            let link6_rest11 = link6_rest5 - link6_rest10;
+            let link6_rest12 = 0.25 * link6_rest11;
+            let link6_rest13 = p_5 - link6_rest12;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_cos0 * link6_rest9;
+            let link5_rest1 = link5_sin0 * link6_rest11;
+            let link5_rest2 = link5_rest0 - link5_rest1;
+            let link5_rest3 = link5_sin0 * link6_rest9;
+            let link5_rest4 = link5_cos0 * link6_rest11;
+            let link5_rest5 = link5_rest3 + link5_rest4;
+            let link5_rest6 = p_4 - link6_rest13;
+            let link5_rest7 = link5_pivot0 * link5_rest6;
+            let link5_rest8 = link5_inertia12 * link5_rest7;
+            let link5_rest9 = link5_rest2 + link5_rest8;
+            let link5_rest10 = link5_inertia15 * link5_rest7;
+            let link5_rest11 = link5_rest5 + link5_rest10;
+            let link5_rest12 = 0.25 * link5_rest11;
+            let link5_rest13 = p_4 - link5_rest12;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_cos0 * link5_rest9;
+            let link4_rest1 = link4_sin0 * link5_rest11;
+            let link4_rest2 = link4_rest0 - link4_rest1;
+            let link4_rest3 = link4_sin0 * link5_rest9;
+            let link4_rest4 = link4_cos0 * link5_rest11;
+            let link4_rest5 = link4_rest3 + link4_rest4;
+            let link4_rest6 = p_3 - link5_rest13;
+            let link4_rest7 = link4_pivot0 * link4_rest6;
+            let link4_rest8 = link4_inertia12 * link4_rest7;
+            let link4_rest9 = link4_rest2 - link4_rest8;
+            let link4_rest10 = link4_inertia15 * link4_rest7;
+            let link4_rest11 = link4_rest5 - link4_rest10;
+            let link4_rest12 = 0.25 * link4_rest11;
+            let link4_rest13 = p_3 - link4_rest12;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_cos0 * link4_rest9;
+            let link3_rest1 = link3_sin0 * link4_rest11;
+            let link3_rest2 = link3_rest0 - link3_rest1;
+            let link3_rest3 = link3_sin0 * link4_rest9;
+            let link3_rest4 = link3_cos0 * link4_rest11;
+            let link3_rest5 = link3_rest3 + link3_rest4;
+            let link3_rest6 = p_2 - link4_rest13;
+            let link3_rest7 = link3_pivot0 * link3_rest6;
+            let link3_rest8 = link3_inertia12 * link3_rest7;
+            let link3_rest9 = link3_rest2 + link3_rest8;
+            let link3_rest10 = link3_inertia15 * link3_rest7;
+            let link3_rest11 = link3_rest5 + link3_rest10;
+            let link3_rest12 = 0.25 * link3_rest11;
+            let link3_rest13 = p_2 - link3_rest12;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_sin0 * link3_rest9;
+            let link2_rest1 = link2_cos0 * link3_rest11;
+            let link2_rest2 = link2_rest0 + link2_rest1;
+            let link2_rest3 = p_1 - link3_rest13;
+            let link2_rest4 = link2_pivot0 * link2_rest3;
+            let link2_rest5 = link2_inertia9 * link2_rest4;
+            let link2_rest6 = link2_rest2 - link2_rest5;
+            let link2_rest7 = 0.25 * link2_rest6;
+            let link2_rest8 = p_1 - link2_rest7;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_0 - link2_rest8;
+            let link1_rest1 = link1_pivot0 * link1_rest0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = 0.25 * link1_rest1;
+            let link2_vel1 = link2_pivot1 * link2_vel0;
+            let link2_vel2 = link2_rest4 - link2_vel1;
+            let link2_vel3 = link1_rest1 - link2_vel2;
+            let link2_vel4 = link2_sin0 * link2_vel0;
+            let link2_vel5 = link2_cos0 * link2_vel0;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = 0.25 * link2_vel2;
+            let link3_vel1 = link2_vel5 + link3_vel0;
+            let link3_vel2 = link3_pivot1 * link2_vel4;
+            let link3_vel3 = link3_pivot2 * link3_vel1;
+            let link3_vel4 = link3_vel2 + link3_vel3;
+            let link3_vel5 = link3_rest7 + link3_vel4;
+            let link3_vel6 = link2_vel2 - link3_vel5;
+            let link3_vel7 = link3_cos0 * link2_vel4;
+            let link3_vel8 = link3_sin0 * link3_vel1;
+            let link3_vel9 = link3_vel7 + link3_vel8;
+            let link3_vel10 = link3_cos0 * link3_vel1;
+            let link3_vel11 = link3_sin0 * link2_vel4;
+            let link3_vel12 = link3_vel10 - link3_vel11;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = 0.25 * link3_vel5;
+            let link4_vel1 = link3_vel12 + link4_vel0;
+            let link4_vel2 = link4_pivot1 * link3_vel9;
+            let link4_vel3 = link4_pivot2 * link4_vel1;
+            let link4_vel4 = link4_vel2 + link4_vel3;
+            let link4_vel5 = link4_rest7 - link4_vel4;
+            let link4_vel6 = link3_vel5 - link4_vel5;
+            let link4_vel7 = link4_cos0 * link3_vel9;
+            let link4_vel8 = link4_sin0 * link4_vel1;
+            let link4_vel9 = link4_vel7 + link4_vel8;
+            let link4_vel10 = link4_cos0 * link4_vel1;
+            let link4_vel11 = link4_sin0 * link3_vel9;
+            let link4_vel12 = link4_vel10 - link4_vel11;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = 0.25 * link4_vel5;
+            let link5_vel1 = link4_vel12 + link5_vel0;
+            let link5_vel2 = link5_pivot1 * link4_vel9;
+            let link5_vel3 = link5_pivot2 * link5_vel1;
+            let link5_vel4 = link5_vel2 + link5_vel3;
+            let link5_vel5 = link5_rest7 + link5_vel4;
+            let link5_vel6 = link4_vel5 - link5_vel5;
+            let link5_vel7 = link5_cos0 * link4_vel9;
+            let link5_vel8 = link5_sin0 * link5_vel1;
+            let link5_vel9 = link5_vel7 + link5_vel8;
+            let link5_vel10 = link5_cos0 * link5_vel1;
+            let link5_vel11 = link5_sin0 * link4_vel9;
+            let link5_vel12 = link5_vel10 - link5_vel11;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = 0.25 * link5_vel5;
+            let link6_vel1 = link5_vel12 + link6_vel0;
+            let link6_vel2 = link6_pivot1 * link5_vel9;
+            let link6_vel3 = link6_pivot2 * link6_vel1;
+            let link6_vel4 = link6_vel2 + link6_vel3;
+            let link6_vel5 = link6_rest7 - link6_vel4;
+            let link6_vel6 = link5_vel5 - link6_vel5;
+            let link6_vel7 = link6_cos0 * link5_vel9;
+            let link6_vel8 = link6_sin0 * link6_vel1;
+            let link6_vel9 = link6_vel7 + link6_vel8;
+            let link6_vel10 = link6_cos0 * link6_vel1;
+            let link6_vel11 = link6_sin0 * link5_vel9;
+            let link6_vel12 = link6_vel10 - link6_vel11;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = 0.25 * link6_vel5;
+            let link7_vel1 = link6_vel12 + link7_vel0;
+            let link7_vel2 = link7_pivot74 * link6_vel9;
+            let link7_vel3 = link7_pivot75 * link7_vel1;
+            let link7_vel4 = link7_vel2 + link7_vel3;
+            let link7_vel5 = link7_rest25 - link7_vel4;
+            let link7_vel6 = link6_vel5 + link7_vel5;
+            let link7_vel7 = link7_pivot58 * link6_vel9;
+            let link7_vel8 = link7_pivot59 * link7_vel1;
+            let link7_vel9 = link7_vel7 + link7_vel8;
+            let link7_vel10 = link7_pivot60 * link7_vel5;
+            let link7_vel11 = link7_vel9 + link7_vel10;
+            let link7_vel12 = link7_rest17 - link7_vel11;
+            let link7_vel13 = link7_pivot33 * link6_vel9;
+            let link7_vel14 = link7_pivot34 * link7_vel1;
+            let link7_vel15 = link7_vel13 + link7_vel14;
+            let link7_vel16 = link7_pivot35 * link7_vel5;
+            let link7_vel17 = link7_vel15 + link7_vel16;
+            let link7_vel18 = link7_rest7 - link7_vel17;
+            let link7_vel19 = link7_pivot54 * link7_vel12;
+            let link7_vel20 = link7_vel18 - link7_vel19;
+            let link7_vel21 = link7_pivot0 * link6_vel9;
+            let link7_vel22 = link7_pivot1 * link7_vel1;
+            let link7_vel23 = link7_vel21 + link7_vel22;
+            let link7_vel24 = link7_pivot2 * link7_vel5;
+            let link7_vel25 = link7_vel23 + link7_vel24;
+            let link7_vel26 = link7_rest0 - link7_vel25;
+            let link7_vel27 = link7_pivot18 * link7_vel20;
+            let link7_vel28 = link7_vel26 - link7_vel27;
+            let link7_vel29 = link7_pivot21 * link7_vel12;
+            let link7_vel30 = link7_vel28 - link7_vel29;
+            results[0][l] = -link1_rest1;
+            results[1][l] = link2_vel3;
+            results[2][l] = link3_vel6;
+            results[3][l] = link4_vel6;
+            results[4][l] = link5_vel6;
+            results[5][l] = link6_vel6;
+            results[6][l] = link7_vel6;
+            results[7][l] = link7_vel12;
+            results[8][l] = link7_vel20;
+            results[9][l] = link7_vel30;
+        }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
+        v.give(6, &results[6]);
+        v.give(7, &results[7]);
+        v.give(8, &results[8]);
+        v.give(9, &results[9]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 191 operations: 82 additions, 109 multiplications, 0 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     #[inline]
     pub fn momenta(&self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = 0.25 * v_0;
-        let link2_vel1 = link2_sin0 * link2_vel0;
-        let link2_vel2 = link2_cos0 * link2_vel0;
-        let link2_vel3 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel3;
-        let link3_vel1 = link2_vel2 + link3_vel0;
-        let link3_vel2 = link3_cos0 * link2_vel1;
-        let link3_vel3 = link3_sin0 * link3_vel1;
-        let link3_vel4 = link3_vel2 + link3_vel3;
-        let link3_vel5 = link3_cos0 * link3_vel1;
-        let link3_vel6 = link3_sin0 * link2_vel1;
-        let link3_vel7 = link3_vel5 - link3_vel6;
-        let link3_vel8 = v_2 + link2_vel3;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel8;
-        let link4_vel1 = link3_vel7 + link4_vel0;
-        let link4_vel2 = link4_cos0 * link3_vel4;
-        let link4_vel3 = link4_sin0 * link4_vel1;
-        let link4_vel4 = link4_vel2 + link4_vel3;
-        let link4_vel5 = link4_cos0 * link4_vel1;
-        let link4_vel6 = link4_sin0 * link3_vel4;
-        let link4_vel7 = link4_vel5 - link4_vel6;
-        let link4_vel8 = v_3 + link3_vel8;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel8;
-        let link5_vel1 = link4_vel7 + link5_vel0;
-        let link5_vel2 = link5_cos0 * link4_vel4;
-        let link5_vel3 = link5_sin0 * link5_vel1;
-        let link5_vel4 = link5_vel2 + link5_vel3;
-        let link5_vel5 = link5_cos0 * link5_vel1;
-        let link5_vel6 = link5_sin0 * link4_vel4;
-        let link5_vel7 = link5_vel5 - link5_vel6;
-        let link5_vel8 = v_4 + link4_vel8;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel8;
-        let link6_vel1 = link5_vel7 + link6_vel0;
-        let link6_vel2 = link6_cos0 * link5_vel4;
-        let link6_vel3 = link6_sin0 * link6_vel1;
-        let link6_vel4 = link6_vel2 + link6_vel3;
-        let link6_vel5 = link6_cos0 * link6_vel1;
-        let link6_vel6 = link6_sin0 * link5_vel4;
-        let link6_vel7 = link6_vel5 - link6_vel6;
-        let link6_vel8 = v_5 + link5_vel8;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel8;
-        let link7_vel1 = link6_vel7 + link7_vel0;
-        let link7_vel2 = link7_cos0 * link6_vel4;
-        let link7_vel3 = link7_sin0 * link7_vel1;
-        let link7_vel4 = link7_vel2 + link7_vel3;
-        let link7_vel5 = link7_cos0 * link7_vel1;
-        let link7_vel6 = link7_sin0 * link6_vel4;
-        let link7_vel7 = link7_vel5 - link7_vel6;
-        let link7_vel8 = v_6 + link6_vel8;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = 0.25 * link7_vel8;
-        let link8_vel1 = link7_vel7 + link8_vel0;
-        let link8_vel2 = link8_cos0 * link7_vel4;
-        let link8_vel3 = link8_sin0 * link8_vel1;
-        let link8_vel4 = link8_vel2 + link8_vel3;
-        let link8_vel5 = link8_cos0 * link8_vel1;
-        let link8_vel6 = link8_sin0 * link7_vel4;
-        let link8_vel7 = link8_vel5 - link8_vel6;
-        let link8_vel8 = v_7 + link7_vel8;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = 0.25 * link8_vel8;
-        let link9_vel1 = link8_vel7 + link9_vel0;
-        let link9_vel2 = link9_cos0 * link8_vel4;
-        let link9_vel3 = link9_sin0 * link9_vel1;
-        let link9_vel4 = link9_vel2 + link9_vel3;
-        let link9_vel5 = link9_cos0 * link9_vel1;
-        let link9_vel6 = link9_sin0 * link8_vel4;
-        let link9_vel7 = link9_vel5 - link9_vel6;
-        let link9_vel8 = v_8 + link8_vel8;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = 0.25 * link9_vel8;
-        let link10_vel1 = link9_vel7 + link10_vel0;
-        let link10_vel2 = link10_cos0 * link10_vel1;
-        let link10_vel3 = link10_sin0 * link9_vel4;
-        let link10_vel4 = link10_vel2 - link10_vel3;
-        let link10_vel5 = v_9 + link9_vel8;
-        // link1: momentum
-        let link1_mom0 = 0.23334999999999997 * v_0;
-        // link2: momentum
-        let link2_mom0 = 0.20834999999999998 * link2_vel3;
-        let link2_mom1 = 0.85 * link2_vel3;
-        let link2_mom2 = 0.85 * link2_vel2;
-        let link2_mom3 = link2_mom0 + link2_mom2;
-        // link3: momentum
-        let link3_mom0 = 0.18334999999999999 * link3_vel8;
-        let link3_mom1 = 0.75 * link3_vel8;
-        let link3_mom2 = 0.75 * link3_vel7;
-        let link3_mom3 = link3_mom0 + link3_mom2;
-        // link4: momentum
-        let link4_mom0 = 0.15835 * link4_vel8;
-        let link4_mom1 = 0.65 * link4_vel8;
-        let link4_mom2 = 0.65 * link4_vel7;
-        let link4_mom3 = link4_mom0 + link4_mom2;
-        // link5: momentum
-        let link5_mom0 = 0.13335 * link5_vel8;
-        let link5_mom1 = 0.55 * link5_vel8;
-        let link5_mom2 = 0.55 * link5_vel7;
-        let link5_mom3 = link5_mom0 + link5_mom2;
-        // link6: momentum
-        let link6_mom0 = 0.10835 * link6_vel8;
-        let link6_mom1 = 0.45 * link6_vel8;
-        let link6_mom2 = 0.45 * link6_vel7;
-        let link6_mom3 = link6_mom0 + link6_mom2;
-        // link7: momentum
-        let link7_mom0 = 0.08335000000000001 * link7_vel8;
-        let link7_mom1 = 0.35000000000000003 * link7_vel8;
-        let link7_mom2 = 0.35000000000000003 * link7_vel7;
-        let link7_mom3 = link7_mom0 + link7_mom2;
-        // link8: momentum
-        let link8_mom0 = 0.05835 * link8_vel8;
-        let link8_mom1 = 0.25 * link8_vel7;
-        let link8_mom2 = link8_mom0 + link8_mom1;
-        // link9: momentum
-        let link9_mom0 = 0.033350000000000005 * link9_vel8;
-        let link9_mom1 = 0.15000000000000002 * link9_vel8;
-        let link9_mom2 = 0.15000000000000002 * link9_vel7;
-        let link9_mom3 = link9_mom0 + link9_mom2;
-        // link10: momentum
-        let link10_mom0 = 0.00835 * link10_vel5;
-        let link10_mom1 = 0.05 * link10_vel5;
-        let link10_mom2 = 0.05 * link10_vel4;
-        let link10_mom3 = link10_mom0 + link10_mom2;
-        let link10_mom4 = link10_sin0 * link10_mom1;
-        let link10_mom5 = link10_cos0 * link10_mom1;
-        let link10_mom6 = 0.25 * link10_mom5;
-        let link10_mom7 = link10_mom3 + link10_mom6;
-        let link10_mom8 = link9_mom1 + link10_mom5;
-        let link10_mom9 = link9_mom3 + link10_mom7;
-        // link9: momentum
-        let link9_mom4 = link9_cos0 * link10_mom4;
-        let link9_mom5 = link9_sin0 * link10_mom8;
-        let link9_mom6 = link9_mom4 + link9_mom5;
-        let link9_mom7 = link9_sin0 * link10_mom4;
-        let link9_mom8 = link9_cos0 * link10_mom8;
-        let link9_mom9 = link9_mom7 - link9_mom8;
-        let link9_mom10 = 0.25 * link9_mom9;
-        let link9_mom11 = link10_mom9 - link9_mom10;
-        let link9_mom12 = link9_vel0 - link9_mom9;
-        let link9_mom13 = link8_mom2 + link9_mom11;
-        // link8: momentum
-        let link8_mom3 = link8_cos0 * link9_mom6;
-        let link8_mom4 = link8_sin0 * link9_mom12;
-        let link8_mom5 = link8_mom3 + link8_mom4;
-        let link8_mom6 = link8_sin0 * link9_mom6;
-        let link8_mom7 = link8_cos0 * link9_mom12;
-        let link8_mom8 = link8_mom6 - link8_mom7;
-        let link8_mom9 = 0.25 * link8_mom8;
-        let link8_mom10 = link9_mom13 - link8_mom9;
-        let link8_mom11 = link7_mom1 - link8_mom8;
-        let link8_mom12 = link7_mom3 + link8_mom10;
-        // link7: momentum
-        let link7_mom4 = link7_cos0 * link8_mom5;
-        let link7_mom5 = link7_sin0 * link8_mom11;
-        let link7_mom6 = link7_mom4 + link7_mom5;
-        let link7_mom7 = link7_sin0 * link8_mom5;
-        let link7_mom8 = link7_cos0 * link8_mom11;
-        let link7_mom9 = link7_mom7 - link7_mom8;
-        let link7_mom10 = 0.25 * link7_mom9;
-        let link7_mom11 = link8_mom12 - link7_mom10;
-        let link7_mom12 = link6_mom1 - link7_mom9;
-        let link7_mom13 = link6_mom3 + link7_mom11;
-        // link6: momentum
-        let link6_mom4 = link6_cos0 * link7_mom6;
-        let link6_mom5 = link6_sin0 * link7_mom12;
-        let link6_mom6 = link6_mom4 + link6_mom5;
-        let link6_mom7 = link6_sin0 * link7_mom6;
-        let link6_mom8 = link6_cos0 * link7_mom12;
-        let link6_mom9 = link6_mom7 - link6_mom8;
-        let link6_mom10 = 0.25 * link6_mom9;
-        let link6_mom11 = link7_mom13 - link6_mom10;
-        let link6_mom12 = link5_mom1 - link6_mom9;
-        let link6_mom13 = link5_mom3 + link6_mom11;
-        // link5: momentum
-        let link5_mom4 = link5_cos0 * link6_mom6;
-        let link5_mom5 = link5_sin0 * link6_mom12;
-        let link5_mom6 = link5_mom4 + link5_mom5;
-        let link5_mom7 = link5_sin0 * link6_mom6;
-        let link5_mom8 = link5_cos0 * link6_mom12;
-        let link5_mom9 = link5_mom7 - link5_mom8;
-        let link5_mom10 = 0.25 * link5_mom9;
-        let link5_mom11 = link6_mom13 - link5_mom10;
-        let link5_mom12 = link4_mom1 - link5_mom9;
-        let link5_mom13 = link4_mom3 + link5_mom11;
-        // link4: momentum
-        let link4_mom4 = link4_cos0 * link5_mom6;
-        let link4_mom5 = link4_sin0 * link5_mom12;
-        let link4_mom6 = link4_mom4 + link4_mom5;
-        let link4_mom7 = link4_sin0 * link5_mom6;
-        let link4_mom8 = link4_cos0 * link5_mom12;
-        let link4_mom9 = link4_mom7 - link4_mom8;
-        let link4_mom10 = 0.25 * link4_mom9;
-        let link4_mom11 = link5_mom13 - link4_mom10;
-        let link4_mom12 = link3_mom1 - link4_mom9;
-        let link4_mom13 = link3_mom3 + link4_mom11;
-        // link3: momentum
-        let link3_mom4 = link3_cos0 * link4_mom6;
-        let link3_mom5 = link3_sin0 * link4_mom12;
-        let link3_mom6 = link3_mom4 + link3_mom5;
-        let link3_mom7 = link3_sin0 * link4_mom6;
-        let link3_mom8 = link3_cos0 * link4_mom12;
-        let link3_mom9 = link3_mom7 - link3_mom8;
-        let link3_mom10 = 0.25 * link3_mom9;
-        let link3_mom11 = link4_mom13 - link3_mom10;
-        let link3_mom12 = link2_mom1 - link3_mom9;
-        let link3_mom13 = link2_mom3 + link3_mom11;
-        // link2: momentum
-        let link2_mom4 = link2_sin0 * link3_mom6;
-        let link2_mom5 = link2_cos0 * link3_mom12;
-        let link2_mom6 = link2_mom4 - link2_mom5;
-        let link2_mom7 = 0.25 * link2_mom6;
-        let link2_mom8 = link3_mom13 - link2_mom7;
-        let link2_mom9 = link1_mom0 + link2_mom8;
-        p[0] = link2_mom9;
-        p[1] = link3_mom13;
-        p[2] = link4_mom13;
-        p[3] = link5_mom13;
-        p[4] = link6_mom13;
-        p[5] = link7_mom13;
-        p[6] = link8_mom12;
-        p[7] = link9_mom13;
-        p[8] = link10_mom9;
-        p[9] = link10_mom3;
+        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+    }
+
+    #[inline(always)]
+    fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 9];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_1;
+            angles[1][l] = q_2;
+            angles[2][l] = q_3;
+            angles[3][l] = q_4;
+            angles[4][l] = q_5;
+            angles[5][l] = q_6;
+            angles[6][l] = q_7;
+            angles[7][l] = q_8;
+            angles[8][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[0][l];
+            let link2_cos0 = cosines[0][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[1][l];
+            let link3_cos0 = cosines[1][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[2][l];
+            let link4_cos0 = cosines[2][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[3][l];
+            let link5_cos0 = cosines[3][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[4][l];
+            let link6_cos0 = cosines[4][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[5][l];
+            let link7_cos0 = cosines[5][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[6][l];
+            let link8_cos0 = cosines[6][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[7][l];
+            let link9_cos0 = cosines[7][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[8][l];
+            let link10_cos0 = cosines[8][l];
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = 0.25 * v_0;
+            let link2_vel1 = link2_sin0 * link2_vel0;
+            let link2_vel2 = link2_cos0 * link2_vel0;
+            let link2_vel3 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = 0.25 * link2_vel3;
+            let link3_vel1 = link2_vel2 + link3_vel0;
+            let link3_vel2 = link3_cos0 * link2_vel1;
+            let link3_vel3 = link3_sin0 * link3_vel1;
+            let link3_vel4 = link3_vel2 + link3_vel3;
+            let link3_vel5 = link3_cos0 * link3_vel1;
+            let link3_vel6 = link3_sin0 * link2_vel1;
+            let link3_vel7 = link3_vel5 - link3_vel6;
+            let link3_vel8 = v_2 + link2_vel3;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = 0.25 * link3_vel8;
+            let link4_vel1 = link3_vel7 + link4_vel0;
+            let link4_vel2 = link4_cos0 * link3_vel4;
+            let link4_vel3 = link4_sin0 * link4_vel1;
+            let link4_vel4 = link4_vel2 + link4_vel3;
+            let link4_vel5 = link4_cos0 * link4_vel1;
+            let link4_vel6 = link4_sin0 * link3_vel4;
+            let link4_vel7 = link4_vel5 - link4_vel6;
+            let link4_vel8 = v_3 + link3_vel8;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = 0.25 * link4_vel8;
+            let link5_vel1 = link4_vel7 + link5_vel0;
+            let link5_vel2 = link5_cos0 * link4_vel4;
+            let link5_vel3 = link5_sin0 * link5_vel1;
+            let link5_vel4 = link5_vel2 + link5_vel3;
+            let link5_vel5 = link5_cos0 * link5_vel1;
+            let link5_vel6 = link5_sin0 * link4_vel4;
+            let link5_vel7 = link5_vel5 - link5_vel6;
+            let link5_vel8 = v_4 + link4_vel8;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = 0.25 * link5_vel8;
+            let link6_vel1 = link5_vel7 + link6_vel0;
+            let link6_vel2 = link6_cos0 * link5_vel4;
+            let link6_vel3 = link6_sin0 * link6_vel1;
+            let link6_vel4 = link6_vel2 + link6_vel3;
+            let link6_vel5 = link6_cos0 * link6_vel1;
+            let link6_vel6 = link6_sin0 * link5_vel4;
+            let link6_vel7 = link6_vel5 - link6_vel6;
+            let link6_vel8 = v_5 + link5_vel8;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = 0.25 * link6_vel8;
+            let link7_vel1 = link6_vel7 + link7_vel0;
+            let link7_vel2 = link7_cos0 * link6_vel4;
+            let link7_vel3 = link7_sin0 * link7_vel1;
+            let link7_vel4 = link7_vel2 + link7_vel3;
+            let link7_vel5 = link7_cos0 * link7_vel1;
+            let link7_vel6 = link7_sin0 * link6_vel4;
+            let link7_vel7 = link7_vel5 - link7_vel6;
+            let link7_vel8 = v_6 + link6_vel8;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = 0.25 * link7_vel8;
+            let link8_vel1 = link7_vel7 + link8_vel0;
+            let link8_vel2 = link8_cos0 * link7_vel4;
+            let link8_vel3 = link8_sin0 * link8_vel1;
+            let link8_vel4 = link8_vel2 + link8_vel3;
+            let link8_vel5 = link8_cos0 * link8_vel1;
+            let link8_vel6 = link8_sin0 * link7_vel4;
+            let link8_vel7 = link8_vel5 - link8_vel6;
+            let link8_vel8 = v_7 + link7_vel8;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = 0.25 * link8_vel8;
+            let link9_vel1 = link8_vel7 + link9_vel0;
+            let link9_vel2 = link9_cos0 * link8_vel4;
+            let link9_vel3 = link9_sin0 * link9_vel1;
+            let link9_vel4 = link9_vel2 + link9_vel3;
+            let link9_vel5 = link9_cos0 * link9_vel1;
+            let link9_vel6 = link9_sin0 * link8_vel4;
+            let link9_vel7 = link9_vel5 - link9_vel6;
+            let link9_vel8 = v_8 + link8_vel8;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = 0.25 * link9_vel8;
+            let link10_vel1 = link9_vel7 + link10_vel0;
+            let link10_vel2 = link10_cos0 * link10_vel1;
+            let link10_vel3 = link10_sin0 * link9_vel4;
+            let link10_vel4 = link10_vel2 - link10_vel3;
+            let link10_vel5 = v_9 + link9_vel8;
+            // link1: momentum
+            let link1_mom0 = 0.23334999999999997 * v_0;
+            // link2: momentum
+            let link2_mom0 = 0.20834999999999998 * link2_vel3;
+            let link2_mom1 = 0.85 * link2_vel3;
+            let link2_mom2 = 0.85 * link2_vel2;
+            let link2_mom3 = link2_mom0 + link2_mom2;
+            // link3: momentum
+            let link3_mom0 = 0.18334999999999999 * link3_vel8;
+            let link3_mom1 = 0.75 * link3_vel8;
+            let link3_mom2 = 0.75 * link3_vel7;
+            let link3_mom3 = link3_mom0 + link3_mom2;
+            // link4: momentum
+            let link4_mom0 = 0.15835 * link4_vel8;
+            let link4_mom1 = 0.65 * link4_vel8;
+            let link4_mom2 = 0.65 * link4_vel7;
+            let link4_mom3 = link4_mom0 + link4_mom2;
+            // link5: momentum
+            let link5_mom0 = 0.13335 * link5_vel8;
+            let link5_mom1 = 0.55 * link5_vel8;
+            let link5_mom2 = 0.55 * link5_vel7;
+            let link5_mom3 = link5_mom0 + link5_mom2;
+            // link6: momentum
+            let link6_mom0 = 0.10835 * link6_vel8;
+            let link6_mom1 = 0.45 * link6_vel8;
+            let link6_mom2 = 0.45 * link6_vel7;
+            let link6_mom3 = link6_mom0 + link6_mom2;
+            // link7: momentum
+            let link7_mom0 = 0.08335000000000001 * link7_vel8;
+            let link7_mom1 = 0.35000000000000003 * link7_vel8;
+            let link7_mom2 = 0.35000000000000003 * link7_vel7;
+            let link7_mom3 = link7_mom0 + link7_mom2;
+            // link8: momentum
+            let link8_mom0 = 0.05835 * link8_vel8;
+            let link8_mom1 = 0.25 * link8_vel7;
+            let link8_mom2 = link8_mom0 + link8_mom1;
+            // link9: momentum
+            let link9_mom0 = 0.033350000000000005 * link9_vel8;
+            let link9_mom1 = 0.15000000000000002 * link9_vel8;
+            let link9_mom2 = 0.15000000000000002 * link9_vel7;
+            let link9_mom3 = link9_mom0 + link9_mom2;
+            // link10: momentum
+            let link10_mom0 = 0.00835 * link10_vel5;
+            let link10_mom1 = 0.05 * link10_vel5;
+            let link10_mom2 = 0.05 * link10_vel4;
+            let link10_mom3 = link10_mom0 + link10_mom2;
+            let link10_mom4 = link10_sin0 * link10_mom1;
+            let link10_mom5 = link10_cos0 * link10_mom1;
+            let link10_mom6 = 0.25 * link10_mom5;
+            let link10_mom7 = link10_mom3 + link10_mom6;
+            let link10_mom8 = link9_mom1 + link10_mom5;
+            let link10_mom9 = link9_mom3 + link10_mom7;
+            // link9: momentum
+            let link9_mom4 = link9_cos0 * link10_mom4;
+            let link9_mom5 = link9_sin0 * link10_mom8;
+            let link9_mom6 = link9_mom4 + link9_mom5;
+            let link9_mom7 = link9_sin0 * link10_mom4;
+            let link9_mom8 = link9_cos0 * link10_mom8;
+            let link9_mom9 = link9_mom7 - link9_mom8;
+            let link9_mom10 = 0.25 * link9_mom9;
+            let link9_mom11 = link10_mom9 - link9_mom10;
+            let link9_mom12 = link9_vel0 - link9_mom9;
+            let link9_mom13 = link8_mom2 + link9_mom11;
+            // link8: momentum
+            let link8_mom3 = link8_cos0 * link9_mom6;
+            let link8_mom4 = link8_sin0 * link9_mom12;
+            let link8_mom5 = link8_mom3 + link8_mom4;
+            let link8_mom6 = link8_sin0 * link9_mom6;
+            let link8_mom7 = link8_cos0 * link9_mom12;
+            let link8_mom8 = link8_mom6 - link8_mom7;
+            let link8_mom9 = 0.25 * link8_mom8;
+            let link8_mom10 = link9_mom13 - link8_mom9;
+            let link8_mom11 = link7_mom1 - link8_mom8;
+            let link8_mom12 = link7_mom3 + link8_mom10;
+            // link7: momentum
+            let link7_mom4 = link7_cos0 * link8_mom5;
+            let link7_mom5 = link7_sin0 * link8_mom11;
+            let link7_mom6 = link7_mom4 + link7_mom5;
+            let link7_mom7 = link7_sin0 * link8_mom5;
+            let link7_mom8 = link7_cos0 * link8_mom11;
+            let link7_mom9 = link7_mom7 - link7_mom8;
+            let link7_mom10 = 0.25 * link7_mom9;
+            let link7_mom11 = link8_mom12 - link7_mom10;
+            let link7_mom12 = link6_mom1 - link7_mom9;
+            let link7_mom13 = link6_mom3 + link7_mom11;
+            // link6: momentum
+            let link6_mom4 = link6_cos0 * link7_mom6;
+            let link6_mom5 = link6_sin0 * link7_mom12;
+            let link6_mom6 = link6_mom4 + link6_mom5;
+            let link6_mom7 = link6_sin0 * link7_mom6;
+            let link6_mom8 = link6_cos0 * link7_mom12;
+            let link6_mom9 = link6_mom7 - link6_mom8;
+            let link6_mom10 = 0.25 * link6_mom9;
+            let link6_mom11 = link7_mom13 - link6_mom10;
+            let link6_mom12 = link5_mom1 - link6_mom9;
+            let link6_mom13 = link5_mom3 + link6_mom11;
+            // link5: momentum
+            let link5_mom4 = link5_cos0 * link6_mom6;
+            let link5_mom5 = link5_sin0 * link6_mom12;
+            let link5_mom6 = link5_mom4 + link5_mom5;
+            let link5_mom7 = link5_sin0 * link6_mom6;
+            let link5_mom8 = link5_cos0 * link6_mom12;
+            let link5_mom9 = link5_mom7 - link5_mom8;
+            let link5_mom10 = 0.25 * link5_mom9;
+            let link5_mom11 = link6_mom13 - link5_mom10;
+            let link5_mom12 = link4_mom1 - link5_mom9;
+            let link5_mom13 = link4_mom3 + link5_mom11;
+            // link4: momentum
+            let link4_mom4 = link4_cos0 * link5_mom6;
+            let link4_mom5 = link4_sin0 * link5_mom12;
+            let link4_mom6 = link4_mom4 + link4_mom5;
+            let link4_mom7 = link4_sin0 * link5_mom6;
+            let link4_mom8 = link4_cos0 * link5_mom12;
+            let link4_mom9 = link4_mom7 - link4_mom8;
+            let link4_mom10 = 0.25 * link4_mom9;
+            let link4_mom11 = link5_mom13 - link4_mom10;
+            let link4_mom12 = link3_mom1 - link4_mom9;
+            let link4_mom13 = link3_mom3 + link4_mom11;
+            // link3: momentum
+            let link3_mom4 = link3_cos0 * link4_mom6;
+            let link3_mom5 = link3_sin0 * link4_mom12;
+            let link3_mom6 = link3_mom4 + link3_mom5;
+            let link3_mom7 = link3_sin0 * link4_mom6;
+            let link3_mom8 = link3_cos0 * link4_mom12;
+            let link3_mom9 = link3_mom7 - link3_mom8;
+            let link3_mom10 = 0.25 * link3_mom9;
+            let link3_mom11 = link4_mom13 - link3_mom10;
+            let link3_mom12 = link2_mom1 - link3_mom9;
+            let link3_mom13 = link2_mom3 + link3_mom11;
+            // link2: momentum
+            let link2_mom4 = link2_sin0 * link3_mom6;
+            let link2_mom5 = link2_cos0 * link3_mom12;
+            let link2_mom6 = link2_mom4 - link2_mom5;
+            let link2_mom7 = 0.25 * link2_mom6;
+            let link2_mom8 = link3_mom13 - link2_mom7;
+            let link2_mom9 = link1_mom0 + link2_mom8;
+            results[0][l] = link2_mom9;
+            results[1][l] = link3_mom13;
+            results[2][l] = link4_mom13;
+            results[3][l] = link5_mom13;
+            results[4][l] = link6_mom13;
+            results[5][l] = link7_mom13;
+            results[6][l] = link8_mom12;
+            results[7][l] = link9_mom13;
+            results[8][l] = link10_mom9;
+            results[9][l] = link10_mom3;
+        }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
+        p.give(6, &results[6]);
+        p.give(7, &results[7]);
+        p.give(8, &results[8]);
+        p.give(9, &results[9]);
     }
 
     /// Kinetic and potential energy, J.
     /// 550 operations: 238 additions, 303 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let p_6 = p[6];
-        let p_7 = p[7];
-        let p_8 = p[8];
-        let p_9 = p[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_sin0;
-        let link10_inertia1 = 0.05 * link10_cos0;
-        let link10_inertia2 = link10_inertia1 + link10_inertia1;
-        let link10_inertia3 = 0.25 * link10_inertia2;
-        let link10_inertia4 = link10_inertia3 + 0.00835;
-        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
-        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
-        let link10_inertia7 = 0.25 * link10_inertia1;
-        let link10_inertia8 = link10_inertia7 + 0.00835;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_cos0 * link10_inertia0;
-        let link9_inertia1 = link9_sin0 * link10_inertia5;
-        let link9_inertia2 = link9_inertia0 + link9_inertia1;
-        let link9_inertia3 = link9_sin0 * link10_inertia0;
-        let link9_inertia4 = link9_cos0 * link10_inertia5;
-        let link9_inertia5 = link9_inertia3 - link9_inertia4;
-        let link9_inertia6 = link9_sin0 * link10_inertia1;
-        let link9_inertia7 = link9_inertia0 + link9_inertia6;
-        let link9_inertia8 = link9_cos0 * link10_inertia1;
-        let link9_inertia9 = link9_inertia3 - link9_inertia8;
-        let link9_inertia10 = link9_inertia5 + link9_inertia5;
-        let link9_inertia11 = 0.25 * link9_inertia10;
-        let link9_inertia12 = link10_inertia6 - link9_inertia11;
-        let link9_inertia13 = link9_inertia5 - 0.25;
-        let link9_inertia14 = link9_inertia12 + 0.05835;
-        let link9_inertia15 = 0.25 * link9_inertia9;
-        let link9_inertia16 = link10_inertia8 - link9_inertia15;
-        let link9_inertia17 = 0.25 * link9_inertia5;
-        let link9_inertia18 = link10_inertia6 - link9_inertia17;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link8_cos0 * link9_inertia2;
-        let link8_inertia1 = link8_sin0 * link9_inertia13;
-        let link8_inertia2 = link8_inertia0 - link8_inertia1;
-        let link8_inertia3 = link8_sin0 * link9_inertia2;
-        let link8_inertia4 = link8_cos0 * link9_inertia13;
-        let link8_inertia5 = link8_inertia3 + link8_inertia4;
-        let link8_inertia6 = link8_inertia5 + link8_inertia5;
-        let link8_inertia7 = 0.25 * link8_inertia6;
-        let link8_inertia8 = link9_inertia14 - link8_inertia7;
-        let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
-        let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
-        let link8_inertia11 = link8_cos0 * link9_inertia7;
-        let link8_inertia12 = link8_sin0 * link9_inertia9;
-        let link8_inertia13 = link8_inertia11 - link8_inertia12;
-        let link8_inertia14 = link8_sin0 * link9_inertia7;
-        let link8_inertia15 = link8_cos0 * link9_inertia9;
-        let link8_inertia16 = link8_inertia14 + link8_inertia15;
-        let link8_inertia17 = 0.25 * link8_inertia16;
-        let link8_inertia18 = link9_inertia16 - link8_inertia17;
-        let link8_inertia19 = link8_sin0 * link9_inertia5;
-        let link8_inertia20 = link8_inertia0 - link8_inertia19;
-        let link8_inertia21 = link8_cos0 * link9_inertia5;
-        let link8_inertia22 = link8_inertia3 + link8_inertia21;
-        let link8_inertia23 = 0.25 * link8_inertia22;
-        let link8_inertia24 = link9_inertia18 - link8_inertia23;
-        let link8_inertia25 = 0.25 * link8_inertia5;
-        let link8_inertia26 = link9_inertia14 - link8_inertia25;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link7_cos0 * link8_inertia2;
-        let link7_inertia1 = link7_sin0 * link8_inertia9;
-        let link7_inertia2 = link7_inertia0 - link7_inertia1;
-        let link7_inertia3 = link7_sin0 * link8_inertia2;
-        let link7_inertia4 = link7_cos0 * link8_inertia9;
-        let link7_inertia5 = link7_inertia3 + link7_inertia4;
-        let link7_inertia6 = link7_cos0 * link8_inertia13;
-        let link7_inertia7 = link7_sin0 * link8_inertia16;
-        let link7_inertia8 = link7_inertia6 - link7_inertia7;
-        let link7_inertia9 = link7_sin0 * link8_inertia13;
-        let link7_inertia10 = link7_cos0 * link8_inertia16;
-        let link7_inertia11 = link7_inertia9 + link7_inertia10;
-        let link7_inertia12 = link7_cos0 * link8_inertia20;
-        let link7_inertia13 = link7_sin0 * link8_inertia22;
-        let link7_inertia14 = link7_inertia12 - link7_inertia13;
-        let link7_inertia15 = link7_sin0 * link8_inertia20;
-        let link7_inertia16 = link7_cos0 * link8_inertia22;
-        let link7_inertia17 = link7_inertia15 + link7_inertia16;
-        let link7_inertia18 = link7_sin0 * link8_inertia5;
-        let link7_inertia19 = link7_inertia0 - link7_inertia18;
-        let link7_inertia20 = link7_cos0 * link8_inertia5;
-        let link7_inertia21 = link7_inertia3 + link7_inertia20;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 119.76047904191617 * link7_inertia8;
-        let link7_pivot1 = 119.76047904191617 * link7_inertia11;
-        let link7_pivot2 = 119.76047904191617 * link8_inertia18;
-        let link7_pivot3 = link7_inertia8 * link7_pivot0;
-        let link7_pivot4 = link7_inertia8 * link7_pivot1;
-        let link7_pivot5 = link7_inertia8 * link7_pivot2;
-        let link7_pivot6 = link7_inertia2 - link7_pivot5;
-        let link7_pivot7 = link7_inertia11 * link7_pivot1;
-        let link7_pivot8 = link7_inertia11 * link7_pivot2;
-        let link7_pivot9 = link7_inertia5 - link7_pivot8;
-        let link7_pivot10 = link8_inertia18 * link7_pivot2;
-        let link7_pivot11 = link8_inertia10 - link7_pivot10;
-        let link7_pivot12 = link10_inertia8 * link7_pivot0;
-        let link7_pivot13 = link10_inertia8 * link7_pivot1;
-        let link7_pivot14 = link10_inertia8 * link7_pivot2;
-        let link7_pivot15 = link7_inertia14 - link7_pivot12;
-        let link7_pivot16 = link7_inertia17 - link7_pivot13;
-        let link7_pivot17 = link8_inertia24 - link7_pivot14;
-        let link7_pivot18 = 119.76047904191617 * link10_inertia8;
-        let link7_pivot19 = link10_inertia8 * link7_pivot18;
-        let link7_pivot20 = link10_inertia6 - link7_pivot19;
-        let link7_pivot21 = 119.76047904191617 * link9_inertia16;
-        let link7_pivot22 = link10_inertia8 * link7_pivot21;
-        let link7_pivot23 = link9_inertia18 - link7_pivot22;
-        let link7_pivot24 = link9_inertia16 * link7_pivot0;
-        let link7_pivot25 = link9_inertia16 * link7_pivot1;
-        let link7_pivot26 = link9_inertia16 * link7_pivot2;
-        let link7_pivot27 = link7_inertia19 - link7_pivot24;
-        let link7_pivot28 = link7_inertia21 - link7_pivot25;
-        let link7_pivot29 = link8_inertia26 - link7_pivot26;
-        let link7_pivot30 = link9_inertia16 * link7_pivot21;
-        let link7_pivot31 = link9_inertia14 - link7_pivot30;
-        let link7_pivot32 = 1.0 / link7_pivot20;
-        let link7_pivot33 = link7_pivot15 * link7_pivot32;
-        let link7_pivot34 = link7_pivot16 * link7_pivot32;
-        let link7_pivot35 = link7_pivot17 * link7_pivot32;
-        let link7_pivot36 = link7_pivot15 * link7_pivot33;
-        let link7_pivot37 = link7_pivot3 + link7_pivot36;
-        let link7_pivot38 = link7_pivot15 * link7_pivot34;
-        let link7_pivot39 = link7_pivot4 + link7_pivot38;
-        let link7_pivot40 = link7_pivot15 * link7_pivot35;
-        let link7_pivot41 = link7_pivot6 - link7_pivot40;
-        let link7_pivot42 = link7_pivot16 * link7_pivot34;
-        let link7_pivot43 = link7_pivot7 + link7_pivot42;
-        let link7_pivot44 = link7_pivot16 * link7_pivot35;
-        let link7_pivot45 = link7_pivot9 - link7_pivot44;
-        let link7_pivot46 = link7_pivot17 * link7_pivot35;
-        let link7_pivot47 = link7_pivot11 - link7_pivot46;
-        let link7_pivot48 = link7_pivot23 * link7_pivot33;
-        let link7_pivot49 = link7_pivot23 * link7_pivot34;
-        let link7_pivot50 = link7_pivot23 * link7_pivot35;
-        let link7_pivot51 = link7_pivot27 - link7_pivot48;
-        let link7_pivot52 = link7_pivot28 - link7_pivot49;
-        let link7_pivot53 = link7_pivot29 - link7_pivot50;
-        let link7_pivot54 = link7_pivot23 * link7_pivot32;
-        let link7_pivot55 = link7_pivot23 * link7_pivot54;
-        let link7_pivot56 = link7_pivot31 - link7_pivot55;
-        let link7_pivot57 = 1.0 / link7_pivot56;
-        let link7_pivot58 = link7_pivot51 * link7_pivot57;
-        let link7_pivot59 = link7_pivot52 * link7_pivot57;
-        let link7_pivot60 = link7_pivot53 * link7_pivot57;
-        let link7_pivot61 = link7_pivot51 * link7_pivot58;
-        let link7_pivot62 = link7_pivot37 + link7_pivot61;
-        let link7_pivot63 = link7_pivot51 * link7_pivot59;
-        let link7_pivot64 = link7_pivot39 + link7_pivot63;
-        let link7_pivot65 = link7_pivot51 * link7_pivot60;
-        let link7_pivot66 = link7_pivot41 - link7_pivot65;
-        let link7_pivot67 = link7_pivot52 * link7_pivot59;
-        let link7_pivot68 = link7_pivot43 + link7_pivot67;
-        let link7_pivot69 = link7_pivot52 * link7_pivot60;
-        let link7_pivot70 = link7_pivot45 - link7_pivot69;
-        let link7_pivot71 = link7_pivot53 * link7_pivot60;
-        let link7_pivot72 = link7_pivot47 - link7_pivot71;
-        let link7_pivot73 = 1.0 / link7_pivot72;
-        let link7_pivot74 = link7_pivot66 * link7_pivot73;
-        let link7_pivot75 = link7_pivot70 * link7_pivot73;
-        let link7_pivot76 = link7_pivot66 * link7_pivot74;
-        let link7_pivot77 = link7_pivot62 + link7_pivot76;
-        let link7_pivot78 = link7_pivot66 * link7_pivot75;
-        let link7_pivot79 = link7_pivot64 + link7_pivot78;
-        let link7_pivot80 = link7_pivot70 * link7_pivot75;
-        let link7_pivot81 = link7_pivot68 + link7_pivot80;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia22 = 0.25 * link7_pivot79;
-        let link7_inertia23 = 0.25 * link7_pivot81;
-        let link7_inertia24 = 0.25 * link7_inertia23;
-        let link7_inertia25 = link7_inertia5 - 0.45;
-        let link7_inertia26 = link7_inertia23 - 0.45;
-        let link7_inertia27 = link7_inertia24 - 0.10835;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link7_pivot77 - link7_pivot81;
-        let link6_inertia1 = link6_sin0 * link6_inertia0;
-        let link6_inertia2 = link6_cos0 + link6_cos0;
-        let link6_inertia3 = link7_pivot79 * link6_inertia2;
-        let link6_inertia4 = link6_inertia1 + link6_inertia3;
-        let link6_inertia5 = link6_sin0 * link6_inertia4;
-        let link6_inertia6 = link6_cos0 * link6_inertia4;
-        let link6_inertia7 = link7_pivot79 - link6_inertia6;
-        let link6_inertia8 = link7_pivot77 - link6_inertia5;
-        let link6_inertia9 = link7_pivot81 + link6_inertia5;
-        let link6_inertia10 = link6_cos0 * link7_inertia2;
-        let link6_inertia11 = link6_sin0 * link7_inertia25;
-        let link6_inertia12 = link6_inertia10 - link6_inertia11;
-        let link6_inertia13 = link6_sin0 * link7_inertia2;
-        let link6_inertia14 = link6_cos0 * link7_inertia25;
-        let link6_inertia15 = link6_inertia13 + link6_inertia14;
-        let link6_inertia16 = link6_cos0 * link7_inertia22;
-        let link6_inertia17 = link6_sin0 * link7_inertia26;
-        let link6_inertia18 = link6_inertia16 - link6_inertia17;
-        let link6_inertia19 = link6_sin0 * link7_inertia22;
-        let link6_inertia20 = link6_cos0 * link7_inertia26;
-        let link6_inertia21 = link6_inertia19 + link6_inertia20;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia27;
-        let link6_pivot1 = link6_inertia18 * link6_pivot0;
-        let link6_pivot2 = link6_inertia21 * link6_pivot0;
-        let link6_pivot3 = link6_inertia18 * link6_pivot1;
-        let link6_pivot4 = link6_inertia8 - link6_pivot3;
-        let link6_pivot5 = link6_inertia18 * link6_pivot2;
-        let link6_pivot6 = link6_inertia7 + link6_pivot5;
-        let link6_pivot7 = link6_inertia21 * link6_pivot2;
-        let link6_pivot8 = link6_inertia9 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia22 = 0.25 * link6_pivot6;
-        let link6_inertia23 = 0.25 * link6_pivot8;
-        let link6_inertia24 = 0.25 * link6_inertia23;
-        let link6_inertia25 = link6_inertia15 - 0.55;
-        let link6_inertia26 = link6_inertia23 - 0.55;
-        let link6_inertia27 = link6_inertia24 - 0.13335;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link6_pivot4 - link6_pivot8;
-        let link5_inertia1 = link5_sin0 * link5_inertia0;
-        let link5_inertia2 = link5_cos0 + link5_cos0;
-        let link5_inertia3 = link6_pivot6 * link5_inertia2;
-        let link5_inertia4 = link5_inertia1 - link5_inertia3;
-        let link5_inertia5 = link5_sin0 * link5_inertia4;
-        let link5_inertia6 = link5_cos0 * link5_inertia4;
-        let link5_inertia7 = link6_pivot6 + link5_inertia6;
-        let link5_inertia8 = link6_pivot4 - link5_inertia5;
-        let link5_inertia9 = link6_pivot8 + link5_inertia5;
-        let link5_inertia10 = link5_cos0 * link6_inertia12;
-        let link5_inertia11 = link5_sin0 * link6_inertia25;
-        let link5_inertia12 = link5_inertia10 - link5_inertia11;
-        let link5_inertia13 = link5_sin0 * link6_inertia12;
-        let link5_inertia14 = link5_cos0 * link6_inertia25;
-        let link5_inertia15 = link5_inertia13 + link5_inertia14;
-        let link5_inertia16 = link5_cos0 * link6_inertia22;
-        let link5_inertia17 = link5_sin0 * link6_inertia26;
-        let link5_inertia18 = link5_inertia16 + link5_inertia17;
-        let link5_inertia19 = link5_sin0 * link6_inertia22;
-        let link5_inertia20 = link5_cos0 * link6_inertia26;
-        let link5_inertia21 = link5_inertia19 - link5_inertia20;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia27;
-        let link5_pivot1 = link5_inertia18 * link5_pivot0;
-        let link5_pivot2 = link5_inertia21 * link5_pivot0;
-        let link5_pivot3 = link5_inertia18 * link5_pivot1;
-        let link5_pivot4 = link5_inertia8 - link5_pivot3;
-        let link5_pivot5 = link5_inertia18 * link5_pivot2;
-        let link5_pivot6 = link5_inertia7 - link5_pivot5;
-        let link5_pivot7 = link5_inertia21 * link5_pivot2;
-        let link5_pivot8 = link5_inertia9 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia22 = 0.25 * link5_pivot6;
-        let link5_inertia23 = 0.25 * link5_pivot8;
-        let link5_inertia24 = 0.25 * link5_inertia23;
-        let link5_inertia25 = link5_inertia15 - 0.65;
-        let link5_inertia26 = link5_inertia23 - 0.65;
-        let link5_inertia27 = link5_inertia24 - 0.15835;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link5_pivot4 - link5_pivot8;
-        let link4_inertia1 = link4_sin0 * link4_inertia0;
-        let link4_inertia2 = link4_cos0 + link4_cos0;
-        let link4_inertia3 = link5_pivot6 * link4_inertia2;
-        let link4_inertia4 = link4_inertia1 + link4_inertia3;
-        let link4_inertia5 = link4_sin0 * link4_inertia4;
-        let link4_inertia6 = link4_cos0 * link4_inertia4;
-        let link4_inertia7 = link5_pivot6 - link4_inertia6;
-        let link4_inertia8 = link5_pivot4 - link4_inertia5;
-        let link4_inertia9 = link5_pivot8 + link4_inertia5;
-        let link4_inertia10 = link4_cos0 * link5_inertia12;
-        let link4_inertia11 = link4_sin0 * link5_inertia25;
-        let link4_inertia12 = link4_inertia10 - link4_inertia11;
-        let link4_inertia13 = link4_sin0 * link5_inertia12;
-        let link4_inertia14 = link4_cos0 * link5_inertia25;
-        let link4_inertia15 = link4_inertia13 + link4_inertia14;
-        let link4_inertia16 = link4_cos0 * link5_inertia22;
-        let link4_inertia17 = link4_sin0 * link5_inertia26;
-        let link4_inertia18 = link4_inertia16 - link4_inertia17;
-        let link4_inertia19 = link4_sin0 * link5_inertia22;
-        let link4_inertia20 = link4_cos0 * link5_inertia26;
-        let link4_inertia21 = link4_inertia19 + link4_inertia20;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia27;
-        let link4_pivot1 = link4_inertia18 * link4_pivot0;
-        let link4_pivot2 = link4_inertia21 * link4_pivot0;
-        let link4_pivot3 = link4_inertia18 * link4_pivot1;
-        let link4_pivot4 = link4_inertia8 - link4_pivot3;
-        let link4_pivot5 = link4_inertia18 * link4_pivot2;
-        let link4_pivot6 = link4_inertia7 + link4_pivot5;
-        let link4_pivot7 = link4_inertia21 * link4_pivot2;
-        let link4_pivot8 = link4_inertia9 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia22 = 0.25 * link4_pivot6;
-        let link4_inertia23 = 0.25 * link4_pivot8;
-        let link4_inertia24 = 0.25 * link4_inertia23;
-        let link4_inertia25 = link4_inertia15 - 0.75;
-        let link4_inertia26 = link4_inertia23 - 0.75;
-        let link4_inertia27 = link4_inertia24 - 0.18334999999999999;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link4_pivot4 - link4_pivot8;
-        let link3_inertia1 = link3_sin0 * link3_inertia0;
-        let link3_inertia2 = link3_cos0 + link3_cos0;
-        let link3_inertia3 = link4_pivot6 * link3_inertia2;
-        let link3_inertia4 = link3_inertia1 - link3_inertia3;
-        let link3_inertia5 = link3_sin0 * link3_inertia4;
-        let link3_inertia6 = link3_cos0 * link3_inertia4;
-        let link3_inertia7 = link4_pivot6 + link3_inertia6;
-        let link3_inertia8 = link4_pivot4 - link3_inertia5;
-        let link3_inertia9 = link4_pivot8 + link3_inertia5;
-        let link3_inertia10 = link3_cos0 * link4_inertia12;
-        let link3_inertia11 = link3_sin0 * link4_inertia25;
-        let link3_inertia12 = link3_inertia10 - link3_inertia11;
-        let link3_inertia13 = link3_sin0 * link4_inertia12;
-        let link3_inertia14 = link3_cos0 * link4_inertia25;
-        let link3_inertia15 = link3_inertia13 + link3_inertia14;
-        let link3_inertia16 = link3_cos0 * link4_inertia22;
-        let link3_inertia17 = link3_sin0 * link4_inertia26;
-        let link3_inertia18 = link3_inertia16 + link3_inertia17;
-        let link3_inertia19 = link3_sin0 * link4_inertia22;
-        let link3_inertia20 = link3_cos0 * link4_inertia26;
-        let link3_inertia21 = link3_inertia19 - link3_inertia20;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia27;
-        let link3_pivot1 = link3_inertia18 * link3_pivot0;
-        let link3_pivot2 = link3_inertia21 * link3_pivot0;
-        let link3_pivot3 = link3_inertia18 * link3_pivot1;
-        let link3_pivot4 = link3_inertia8 - link3_pivot3;
-        let link3_pivot5 = link3_inertia18 * link3_pivot2;
-        let link3_pivot6 = link3_inertia7 - link3_pivot5;
-        let link3_pivot7 = link3_inertia21 * link3_pivot2;
-        let link3_pivot8 = link3_inertia9 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia22 = 0.25 * link3_pivot6;
-        let link3_inertia23 = 0.25 * link3_pivot8;
-        let link3_inertia24 = 0.25 * link3_inertia23;
-        let link3_inertia25 = link3_inertia15 - 0.85;
-        let link3_inertia26 = link3_inertia23 - 0.85;
-        let link3_inertia27 = link3_inertia24 - 0.20834999999999998;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link3_pivot4 - link3_pivot8;
-        let link2_inertia1 = link2_sin0 * link2_inertia0;
-        let link2_inertia2 = link2_cos0 + link2_cos0;
-        let link2_inertia3 = link3_pivot6 * link2_inertia2;
-        let link2_inertia4 = link2_inertia1 + link2_inertia3;
-        let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link3_pivot8 + link2_inertia5;
-        let link2_inertia7 = link2_cos0 * link3_inertia12;
-        let link2_inertia8 = link2_sin0 * link3_inertia25;
-        let link2_inertia9 = link2_inertia7 - link2_inertia8;
-        let link2_inertia10 = link2_sin0 * link3_inertia12;
-        let link2_inertia11 = link2_cos0 * link3_inertia25;
-        let link2_inertia12 = link2_inertia10 + link2_inertia11;
-        let link2_inertia13 = link2_sin0 * link3_inertia22;
-        let link2_inertia14 = link2_cos0 * link3_inertia26;
-        let link2_inertia15 = link2_inertia13 + link2_inertia14;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = 1.0 / link3_inertia27;
-        let link2_pivot1 = link2_inertia15 * link2_pivot0;
-        let link2_pivot2 = link2_inertia15 * link2_pivot1;
-        let link2_pivot3 = link2_inertia6 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia16 = 0.25 * link2_pivot3;
-        let link2_inertia17 = 0.25 * link2_inertia16;
-        let link2_inertia18 = link2_inertia12 - 0.95;
-        let link2_inertia19 = link2_inertia17 - 0.23334999999999997;
-        // link1: inertia carried to the parent, M* (4.48)
-        let link1_inertia0 = link1_sin0 * link2_inertia9;
-        let link1_inertia1 = link1_cos0 * link2_inertia18;
-        let link1_inertia2 = link1_inertia0 + link1_inertia1;
-        // link1: U, Mj, k and the reduced inertia M' (4.44)
-        let link1_pivot0 = 1.0 / link2_inertia19;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = 119.76047904191617 * p_9;
-        let link7_rest1 = link10_inertia8 * link7_rest0;
-        let link7_rest2 = link9_inertia16 * link7_rest0;
-        let link7_rest3 = link7_inertia8 * link7_rest0;
-        let link7_rest4 = link7_inertia11 * link7_rest0;
-        let link7_rest5 = link8_inertia18 * link7_rest0;
-        let link7_rest6 = p_8 - link7_rest1;
-        let link7_rest7 = link7_pivot32 * link7_rest6;
-        let link7_rest8 = link7_pivot23 * link7_rest7;
-        let link7_rest9 = link7_rest2 + link7_rest8;
-        let link7_rest10 = link7_pivot15 * link7_rest7;
-        let link7_rest11 = link7_pivot16 * link7_rest7;
-        let link7_rest12 = link7_pivot17 * link7_rest7;
-        let link7_rest13 = link7_rest3 + link7_rest10;
-        let link7_rest14 = link7_rest4 + link7_rest11;
-        let link7_rest15 = link7_rest5 + link7_rest12;
-        let link7_rest16 = p_7 - link7_rest9;
-        let link7_rest17 = link7_pivot57 * link7_rest16;
-        let link7_rest18 = link7_pivot51 * link7_rest17;
-        let link7_rest19 = link7_pivot52 * link7_rest17;
-        let link7_rest20 = link7_pivot53 * link7_rest17;
-        let link7_rest21 = link7_rest13 + link7_rest18;
-        let link7_rest22 = link7_rest14 + link7_rest19;
-        let link7_rest23 = link7_rest15 + link7_rest20;
-        let link7_rest24 = p_6 - link7_rest23;
-        let link7_rest25 = link7_pivot73 * link7_rest24;
-        let link7_rest26 = link7_pivot66 * link7_rest25;
-        let link7_rest27 = link7_rest21 + link7_rest26;
-        let link7_rest28 = link7_pivot70 * link7_rest25;
-        let link7_rest29 = link7_rest22 + link7_rest28;
-        let link7_rest30 = 0.25 * link7_rest29;
-        let link7_rest31 = p_6 - link7_rest30;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = link6_cos0 * link7_rest27;
-        let link6_rest1 = link6_sin0 * link7_rest29;
-        let link6_rest2 = link6_rest0 - link6_rest1;
-        let link6_rest3 = link6_sin0 * link7_rest27;
-        let link6_rest4 = link6_cos0 * link7_rest29;
-        let link6_rest5 = link6_rest3 + link6_rest4;
-        let link6_rest6 = p_5 - link7_rest31;
-        let link6_rest7 = link6_pivot0 * link6_rest6;
-        let link6_rest8 = link6_inertia18 * link6_rest7;
-        let link6_rest9 = link6_rest2 - link6_rest8;
-        let link6_rest10 = link6_inertia21 * link6_rest7;
-        let link6_rest11 = link6_rest5 - link6_rest10;
-        let link6_rest12 = 0.25 * link6_rest11;
-        let link6_rest13 = p_5 - link6_rest12;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = link5_cos0 * link6_rest9;
-        let link5_rest1 = link5_sin0 * link6_rest11;
-        let link5_rest2 = link5_rest0 - link5_rest1;
-        let link5_rest3 = link5_sin0 * link6_rest9;
-        let link5_rest4 = link5_cos0 * link6_rest11;
-        let link5_rest5 = link5_rest3 + link5_rest4;
-        let link5_rest6 = p_4 - link6_rest13;
-        let link5_rest7 = link5_pivot0 * link5_rest6;
-        let link5_rest8 = link5_inertia18 * link5_rest7;
-        let link5_rest9 = link5_rest2 + link5_rest8;
-        let link5_rest10 = link5_inertia21 * link5_rest7;
-        let link5_rest11 = link5_rest5 + link5_rest10;
-        let link5_rest12 = 0.25 * link5_rest11;
-        let link5_rest13 = p_4 - link5_rest12;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = link4_cos0 * link5_rest9;
-        let link4_rest1 = link4_sin0 * link5_rest11;
-        let link4_rest2 = link4_rest0 - link4_rest1;
-        let link4_rest3 = link4_sin0 * link5_rest9;
-        let link4_rest4 = link4_cos0 * link5_rest11;
-        let link4_rest5 = link4_rest3 + link4_rest4;
-        let link4_rest6 = p_3 - link5_rest13;
-        let link4_rest7 = link4_pivot0 * link4_rest6;
-        let link4_rest8 = link4_inertia18 * link4_rest7;
-        let link4_rest9 = link4_rest2 - link4_rest8;
-        let link4_rest10 = link4_inertia21 * link4_rest7;
-        let link4_rest11 = link4_rest5 - link4_rest10;
-        let link4_rest12 = 0.25 * link4_rest11;
-        let link4_rest13 = p_3 - link4_rest12;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = link3_cos0 * link4_rest9;
-        let link3_rest1 = link3_sin0 * link4_rest11;
-        let link3_rest2 = link3_rest0 - link3_rest1;
-        let link3_rest3 = link3_sin0 * link4_rest9;
-        let link3_rest4 = link3_cos0 * link4_rest11;
-        let link3_rest5 = link3_rest3 + link3_rest4;
-        let link3_rest6 = p_2 - link4_rest13;
-        let link3_rest7 = link3_pivot0 * link3_rest6;
-        let link3_rest8 = link3_inertia18 * link3_rest7;
-        let link3_rest9 = link3_rest2 + link3_rest8;
-        let link3_rest10 = link3_inertia21 * link3_rest7;
-        let link3_rest11 = link3_rest5 + link3_rest10;
-        let link3_rest12 = 0.25 * link3_rest11;
-        let link3_rest13 = p_2 - link3_rest12;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_sin0 * link3_rest9;
-        let link2_rest1 = link2_cos0 * link3_rest11;
-        let link2_rest2 = link2_rest0 + link2_rest1;
-        let link2_rest3 = p_1 - link3_rest13;
-        let link2_rest4 = link2_pivot0 * link2_rest3;
-        let link2_rest5 = link2_inertia15 * link2_rest4;
-        let link2_rest6 = link2_rest2 - link2_rest5;
-        let link2_rest7 = 0.25 * link2_rest6;
-        let link2_rest8 = p_1 - link2_rest7;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = p_0 - link2_rest8;
-        let link1_rest1 = link1_pivot0 * link1_rest0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = 0.25 * link1_rest1;
-        let link2_vel1 = link2_pivot1 * link2_vel0;
-        let link2_vel2 = link2_rest4 - link2_vel1;
-        let link2_vel3 = link1_rest1 - link2_vel2;
-        let link2_vel4 = link2_sin0 * link2_vel0;
-        let link2_vel5 = link2_cos0 * link2_vel0;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = 0.25 * link2_vel2;
-        let link3_vel1 = link2_vel5 + link3_vel0;
-        let link3_vel2 = link3_pivot1 * link2_vel4;
-        let link3_vel3 = link3_pivot2 * link3_vel1;
-        let link3_vel4 = link3_vel2 + link3_vel3;
-        let link3_vel5 = link3_rest7 + link3_vel4;
-        let link3_vel6 = link2_vel2 - link3_vel5;
-        let link3_vel7 = link3_cos0 * link2_vel4;
-        let link3_vel8 = link3_sin0 * link3_vel1;
-        let link3_vel9 = link3_vel7 + link3_vel8;
-        let link3_vel10 = link3_cos0 * link3_vel1;
-        let link3_vel11 = link3_sin0 * link2_vel4;
-        let link3_vel12 = link3_vel10 - link3_vel11;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = 0.25 * link3_vel5;
-        let link4_vel1 = link3_vel12 + link4_vel0;
-        let link4_vel2 = link4_pivot1 * link3_vel9;
-        let link4_vel3 = link4_pivot2 * link4_vel1;
-        let link4_vel4 = link4_vel2 + link4_vel3;
-        let link4_vel5 = link4_rest7 - link4_vel4;
-        let link4_vel6 = link3_vel5 - link4_vel5;
-        let link4_vel7 = link4_cos0 * link3_vel9;
-        let link4_vel8 = link4_sin0 * link4_vel1;
-        let link4_vel9 = link4_vel7 + link4_vel8;
-        let link4_vel10 = link4_cos0 * link4_vel1;
-        let link4_vel11 = link4_sin0 * link3_vel9;
-        let link4_vel12 = link4_vel10 - link4_vel11;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = 0.25 * link4_vel5;
-        let link5_vel1 = link4_vel12 + link5_vel0;
-        let link5_vel2 = link5_pivot1 * link4_vel9;
-        let link5_vel3 = link5_pivot2 * link5_vel1;
-        let link5_vel4 = link5_vel2 + link5_vel3;
-        let link5_vel5 = link5_rest7 + link5_vel4;
-        let link5_vel6 = link4_vel5 - link5_vel5;
-        let link5_vel7 = link5_cos0 * link4_vel9;
-        let link5_vel8 = link5_sin0 * link5_vel1;
-        let link5_vel9 = link5_vel7 + link5_vel8;
-        let link5_vel10 = link5_cos0 * link5_vel1;
-        let link5_vel11 = link5_sin0 * link4_vel9;
-        let link5_vel12 = link5_vel10 - link5_vel11;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = 0.25 * link5_vel5;
-        let link6_vel1 = link5_vel12 + link6_vel0;
-        let link6_vel2 = link6_pivot1 * link5_vel9;
-        let link6_vel3 = link6_pivot2 * link6_vel1;
-        let link6_vel4 = link6_vel2 + link6_vel3;
-        let link6_vel5 = link6_rest7 - link6_vel4;
-        let link6_vel6 = link5_vel5 - link6_vel5;
-        let link6_vel7 = link6_cos0 * link5_vel9;
-        let link6_vel8 = link6_sin0 * link6_vel1;
-        let link6_vel9 = link6_vel7 + link6_vel8;
-        let link6_vel10 = link6_cos0 * link6_vel1;
-        let link6_vel11 = link6_sin0 * link5_vel9;
-        let link6_vel12 = link6_vel10 - link6_vel11;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = 0.25 * link6_vel5;
-        let link7_vel1 = link6_vel12 + link7_vel0;
-        let link7_vel2 = link7_pivot74 * link6_vel9;
-        let link7_vel3 = link7_pivot75 * link7_vel1;
-        let link7_vel4 = link7_vel2 + link7_vel3;
-        let link7_vel5 = link7_rest25 - link7_vel4;
-        let link7_vel6 = link6_vel5 + link7_vel5;
-        let link7_vel7 = link7_pivot58 * link6_vel9;
-        let link7_vel8 = link7_pivot59 * link7_vel1;
-        let link7_vel9 = link7_vel7 + link7_vel8;
-        let link7_vel10 = link7_pivot60 * link7_vel5;
-        let link7_vel11 = link7_vel9 + link7_vel10;
-        let link7_vel12 = link7_rest17 - link7_vel11;
-        let link7_vel13 = link7_pivot33 * link6_vel9;
-        let link7_vel14 = link7_pivot34 * link7_vel1;
-        let link7_vel15 = link7_vel13 + link7_vel14;
-        let link7_vel16 = link7_pivot35 * link7_vel5;
-        let link7_vel17 = link7_vel15 + link7_vel16;
-        let link7_vel18 = link7_rest7 - link7_vel17;
-        let link7_vel19 = link7_pivot54 * link7_vel12;
-        let link7_vel20 = link7_vel18 - link7_vel19;
-        let link7_vel21 = link7_pivot0 * link6_vel9;
-        let link7_vel22 = link7_pivot1 * link7_vel1;
-        let link7_vel23 = link7_vel21 + link7_vel22;
-        let link7_vel24 = link7_pivot2 * link7_vel5;
-        let link7_vel25 = link7_vel23 + link7_vel24;
-        let link7_vel26 = link7_rest0 - link7_vel25;
-        let link7_vel27 = link7_pivot18 * link7_vel20;
-        let link7_vel28 = link7_vel26 - link7_vel27;
-        let link7_vel29 = link7_pivot21 * link7_vel12;
-        let link7_vel30 = link7_vel28 - link7_vel29;
-        // link1: energy
-        let link1_energy0 = p_0 * link1_rest1;
-        // link2: energy
-        let link2_energy0 = p_1 * link2_vel3;
-        let link2_energy1 = link1_energy0 - link2_energy0;
-        // link3: energy
-        let link3_energy0 = p_2 * link3_vel6;
-        let link3_energy1 = link2_energy1 - link3_energy0;
-        // link4: energy
-        let link4_energy0 = p_3 * link4_vel6;
-        let link4_energy1 = link3_energy1 - link4_energy0;
-        // link5: energy
-        let link5_energy0 = p_4 * link5_vel6;
-        let link5_energy1 = link4_energy1 - link5_energy0;
-        // link6: energy
-        let link6_energy0 = p_5 * link6_vel6;
-        let link6_energy1 = link5_energy1 - link6_energy0;
-        // link7: energy
-        let link7_energy0 = p_6 * link7_vel6;
-        let link7_energy1 = link6_energy1 - link7_energy0;
-        // link10: energy
-        let link10_energy0 = p_9 * link7_vel30;
-        let link10_energy1 = link7_energy1 - link10_energy0;
-        let link10_energy2 = p_8 * link7_vel20;
-        let link10_energy3 = link10_energy1 - link10_energy2;
-        let link10_energy4 = p_7 * link7_vel12;
-        let link10_energy5 = link10_energy3 - link10_energy4;
-        let link10_energy6 = 0.5 * link10_energy5;
-        // ground: energy
-        let ground_energy0 = 9.81 * link1_inertia2;
-        let kinetic = -link10_energy6;
-        let potential = ground_energy0;
-        [kinetic, potential]
+        let mut result = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
+        result
+    }
+
+    #[inline(always)]
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+            angles[2][l] = q_2;
+            angles[3][l] = q_3;
+            angles[4][l] = q_4;
+            angles[5][l] = q_5;
+            angles[6][l] = q_6;
+            angles[7][l] = q_7;
+            angles[8][l] = q_8;
+            angles[9][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let p_6 = p.get(6, l);
+            let p_7 = p.get(7, l);
+            let p_8 = p.get(8, l);
+            let p_9 = p.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.05 * link10_sin0;
+            let link10_inertia1 = 0.05 * link10_cos0;
+            let link10_inertia2 = link10_inertia1 + link10_inertia1;
+            let link10_inertia3 = 0.25 * link10_inertia2;
+            let link10_inertia4 = link10_inertia3 + 0.00835;
+            let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+            let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+            let link10_inertia7 = 0.25 * link10_inertia1;
+            let link10_inertia8 = link10_inertia7 + 0.00835;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link9_cos0 * link10_inertia0;
+            let link9_inertia1 = link9_sin0 * link10_inertia5;
+            let link9_inertia2 = link9_inertia0 + link9_inertia1;
+            let link9_inertia3 = link9_sin0 * link10_inertia0;
+            let link9_inertia4 = link9_cos0 * link10_inertia5;
+            let link9_inertia5 = link9_inertia3 - link9_inertia4;
+            let link9_inertia6 = link9_sin0 * link10_inertia1;
+            let link9_inertia7 = link9_inertia0 + link9_inertia6;
+            let link9_inertia8 = link9_cos0 * link10_inertia1;
+            let link9_inertia9 = link9_inertia3 - link9_inertia8;
+            let link9_inertia10 = link9_inertia5 + link9_inertia5;
+            let link9_inertia11 = 0.25 * link9_inertia10;
+            let link9_inertia12 = link10_inertia6 - link9_inertia11;
+            let link9_inertia13 = link9_inertia5 - 0.25;
+            let link9_inertia14 = link9_inertia12 + 0.05835;
+            let link9_inertia15 = 0.25 * link9_inertia9;
+            let link9_inertia16 = link10_inertia8 - link9_inertia15;
+            let link9_inertia17 = 0.25 * link9_inertia5;
+            let link9_inertia18 = link10_inertia6 - link9_inertia17;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link8_cos0 * link9_inertia2;
+            let link8_inertia1 = link8_sin0 * link9_inertia13;
+            let link8_inertia2 = link8_inertia0 - link8_inertia1;
+            let link8_inertia3 = link8_sin0 * link9_inertia2;
+            let link8_inertia4 = link8_cos0 * link9_inertia13;
+            let link8_inertia5 = link8_inertia3 + link8_inertia4;
+            let link8_inertia6 = link8_inertia5 + link8_inertia5;
+            let link8_inertia7 = 0.25 * link8_inertia6;
+            let link8_inertia8 = link9_inertia14 - link8_inertia7;
+            let link8_inertia9 = link8_inertia5 - 0.35000000000000003;
+            let link8_inertia10 = link8_inertia8 + 0.08335000000000001;
+            let link8_inertia11 = link8_cos0 * link9_inertia7;
+            let link8_inertia12 = link8_sin0 * link9_inertia9;
+            let link8_inertia13 = link8_inertia11 - link8_inertia12;
+            let link8_inertia14 = link8_sin0 * link9_inertia7;
+            let link8_inertia15 = link8_cos0 * link9_inertia9;
+            let link8_inertia16 = link8_inertia14 + link8_inertia15;
+            let link8_inertia17 = 0.25 * link8_inertia16;
+            let link8_inertia18 = link9_inertia16 - link8_inertia17;
+            let link8_inertia19 = link8_sin0 * link9_inertia5;
+            let link8_inertia20 = link8_inertia0 - link8_inertia19;
+            let link8_inertia21 = link8_cos0 * link9_inertia5;
+            let link8_inertia22 = link8_inertia3 + link8_inertia21;
+            let link8_inertia23 = 0.25 * link8_inertia22;
+            let link8_inertia24 = link9_inertia18 - link8_inertia23;
+            let link8_inertia25 = 0.25 * link8_inertia5;
+            let link8_inertia26 = link9_inertia14 - link8_inertia25;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link7_cos0 * link8_inertia2;
+            let link7_inertia1 = link7_sin0 * link8_inertia9;
+            let link7_inertia2 = link7_inertia0 - link7_inertia1;
+            let link7_inertia3 = link7_sin0 * link8_inertia2;
+            let link7_inertia4 = link7_cos0 * link8_inertia9;
+            let link7_inertia5 = link7_inertia3 + link7_inertia4;
+            let link7_inertia6 = link7_cos0 * link8_inertia13;
+            let link7_inertia7 = link7_sin0 * link8_inertia16;
+            let link7_inertia8 = link7_inertia6 - link7_inertia7;
+            let link7_inertia9 = link7_sin0 * link8_inertia13;
+            let link7_inertia10 = link7_cos0 * link8_inertia16;
+            let link7_inertia11 = link7_inertia9 + link7_inertia10;
+            let link7_inertia12 = link7_cos0 * link8_inertia20;
+            let link7_inertia13 = link7_sin0 * link8_inertia22;
+            let link7_inertia14 = link7_inertia12 - link7_inertia13;
+            let link7_inertia15 = link7_sin0 * link8_inertia20;
+            let link7_inertia16 = link7_cos0 * link8_inertia22;
+            let link7_inertia17 = link7_inertia15 + link7_inertia16;
+            let link7_inertia18 = link7_sin0 * link8_inertia5;
+            let link7_inertia19 = link7_inertia0 - link7_inertia18;
+            let link7_inertia20 = link7_cos0 * link8_inertia5;
+            let link7_inertia21 = link7_inertia3 + link7_inertia20;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = 119.76047904191617 * link7_inertia8;
+            let link7_pivot1 = 119.76047904191617 * link7_inertia11;
+            let link7_pivot2 = 119.76047904191617 * link8_inertia18;
+            let link7_pivot3 = link7_inertia8 * link7_pivot0;
+            let link7_pivot4 = link7_inertia8 * link7_pivot1;
+            let link7_pivot5 = link7_inertia8 * link7_pivot2;
+            let link7_pivot6 = link7_inertia2 - link7_pivot5;
+            let link7_pivot7 = link7_inertia11 * link7_pivot1;
+            let link7_pivot8 = link7_inertia11 * link7_pivot2;
+            let link7_pivot9 = link7_inertia5 - link7_pivot8;
+            let link7_pivot10 = link8_inertia18 * link7_pivot2;
+            let link7_pivot11 = link8_inertia10 - link7_pivot10;
+            let link7_pivot12 = link10_inertia8 * link7_pivot0;
+            let link7_pivot13 = link10_inertia8 * link7_pivot1;
+            let link7_pivot14 = link10_inertia8 * link7_pivot2;
+            let link7_pivot15 = link7_inertia14 - link7_pivot12;
+            let link7_pivot16 = link7_inertia17 - link7_pivot13;
+            let link7_pivot17 = link8_inertia24 - link7_pivot14;
+            let link7_pivot18 = 119.76047904191617 * link10_inertia8;
+            let link7_pivot19 = link10_inertia8 * link7_pivot18;
+            let link7_pivot20 = link10_inertia6 - link7_pivot19;
+            let link7_pivot21 = 119.76047904191617 * link9_inertia16;
+            let link7_pivot22 = link10_inertia8 * link7_pivot21;
+            let link7_pivot23 = link9_inertia18 - link7_pivot22;
+            let link7_pivot24 = link9_inertia16 * link7_pivot0;
+            let link7_pivot25 = link9_inertia16 * link7_pivot1;
+            let link7_pivot26 = link9_inertia16 * link7_pivot2;
+            let link7_pivot27 = link7_inertia19 - link7_pivot24;
+            let link7_pivot28 = link7_inertia21 - link7_pivot25;
+            let link7_pivot29 = link8_inertia26 - link7_pivot26;
+            let link7_pivot30 = link9_inertia16 * link7_pivot21;
+            let link7_pivot31 = link9_inertia14 - link7_pivot30;
+            let link7_pivot32 = 1.0 / link7_pivot20;
+            let link7_pivot33 = link7_pivot15 * link7_pivot32;
+            let link7_pivot34 = link7_pivot16 * link7_pivot32;
+            let link7_pivot35 = link7_pivot17 * link7_pivot32;
+            let link7_pivot36 = link7_pivot15 * link7_pivot33;
+            let link7_pivot37 = link7_pivot3 + link7_pivot36;
+            let link7_pivot38 = link7_pivot15 * link7_pivot34;
+            let link7_pivot39 = link7_pivot4 + link7_pivot38;
+            let link7_pivot40 = link7_pivot15 * link7_pivot35;
+            let link7_pivot41 = link7_pivot6 - link7_pivot40;
+            let link7_pivot42 = link7_pivot16 * link7_pivot34;
+            let link7_pivot43 = link7_pivot7 + link7_pivot42;
+            let link7_pivot44 = link7_pivot16 * link7_pivot35;
+            let link7_pivot45 = link7_pivot9 - link7_pivot44;
+            let link7_pivot46 = link7_pivot17 * link7_pivot35;
+            let link7_pivot47 = link7_pivot11 - link7_pivot46;
+            let link7_pivot48 = link7_pivot23 * link7_pivot33;
+            let link7_pivot49 = link7_pivot23 * link7_pivot34;
+            let link7_pivot50 = link7_pivot23 * link7_pivot35;
+            let link7_pivot51 = link7_pivot27 - link7_pivot48;
+            let link7_pivot52 = link7_pivot28 - link7_pivot49;
+            let link7_pivot53 = link7_pivot29 - link7_pivot50;
+            let link7_pivot54 = link7_pivot23 * link7_pivot32;
+            let link7_pivot55 = link7_pivot23 * link7_pivot54;
+            let link7_pivot56 = link7_pivot31 - link7_pivot55;
+            let link7_pivot57 = 1.0 / link7_pivot56;
+            let link7_pivot58 = link7_pivot51 * link7_pivot57;
+            let link7_pivot59 = link7_pivot52 * link7_pivot57;
+            let link7_pivot60 = link7_pivot53 * link7_pivot57;
+            let link7_pivot61 = link7_pivot51 * link7_pivot58;
+            let link7_pivot62 = link7_pivot37 + link7_pivot61;
+            let link7_pivot63 = link7_pivot51 * link7_pivot59;
+            let link7_pivot64 = link7_pivot39 + link7_pivot63;
+            let link7_pivot65 = link7_pivot51 * link7_pivot60;
+            let link7_pivot66 = link7_pivot41 - link7_pivot65;
+            let link7_pivot67 = link7_pivot52 * link7_pivot59;
+            let link7_pivot68 = link7_pivot43 + link7_pivot67;
+            let link7_pivot69 = link7_pivot52 * link7_pivot60;
+            let link7_pivot70 = link7_pivot45 - link7_pivot69;
+            let link7_pivot71 = link7_pivot53 * link7_pivot60;
+            let link7_pivot72 = link7_pivot47 - link7_pivot71;
+            let link7_pivot73 = 1.0 / link7_pivot72;
+            let link7_pivot74 = link7_pivot66 * link7_pivot73;
+            let link7_pivot75 = link7_pivot70 * link7_pivot73;
+            let link7_pivot76 = link7_pivot66 * link7_pivot74;
+            let link7_pivot77 = link7_pivot62 + link7_pivot76;
+            let link7_pivot78 = link7_pivot66 * link7_pivot75;
+            let link7_pivot79 = link7_pivot64 + link7_pivot78;
+            let link7_pivot80 = link7_pivot70 * link7_pivot75;
+            let link7_pivot81 = link7_pivot68 + link7_pivot80;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia22 = 0.25 * link7_pivot79;
+            let link7_inertia23 = 0.25 * link7_pivot81;
+            let link7_inertia24 = 0.25 * link7_inertia23;
+            let link7_inertia25 = link7_inertia5 - 0.45;
+            let link7_inertia26 = link7_inertia23 - 0.45;
+            let link7_inertia27 = link7_inertia24 - 0.10835;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link7_pivot77 - link7_pivot81;
+            let link6_inertia1 = link6_sin0 * link6_inertia0;
+            let link6_inertia2 = link6_cos0 + link6_cos0;
+            let link6_inertia3 = link7_pivot79 * link6_inertia2;
+            let link6_inertia4 = link6_inertia1 + link6_inertia3;
+            let link6_inertia5 = link6_sin0 * link6_inertia4;
+            let link6_inertia6 = link6_cos0 * link6_inertia4;
+            let link6_inertia7 = link7_pivot79 - link6_inertia6;
+            let link6_inertia8 = link7_pivot77 - link6_inertia5;
+            let link6_inertia9 = link7_pivot81 + link6_inertia5;
+            let link6_inertia10 = link6_cos0 * link7_inertia2;
+            let link6_inertia11 = link6_sin0 * link7_inertia25;
+            let link6_inertia12 = link6_inertia10 - link6_inertia11;
+            let link6_inertia13 = link6_sin0 * link7_inertia2;
+            let link6_inertia14 = link6_cos0 * link7_inertia25;
+            let link6_inertia15 = link6_inertia13 + link6_inertia14;
+            let link6_inertia16 = link6_cos0 * link7_inertia22;
+            let link6_inertia17 = link6_sin0 * link7_inertia26;
+            let link6_inertia18 = link6_inertia16 - link6_inertia17;
+            let link6_inertia19 = link6_sin0 * link7_inertia22;
+            let link6_inertia20 = link6_cos0 * link7_inertia26;
+            let link6_inertia21 = link6_inertia19 + link6_inertia20;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = 1.0 / link7_inertia27;
+            let link6_pivot1 = link6_inertia18 * link6_pivot0;
+            let link6_pivot2 = link6_inertia21 * link6_pivot0;
+            let link6_pivot3 = link6_inertia18 * link6_pivot1;
+            let link6_pivot4 = link6_inertia8 - link6_pivot3;
+            let link6_pivot5 = link6_inertia18 * link6_pivot2;
+            let link6_pivot6 = link6_inertia7 + link6_pivot5;
+            let link6_pivot7 = link6_inertia21 * link6_pivot2;
+            let link6_pivot8 = link6_inertia9 - link6_pivot7;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia22 = 0.25 * link6_pivot6;
+            let link6_inertia23 = 0.25 * link6_pivot8;
+            let link6_inertia24 = 0.25 * link6_inertia23;
+            let link6_inertia25 = link6_inertia15 - 0.55;
+            let link6_inertia26 = link6_inertia23 - 0.55;
+            let link6_inertia27 = link6_inertia24 - 0.13335;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link6_pivot4 - link6_pivot8;
+            let link5_inertia1 = link5_sin0 * link5_inertia0;
+            let link5_inertia2 = link5_cos0 + link5_cos0;
+            let link5_inertia3 = link6_pivot6 * link5_inertia2;
+            let link5_inertia4 = link5_inertia1 - link5_inertia3;
+            let link5_inertia5 = link5_sin0 * link5_inertia4;
+            let link5_inertia6 = link5_cos0 * link5_inertia4;
+            let link5_inertia7 = link6_pivot6 + link5_inertia6;
+            let link5_inertia8 = link6_pivot4 - link5_inertia5;
+            let link5_inertia9 = link6_pivot8 + link5_inertia5;
+            let link5_inertia10 = link5_cos0 * link6_inertia12;
+            let link5_inertia11 = link5_sin0 * link6_inertia25;
+            let link5_inertia12 = link5_inertia10 - link5_inertia11;
+            let link5_inertia13 = link5_sin0 * link6_inertia12;
+            let link5_inertia14 = link5_cos0 * link6_inertia25;
+            let link5_inertia15 = link5_inertia13 + link5_inertia14;
+            let link5_inertia16 = link5_cos0 * link6_inertia22;
+            let link5_inertia17 = link5_sin0 * link6_inertia26;
+            let link5_inertia18 = link5_inertia16 + link5_inertia17;
+            let link5_inertia19 = link5_sin0 * link6_inertia22;
+            let link5_inertia20 = link5_cos0 * link6_inertia26;
+            let link5_inertia21 = link5_inertia19 - link5_inertia20;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = 1.0 / link6_inertia27;
+            let link5_pivot1 = link5_inertia18 * link5_pivot0;
+            let link5_pivot2 = link5_inertia21 * link5_pivot0;
+            let link5_pivot3 = link5_inertia18 * link5_pivot1;
+            let link5_pivot4 = link5_inertia8 - link5_pivot3;
+            let link5_pivot5 = link5_inertia18 * link5_pivot2;
+            let link5_pivot6 = link5_inertia7 - link5_pivot5;
+            let link5_pivot7 = link5_inertia21 * link5_pivot2;
+            let link5_pivot8 = link5_inertia9 - link5_pivot7;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia22 = 0.25 * link5_pivot6;
+            let link5_inertia23 = 0.25 * link5_pivot8;
+            let link5_inertia24 = 0.25 * link5_inertia23;
+            let link5_inertia25 = link5_inertia15 - 0.65;
+            let link5_inertia26 = link5_inertia23 - 0.65;
+            let link5_inertia27 = link5_inertia24 - 0.15835;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link5_pivot4 - link5_pivot8;
+            let link4_inertia1 = link4_sin0 * link4_inertia0;
+            let link4_inertia2 = link4_cos0 + link4_cos0;
+            let link4_inertia3 = link5_pivot6 * link4_inertia2;
+            let link4_inertia4 = link4_inertia1 + link4_inertia3;
+            let link4_inertia5 = link4_sin0 * link4_inertia4;
+            let link4_inertia6 = link4_cos0 * link4_inertia4;
+            let link4_inertia7 = link5_pivot6 - link4_inertia6;
+            let link4_inertia8 = link5_pivot4 - link4_inertia5;
+            let link4_inertia9 = link5_pivot8 + link4_inertia5;
+            let link4_inertia10 = link4_cos0 * link5_inertia12;
+            let link4_inertia11 = link4_sin0 * link5_inertia25;
+            let link4_inertia12 = link4_inertia10 - link4_inertia11;
+            let link4_inertia13 = link4_sin0 * link5_inertia12;
+            let link4_inertia14 = link4_cos0 * link5_inertia25;
+            let link4_inertia15 = link4_inertia13 + link4_inertia14;
+            let link4_inertia16 = link4_cos0 * link5_inertia22;
+            let link4_inertia17 = link4_sin0 * link5_inertia26;
+            let link4_inertia18 = link4_inertia16 - link4_inertia17;
+            let link4_inertia19 = link4_sin0 * link5_inertia22;
+            let link4_inertia20 = link4_cos0 * link5_inertia26;
+            let link4_inertia21 = link4_inertia19 + link4_inertia20;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = 1.0 / link5_inertia27;
+            let link4_pivot1 = link4_inertia18 * link4_pivot0;
+            let link4_pivot2 = link4_inertia21 * link4_pivot0;
+            let link4_pivot3 = link4_inertia18 * link4_pivot1;
+            let link4_pivot4 = link4_inertia8 - link4_pivot3;
+            let link4_pivot5 = link4_inertia18 * link4_pivot2;
+            let link4_pivot6 = link4_inertia7 + link4_pivot5;
+            let link4_pivot7 = link4_inertia21 * link4_pivot2;
+            let link4_pivot8 = link4_inertia9 - link4_pivot7;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia22 = 0.25 * link4_pivot6;
+            let link4_inertia23 = 0.25 * link4_pivot8;
+            let link4_inertia24 = 0.25 * link4_inertia23;
+            let link4_inertia25 = link4_inertia15 - 0.75;
+            let link4_inertia26 = link4_inertia23 - 0.75;
+            let link4_inertia27 = link4_inertia24 - 0.18334999999999999;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link4_pivot4 - link4_pivot8;
+            let link3_inertia1 = link3_sin0 * link3_inertia0;
+            let link3_inertia2 = link3_cos0 + link3_cos0;
+            let link3_inertia3 = link4_pivot6 * link3_inertia2;
+            let link3_inertia4 = link3_inertia1 - link3_inertia3;
+            let link3_inertia5 = link3_sin0 * link3_inertia4;
+            let link3_inertia6 = link3_cos0 * link3_inertia4;
+            let link3_inertia7 = link4_pivot6 + link3_inertia6;
+            let link3_inertia8 = link4_pivot4 - link3_inertia5;
+            let link3_inertia9 = link4_pivot8 + link3_inertia5;
+            let link3_inertia10 = link3_cos0 * link4_inertia12;
+            let link3_inertia11 = link3_sin0 * link4_inertia25;
+            let link3_inertia12 = link3_inertia10 - link3_inertia11;
+            let link3_inertia13 = link3_sin0 * link4_inertia12;
+            let link3_inertia14 = link3_cos0 * link4_inertia25;
+            let link3_inertia15 = link3_inertia13 + link3_inertia14;
+            let link3_inertia16 = link3_cos0 * link4_inertia22;
+            let link3_inertia17 = link3_sin0 * link4_inertia26;
+            let link3_inertia18 = link3_inertia16 + link3_inertia17;
+            let link3_inertia19 = link3_sin0 * link4_inertia22;
+            let link3_inertia20 = link3_cos0 * link4_inertia26;
+            let link3_inertia21 = link3_inertia19 - link3_inertia20;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = 1.0 / link4_inertia27;
+            let link3_pivot1 = link3_inertia18 * link3_pivot0;
+            let link3_pivot2 = link3_inertia21 * link3_pivot0;
+            let link3_pivot3 = link3_inertia18 * link3_pivot1;
+            let link3_pivot4 = link3_inertia8 - link3_pivot3;
+            let link3_pivot5 = link3_inertia18 * link3_pivot2;
+            let link3_pivot6 = link3_inertia7 - link3_pivot5;
+            let link3_pivot7 = link3_inertia21 * link3_pivot2;
+            let link3_pivot8 = link3_inertia9 - link3_pivot7;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia22 = 0.25 * link3_pivot6;
+            let link3_inertia23 = 0.25 * link3_pivot8;
+            let link3_inertia24 = 0.25 * link3_inertia23;
+            let link3_inertia25 = link3_inertia15 - 0.85;
+            let link3_inertia26 = link3_inertia23 - 0.85;
+            let link3_inertia27 = link3_inertia24 - 0.20834999999999998;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link3_pivot4 - link3_pivot8;
+            let link2_inertia1 = link2_sin0 * link2_inertia0;
+            let link2_inertia2 = link2_cos0 + link2_cos0;
+            let link2_inertia3 = link3_pivot6 * link2_inertia2;
+            let link2_inertia4 = link2_inertia1 + link2_inertia3;
+            let link2_inertia5 = link2_sin0 * link2_inertia4;
+            let link2_inertia6 = link3_pivot8 + link2_inertia5;
+            let link2_inertia7 = link2_cos0 * link3_inertia12;
+            let link2_inertia8 = link2_sin0 * link3_inertia25;
+            let link2_inertia9 = link2_inertia7 - link2_inertia8;
+            let link2_inertia10 = link2_sin0 * link3_inertia12;
+            let link2_inertia11 = link2_cos0 * link3_inertia25;
+            let link2_inertia12 = link2_inertia10 + link2_inertia11;
+            let link2_inertia13 = link2_sin0 * link3_inertia22;
+            let link2_inertia14 = link2_cos0 * link3_inertia26;
+            let link2_inertia15 = link2_inertia13 + link2_inertia14;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = 1.0 / link3_inertia27;
+            let link2_pivot1 = link2_inertia15 * link2_pivot0;
+            let link2_pivot2 = link2_inertia15 * link2_pivot1;
+            let link2_pivot3 = link2_inertia6 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia16 = 0.25 * link2_pivot3;
+            let link2_inertia17 = 0.25 * link2_inertia16;
+            let link2_inertia18 = link2_inertia12 - 0.95;
+            let link2_inertia19 = link2_inertia17 - 0.23334999999999997;
+            // link1: inertia carried to the parent, M* (4.48)
+            let link1_inertia0 = link1_sin0 * link2_inertia9;
+            let link1_inertia1 = link1_cos0 * link2_inertia18;
+            let link1_inertia2 = link1_inertia0 + link1_inertia1;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = 1.0 / link2_inertia19;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = 119.76047904191617 * p_9;
+            let link7_rest1 = link10_inertia8 * link7_rest0;
+            let link7_rest2 = link9_inertia16 * link7_rest0;
+            let link7_rest3 = link7_inertia8 * link7_rest0;
+            let link7_rest4 = link7_inertia11 * link7_rest0;
+            let link7_rest5 = link8_inertia18 * link7_rest0;
+            let link7_rest6 = p_8 - link7_rest1;
+            let link7_rest7 = link7_pivot32 * link7_rest6;
+            let link7_rest8 = link7_pivot23 * link7_rest7;
+            let link7_rest9 = link7_rest2 + link7_rest8;
+            let link7_rest10 = link7_pivot15 * link7_rest7;
+            let link7_rest11 = link7_pivot16 * link7_rest7;
+            let link7_rest12 = link7_pivot17 * link7_rest7;
+            let link7_rest13 = link7_rest3 + link7_rest10;
+            let link7_rest14 = link7_rest4 + link7_rest11;
+            let link7_rest15 = link7_rest5 + link7_rest12;
+            let link7_rest16 = p_7 - link7_rest9;
+            let link7_rest17 = link7_pivot57 * link7_rest16;
+            let link7_rest18 = link7_pivot51 * link7_rest17;
+            let link7_rest19 = link7_pivot52 * link7_rest17;
+            let link7_rest20 = link7_pivot53 * link7_rest17;
+            let link7_rest21 = link7_rest13 + link7_rest18;
+            let link7_rest22 = link7_rest14 + link7_rest19;
+            let link7_rest23 = link7_rest15 + link7_rest20;
+            let link7_rest24 = p_6 - link7_rest23;
+            let link7_rest25 = link7_pivot73 * link7_rest24;
+            let link7_rest26 = link7_pivot66 * link7_rest25;
+            let link7_rest27 = link7_rest21 + link7_rest26;
+            let link7_rest28 = link7_pivot70 * link7_rest25;
+            let link7_rest29 = link7_rest22 + link7_rest28;
+            let link7_rest30 = 0.25 * link7_rest29;
+            let link7_rest31 = p_6 - link7_rest30;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_cos0 * link7_rest27;
+            let link6_rest1 = link6_sin0 * link7_rest29;
+            let link6_rest2 = link6_rest0 - link6_rest1;
+            let link6_rest3 = link6_sin0 * link7_rest27;
+            let link6_rest4 = link6_cos0 * link7_rest29;
+            let link6_rest5 = link6_rest3 + link6_rest4;
+            let link6_rest6 = p_5 - link7_rest31;
+            let link6_rest7 = link6_pivot0 * link6_rest6;
+            let link6_rest8 = link6_inertia18 * link6_rest7;
+            let link6_rest9 = link6_rest2 - link6_rest8;
+            let link6_rest10 = link6_inertia21 * link6_rest7;
+            let link6_rest11 = link6_rest5 - link6_rest10;
+            let link6_rest12 = 0.25 * link6_rest11;
+            let link6_rest13 = p_5 - link6_rest12;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_cos0 * link6_rest9;
+            let link5_rest1 = link5_sin0 * link6_rest11;
+            let link5_rest2 = link5_rest0 - link5_rest1;
+            let link5_rest3 = link5_sin0 * link6_rest9;
+            let link5_rest4 = link5_cos0 * link6_rest11;
+            let link5_rest5 = link5_rest3 + link5_rest4;
+            let link5_rest6 = p_4 - link6_rest13;
+            let link5_rest7 = link5_pivot0 * link5_rest6;
+            let link5_rest8 = link5_inertia18 * link5_rest7;
+            let link5_rest9 = link5_rest2 + link5_rest8;
+            let link5_rest10 = link5_inertia21 * link5_rest7;
+            let link5_rest11 = link5_rest5 + link5_rest10;
+            let link5_rest12 = 0.25 * link5_rest11;
+            let link5_rest13 = p_4 - link5_rest12;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_cos0 * link5_rest9;
+            let link4_rest1 = link4_sin0 * link5_rest11;
+            let link4_rest2 = link4_rest0 - link4_rest1;
+            let link4_rest3 = link4_sin0 * link5_rest9;
+            let link4_rest4 = link4_cos0 * link5_rest11;
+            let link4_rest5 = link4_rest3 + link4_rest4;
+            let link4_rest6 = p_3 - link5_rest13;
+            let link4_rest7 = link4_pivot0 * link4_rest6;
+            let link4_rest8 = link4_inertia18 * link4_rest7;
+            let link4_rest9 = link4_rest2 - link4_rest8;
+            let link4_rest10 = link4_inertia21 * link4_rest7;
+            let link4_rest11 = link4_rest5 - link4_rest10;
+            let link4_rest12 = 0.25 * link4_rest11;
+            let link4_rest13 = p_3 - link4_rest12;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_cos0 * link4_rest9;
+            let link3_rest1 = link3_sin0 * link4_rest11;
+            let link3_rest2 = link3_rest0 - link3_rest1;
+            let link3_rest3 = link3_sin0 * link4_rest9;
+            let link3_rest4 = link3_cos0 * link4_rest11;
+            let link3_rest5 = link3_rest3 + link3_rest4;
+            let link3_rest6 = p_2 - link4_rest13;
+            let link3_rest7 = link3_pivot0 * link3_rest6;
+            let link3_rest8 = link3_inertia18 * link3_rest7;
+            let link3_rest9 = link3_rest2 + link3_rest8;
+            let link3_rest10 = link3_inertia21 * link3_rest7;
+            let link3_rest11 = link3_rest5 + link3_rest10;
+            let link3_rest12 = 0.25 * link3_rest11;
+            let link3_rest13 = p_2 - link3_rest12;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_sin0 * link3_rest9;
+            let link2_rest1 = link2_cos0 * link3_rest11;
+            let link2_rest2 = link2_rest0 + link2_rest1;
+            let link2_rest3 = p_1 - link3_rest13;
+            let link2_rest4 = link2_pivot0 * link2_rest3;
+            let link2_rest5 = link2_inertia15 * link2_rest4;
+            let link2_rest6 = link2_rest2 - link2_rest5;
+            let link2_rest7 = 0.25 * link2_rest6;
+            let link2_rest8 = p_1 - link2_rest7;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = p_0 - link2_rest8;
+            let link1_rest1 = link1_pivot0 * link1_rest0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = 0.25 * link1_rest1;
+            let link2_vel1 = link2_pivot1 * link2_vel0;
+            let link2_vel2 = link2_rest4 - link2_vel1;
+            let link2_vel3 = link1_rest1 - link2_vel2;
+            let link2_vel4 = link2_sin0 * link2_vel0;
+            let link2_vel5 = link2_cos0 * link2_vel0;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = 0.25 * link2_vel2;
+            let link3_vel1 = link2_vel5 + link3_vel0;
+            let link3_vel2 = link3_pivot1 * link2_vel4;
+            let link3_vel3 = link3_pivot2 * link3_vel1;
+            let link3_vel4 = link3_vel2 + link3_vel3;
+            let link3_vel5 = link3_rest7 + link3_vel4;
+            let link3_vel6 = link2_vel2 - link3_vel5;
+            let link3_vel7 = link3_cos0 * link2_vel4;
+            let link3_vel8 = link3_sin0 * link3_vel1;
+            let link3_vel9 = link3_vel7 + link3_vel8;
+            let link3_vel10 = link3_cos0 * link3_vel1;
+            let link3_vel11 = link3_sin0 * link2_vel4;
+            let link3_vel12 = link3_vel10 - link3_vel11;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = 0.25 * link3_vel5;
+            let link4_vel1 = link3_vel12 + link4_vel0;
+            let link4_vel2 = link4_pivot1 * link3_vel9;
+            let link4_vel3 = link4_pivot2 * link4_vel1;
+            let link4_vel4 = link4_vel2 + link4_vel3;
+            let link4_vel5 = link4_rest7 - link4_vel4;
+            let link4_vel6 = link3_vel5 - link4_vel5;
+            let link4_vel7 = link4_cos0 * link3_vel9;
+            let link4_vel8 = link4_sin0 * link4_vel1;
+            let link4_vel9 = link4_vel7 + link4_vel8;
+            let link4_vel10 = link4_cos0 * link4_vel1;
+            let link4_vel11 = link4_sin0 * link3_vel9;
+            let link4_vel12 = link4_vel10 - link4_vel11;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = 0.25 * link4_vel5;
+            let link5_vel1 = link4_vel12 + link5_vel0;
+            let link5_vel2 = link5_pivot1 * link4_vel9;
+            let link5_vel3 = link5_pivot2 * link5_vel1;
+            let link5_vel4 = link5_vel2 + link5_vel3;
+            let link5_vel5 = link5_rest7 + link5_vel4;
+            let link5_vel6 = link4_vel5 - link5_vel5;
+            let link5_vel7 = link5_cos0 * link4_vel9;
+            let link5_vel8 = link5_sin0 * link5_vel1;
+            let link5_vel9 = link5_vel7 + link5_vel8;
+            let link5_vel10 = link5_cos0 * link5_vel1;
+            let link5_vel11 = link5_sin0 * link4_vel9;
+            let link5_vel12 = link5_vel10 - link5_vel11;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = 0.25 * link5_vel5;
+            let link6_vel1 = link5_vel12 + link6_vel0;
+            let link6_vel2 = link6_pivot1 * link5_vel9;
+            let link6_vel3 = link6_pivot2 * link6_vel1;
+            let link6_vel4 = link6_vel2 + link6_vel3;
+            let link6_vel5 = link6_rest7 - link6_vel4;
+            let link6_vel6 = link5_vel5 - link6_vel5;
+            let link6_vel7 = link6_cos0 * link5_vel9;
+            let link6_vel8 = link6_sin0 * link6_vel1;
+            let link6_vel9 = link6_vel7 + link6_vel8;
+            let link6_vel10 = link6_cos0 * link6_vel1;
+            let link6_vel11 = link6_sin0 * link5_vel9;
+            let link6_vel12 = link6_vel10 - link6_vel11;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = 0.25 * link6_vel5;
+            let link7_vel1 = link6_vel12 + link7_vel0;
+            let link7_vel2 = link7_pivot74 * link6_vel9;
+            let link7_vel3 = link7_pivot75 * link7_vel1;
+            let link7_vel4 = link7_vel2 + link7_vel3;
+            let link7_vel5 = link7_rest25 - link7_vel4;
+            let link7_vel6 = link6_vel5 + link7_vel5;
+            let link7_vel7 = link7_pivot58 * link6_vel9;
+            let link7_vel8 = link7_pivot59 * link7_vel1;
+            let link7_vel9 = link7_vel7 + link7_vel8;
+            let link7_vel10 = link7_pivot60 * link7_vel5;
+            let link7_vel11 = link7_vel9 + link7_vel10;
+            let link7_vel12 = link7_rest17 - link7_vel11;
+            let link7_vel13 = link7_pivot33 * link6_vel9;
+            let link7_vel14 = link7_pivot34 * link7_vel1;
+            let link7_vel15 = link7_vel13 + link7_vel14;
+            let link7_vel16 = link7_pivot35 * link7_vel5;
+            let link7_vel17 = link7_vel15 + link7_vel16;
+            let link7_vel18 = link7_rest7 - link7_vel17;
+            let link7_vel19 = link7_pivot54 * link7_vel12;
+            let link7_vel20 = link7_vel18 - link7_vel19;
+            let link7_vel21 = link7_pivot0 * link6_vel9;
+            let link7_vel22 = link7_pivot1 * link7_vel1;
+            let link7_vel23 = link7_vel21 + link7_vel22;
+            let link7_vel24 = link7_pivot2 * link7_vel5;
+            let link7_vel25 = link7_vel23 + link7_vel24;
+            let link7_vel26 = link7_rest0 - link7_vel25;
+            let link7_vel27 = link7_pivot18 * link7_vel20;
+            let link7_vel28 = link7_vel26 - link7_vel27;
+            let link7_vel29 = link7_pivot21 * link7_vel12;
+            let link7_vel30 = link7_vel28 - link7_vel29;
+            // link1: energy
+            let link1_energy0 = p_0 * link1_rest1;
+            // link2: energy
+            let link2_energy0 = p_1 * link2_vel3;
+            let link2_energy1 = link1_energy0 - link2_energy0;
+            // link3: energy
+            let link3_energy0 = p_2 * link3_vel6;
+            let link3_energy1 = link2_energy1 - link3_energy0;
+            // link4: energy
+            let link4_energy0 = p_3 * link4_vel6;
+            let link4_energy1 = link3_energy1 - link4_energy0;
+            // link5: energy
+            let link5_energy0 = p_4 * link5_vel6;
+            let link5_energy1 = link4_energy1 - link5_energy0;
+            // link6: energy
+            let link6_energy0 = p_5 * link6_vel6;
+            let link6_energy1 = link5_energy1 - link6_energy0;
+            // link7: energy
+            let link7_energy0 = p_6 * link7_vel6;
+            let link7_energy1 = link6_energy1 - link7_energy0;
+            // link10: energy
+            let link10_energy0 = p_9 * link7_vel30;
+            let link10_energy1 = link7_energy1 - link10_energy0;
+            let link10_energy2 = p_8 * link7_vel20;
+            let link10_energy3 = link10_energy1 - link10_energy2;
+            let link10_energy4 = p_7 * link7_vel12;
+            let link10_energy5 = link10_energy3 - link10_energy4;
+            let link10_energy6 = 0.5 * link10_energy5;
+            // ground: energy
+            let ground_energy0 = 9.81 * link1_inertia2;
+            results[0][l] = -link10_energy6;
+            results[1][l] = ground_energy0;
+        }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
     /// 586 operations: 251 additions, 326 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        let tau_6 = self.tau[6];
-        let tau_7 = self.tau[7];
-        let tau_8 = self.tau[8];
-        let tau_9 = self.tau[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link10: inertia carried to the parent, M* (4.48)
-        let link10_inertia0 = 0.05 * link10_sin0;
-        let link10_inertia1 = 0.05 * link10_cos0;
-        let link10_inertia2 = link10_inertia1 + link10_inertia1;
-        let link10_inertia3 = 0.25 * link10_inertia2;
-        let link10_inertia4 = link10_inertia3 + 0.00835;
-        let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
-        let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
-        let link10_inertia7 = 0.25 * link10_inertia1;
-        let link10_inertia8 = link10_inertia7 + 0.00835;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia0 = link9_cos0 * link10_inertia0;
-        let link9_inertia1 = link9_sin0 * link10_inertia5;
-        let link9_inertia2 = link9_inertia0 + link9_inertia1;
-        let link9_inertia3 = link9_sin0 * link10_inertia0;
-        let link9_inertia4 = link9_cos0 * link10_inertia5;
-        let link9_inertia5 = link9_inertia3 - link9_inertia4;
-        let link9_inertia6 = link9_sin0 * link10_inertia1;
-        let link9_inertia7 = link9_inertia0 + link9_inertia6;
-        let link9_inertia8 = link9_cos0 * link10_inertia1;
-        let link9_inertia9 = link9_inertia3 - link9_inertia8;
-        // link9: U, Mj, k and the reduced inertia M' (4.44)
-        let link9_pivot0 = 119.76047904191617 * link9_inertia7;
-        let link9_pivot1 = 119.76047904191617 * link9_inertia9;
-        let link9_pivot2 = 119.76047904191617 * link10_inertia8;
-        let link9_pivot3 = link9_inertia7 * link9_pivot0;
-        let link9_pivot4 = link9_inertia7 * link9_pivot1;
-        let link9_pivot5 = link9_inertia7 * link9_pivot2;
-        let link9_pivot6 = link9_inertia2 - link9_pivot5;
-        let link9_pivot7 = link9_inertia9 * link9_pivot1;
-        let link9_pivot8 = link9_inertia9 * link9_pivot2;
-        let link9_pivot9 = link9_inertia5 - link9_pivot8;
-        let link9_pivot10 = link10_inertia8 * link9_pivot2;
-        let link9_pivot11 = link10_inertia6 - link9_pivot10;
-        let link9_pivot12 = 1.0 / link9_pivot11;
-        let link9_pivot13 = link9_pivot6 * link9_pivot12;
-        let link9_pivot14 = link9_pivot9 * link9_pivot12;
-        let link9_pivot15 = link9_pivot6 * link9_pivot13;
-        let link9_pivot16 = link9_pivot3 + link9_pivot15;
-        let link9_pivot17 = link9_pivot6 * link9_pivot14;
-        let link9_pivot18 = link9_pivot4 + link9_pivot17;
-        let link9_pivot19 = link9_pivot9 * link9_pivot14;
-        let link9_pivot20 = link9_pivot7 + link9_pivot19;
-        // link9: inertia carried to the parent, M* (4.48)
-        let link9_inertia10 = 0.25 * link9_pivot18;
-        let link9_inertia11 = 0.25 * link9_pivot20;
-        let link9_inertia12 = 0.25 * link9_inertia11;
-        let link9_inertia13 = link9_inertia11 - 0.25;
-        let link9_inertia14 = link9_inertia12 - 0.05835;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia0 = link9_pivot16 - link9_pivot20;
-        let link8_inertia1 = link8_sin0 * link8_inertia0;
-        let link8_inertia2 = link8_cos0 + link8_cos0;
-        let link8_inertia3 = link9_pivot18 * link8_inertia2;
-        let link8_inertia4 = link8_inertia1 + link8_inertia3;
-        let link8_inertia5 = link8_sin0 * link8_inertia4;
-        let link8_inertia6 = link8_cos0 * link8_inertia4;
-        let link8_inertia7 = link9_pivot18 - link8_inertia6;
-        let link8_inertia8 = link9_pivot16 - link8_inertia5;
-        let link8_inertia9 = link9_pivot20 + link8_inertia5;
-        let link8_inertia10 = link8_cos0 * link9_inertia10;
-        let link8_inertia11 = link8_sin0 * link9_inertia13;
-        let link8_inertia12 = link8_inertia10 - link8_inertia11;
-        let link8_inertia13 = link8_sin0 * link9_inertia10;
-        let link8_inertia14 = link8_cos0 * link9_inertia13;
-        let link8_inertia15 = link8_inertia13 + link8_inertia14;
-        // link8: U, Mj, k and the reduced inertia M' (4.44)
-        let link8_pivot0 = 1.0 / link9_inertia14;
-        let link8_pivot1 = link8_inertia12 * link8_pivot0;
-        let link8_pivot2 = link8_inertia15 * link8_pivot0;
-        let link8_pivot3 = link8_inertia12 * link8_pivot1;
-        let link8_pivot4 = link8_inertia8 - link8_pivot3;
-        let link8_pivot5 = link8_inertia12 * link8_pivot2;
-        let link8_pivot6 = link8_inertia7 + link8_pivot5;
-        let link8_pivot7 = link8_inertia15 * link8_pivot2;
-        let link8_pivot8 = link8_inertia9 - link8_pivot7;
-        // link8: inertia carried to the parent, M* (4.48)
-        let link8_inertia16 = 0.25 * link8_pivot6;
-        let link8_inertia17 = 0.25 * link8_pivot8;
-        let link8_inertia18 = 0.25 * link8_inertia17;
-        let link8_inertia19 = link8_inertia17 - 0.35000000000000003;
-        let link8_inertia20 = link8_inertia18 - 0.08335000000000001;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia0 = link8_pivot4 - link8_pivot8;
-        let link7_inertia1 = link7_sin0 * link7_inertia0;
-        let link7_inertia2 = link7_cos0 + link7_cos0;
-        let link7_inertia3 = link8_pivot6 * link7_inertia2;
-        let link7_inertia4 = link7_inertia1 - link7_inertia3;
-        let link7_inertia5 = link7_sin0 * link7_inertia4;
-        let link7_inertia6 = link7_cos0 * link7_inertia4;
-        let link7_inertia7 = link8_pivot6 + link7_inertia6;
-        let link7_inertia8 = link8_pivot4 - link7_inertia5;
-        let link7_inertia9 = link8_pivot8 + link7_inertia5;
-        let link7_inertia10 = link7_cos0 * link8_inertia16;
-        let link7_inertia11 = link7_sin0 * link8_inertia19;
-        let link7_inertia12 = link7_inertia10 + link7_inertia11;
-        let link7_inertia13 = link7_sin0 * link8_inertia16;
-        let link7_inertia14 = link7_cos0 * link8_inertia19;
-        let link7_inertia15 = link7_inertia13 - link7_inertia14;
-        // link7: U, Mj, k and the reduced inertia M' (4.44)
-        let link7_pivot0 = 1.0 / link8_inertia20;
-        let link7_pivot1 = link7_inertia12 * link7_pivot0;
-        let link7_pivot2 = link7_inertia15 * link7_pivot0;
-        let link7_pivot3 = link7_inertia12 * link7_pivot1;
-        let link7_pivot4 = link7_inertia8 - link7_pivot3;
-        let link7_pivot5 = link7_inertia12 * link7_pivot2;
-        let link7_pivot6 = link7_inertia7 - link7_pivot5;
-        let link7_pivot7 = link7_inertia15 * link7_pivot2;
-        let link7_pivot8 = link7_inertia9 - link7_pivot7;
-        // link7: inertia carried to the parent, M* (4.48)
-        let link7_inertia16 = 0.25 * link7_pivot6;
-        let link7_inertia17 = 0.25 * link7_pivot8;
-        let link7_inertia18 = 0.25 * link7_inertia17;
-        let link7_inertia19 = link7_inertia17 - 0.45;
-        let link7_inertia20 = link7_inertia18 - 0.10835;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia0 = link7_pivot4 - link7_pivot8;
-        let link6_inertia1 = link6_sin0 * link6_inertia0;
-        let link6_inertia2 = link6_cos0 + link6_cos0;
-        let link6_inertia3 = link7_pivot6 * link6_inertia2;
-        let link6_inertia4 = link6_inertia1 + link6_inertia3;
-        let link6_inertia5 = link6_sin0 * link6_inertia4;
-        let link6_inertia6 = link6_cos0 * link6_inertia4;
-        let link6_inertia7 = link7_pivot6 - link6_inertia6;
-        let link6_inertia8 = link7_pivot4 - link6_inertia5;
-        let link6_inertia9 = link7_pivot8 + link6_inertia5;
-        let link6_inertia10 = link6_cos0 * link7_inertia16;
-        let link6_inertia11 = link6_sin0 * link7_inertia19;
-        let link6_inertia12 = link6_inertia10 - link6_inertia11;
-        let link6_inertia13 = link6_sin0 * link7_inertia16;
-        let link6_inertia14 = link6_cos0 * link7_inertia19;
-        let link6_inertia15 = link6_inertia13 + link6_inertia14;
-        // link6: U, Mj, k and the reduced inertia M' (4.44)
-        let link6_pivot0 = 1.0 / link7_inertia20;
-        let link6_pivot1 = link6_inertia12 * link6_pivot0;
-        let link6_pivot2 = link6_inertia15 * link6_pivot0;
-        let link6_pivot3 = link6_inertia12 * link6_pivot1;
-        let link6_pivot4 = link6_inertia8 - link6_pivot3;
-        let link6_pivot5 = link6_inertia12 * link6_pivot2;
-        let link6_pivot6 = link6_inertia7 + link6_pivot5;
-        let link6_pivot7 = link6_inertia15 * link6_pivot2;
-        let link6_pivot8 = link6_inertia9 - link6_pivot7;
-        // link6: inertia carried to the parent, M* (4.48)
-        let link6_inertia16 = 0.25 * link6_pivot6;
-        let link6_inertia17 = 0.25 * link6_pivot8;
-        let link6_inertia18 = 0.25 * link6_inertia17;
-        let link6_inertia19 = link6_inertia17 - 0.55;
-        let link6_inertia20 = link6_inertia18 - 0.13335;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia0 = link6_pivot4 - link6_pivot8;
-        let link5_inertia1 = link5_sin0 * link5_inertia0;
-        let link5_inertia2 = link5_cos0 + link5_cos0;
-        let link5_inertia3 = link6_pivot6 * link5_inertia2;
-        let link5_inertia4 = link5_inertia1 - link5_inertia3;
-        let link5_inertia5 = link5_sin0 * link5_inertia4;
-        let link5_inertia6 = link5_cos0 * link5_inertia4;
-        let link5_inertia7 = link6_pivot6 + link5_inertia6;
-        let link5_inertia8 = link6_pivot4 - link5_inertia5;
-        let link5_inertia9 = link6_pivot8 + link5_inertia5;
-        let link5_inertia10 = link5_cos0 * link6_inertia16;
-        let link5_inertia11 = link5_sin0 * link6_inertia19;
-        let link5_inertia12 = link5_inertia10 + link5_inertia11;
-        let link5_inertia13 = link5_sin0 * link6_inertia16;
-        let link5_inertia14 = link5_cos0 * link6_inertia19;
-        let link5_inertia15 = link5_inertia13 - link5_inertia14;
-        // link5: U, Mj, k and the reduced inertia M' (4.44)
-        let link5_pivot0 = 1.0 / link6_inertia20;
-        let link5_pivot1 = link5_inertia12 * link5_pivot0;
-        let link5_pivot2 = link5_inertia15 * link5_pivot0;
-        let link5_pivot3 = link5_inertia12 * link5_pivot1;
-        let link5_pivot4 = link5_inertia8 - link5_pivot3;
-        let link5_pivot5 = link5_inertia12 * link5_pivot2;
-        let link5_pivot6 = link5_inertia7 - link5_pivot5;
-        let link5_pivot7 = link5_inertia15 * link5_pivot2;
-        let link5_pivot8 = link5_inertia9 - link5_pivot7;
-        // link5: inertia carried to the parent, M* (4.48)
-        let link5_inertia16 = 0.25 * link5_pivot6;
-        let link5_inertia17 = 0.25 * link5_pivot8;
-        let link5_inertia18 = 0.25 * link5_inertia17;
-        let link5_inertia19 = link5_inertia17 - 0.65;
-        let link5_inertia20 = link5_inertia18 - 0.15835;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia0 = link5_pivot4 - link5_pivot8;
-        let link4_inertia1 = link4_sin0 * link4_inertia0;
-        let link4_inertia2 = link4_cos0 + link4_cos0;
-        let link4_inertia3 = link5_pivot6 * link4_inertia2;
-        let link4_inertia4 = link4_inertia1 + link4_inertia3;
-        let link4_inertia5 = link4_sin0 * link4_inertia4;
-        let link4_inertia6 = link4_cos0 * link4_inertia4;
-        let link4_inertia7 = link5_pivot6 - link4_inertia6;
-        let link4_inertia8 = link5_pivot4 - link4_inertia5;
-        let link4_inertia9 = link5_pivot8 + link4_inertia5;
-        let link4_inertia10 = link4_cos0 * link5_inertia16;
-        let link4_inertia11 = link4_sin0 * link5_inertia19;
-        let link4_inertia12 = link4_inertia10 - link4_inertia11;
-        let link4_inertia13 = link4_sin0 * link5_inertia16;
-        let link4_inertia14 = link4_cos0 * link5_inertia19;
-        let link4_inertia15 = link4_inertia13 + link4_inertia14;
-        // link4: U, Mj, k and the reduced inertia M' (4.44)
-        let link4_pivot0 = 1.0 / link5_inertia20;
-        let link4_pivot1 = link4_inertia12 * link4_pivot0;
-        let link4_pivot2 = link4_inertia15 * link4_pivot0;
-        let link4_pivot3 = link4_inertia12 * link4_pivot1;
-        let link4_pivot4 = link4_inertia8 - link4_pivot3;
-        let link4_pivot5 = link4_inertia12 * link4_pivot2;
-        let link4_pivot6 = link4_inertia7 + link4_pivot5;
-        let link4_pivot7 = link4_inertia15 * link4_pivot2;
-        let link4_pivot8 = link4_inertia9 - link4_pivot7;
-        // link4: inertia carried to the parent, M* (4.48)
-        let link4_inertia16 = 0.25 * link4_pivot6;
-        let link4_inertia17 = 0.25 * link4_pivot8;
-        let link4_inertia18 = 0.25 * link4_inertia17;
-        let link4_inertia19 = link4_inertia17 - 0.75;
-        let link4_inertia20 = link4_inertia18 - 0.18334999999999999;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia0 = link4_pivot4 - link4_pivot8;
-        let link3_inertia1 = link3_sin0 * link3_inertia0;
-        let link3_inertia2 = link3_cos0 + link3_cos0;
-        let link3_inertia3 = link4_pivot6 * link3_inertia2;
-        let link3_inertia4 = link3_inertia1 - link3_inertia3;
-        let link3_inertia5 = link3_sin0 * link3_inertia4;
-        let link3_inertia6 = link3_cos0 * link3_inertia4;
-        let link3_inertia7 = link4_pivot6 + link3_inertia6;
-        let link3_inertia8 = link4_pivot4 - link3_inertia5;
-        let link3_inertia9 = link4_pivot8 + link3_inertia5;
-        let link3_inertia10 = link3_cos0 * link4_inertia16;
-        let link3_inertia11 = link3_sin0 * link4_inertia19;
-        let link3_inertia12 = link3_inertia10 + link3_inertia11;
-        let link3_inertia13 = link3_sin0 * link4_inertia16;
-        let link3_inertia14 = link3_cos0 * link4_inertia19;
-        let link3_inertia15 = link3_inertia13 - link3_inertia14;
-        // link3: U, Mj, k and the reduced inertia M' (4.44)
-        let link3_pivot0 = 1.0 / link4_inertia20;
-        let link3_pivot1 = link3_inertia12 * link3_pivot0;
-        let link3_pivot2 = link3_inertia15 * link3_pivot0;
-        let link3_pivot3 = link3_inertia12 * link3_pivot1;
-        let link3_pivot4 = link3_inertia8 - link3_pivot3;
-        let link3_pivot5 = link3_inertia12 * link3_pivot2;
-        let link3_pivot6 = link3_inertia7 - link3_pivot5;
-        let link3_pivot7 = link3_inertia15 * link3_pivot2;
-        let link3_pivot8 = link3_inertia9 - link3_pivot7;
-        // link3: inertia carried to the parent, M* (4.48)
-        let link3_inertia16 = 0.25 * link3_pivot6;
-        let link3_inertia17 = 0.25 * link3_pivot8;
-        let link3_inertia18 = 0.25 * link3_inertia17;
-        let link3_inertia19 = link3_inertia17 - 0.85;
-        let link3_inertia20 = link3_inertia18 - 0.20834999999999998;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia0 = link3_pivot4 - link3_pivot8;
-        let link2_inertia1 = link2_sin0 * link2_inertia0;
-        let link2_inertia2 = link2_cos0 + link2_cos0;
-        let link2_inertia3 = link3_pivot6 * link2_inertia2;
-        let link2_inertia4 = link2_inertia1 + link2_inertia3;
-        let link2_inertia5 = link2_sin0 * link2_inertia4;
-        let link2_inertia6 = link3_pivot8 + link2_inertia5;
-        let link2_inertia7 = link2_sin0 * link3_inertia16;
-        let link2_inertia8 = link2_cos0 * link3_inertia19;
-        let link2_inertia9 = link2_inertia7 + link2_inertia8;
-        // link2: U, Mj, k and the reduced inertia M' (4.44)
-        let link2_pivot0 = 1.0 / link3_inertia20;
-        let link2_pivot1 = link2_inertia9 * link2_pivot0;
-        let link2_pivot2 = link2_inertia9 * link2_pivot1;
-        let link2_pivot3 = link2_inertia6 - link2_pivot2;
-        // link2: inertia carried to the parent, M* (4.48)
-        let link2_inertia10 = 0.25 * link2_pivot3;
-        let link2_inertia11 = 0.25 * link2_inertia10;
-        let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
-        // link1: U, Mj, k and the reduced inertia M' (4.44)
-        let link1_pivot0 = 1.0 / link2_inertia12;
-        // link1: velocity and joint rate (4.40)
-        let link1_vel0 = 9.81 * link1_cos0;
-        let link1_vel1 = 9.81 * link1_sin0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = 0.25 * link2_vel0;
-        let link2_vel2 = link1_vel0 + link2_vel1;
-        let link2_vel3 = link2_cos0 * link2_vel2;
-        let link2_vel4 = link2_sin0 * link1_vel1;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link2_cos0 * link1_vel1;
-        let link2_vel7 = link2_sin0 * link2_vel2;
-        let link2_vel8 = link2_vel6 + link2_vel7;
-        let link2_vel9 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel9 * link2_vel9;
-        let link3_vel1 = 0.25 * link3_vel0;
-        let link3_vel2 = link2_vel5 + link3_vel1;
-        let link3_vel3 = link3_cos0 * link3_vel2;
-        let link3_vel4 = link3_sin0 * link2_vel8;
-        let link3_vel5 = link3_vel3 - link3_vel4;
-        let link3_vel6 = link3_cos0 * link2_vel8;
-        let link3_vel7 = link3_sin0 * link3_vel2;
-        let link3_vel8 = link3_vel6 + link3_vel7;
-        let link3_vel9 = v_2 + link2_vel9;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel9 * link3_vel9;
-        let link4_vel1 = 0.25 * link4_vel0;
-        let link4_vel2 = link3_vel5 + link4_vel1;
-        let link4_vel3 = link4_cos0 * link4_vel2;
-        let link4_vel4 = link4_sin0 * link3_vel8;
-        let link4_vel5 = link4_vel3 - link4_vel4;
-        let link4_vel6 = link4_cos0 * link3_vel8;
-        let link4_vel7 = link4_sin0 * link4_vel2;
-        let link4_vel8 = link4_vel6 + link4_vel7;
-        let link4_vel9 = v_3 + link3_vel9;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel9 * link4_vel9;
-        let link5_vel1 = 0.25 * link5_vel0;
-        let link5_vel2 = link4_vel5 + link5_vel1;
-        let link5_vel3 = link5_cos0 * link5_vel2;
-        let link5_vel4 = link5_sin0 * link4_vel8;
-        let link5_vel5 = link5_vel3 - link5_vel4;
-        let link5_vel6 = link5_cos0 * link4_vel8;
-        let link5_vel7 = link5_sin0 * link5_vel2;
-        let link5_vel8 = link5_vel6 + link5_vel7;
-        let link5_vel9 = v_4 + link4_vel9;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel9 * link5_vel9;
-        let link6_vel1 = 0.25 * link6_vel0;
-        let link6_vel2 = link5_vel5 + link6_vel1;
-        let link6_vel3 = link6_cos0 * link6_vel2;
-        let link6_vel4 = link6_sin0 * link5_vel8;
-        let link6_vel5 = link6_vel3 - link6_vel4;
-        let link6_vel6 = link6_cos0 * link5_vel8;
-        let link6_vel7 = link6_sin0 * link6_vel2;
-        let link6_vel8 = link6_vel6 + link6_vel7;
-        let link6_vel9 = v_5 + link5_vel9;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel9 * link6_vel9;
-        let link7_vel1 = 0.25 * link7_vel0;
-        let link7_vel2 = link6_vel5 + link7_vel1;
-        let link7_vel3 = link7_cos0 * link7_vel2;
-        let link7_vel4 = link7_sin0 * link6_vel8;
-        let link7_vel5 = link7_vel3 - link7_vel4;
-        let link7_vel6 = link7_cos0 * link6_vel8;
-        let link7_vel7 = link7_sin0 * link7_vel2;
-        let link7_vel8 = link7_vel6 + link7_vel7;
-        let link7_vel9 = v_6 + link6_vel9;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel9 * link7_vel9;
-        let link8_vel1 = 0.25 * link8_vel0;
-        let link8_vel2 = link7_vel5 + link8_vel1;
-        let link8_vel3 = link8_cos0 * link8_vel2;
-        let link8_vel4 = link8_sin0 * link7_vel8;
-        let link8_vel5 = link8_vel3 - link8_vel4;
-        let link8_vel6 = link8_cos0 * link7_vel8;
-        let link8_vel7 = link8_sin0 * link8_vel2;
-        let link8_vel8 = link8_vel6 + link8_vel7;
-        let link8_vel9 = v_7 + link7_vel9;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel9 * link8_vel9;
-        let link9_vel1 = 0.25 * link9_vel0;
-        let link9_vel2 = link8_vel5 + link9_vel1;
-        let link9_vel3 = link9_cos0 * link9_vel2;
-        let link9_vel4 = link9_sin0 * link8_vel8;
-        let link9_vel5 = link9_vel3 - link9_vel4;
-        let link9_vel6 = link9_cos0 * link8_vel8;
-        let link9_vel7 = link9_sin0 * link9_vel2;
-        let link9_vel8 = link9_vel6 + link9_vel7;
-        let link9_vel9 = v_8 + link8_vel9;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel9 * link9_vel9;
-        let link10_vel1 = 0.25 * link10_vel0;
-        let link10_vel2 = link9_vel5 + link10_vel1;
-        let link10_vel3 = link10_cos0 * link9_vel8;
-        let link10_vel4 = link10_sin0 * link10_vel2;
-        let link10_vel5 = link10_vel3 + link10_vel4;
-        let link10_vel6 = v_9 + link9_vel9;
-        // link1: gravity and wrenches
-        let link1_load0 = 0.95 * link1_vel1;
-        // link2: gravity and wrenches
-        let link2_load0 = 0.85 * link3_vel0;
-        let link2_load1 = 0.85 * link2_vel8;
-        // link3: gravity and wrenches
-        let link3_load0 = 0.75 * link4_vel0;
-        let link3_load1 = 0.75 * link3_vel8;
-        // link4: gravity and wrenches
-        let link4_load0 = 0.65 * link5_vel0;
-        let link4_load1 = 0.65 * link4_vel8;
-        // link5: gravity and wrenches
-        let link5_load0 = 0.55 * link6_vel0;
-        let link5_load1 = 0.55 * link5_vel8;
-        // link6: gravity and wrenches
-        let link6_load0 = 0.45 * link7_vel0;
-        let link6_load1 = 0.45 * link6_vel8;
-        // link7: gravity and wrenches
-        let link7_load0 = 0.35000000000000003 * link8_vel0;
-        let link7_load1 = 0.35000000000000003 * link7_vel8;
-        // link8: gravity and wrenches
-        let link8_load0 = 0.25 * link8_vel8;
-        // link9: gravity and wrenches
-        let link9_load0 = 0.15000000000000002 * link10_vel0;
-        let link9_load1 = 0.15000000000000002 * link9_vel8;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel6 * link10_vel6;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_vel5;
-        // link10: momentum remainder D, D' (4.45, 4.49)
-        let link10_rest0 = link10_cos0 * link10_load1;
-        let link10_rest1 = link10_sin0 * link10_load1;
-        let link10_rest2 = 0.25 * link10_rest1;
-        let link10_rest3 = link10_load2 - link10_rest2;
-        let link10_rest4 = link9_load0 + link10_rest0;
-        let link10_rest5 = link9_load1 + link10_rest3;
-        // link9: momentum remainder D, D' (4.45, 4.49)
-        let link9_rest0 = link9_cos0 * link10_rest4;
-        let link9_rest1 = link9_sin0 * link10_rest1;
-        let link9_rest2 = link9_rest0 - link9_rest1;
-        let link9_rest3 = link9_sin0 * link10_rest4;
-        let link9_rest4 = link9_cos0 * link10_rest1;
-        let link9_rest5 = link9_rest3 + link9_rest4;
-        let link9_rest6 = tau_9 - link10_load2;
-        let link9_rest7 = 119.76047904191617 * link9_rest6;
-        let link9_rest8 = link9_inertia7 * link9_rest7;
-        let link9_rest9 = link9_inertia9 * link9_rest7;
-        let link9_rest10 = link10_inertia8 * link9_rest7;
-        let link9_rest11 = link9_rest2 + link9_rest8;
-        let link9_rest12 = link9_rest5 + link9_rest9;
-        let link9_rest13 = link10_rest5 + link9_rest10;
-        let link9_rest14 = tau_8 - link9_rest13;
-        let link9_rest15 = link9_pivot12 * link9_rest14;
-        let link9_rest16 = link9_pivot6 * link9_rest15;
-        let link9_rest17 = link9_rest11 + link9_rest16;
-        let link9_rest18 = link9_pivot9 * link9_rest15;
-        let link9_rest19 = link9_rest12 + link9_rest18;
-        let link9_rest20 = 0.25 * link9_rest19;
-        let link9_rest21 = tau_8 - link9_rest20;
-        let link9_rest22 = link9_vel1 + link9_rest17;
-        let link9_rest23 = link8_load0 + link9_rest21;
-        // link8: momentum remainder D, D' (4.45, 4.49)
-        let link8_rest0 = link8_cos0 * link9_rest22;
-        let link8_rest1 = link8_sin0 * link9_rest19;
-        let link8_rest2 = link8_rest0 - link8_rest1;
-        let link8_rest3 = link8_sin0 * link9_rest22;
-        let link8_rest4 = link8_cos0 * link9_rest19;
-        let link8_rest5 = link8_rest3 + link8_rest4;
-        let link8_rest6 = tau_7 - link9_rest23;
-        let link8_rest7 = link8_pivot0 * link8_rest6;
-        let link8_rest8 = link8_inertia12 * link8_rest7;
-        let link8_rest9 = link8_rest2 - link8_rest8;
-        let link8_rest10 = link8_inertia15 * link8_rest7;
-        let link8_rest11 = link8_rest5 - link8_rest10;
-        let link8_rest12 = 0.25 * link8_rest11;
-        let link8_rest13 = tau_7 - link8_rest12;
-        let link8_rest14 = link7_load0 + link8_rest9;
-        let link8_rest15 = link7_load1 + link8_rest13;
-        // link7: momentum remainder D, D' (4.45, 4.49)
-        let link7_rest0 = link7_cos0 * link8_rest14;
-        let link7_rest1 = link7_sin0 * link8_rest11;
-        let link7_rest2 = link7_rest0 - link7_rest1;
-        let link7_rest3 = link7_sin0 * link8_rest14;
-        let link7_rest4 = link7_cos0 * link8_rest11;
-        let link7_rest5 = link7_rest3 + link7_rest4;
-        let link7_rest6 = tau_6 - link8_rest15;
-        let link7_rest7 = link7_pivot0 * link7_rest6;
-        let link7_rest8 = link7_inertia12 * link7_rest7;
-        let link7_rest9 = link7_rest2 + link7_rest8;
-        let link7_rest10 = link7_inertia15 * link7_rest7;
-        let link7_rest11 = link7_rest5 + link7_rest10;
-        let link7_rest12 = 0.25 * link7_rest11;
-        let link7_rest13 = tau_6 - link7_rest12;
-        let link7_rest14 = link6_load0 + link7_rest9;
-        let link7_rest15 = link6_load1 + link7_rest13;
-        // link6: momentum remainder D, D' (4.45, 4.49)
-        let link6_rest0 = link6_cos0 * link7_rest14;
-        let link6_rest1 = link6_sin0 * link7_rest11;
-        let link6_rest2 = link6_rest0 - link6_rest1;
-        let link6_rest3 = link6_sin0 * link7_rest14;
-        let link6_rest4 = link6_cos0 * link7_rest11;
-        let link6_rest5 = link6_rest3 + link6_rest4;
-        let link6_rest6 = tau_5 - link7_rest15;
-        let link6_rest7 = link6_pivot0 * link6_rest6;
-        let link6_rest8 = link6_inertia12 * link6_rest7;
-        let link6_rest9 = link6_rest2 - link6_rest8;
-        let link6_rest10 = link6_inertia15 * link6_rest7;
-        let link6_rest11 = link6_rest5 - link6_rest10;
-        let link6_rest12 = 0.25 * link6_rest11;
-        let link6_rest13 = tau_5 - link6_rest12;
-        let link6_rest14 = link5_load0 + link6_rest9;
-        let link6_rest15 = link5_load1 + link6_rest13;
-        // link5: momentum remainder D, D' (4.45, 4.49)
-        let link5_rest0 = link5_cos0 * link6_rest14;
-        let link5_rest1 = link5_sin0 * link6_rest11;
-        let link5_rest2 = link5_rest0 - link5_rest1;
-        let link5_rest3 = link5_sin0 * link6_rest14;
-        let link5_rest4 = link5_cos0 * link6_rest11;
-        let link5_rest5 = link5_rest3 + link5_rest4;
-        let link5_rest6 = tau_4 - link6_rest15;
-        let link5_rest7 = link5_pivot0 * link5_rest6;
-        let link5_rest8 = link5_inertia12 * link5_rest7;
-        let link5_rest9 = link5_rest2 + link5_rest8;
-        let link5_rest10 = link5_inertia15 * link5_rest7;
-        let link5_rest11 = link5_rest5 + link5_rest10;
-        let link5_rest12 = 0.25 * link5_rest11;
-        let link5_rest13 = tau_4 - link5_rest12;
-        let link5_rest14 = link4_load0 + link5_rest9;
-        let link5_rest15 = link4_load1 + link5_rest13;
-        // link4: momentum remainder D, D' (4.45, 4.49)
-        let link4_rest0 = link4_cos0 * link5_rest14;
-        let link4_rest1 = link4_sin0 * link5_rest11;
-        let link4_rest2 = link4_rest0 - link4_rest1;
-        let link4_rest3 = link4_sin0 * link5_rest14;
-        let link4_rest4 = link4_cos0 * link5_rest11;
-        let link4_rest5 = link4_rest3 + link4_rest4;
-        let link4_rest6 = tau_3 - link5_rest15;
-        let link4_rest7 = link4_pivot0 * link4_rest6;
-        let link4_rest8 = link4_inertia12 * link4_rest7;
-        let link4_rest9 = link4_rest2 - link4_rest8;
-        let link4_rest10 = link4_inertia15 * link4_rest7;
-        let link4_rest11 = link4_rest5 - link4_rest10;
-        let link4_rest12 = 0.25 * link4_rest11;
-        let link4_rest13 = tau_3 - link4_rest12;
-        let link4_rest14 = link3_load0 + link4_rest9;
-        let link4_rest15 = link3_load1 + link4_rest13;
-        // link3: momentum remainder D, D' (4.45, 4.49)
-        let link3_rest0 = link3_cos0 * link4_rest14;
-        let link3_rest1 = link3_sin0 * link4_rest11;
-        let link3_rest2 = link3_rest0 - link3_rest1;
-        let link3_rest3 = link3_sin0 * link4_rest14;
-        let link3_rest4 = link3_cos0 * link4_rest11;
-        let link3_rest5 = link3_rest3 + link3_rest4;
-        let link3_rest6 = tau_2 - link4_rest15;
-        let link3_rest7 = link3_pivot0 * link3_rest6;
-        let link3_rest8 = link3_inertia12 * link3_rest7;
-        let link3_rest9 = link3_rest2 + link3_rest8;
-        let link3_rest10 = link3_inertia15 * link3_rest7;
-        let link3_rest11 = link3_rest5 + link3_rest10;
-        let link3_rest12 = 0.25 * link3_rest11;
-        let link3_rest13 = tau_2 - link3_rest12;
-        let link3_rest14 = link2_load0 + link3_rest9;
-        let link3_rest15 = link2_load1 + link3_rest13;
-        // link2: momentum remainder D, D' (4.45, 4.49)
-        let link2_rest0 = link2_sin0 * link3_rest14;
-        let link2_rest1 = link2_cos0 * link3_rest11;
-        let link2_rest2 = link2_rest0 + link2_rest1;
-        let link2_rest3 = tau_1 - link3_rest15;
-        let link2_rest4 = link2_pivot0 * link2_rest3;
-        let link2_rest5 = link2_inertia9 * link2_rest4;
-        let link2_rest6 = link2_rest2 - link2_rest5;
-        let link2_rest7 = 0.25 * link2_rest6;
-        let link2_rest8 = tau_1 - link2_rest7;
-        let link2_rest9 = link1_load0 + link2_rest8;
-        // link1: momentum remainder D, D' (4.45, 4.49)
-        let link1_rest0 = tau_0 - link2_rest9;
-        let link1_rest1 = link1_pivot0 * link1_rest0;
-        // link2: acceleration
-        let link2_acc0 = 0.25 * link1_rest1;
-        let link2_acc1 = link2_pivot1 * link2_acc0;
-        let link2_acc2 = link2_rest4 - link2_acc1;
-        let link2_acc3 = link1_rest1 - link2_acc2;
-        let link2_acc4 = link2_sin0 * link2_acc0;
-        let link2_acc5 = link2_cos0 * link2_acc0;
-        // link3: acceleration
-        let link3_acc0 = 0.25 * link2_acc2;
-        let link3_acc1 = link2_acc5 + link3_acc0;
-        let link3_acc2 = link3_pivot1 * link2_acc4;
-        let link3_acc3 = link3_pivot2 * link3_acc1;
-        let link3_acc4 = link3_acc2 + link3_acc3;
-        let link3_acc5 = link3_rest7 + link3_acc4;
-        let link3_acc6 = link2_acc2 - link3_acc5;
-        let link3_acc7 = link3_cos0 * link2_acc4;
-        let link3_acc8 = link3_sin0 * link3_acc1;
-        let link3_acc9 = link3_acc7 + link3_acc8;
-        let link3_acc10 = link3_cos0 * link3_acc1;
-        let link3_acc11 = link3_sin0 * link2_acc4;
-        let link3_acc12 = link3_acc10 - link3_acc11;
-        // link4: acceleration
-        let link4_acc0 = 0.25 * link3_acc5;
-        let link4_acc1 = link3_acc12 + link4_acc0;
-        let link4_acc2 = link4_pivot1 * link3_acc9;
-        let link4_acc3 = link4_pivot2 * link4_acc1;
-        let link4_acc4 = link4_acc2 + link4_acc3;
-        let link4_acc5 = link4_rest7 - link4_acc4;
-        let link4_acc6 = link3_acc5 - link4_acc5;
-        let link4_acc7 = link4_cos0 * link3_acc9;
-        let link4_acc8 = link4_sin0 * link4_acc1;
-        let link4_acc9 = link4_acc7 + link4_acc8;
-        let link4_acc10 = link4_cos0 * link4_acc1;
-        let link4_acc11 = link4_sin0 * link3_acc9;
-        let link4_acc12 = link4_acc10 - link4_acc11;
-        // link5: acceleration
-        let link5_acc0 = 0.25 * link4_acc5;
-        let link5_acc1 = link4_acc12 + link5_acc0;
-        let link5_acc2 = link5_pivot1 * link4_acc9;
-        let link5_acc3 = link5_pivot2 * link5_acc1;
-        let link5_acc4 = link5_acc2 + link5_acc3;
-        let link5_acc5 = link5_rest7 + link5_acc4;
-        let link5_acc6 = link4_acc5 - link5_acc5;
-        let link5_acc7 = link5_cos0 * link4_acc9;
-        let link5_acc8 = link5_sin0 * link5_acc1;
-        let link5_acc9 = link5_acc7 + link5_acc8;
-        let link5_acc10 = link5_cos0 * link5_acc1;
-        let link5_acc11 = link5_sin0 * link4_acc9;
-        let link5_acc12 = link5_acc10 - link5_acc11;
-        // link6: acceleration
-        let link6_acc0 = 0.25 * link5_acc5;
-        let link6_acc1 = link5_acc12 + link6_acc0;
-        let link6_acc2 = link6_pivot1 * link5_acc9;
-        let link6_acc3 = link6_pivot2 * link6_acc1;
-        let link6_acc4 = link6_acc2 + link6_acc3;
-        let link6_acc5 = link6_rest7 - link6_acc4;
-        let link6_acc6 = link5_acc5 - link6_acc5;
-        let link6_acc7 = link6_cos0 * link5_acc9;
-        let link6_acc8 = link6_sin0 * link6_acc1;
-        let link6_acc9 = link6_acc7 + link6_acc8;
-        let link6_acc10 = link6_cos0 * link6_acc1;
-        let link6_acc11 = link6_sin0 * link5_acc9;
-        let link6_acc12 = link6_acc10 - link6_acc11;
-        // link7: acceleration
-        let link7_acc0 = 0.25 * link6_acc5;
-        let link7_acc1 = link6_acc12 + link7_acc0;
-        let link7_acc2 = link7_pivot1 * link6_acc9;
-        let link7_acc3 = link7_pivot2 * link7_acc1;
-        let link7_acc4 = link7_acc2 + link7_acc3;
-        let link7_acc5 = link7_rest7 + link7_acc4;
-        let link7_acc6 = link6_acc5 - link7_acc5;
-        let link7_acc7 = link7_cos0 * link6_acc9;
-        let link7_acc8 = link7_sin0 * link7_acc1;
-        let link7_acc9 = link7_acc7 + link7_acc8;
-        let link7_acc10 = link7_cos0 * link7_acc1;
-        let link7_acc11 = link7_sin0 * link6_acc9;
-        let link7_acc12 = link7_acc10 - link7_acc11;
-        // link8: acceleration
-        let link8_acc0 = 0.25 * link7_acc5;
-        let link8_acc1 = link7_acc12 + link8_acc0;
-        let link8_acc2 = link8_pivot1 * link7_acc9;
-        let link8_acc3 = link8_pivot2 * link8_acc1;
-        let link8_acc4 = link8_acc2 + link8_acc3;
-        let link8_acc5 = link8_rest7 - link8_acc4;
-        let link8_acc6 = link7_acc5 - link8_acc5;
-        let link8_acc7 = link8_cos0 * link7_acc9;
-        let link8_acc8 = link8_sin0 * link8_acc1;
-        let link8_acc9 = link8_acc7 + link8_acc8;
-        let link8_acc10 = link8_cos0 * link8_acc1;
-        let link8_acc11 = link8_sin0 * link7_acc9;
-        let link8_acc12 = link8_acc10 - link8_acc11;
-        // link9: acceleration
-        let link9_acc0 = 0.25 * link8_acc5;
-        let link9_acc1 = link8_acc12 + link9_acc0;
-        let link9_acc2 = link9_pivot13 * link8_acc9;
-        let link9_acc3 = link9_pivot14 * link9_acc1;
-        let link9_acc4 = link9_acc2 + link9_acc3;
-        let link9_acc5 = link9_rest15 - link9_acc4;
-        let link9_acc6 = link8_acc5 + link9_acc5;
-        let link9_acc7 = link9_pivot0 * link8_acc9;
-        let link9_acc8 = link9_pivot1 * link9_acc1;
-        let link9_acc9 = link9_acc7 + link9_acc8;
-        let link9_acc10 = link9_pivot2 * link9_acc5;
-        let link9_acc11 = link9_acc9 + link9_acc10;
-        let link9_acc12 = link9_rest7 - link9_acc11;
-        a[0] = -link1_rest1;
-        a[1] = link2_acc3;
-        a[2] = link3_acc6;
-        a[3] = link4_acc6;
-        a[4] = link5_acc6;
-        a[5] = link6_acc6;
-        a[6] = link7_acc6;
-        a[7] = link8_acc6;
-        a[8] = link9_acc6;
-        a[9] = link9_acc12;
+        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+    }
+
+    #[inline(always)]
+    fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+            angles[2][l] = q_2;
+            angles[3][l] = q_3;
+            angles[4][l] = q_4;
+            angles[5][l] = q_5;
+            angles[6][l] = q_6;
+            angles[7][l] = q_7;
+            angles[8][l] = q_8;
+            angles[9][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            let tau_6 = tau.get(6, l);
+            let tau_7 = tau.get(7, l);
+            let tau_8 = tau.get(8, l);
+            let tau_9 = tau.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia0 = 0.05 * link10_sin0;
+            let link10_inertia1 = 0.05 * link10_cos0;
+            let link10_inertia2 = link10_inertia1 + link10_inertia1;
+            let link10_inertia3 = 0.25 * link10_inertia2;
+            let link10_inertia4 = link10_inertia3 + 0.00835;
+            let link10_inertia5 = link10_inertia1 + 0.15000000000000002;
+            let link10_inertia6 = link10_inertia4 + 0.033350000000000005;
+            let link10_inertia7 = 0.25 * link10_inertia1;
+            let link10_inertia8 = link10_inertia7 + 0.00835;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia0 = link9_cos0 * link10_inertia0;
+            let link9_inertia1 = link9_sin0 * link10_inertia5;
+            let link9_inertia2 = link9_inertia0 + link9_inertia1;
+            let link9_inertia3 = link9_sin0 * link10_inertia0;
+            let link9_inertia4 = link9_cos0 * link10_inertia5;
+            let link9_inertia5 = link9_inertia3 - link9_inertia4;
+            let link9_inertia6 = link9_sin0 * link10_inertia1;
+            let link9_inertia7 = link9_inertia0 + link9_inertia6;
+            let link9_inertia8 = link9_cos0 * link10_inertia1;
+            let link9_inertia9 = link9_inertia3 - link9_inertia8;
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot0 = 119.76047904191617 * link9_inertia7;
+            let link9_pivot1 = 119.76047904191617 * link9_inertia9;
+            let link9_pivot2 = 119.76047904191617 * link10_inertia8;
+            let link9_pivot3 = link9_inertia7 * link9_pivot0;
+            let link9_pivot4 = link9_inertia7 * link9_pivot1;
+            let link9_pivot5 = link9_inertia7 * link9_pivot2;
+            let link9_pivot6 = link9_inertia2 - link9_pivot5;
+            let link9_pivot7 = link9_inertia9 * link9_pivot1;
+            let link9_pivot8 = link9_inertia9 * link9_pivot2;
+            let link9_pivot9 = link9_inertia5 - link9_pivot8;
+            let link9_pivot10 = link10_inertia8 * link9_pivot2;
+            let link9_pivot11 = link10_inertia6 - link9_pivot10;
+            let link9_pivot12 = 1.0 / link9_pivot11;
+            let link9_pivot13 = link9_pivot6 * link9_pivot12;
+            let link9_pivot14 = link9_pivot9 * link9_pivot12;
+            let link9_pivot15 = link9_pivot6 * link9_pivot13;
+            let link9_pivot16 = link9_pivot3 + link9_pivot15;
+            let link9_pivot17 = link9_pivot6 * link9_pivot14;
+            let link9_pivot18 = link9_pivot4 + link9_pivot17;
+            let link9_pivot19 = link9_pivot9 * link9_pivot14;
+            let link9_pivot20 = link9_pivot7 + link9_pivot19;
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia10 = 0.25 * link9_pivot18;
+            let link9_inertia11 = 0.25 * link9_pivot20;
+            let link9_inertia12 = 0.25 * link9_inertia11;
+            let link9_inertia13 = link9_inertia11 - 0.25;
+            let link9_inertia14 = link9_inertia12 - 0.05835;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia0 = link9_pivot16 - link9_pivot20;
+            let link8_inertia1 = link8_sin0 * link8_inertia0;
+            let link8_inertia2 = link8_cos0 + link8_cos0;
+            let link8_inertia3 = link9_pivot18 * link8_inertia2;
+            let link8_inertia4 = link8_inertia1 + link8_inertia3;
+            let link8_inertia5 = link8_sin0 * link8_inertia4;
+            let link8_inertia6 = link8_cos0 * link8_inertia4;
+            let link8_inertia7 = link9_pivot18 - link8_inertia6;
+            let link8_inertia8 = link9_pivot16 - link8_inertia5;
+            let link8_inertia9 = link9_pivot20 + link8_inertia5;
+            let link8_inertia10 = link8_cos0 * link9_inertia10;
+            let link8_inertia11 = link8_sin0 * link9_inertia13;
+            let link8_inertia12 = link8_inertia10 - link8_inertia11;
+            let link8_inertia13 = link8_sin0 * link9_inertia10;
+            let link8_inertia14 = link8_cos0 * link9_inertia13;
+            let link8_inertia15 = link8_inertia13 + link8_inertia14;
+            // link8: U, Mj, k and the reduced inertia M' (4.44)
+            let link8_pivot0 = 1.0 / link9_inertia14;
+            let link8_pivot1 = link8_inertia12 * link8_pivot0;
+            let link8_pivot2 = link8_inertia15 * link8_pivot0;
+            let link8_pivot3 = link8_inertia12 * link8_pivot1;
+            let link8_pivot4 = link8_inertia8 - link8_pivot3;
+            let link8_pivot5 = link8_inertia12 * link8_pivot2;
+            let link8_pivot6 = link8_inertia7 + link8_pivot5;
+            let link8_pivot7 = link8_inertia15 * link8_pivot2;
+            let link8_pivot8 = link8_inertia9 - link8_pivot7;
+            // link8: inertia carried to the parent, M* (4.48)
+            let link8_inertia16 = 0.25 * link8_pivot6;
+            let link8_inertia17 = 0.25 * link8_pivot8;
+            let link8_inertia18 = 0.25 * link8_inertia17;
+            let link8_inertia19 = link8_inertia17 - 0.35000000000000003;
+            let link8_inertia20 = link8_inertia18 - 0.08335000000000001;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia0 = link8_pivot4 - link8_pivot8;
+            let link7_inertia1 = link7_sin0 * link7_inertia0;
+            let link7_inertia2 = link7_cos0 + link7_cos0;
+            let link7_inertia3 = link8_pivot6 * link7_inertia2;
+            let link7_inertia4 = link7_inertia1 - link7_inertia3;
+            let link7_inertia5 = link7_sin0 * link7_inertia4;
+            let link7_inertia6 = link7_cos0 * link7_inertia4;
+            let link7_inertia7 = link8_pivot6 + link7_inertia6;
+            let link7_inertia8 = link8_pivot4 - link7_inertia5;
+            let link7_inertia9 = link8_pivot8 + link7_inertia5;
+            let link7_inertia10 = link7_cos0 * link8_inertia16;
+            let link7_inertia11 = link7_sin0 * link8_inertia19;
+            let link7_inertia12 = link7_inertia10 + link7_inertia11;
+            let link7_inertia13 = link7_sin0 * link8_inertia16;
+            let link7_inertia14 = link7_cos0 * link8_inertia19;
+            let link7_inertia15 = link7_inertia13 - link7_inertia14;
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot0 = 1.0 / link8_inertia20;
+            let link7_pivot1 = link7_inertia12 * link7_pivot0;
+            let link7_pivot2 = link7_inertia15 * link7_pivot0;
+            let link7_pivot3 = link7_inertia12 * link7_pivot1;
+            let link7_pivot4 = link7_inertia8 - link7_pivot3;
+            let link7_pivot5 = link7_inertia12 * link7_pivot2;
+            let link7_pivot6 = link7_inertia7 - link7_pivot5;
+            let link7_pivot7 = link7_inertia15 * link7_pivot2;
+            let link7_pivot8 = link7_inertia9 - link7_pivot7;
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia16 = 0.25 * link7_pivot6;
+            let link7_inertia17 = 0.25 * link7_pivot8;
+            let link7_inertia18 = 0.25 * link7_inertia17;
+            let link7_inertia19 = link7_inertia17 - 0.45;
+            let link7_inertia20 = link7_inertia18 - 0.10835;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia0 = link7_pivot4 - link7_pivot8;
+            let link6_inertia1 = link6_sin0 * link6_inertia0;
+            let link6_inertia2 = link6_cos0 + link6_cos0;
+            let link6_inertia3 = link7_pivot6 * link6_inertia2;
+            let link6_inertia4 = link6_inertia1 + link6_inertia3;
+            let link6_inertia5 = link6_sin0 * link6_inertia4;
+            let link6_inertia6 = link6_cos0 * link6_inertia4;
+            let link6_inertia7 = link7_pivot6 - link6_inertia6;
+            let link6_inertia8 = link7_pivot4 - link6_inertia5;
+            let link6_inertia9 = link7_pivot8 + link6_inertia5;
+            let link6_inertia10 = link6_cos0 * link7_inertia16;
+            let link6_inertia11 = link6_sin0 * link7_inertia19;
+            let link6_inertia12 = link6_inertia10 - link6_inertia11;
+            let link6_inertia13 = link6_sin0 * link7_inertia16;
+            let link6_inertia14 = link6_cos0 * link7_inertia19;
+            let link6_inertia15 = link6_inertia13 + link6_inertia14;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot0 = 1.0 / link7_inertia20;
+            let link6_pivot1 = link6_inertia12 * link6_pivot0;
+            let link6_pivot2 = link6_inertia15 * link6_pivot0;
+            let link6_pivot3 = link6_inertia12 * link6_pivot1;
+            let link6_pivot4 = link6_inertia8 - link6_pivot3;
+            let link6_pivot5 = link6_inertia12 * link6_pivot2;
+            let link6_pivot6 = link6_inertia7 + link6_pivot5;
+            let link6_pivot7 = link6_inertia15 * link6_pivot2;
+            let link6_pivot8 = link6_inertia9 - link6_pivot7;
+            // link6: inertia carried to the parent, M* (4.48)
+            let link6_inertia16 = 0.25 * link6_pivot6;
+            let link6_inertia17 = 0.25 * link6_pivot8;
+            let link6_inertia18 = 0.25 * link6_inertia17;
+            let link6_inertia19 = link6_inertia17 - 0.55;
+            let link6_inertia20 = link6_inertia18 - 0.13335;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia0 = link6_pivot4 - link6_pivot8;
+            let link5_inertia1 = link5_sin0 * link5_inertia0;
+            let link5_inertia2 = link5_cos0 + link5_cos0;
+            let link5_inertia3 = link6_pivot6 * link5_inertia2;
+            let link5_inertia4 = link5_inertia1 - link5_inertia3;
+            let link5_inertia5 = link5_sin0 * link5_inertia4;
+            let link5_inertia6 = link5_cos0 * link5_inertia4;
+            let link5_inertia7 = link6_pivot6 + link5_inertia6;
+            let link5_inertia8 = link6_pivot4 - link5_inertia5;
+            let link5_inertia9 = link6_pivot8 + link5_inertia5;
+            let link5_inertia10 = link5_cos0 * link6_inertia16;
+            let link5_inertia11 = link5_sin0 * link6_inertia19;
+            let link5_inertia12 = link5_inertia10 + link5_inertia11;
+            let link5_inertia13 = link5_sin0 * link6_inertia16;
+            let link5_inertia14 = link5_cos0 * link6_inertia19;
+            let link5_inertia15 = link5_inertia13 - link5_inertia14;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot0 = 1.0 / link6_inertia20;
+            let link5_pivot1 = link5_inertia12 * link5_pivot0;
+            let link5_pivot2 = link5_inertia15 * link5_pivot0;
+            let link5_pivot3 = link5_inertia12 * link5_pivot1;
+            let link5_pivot4 = link5_inertia8 - link5_pivot3;
+            let link5_pivot5 = link5_inertia12 * link5_pivot2;
+            let link5_pivot6 = link5_inertia7 - link5_pivot5;
+            let link5_pivot7 = link5_inertia15 * link5_pivot2;
+            let link5_pivot8 = link5_inertia9 - link5_pivot7;
+            // link5: inertia carried to the parent, M* (4.48)
+            let link5_inertia16 = 0.25 * link5_pivot6;
+            let link5_inertia17 = 0.25 * link5_pivot8;
+            let link5_inertia18 = 0.25 * link5_inertia17;
+            let link5_inertia19 = link5_inertia17 - 0.65;
+            let link5_inertia20 = link5_inertia18 - 0.15835;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia0 = link5_pivot4 - link5_pivot8;
+            let link4_inertia1 = link4_sin0 * link4_inertia0;
+            let link4_inertia2 = link4_cos0 + link4_cos0;
+            let link4_inertia3 = link5_pivot6 * link4_inertia2;
+            let link4_inertia4 = link4_inertia1 + link4_inertia3;
+            let link4_inertia5 = link4_sin0 * link4_inertia4;
+            let link4_inertia6 = link4_cos0 * link4_inertia4;
+            let link4_inertia7 = link5_pivot6 - link4_inertia6;
+            let link4_inertia8 = link5_pivot4 - link4_inertia5;
+            let link4_inertia9 = link5_pivot8 + link4_inertia5;
+            let link4_inertia10 = link4_cos0 * link5_inertia16;
+            let link4_inertia11 = link4_sin0 * link5_inertia19;
+            let link4_inertia12 = link4_inertia10 - link4_inertia11;
+            let link4_inertia13 = link4_sin0 * link5_inertia16;
+            let link4_inertia14 = link4_cos0 * link5_inertia19;
+            let link4_inertia15 = link4_inertia13 + link4_inertia14;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot0 = 1.0 / link5_inertia20;
+            let link4_pivot1 = link4_inertia12 * link4_pivot0;
+            let link4_pivot2 = link4_inertia15 * link4_pivot0;
+            let link4_pivot3 = link4_inertia12 * link4_pivot1;
+            let link4_pivot4 = link4_inertia8 - link4_pivot3;
+            let link4_pivot5 = link4_inertia12 * link4_pivot2;
+            let link4_pivot6 = link4_inertia7 + link4_pivot5;
+            let link4_pivot7 = link4_inertia15 * link4_pivot2;
+            let link4_pivot8 = link4_inertia9 - link4_pivot7;
+            // link4: inertia carried to the parent, M* (4.48)
+            let link4_inertia16 = 0.25 * link4_pivot6;
+            let link4_inertia17 = 0.25 * link4_pivot8;
+            let link4_inertia18 = 0.25 * link4_inertia17;
+            let link4_inertia19 = link4_inertia17 - 0.75;
+            let link4_inertia20 = link4_inertia18 - 0.18334999999999999;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia0 = link4_pivot4 - link4_pivot8;
+            let link3_inertia1 = link3_sin0 * link3_inertia0;
+            let link3_inertia2 = link3_cos0 + link3_cos0;
+            let link3_inertia3 = link4_pivot6 * link3_inertia2;
+            let link3_inertia4 = link3_inertia1 - link3_inertia3;
+            let link3_inertia5 = link3_sin0 * link3_inertia4;
+            let link3_inertia6 = link3_cos0 * link3_inertia4;
+            let link3_inertia7 = link4_pivot6 + link3_inertia6;
+            let link3_inertia8 = link4_pivot4 - link3_inertia5;
+            let link3_inertia9 = link4_pivot8 + link3_inertia5;
+            let link3_inertia10 = link3_cos0 * link4_inertia16;
+            let link3_inertia11 = link3_sin0 * link4_inertia19;
+            let link3_inertia12 = link3_inertia10 + link3_inertia11;
+            let link3_inertia13 = link3_sin0 * link4_inertia16;
+            let link3_inertia14 = link3_cos0 * link4_inertia19;
+            let link3_inertia15 = link3_inertia13 - link3_inertia14;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot0 = 1.0 / link4_inertia20;
+            let link3_pivot1 = link3_inertia12 * link3_pivot0;
+            let link3_pivot2 = link3_inertia15 * link3_pivot0;
+            let link3_pivot3 = link3_inertia12 * link3_pivot1;
+            let link3_pivot4 = link3_inertia8 - link3_pivot3;
+            let link3_pivot5 = link3_inertia12 * link3_pivot2;
+            let link3_pivot6 = link3_inertia7 - link3_pivot5;
+            let link3_pivot7 = link3_inertia15 * link3_pivot2;
+            let link3_pivot8 = link3_inertia9 - link3_pivot7;
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia16 = 0.25 * link3_pivot6;
+            let link3_inertia17 = 0.25 * link3_pivot8;
+            let link3_inertia18 = 0.25 * link3_inertia17;
+            let link3_inertia19 = link3_inertia17 - 0.85;
+            let link3_inertia20 = link3_inertia18 - 0.20834999999999998;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia0 = link3_pivot4 - link3_pivot8;
+            let link2_inertia1 = link2_sin0 * link2_inertia0;
+            let link2_inertia2 = link2_cos0 + link2_cos0;
+            let link2_inertia3 = link3_pivot6 * link2_inertia2;
+            let link2_inertia4 = link2_inertia1 + link2_inertia3;
+            let link2_inertia5 = link2_sin0 * link2_inertia4;
+            let link2_inertia6 = link3_pivot8 + link2_inertia5;
+            let link2_inertia7 = link2_sin0 * link3_inertia16;
+            let link2_inertia8 = link2_cos0 * link3_inertia19;
+            let link2_inertia9 = link2_inertia7 + link2_inertia8;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = 1.0 / link3_inertia20;
+            let link2_pivot1 = link2_inertia9 * link2_pivot0;
+            let link2_pivot2 = link2_inertia9 * link2_pivot1;
+            let link2_pivot3 = link2_inertia6 - link2_pivot2;
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia10 = 0.25 * link2_pivot3;
+            let link2_inertia11 = 0.25 * link2_inertia10;
+            let link2_inertia12 = link2_inertia11 - 0.23334999999999997;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = 1.0 / link2_inertia12;
+            // link1: velocity and joint rate (4.40)
+            let link1_vel0 = 9.81 * link1_cos0;
+            let link1_vel1 = 9.81 * link1_sin0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = 0.25 * link2_vel0;
+            let link2_vel2 = link1_vel0 + link2_vel1;
+            let link2_vel3 = link2_cos0 * link2_vel2;
+            let link2_vel4 = link2_sin0 * link1_vel1;
+            let link2_vel5 = link2_vel3 - link2_vel4;
+            let link2_vel6 = link2_cos0 * link1_vel1;
+            let link2_vel7 = link2_sin0 * link2_vel2;
+            let link2_vel8 = link2_vel6 + link2_vel7;
+            let link2_vel9 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel9 * link2_vel9;
+            let link3_vel1 = 0.25 * link3_vel0;
+            let link3_vel2 = link2_vel5 + link3_vel1;
+            let link3_vel3 = link3_cos0 * link3_vel2;
+            let link3_vel4 = link3_sin0 * link2_vel8;
+            let link3_vel5 = link3_vel3 - link3_vel4;
+            let link3_vel6 = link3_cos0 * link2_vel8;
+            let link3_vel7 = link3_sin0 * link3_vel2;
+            let link3_vel8 = link3_vel6 + link3_vel7;
+            let link3_vel9 = v_2 + link2_vel9;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel9 * link3_vel9;
+            let link4_vel1 = 0.25 * link4_vel0;
+            let link4_vel2 = link3_vel5 + link4_vel1;
+            let link4_vel3 = link4_cos0 * link4_vel2;
+            let link4_vel4 = link4_sin0 * link3_vel8;
+            let link4_vel5 = link4_vel3 - link4_vel4;
+            let link4_vel6 = link4_cos0 * link3_vel8;
+            let link4_vel7 = link4_sin0 * link4_vel2;
+            let link4_vel8 = link4_vel6 + link4_vel7;
+            let link4_vel9 = v_3 + link3_vel9;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel9 * link4_vel9;
+            let link5_vel1 = 0.25 * link5_vel0;
+            let link5_vel2 = link4_vel5 + link5_vel1;
+            let link5_vel3 = link5_cos0 * link5_vel2;
+            let link5_vel4 = link5_sin0 * link4_vel8;
+            let link5_vel5 = link5_vel3 - link5_vel4;
+            let link5_vel6 = link5_cos0 * link4_vel8;
+            let link5_vel7 = link5_sin0 * link5_vel2;
+            let link5_vel8 = link5_vel6 + link5_vel7;
+            let link5_vel9 = v_4 + link4_vel9;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel9 * link5_vel9;
+            let link6_vel1 = 0.25 * link6_vel0;
+            let link6_vel2 = link5_vel5 + link6_vel1;
+            let link6_vel3 = link6_cos0 * link6_vel2;
+            let link6_vel4 = link6_sin0 * link5_vel8;
+            let link6_vel5 = link6_vel3 - link6_vel4;
+            let link6_vel6 = link6_cos0 * link5_vel8;
+            let link6_vel7 = link6_sin0 * link6_vel2;
+            let link6_vel8 = link6_vel6 + link6_vel7;
+            let link6_vel9 = v_5 + link5_vel9;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel9 * link6_vel9;
+            let link7_vel1 = 0.25 * link7_vel0;
+            let link7_vel2 = link6_vel5 + link7_vel1;
+            let link7_vel3 = link7_cos0 * link7_vel2;
+            let link7_vel4 = link7_sin0 * link6_vel8;
+            let link7_vel5 = link7_vel3 - link7_vel4;
+            let link7_vel6 = link7_cos0 * link6_vel8;
+            let link7_vel7 = link7_sin0 * link7_vel2;
+            let link7_vel8 = link7_vel6 + link7_vel7;
+            let link7_vel9 = v_6 + link6_vel9;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel9 * link7_vel9;
+            let link8_vel1 = 0.25 * link8_vel0;
+            let link8_vel2 = link7_vel5 + link8_vel1;
+            let link8_vel3 = link8_cos0 * link8_vel2;
+            let link8_vel4 = link8_sin0 * link7_vel8;
+            let link8_vel5 = link8_vel3 - link8_vel4;
+            let link8_vel6 = link8_cos0 * link7_vel8;
+            let link8_vel7 = link8_sin0 * link8_vel2;
+            let link8_vel8 = link8_vel6 + link8_vel7;
+            let link8_vel9 = v_7 + link7_vel9;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel9 * link8_vel9;
+            let link9_vel1 = 0.25 * link9_vel0;
+            let link9_vel2 = link8_vel5 + link9_vel1;
+            let link9_vel3 = link9_cos0 * link9_vel2;
+            let link9_vel4 = link9_sin0 * link8_vel8;
+            let link9_vel5 = link9_vel3 - link9_vel4;
+            let link9_vel6 = link9_cos0 * link8_vel8;
+            let link9_vel7 = link9_sin0 * link9_vel2;
+            let link9_vel8 = link9_vel6 + link9_vel7;
+            let link9_vel9 = v_8 + link8_vel9;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel9 * link9_vel9;
+            let link10_vel1 = 0.25 * link10_vel0;
+            let link10_vel2 = link9_vel5 + link10_vel1;
+            let link10_vel3 = link10_cos0 * link9_vel8;
+            let link10_vel4 = link10_sin0 * link10_vel2;
+            let link10_vel5 = link10_vel3 + link10_vel4;
+            let link10_vel6 = v_9 + link9_vel9;
+            // link1: gravity and wrenches
+            let link1_load0 = 0.95 * link1_vel1;
+            // link2: gravity and wrenches
+            let link2_load0 = 0.85 * link3_vel0;
+            let link2_load1 = 0.85 * link2_vel8;
+            // link3: gravity and wrenches
+            let link3_load0 = 0.75 * link4_vel0;
+            let link3_load1 = 0.75 * link3_vel8;
+            // link4: gravity and wrenches
+            let link4_load0 = 0.65 * link5_vel0;
+            let link4_load1 = 0.65 * link4_vel8;
+            // link5: gravity and wrenches
+            let link5_load0 = 0.55 * link6_vel0;
+            let link5_load1 = 0.55 * link5_vel8;
+            // link6: gravity and wrenches
+            let link6_load0 = 0.45 * link7_vel0;
+            let link6_load1 = 0.45 * link6_vel8;
+            // link7: gravity and wrenches
+            let link7_load0 = 0.35000000000000003 * link8_vel0;
+            let link7_load1 = 0.35000000000000003 * link7_vel8;
+            // link8: gravity and wrenches
+            let link8_load0 = 0.25 * link8_vel8;
+            // link9: gravity and wrenches
+            let link9_load0 = 0.15000000000000002 * link10_vel0;
+            let link9_load1 = 0.15000000000000002 * link9_vel8;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel6 * link10_vel6;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_vel5;
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest0 = link10_cos0 * link10_load1;
+            let link10_rest1 = link10_sin0 * link10_load1;
+            let link10_rest2 = 0.25 * link10_rest1;
+            let link10_rest3 = link10_load2 - link10_rest2;
+            let link10_rest4 = link9_load0 + link10_rest0;
+            let link10_rest5 = link9_load1 + link10_rest3;
+            // link9: momentum remainder D, D' (4.45, 4.49)
+            let link9_rest0 = link9_cos0 * link10_rest4;
+            let link9_rest1 = link9_sin0 * link10_rest1;
+            let link9_rest2 = link9_rest0 - link9_rest1;
+            let link9_rest3 = link9_sin0 * link10_rest4;
+            let link9_rest4 = link9_cos0 * link10_rest1;
+            let link9_rest5 = link9_rest3 + link9_rest4;
+            let link9_rest6 = tau_9 - link10_load2;
+            let link9_rest7 = 119.76047904191617 * link9_rest6;
+            let link9_rest8 = link9_inertia7 * link9_rest7;
+            let link9_rest9 = link9_inertia9 * link9_rest7;
+            let link9_rest10 = link10_inertia8 * link9_rest7;
+            let link9_rest11 = link9_rest2 + link9_rest8;
+            let link9_rest12 = link9_rest5 + link9_rest9;
+            let link9_rest13 = link10_rest5 + link9_rest10;
+            let link9_rest14 = tau_8 - link9_rest13;
+            let link9_rest15 = link9_pivot12 * link9_rest14;
+            let link9_rest16 = link9_pivot6 * link9_rest15;
+            let link9_rest17 = link9_rest11 + link9_rest16;
+            let link9_rest18 = link9_pivot9 * link9_rest15;
+            let link9_rest19 = link9_rest12 + link9_rest18;
+            let link9_rest20 = 0.25 * link9_rest19;
+            let link9_rest21 = tau_8 - link9_rest20;
+            let link9_rest22 = link9_vel1 + link9_rest17;
+            let link9_rest23 = link8_load0 + link9_rest21;
+            // link8: momentum remainder D, D' (4.45, 4.49)
+            let link8_rest0 = link8_cos0 * link9_rest22;
+            let link8_rest1 = link8_sin0 * link9_rest19;
+            let link8_rest2 = link8_rest0 - link8_rest1;
+            let link8_rest3 = link8_sin0 * link9_rest22;
+            let link8_rest4 = link8_cos0 * link9_rest19;
+            let link8_rest5 = link8_rest3 + link8_rest4;
+            let link8_rest6 = tau_7 - link9_rest23;
+            let link8_rest7 = link8_pivot0 * link8_rest6;
+            let link8_rest8 = link8_inertia12 * link8_rest7;
+            let link8_rest9 = link8_rest2 - link8_rest8;
+            let link8_rest10 = link8_inertia15 * link8_rest7;
+            let link8_rest11 = link8_rest5 - link8_rest10;
+            let link8_rest12 = 0.25 * link8_rest11;
+            let link8_rest13 = tau_7 - link8_rest12;
+            let link8_rest14 = link7_load0 + link8_rest9;
+            let link8_rest15 = link7_load1 + link8_rest13;
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = link7_cos0 * link8_rest14;
+            let link7_rest1 = link7_sin0 * link8_rest11;
+            let link7_rest2 = link7_rest0 - link7_rest1;
+            let link7_rest3 = link7_sin0 * link8_rest14;
+            let link7_rest4 = link7_cos0 * link8_rest11;
+            let link7_rest5 = link7_rest3 + link7_rest4;
+            let link7_rest6 = tau_6 - link8_rest15;
+            let link7_rest7 = link7_pivot0 * link7_rest6;
+            let link7_rest8 = link7_inertia12 * link7_rest7;
+            let link7_rest9 = link7_rest2 + link7_rest8;
+            let link7_rest10 = link7_inertia15 * link7_rest7;
+            let link7_rest11 = link7_rest5 + link7_rest10;
+            let link7_rest12 = 0.25 * link7_rest11;
+            let link7_rest13 = tau_6 - link7_rest12;
+            let link7_rest14 = link6_load0 + link7_rest9;
+            let link7_rest15 = link6_load1 + link7_rest13;
+            // link6: momentum remainder D, D' (4.45, 4.49)
+            let link6_rest0 = link6_cos0 * link7_rest14;
+            let link6_rest1 = link6_sin0 * link7_rest11;
+            let link6_rest2 = link6_rest0 - link6_rest1;
+            let link6_rest3 = link6_sin0 * link7_rest14;
+            let link6_rest4 = link6_cos0 * link7_rest11;
+            let link6_rest5 = link6_rest3 + link6_rest4;
+            let link6_rest6 = tau_5 - link7_rest15;
+            let link6_rest7 = link6_pivot0 * link6_rest6;
+            let link6_rest8 = link6_inertia12 * link6_rest7;
+            let link6_rest9 = link6_rest2 - link6_rest8;
+            let link6_rest10 = link6_inertia15 * link6_rest7;
+            let link6_rest11 = link6_rest5 - link6_rest10;
+            let link6_rest12 = 0.25 * link6_rest11;
+            let link6_rest13 = tau_5 - link6_rest12;
+            let link6_rest14 = link5_load0 + link6_rest9;
+            let link6_rest15 = link5_load1 + link6_rest13;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest0 = link5_cos0 * link6_rest14;
+            let link5_rest1 = link5_sin0 * link6_rest11;
+            let link5_rest2 = link5_rest0 - link5_rest1;
+            let link5_rest3 = link5_sin0 * link6_rest14;
+            let link5_rest4 = link5_cos0 * link6_rest11;
+            let link5_rest5 = link5_rest3 + link5_rest4;
+            let link5_rest6 = tau_4 - link6_rest15;
+            let link5_rest7 = link5_pivot0 * link5_rest6;
+            let link5_rest8 = link5_inertia12 * link5_rest7;
+            let link5_rest9 = link5_rest2 + link5_rest8;
+            let link5_rest10 = link5_inertia15 * link5_rest7;
+            let link5_rest11 = link5_rest5 + link5_rest10;
+            let link5_rest12 = 0.25 * link5_rest11;
+            let link5_rest13 = tau_4 - link5_rest12;
+            let link5_rest14 = link4_load0 + link5_rest9;
+            let link5_rest15 = link4_load1 + link5_rest13;
+            // link4: momentum remainder D, D' (4.45, 4.49)
+            let link4_rest0 = link4_cos0 * link5_rest14;
+            let link4_rest1 = link4_sin0 * link5_rest11;
+            let link4_rest2 = link4_rest0 - link4_rest1;
+            let link4_rest3 = link4_sin0 * link5_rest14;
+            let link4_rest4 = link4_cos0 * link5_rest11;
+            let link4_rest5 = link4_rest3 + link4_rest4;
+            let link4_rest6 = tau_3 - link5_rest15;
+            let link4_rest7 = link4_pivot0 * link4_rest6;
+            let link4_rest8 = link4_inertia12 * link4_rest7;
+            let link4_rest9 = link4_rest2 - link4_rest8;
+            let link4_rest10 = link4_inertia15 * link4_rest7;
+            let link4_rest11 = link4_rest5 - link4_rest10;
+            let link4_rest12 = 0.25 * link4_rest11;
+            let link4_rest13 = tau_3 - link4_rest12;
+            let link4_rest14 = link3_load0 + link4_rest9;
+            let link4_rest15 = link3_load1 + link4_rest13;
+            // link3: momentum remainder D, D' (4.45, 4.49)
+            let link3_rest0 = link3_cos0 * link4_rest14;
+            let link3_rest1 = link3_sin0 * link4_rest11;
+            let link3_rest2 = link3_rest0 - link3_rest1;
+            let link3_rest3 = link3_sin0 * link4_rest14;
+            let link3_rest4 = link3_cos0 * link4_rest11;
+            let link3_rest5 = link3_rest3 + link3_rest4;
+            let link3_rest6 = tau_2 - link4_rest15;
+            let link3_rest7 = link3_pivot0 * link3_rest6;
+            let link3_rest8 = link3_inertia12 * link3_rest7;
+            let link3_rest9 = link3_rest2 + link3_rest8;
+            let link3_rest10 = link3_inertia15 * link3_rest7;
+            let link3_rest11 = link3_rest5 + link3_rest10;
+            let link3_rest12 = 0.25 * link3_rest11;
+            let link3_rest13 = tau_2 - link3_rest12;
+            let link3_rest14 = link2_load0 + link3_rest9;
+            let link3_rest15 = link2_load1 + link3_rest13;
+            // link2: momentum remainder D, D' (4.45, 4.49)
+            let link2_rest0 = link2_sin0 * link3_rest14;
+            let link2_rest1 = link2_cos0 * link3_rest11;
+            let link2_rest2 = link2_rest0 + link2_rest1;
+            let link2_rest3 = tau_1 - link3_rest15;
+            let link2_rest4 = link2_pivot0 * link2_rest3;
+            let link2_rest5 = link2_inertia9 * link2_rest4;
+            let link2_rest6 = link2_rest2 - link2_rest5;
+            let link2_rest7 = 0.25 * link2_rest6;
+            let link2_rest8 = tau_1 - link2_rest7;
+            let link2_rest9 = link1_load0 + link2_rest8;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = tau_0 - link2_rest9;
+            let link1_rest1 = link1_pivot0 * link1_rest0;
+            // link2: acceleration
+            let link2_acc0 = 0.25 * link1_rest1;
+            let link2_acc1 = link2_pivot1 * link2_acc0;
+            let link2_acc2 = link2_rest4 - link2_acc1;
+            let link2_acc3 = link1_rest1 - link2_acc2;
+            let link2_acc4 = link2_sin0 * link2_acc0;
+            let link2_acc5 = link2_cos0 * link2_acc0;
+            // link3: acceleration
+            let link3_acc0 = 0.25 * link2_acc2;
+            let link3_acc1 = link2_acc5 + link3_acc0;
+            let link3_acc2 = link3_pivot1 * link2_acc4;
+            let link3_acc3 = link3_pivot2 * link3_acc1;
+            let link3_acc4 = link3_acc2 + link3_acc3;
+            let link3_acc5 = link3_rest7 + link3_acc4;
+            let link3_acc6 = link2_acc2 - link3_acc5;
+            let link3_acc7 = link3_cos0 * link2_acc4;
+            let link3_acc8 = link3_sin0 * link3_acc1;
+            let link3_acc9 = link3_acc7 + link3_acc8;
+            let link3_acc10 = link3_cos0 * link3_acc1;
+            let link3_acc11 = link3_sin0 * link2_acc4;
+            let link3_acc12 = link3_acc10 - link3_acc11;
+            // link4: acceleration
+            let link4_acc0 = 0.25 * link3_acc5;
+            let link4_acc1 = link3_acc12 + link4_acc0;
+            let link4_acc2 = link4_pivot1 * link3_acc9;
+            let link4_acc3 = link4_pivot2 * link4_acc1;
+            let link4_acc4 = link4_acc2 + link4_acc3;
+            let link4_acc5 = link4_rest7 - link4_acc4;
+            let link4_acc6 = link3_acc5 - link4_acc5;
+            let link4_acc7 = link4_cos0 * link3_acc9;
+            let link4_acc8 = link4_sin0 * link4_acc1;
+            let link4_acc9 = link4_acc7 + link4_acc8;
+            let link4_acc10 = link4_cos0 * link4_acc1;
+            let link4_acc11 = link4_sin0 * link3_acc9;
+            let link4_acc12 = link4_acc10 - link4_acc11;
+            // link5: acceleration
+            let link5_acc0 = 0.25 * link4_acc5;
+            let link5_acc1 = link4_acc12 + link5_acc0;
+            let link5_acc2 = link5_pivot1 * link4_acc9;
+            let link5_acc3 = link5_pivot2 * link5_acc1;
+            let link5_acc4 = link5_acc2 + link5_acc3;
+            let link5_acc5 = link5_rest7 + link5_acc4;
+            let link5_acc6 = link4_acc5 - link5_acc5;
+            let link5_acc7 = link5_cos0 * link4_acc9;
+            let link5_acc8 = link5_sin0 * link5_acc1;
+            let link5_acc9 = link5_acc7 + link5_acc8;
+            let link5_acc10 = link5_cos0 * link5_acc1;
+            let link5_acc11 = link5_sin0 * link4_acc9;
+            let link5_acc12 = link5_acc10 - link5_acc11;
+            // link6: acceleration
+            let link6_acc0 = 0.25 * link5_acc5;
+            let link6_acc1 = link5_acc12 + link6_acc0;
+            let link6_acc2 = link6_pivot1 * link5_acc9;
+            let link6_acc3 = link6_pivot2 * link6_acc1;
+            let link6_acc4 = link6_acc2 + link6_acc3;
+            let link6_acc5 = link6_rest7 - link6_acc4;
+            let link6_acc6 = link5_acc5 - link6_acc5;
+            let link6_acc7 = link6_cos0 * link5_acc9;
+            let link6_acc8 = link6_sin0 * link6_acc1;
+            let link6_acc9 = link6_acc7 + link6_acc8;
+            let link6_acc10 = link6_cos0 * link6_acc1;
+            let link6_acc11 = link6_sin0 * link5_acc9;
+            let link6_acc12 = link6_acc10 - link6_acc11;
+            // link7: acceleration
+            let link7_acc0 = 0.25 * link6_acc5;
+            let link7_acc1 = link6_acc12 + link7_acc0;
+            let link7_acc2 = link7_pivot1 * link6_acc9;
+            let link7_acc3 = link7_pivot2 * link7_acc1;
+            let link7_acc4 = link7_acc2 + link7_acc3;
+            let link7_acc5 = link7_rest7 + link7_acc4;
+            let link7_acc6 = link6_acc5 - link7_acc5;
+            let link7_acc7 = link7_cos0 * link6_acc9;
+            let link7_acc8 = link7_sin0 * link7_acc1;
+            let link7_acc9 = link7_acc7 + link7_acc8;
+            let link7_acc10 = link7_cos0 * link7_acc1;
+            let link7_acc11 = link7_sin0 * link6_acc9;
+            let link7_acc12 = link7_acc10 - link7_acc11;
+            // link8: acceleration
+            let link8_acc0 = 0.25 * link7_acc5;
+            let link8_acc1 = link7_acc12 + link8_acc0;
+            let link8_acc2 = link8_pivot1 * link7_acc9;
+            let link8_acc3 = link8_pivot2 * link8_acc1;
+            let link8_acc4 = link8_acc2 + link8_acc3;
+            let link8_acc5 = link8_rest7 - link8_acc4;
+            let link8_acc6 = link7_acc5 - link8_acc5;
+            let link8_acc7 = link8_cos0 * link7_acc9;
+            let link8_acc8 = link8_sin0 * link8_acc1;
+            let link8_acc9 = link8_acc7 + link8_acc8;
+            let link8_acc10 = link8_cos0 * link8_acc1;
+            let link8_acc11 = link8_sin0 * link7_acc9;
+            let link8_acc12 = link8_acc10 - link8_acc11;
+            // link9: acceleration
+            let link9_acc0 = 0.25 * link8_acc5;
+            let link9_acc1 = link8_acc12 + link9_acc0;
+            let link9_acc2 = link9_pivot13 * link8_acc9;
+            let link9_acc3 = link9_pivot14 * link9_acc1;
+            let link9_acc4 = link9_acc2 + link9_acc3;
+            let link9_acc5 = link9_rest15 - link9_acc4;
+            let link9_acc6 = link8_acc5 + link9_acc5;
+            let link9_acc7 = link9_pivot0 * link8_acc9;
+            let link9_acc8 = link9_pivot1 * link9_acc1;
+            let link9_acc9 = link9_acc7 + link9_acc8;
+            let link9_acc10 = link9_pivot2 * link9_acc5;
+            let link9_acc11 = link9_acc9 + link9_acc10;
+            let link9_acc12 = link9_rest7 - link9_acc11;
+            results[0][l] = -link1_rest1;
+            results[1][l] = link2_acc3;
+            results[2][l] = link3_acc6;
+            results[3][l] = link4_acc6;
+            results[4][l] = link5_acc6;
+            results[5][l] = link6_acc6;
+            results[6][l] = link7_acc6;
+            results[7][l] = link8_acc6;
+            results[8][l] = link9_acc6;
+            results[9][l] = link9_acc12;
+        }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
+        a.give(6, &results[6]);
+        a.give(7, &results[7]);
+        a.give(8, &results[8]);
+        a.give(9, &results[9]);
     }
 
     /// Mass matrix, by rows.
     /// 333 operations: 158 additions, 175 multiplications, 0 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn mass_matrix(&self, q: &[f64; 10], m: &mut [[f64; 10]; 10]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link2: mass matrix by composite inertias
-        let link2_mass0 = 0.25 * link2_sin0;
-        let link2_mass1 = 0.25 * link2_cos0;
-        // link3: mass matrix by composite inertias
-        let link3_mass0 = 0.25 * link3_sin0;
-        let link3_mass1 = 0.25 * link3_cos0;
-        let link3_mass2 = link2_mass1 + 0.25;
-        let link3_mass3 = link3_cos0 * link2_mass0;
-        let link3_mass4 = link3_sin0 * link3_mass2;
-        let link3_mass5 = link3_mass3 + link3_mass4;
-        let link3_mass6 = link3_cos0 * link3_mass2;
-        let link3_mass7 = link3_sin0 * link2_mass0;
-        let link3_mass8 = link3_mass6 - link3_mass7;
-        // link4: mass matrix by composite inertias
-        let link4_mass0 = 0.25 * link4_sin0;
-        let link4_mass1 = 0.25 * link4_cos0;
-        let link4_mass2 = link3_mass1 + 0.25;
-        let link4_mass3 = link4_cos0 * link3_mass0;
-        let link4_mass4 = link4_sin0 * link4_mass2;
-        let link4_mass5 = link4_mass3 + link4_mass4;
-        let link4_mass6 = link4_cos0 * link4_mass2;
-        let link4_mass7 = link4_sin0 * link3_mass0;
-        let link4_mass8 = link4_mass6 - link4_mass7;
-        let link4_mass9 = link3_mass8 + 0.25;
-        let link4_mass10 = link4_cos0 * link3_mass5;
-        let link4_mass11 = link4_sin0 * link4_mass9;
-        let link4_mass12 = link4_mass10 + link4_mass11;
-        let link4_mass13 = link4_cos0 * link4_mass9;
-        let link4_mass14 = link4_sin0 * link3_mass5;
-        let link4_mass15 = link4_mass13 - link4_mass14;
-        // link10: mass matrix by composite inertias
-        let link10_mass0 = 0.05 * link10_sin0;
-        let link10_mass1 = 0.05 * link10_cos0;
-        let link10_mass2 = 0.25 * link10_mass1;
-        let link10_mass3 = link10_mass2 + 0.00835;
-        let link10_mass4 = link9_cos0 * link10_mass0;
-        let link10_mass5 = link9_sin0 * link10_mass1;
-        let link10_mass6 = link10_mass4 + link10_mass5;
-        let link10_mass7 = link9_sin0 * link10_mass0;
-        let link10_mass8 = link9_cos0 * link10_mass1;
-        let link10_mass9 = link10_mass7 - link10_mass8;
-        let link10_mass10 = 0.25 * link10_mass9;
-        let link10_mass11 = link10_mass3 - link10_mass10;
-        let link10_mass12 = link8_cos0 * link10_mass6;
-        let link10_mass13 = link8_sin0 * link10_mass9;
-        let link10_mass14 = link10_mass12 - link10_mass13;
-        let link10_mass15 = link8_sin0 * link10_mass6;
-        let link10_mass16 = link8_cos0 * link10_mass9;
-        let link10_mass17 = link10_mass15 + link10_mass16;
-        let link10_mass18 = 0.25 * link10_mass17;
-        let link10_mass19 = link10_mass11 - link10_mass18;
-        let link10_mass20 = link7_cos0 * link10_mass14;
-        let link10_mass21 = link7_sin0 * link10_mass17;
-        let link10_mass22 = link10_mass20 - link10_mass21;
-        let link10_mass23 = link7_sin0 * link10_mass14;
-        let link10_mass24 = link7_cos0 * link10_mass17;
-        let link10_mass25 = link10_mass23 + link10_mass24;
-        let link10_mass26 = 0.25 * link10_mass25;
-        let link10_mass27 = link10_mass19 - link10_mass26;
-        let link10_mass28 = link6_cos0 * link10_mass22;
-        let link10_mass29 = link6_sin0 * link10_mass25;
-        let link10_mass30 = link10_mass28 - link10_mass29;
-        let link10_mass31 = link6_sin0 * link10_mass22;
-        let link10_mass32 = link6_cos0 * link10_mass25;
-        let link10_mass33 = link10_mass31 + link10_mass32;
-        let link10_mass34 = 0.25 * link10_mass33;
-        let link10_mass35 = link10_mass27 - link10_mass34;
-        let link10_mass36 = link5_cos0 * link10_mass30;
-        let link10_mass37 = link5_sin0 * link10_mass33;
-        let link10_mass38 = link10_mass36 - link10_mass37;
-        let link10_mass39 = link5_sin0 * link10_mass30;
-        let link10_mass40 = link5_cos0 * link10_mass33;
-        let link10_mass41 = link10_mass39 + link10_mass40;
-        let link10_mass42 = 0.25 * link10_mass41;
-        let link10_mass43 = link10_mass35 - link10_mass42;
-        let link10_mass44 = link4_mass0 * link10_mass38;
-        let link10_mass45 = link4_mass1 * link10_mass41;
-        let link10_mass46 = link10_mass44 + link10_mass45;
-        let link10_mass47 = link10_mass43 - link10_mass46;
-        let link10_mass48 = link4_mass5 * link10_mass38;
-        let link10_mass49 = link4_mass8 * link10_mass41;
-        let link10_mass50 = link10_mass48 + link10_mass49;
-        let link10_mass51 = link10_mass43 - link10_mass50;
-        let link10_mass52 = link4_mass12 * link10_mass38;
-        let link10_mass53 = link4_mass15 * link10_mass41;
-        let link10_mass54 = link10_mass52 + link10_mass53;
-        let link10_mass55 = link10_mass43 - link10_mass54;
-        let link10_mass56 = link10_mass1 + link10_mass1;
-        let link10_mass57 = 0.25 * link10_mass56;
-        let link10_mass58 = link10_mass57 + 0.00835;
-        let link10_mass59 = link10_mass1 + 0.15000000000000002;
-        let link10_mass60 = link10_mass58 + 0.033350000000000005;
-        // link9: mass matrix by composite inertias
-        let link9_mass0 = link9_sin0 * link10_mass59;
-        let link9_mass1 = link10_mass4 + link9_mass0;
-        let link9_mass2 = link9_cos0 * link10_mass59;
-        let link9_mass3 = link10_mass7 - link9_mass2;
-        let link9_mass4 = 0.25 * link9_mass3;
-        let link9_mass5 = link10_mass60 - link9_mass4;
-        let link9_mass6 = link8_cos0 * link9_mass1;
-        let link9_mass7 = link8_sin0 * link9_mass3;
-        let link9_mass8 = link9_mass6 - link9_mass7;
-        let link9_mass9 = link8_sin0 * link9_mass1;
-        let link9_mass10 = link8_cos0 * link9_mass3;
-        let link9_mass11 = link9_mass9 + link9_mass10;
-        let link9_mass12 = 0.25 * link9_mass11;
-        let link9_mass13 = link9_mass5 - link9_mass12;
-        let link9_mass14 = link7_cos0 * link9_mass8;
-        let link9_mass15 = link7_sin0 * link9_mass11;
-        let link9_mass16 = link9_mass14 - link9_mass15;
-        let link9_mass17 = link7_sin0 * link9_mass8;
-        let link9_mass18 = link7_cos0 * link9_mass11;
-        let link9_mass19 = link9_mass17 + link9_mass18;
-        let link9_mass20 = 0.25 * link9_mass19;
-        let link9_mass21 = link9_mass13 - link9_mass20;
-        let link9_mass22 = link6_cos0 * link9_mass16;
-        let link9_mass23 = link6_sin0 * link9_mass19;
-        let link9_mass24 = link9_mass22 - link9_mass23;
-        let link9_mass25 = link6_sin0 * link9_mass16;
-        let link9_mass26 = link6_cos0 * link9_mass19;
-        let link9_mass27 = link9_mass25 + link9_mass26;
-        let link9_mass28 = 0.25 * link9_mass27;
-        let link9_mass29 = link9_mass21 - link9_mass28;
-        let link9_mass30 = link5_cos0 * link9_mass24;
-        let link9_mass31 = link5_sin0 * link9_mass27;
-        let link9_mass32 = link9_mass30 - link9_mass31;
-        let link9_mass33 = link5_sin0 * link9_mass24;
-        let link9_mass34 = link5_cos0 * link9_mass27;
-        let link9_mass35 = link9_mass33 + link9_mass34;
-        let link9_mass36 = 0.25 * link9_mass35;
-        let link9_mass37 = link9_mass29 - link9_mass36;
-        let link9_mass38 = link4_mass0 * link9_mass32;
-        let link9_mass39 = link4_mass1 * link9_mass35;
-        let link9_mass40 = link9_mass38 + link9_mass39;
-        let link9_mass41 = link9_mass37 - link9_mass40;
-        let link9_mass42 = link4_mass5 * link9_mass32;
-        let link9_mass43 = link4_mass8 * link9_mass35;
-        let link9_mass44 = link9_mass42 + link9_mass43;
-        let link9_mass45 = link9_mass37 - link9_mass44;
-        let link9_mass46 = link4_mass12 * link9_mass32;
-        let link9_mass47 = link4_mass15 * link9_mass35;
-        let link9_mass48 = link9_mass46 + link9_mass47;
-        let link9_mass49 = link9_mass37 - link9_mass48;
-        let link9_mass50 = link9_mass3 + link9_mass3;
-        let link9_mass51 = 0.25 * link9_mass50;
-        let link9_mass52 = link10_mass60 - link9_mass51;
-        let link9_mass53 = link9_mass3 - 0.25;
-        let link9_mass54 = link9_mass52 + 0.05835;
-        // link8: mass matrix by composite inertias
-        let link8_mass0 = link8_sin0 * link9_mass53;
-        let link8_mass1 = link9_mass6 - link8_mass0;
-        let link8_mass2 = link8_cos0 * link9_mass53;
-        let link8_mass3 = link9_mass9 + link8_mass2;
-        let link8_mass4 = 0.25 * link8_mass3;
-        let link8_mass5 = link9_mass54 - link8_mass4;
-        let link8_mass6 = link7_cos0 * link8_mass1;
-        let link8_mass7 = link7_sin0 * link8_mass3;
-        let link8_mass8 = link8_mass6 - link8_mass7;
-        let link8_mass9 = link7_sin0 * link8_mass1;
-        let link8_mass10 = link7_cos0 * link8_mass3;
-        let link8_mass11 = link8_mass9 + link8_mass10;
-        let link8_mass12 = 0.25 * link8_mass11;
-        let link8_mass13 = link8_mass5 - link8_mass12;
-        let link8_mass14 = link6_cos0 * link8_mass8;
-        let link8_mass15 = link6_sin0 * link8_mass11;
-        let link8_mass16 = link8_mass14 - link8_mass15;
-        let link8_mass17 = link6_sin0 * link8_mass8;
-        let link8_mass18 = link6_cos0 * link8_mass11;
-        let link8_mass19 = link8_mass17 + link8_mass18;
-        let link8_mass20 = 0.25 * link8_mass19;
-        let link8_mass21 = link8_mass13 - link8_mass20;
-        let link8_mass22 = link5_cos0 * link8_mass16;
-        let link8_mass23 = link5_sin0 * link8_mass19;
-        let link8_mass24 = link8_mass22 - link8_mass23;
-        let link8_mass25 = link5_sin0 * link8_mass16;
-        let link8_mass26 = link5_cos0 * link8_mass19;
-        let link8_mass27 = link8_mass25 + link8_mass26;
-        let link8_mass28 = 0.25 * link8_mass27;
-        let link8_mass29 = link8_mass21 - link8_mass28;
-        let link8_mass30 = link4_mass0 * link8_mass24;
-        let link8_mass31 = link4_mass1 * link8_mass27;
-        let link8_mass32 = link8_mass30 + link8_mass31;
-        let link8_mass33 = link8_mass29 - link8_mass32;
-        let link8_mass34 = link4_mass5 * link8_mass24;
-        let link8_mass35 = link4_mass8 * link8_mass27;
-        let link8_mass36 = link8_mass34 + link8_mass35;
-        let link8_mass37 = link8_mass29 - link8_mass36;
-        let link8_mass38 = link4_mass12 * link8_mass24;
-        let link8_mass39 = link4_mass15 * link8_mass27;
-        let link8_mass40 = link8_mass38 + link8_mass39;
-        let link8_mass41 = link8_mass29 - link8_mass40;
-        let link8_mass42 = link8_mass3 + link8_mass3;
-        let link8_mass43 = 0.25 * link8_mass42;
-        let link8_mass44 = link9_mass54 - link8_mass43;
-        let link8_mass45 = link8_mass3 - 0.35000000000000003;
-        let link8_mass46 = link8_mass44 + 0.08335000000000001;
-        // link7: mass matrix by composite inertias
-        let link7_mass0 = link7_sin0 * link8_mass45;
-        let link7_mass1 = link8_mass6 - link7_mass0;
-        let link7_mass2 = link7_cos0 * link8_mass45;
-        let link7_mass3 = link8_mass9 + link7_mass2;
-        let link7_mass4 = 0.25 * link7_mass3;
-        let link7_mass5 = link8_mass46 - link7_mass4;
-        let link7_mass6 = link6_cos0 * link7_mass1;
-        let link7_mass7 = link6_sin0 * link7_mass3;
-        let link7_mass8 = link7_mass6 - link7_mass7;
-        let link7_mass9 = link6_sin0 * link7_mass1;
-        let link7_mass10 = link6_cos0 * link7_mass3;
-        let link7_mass11 = link7_mass9 + link7_mass10;
-        let link7_mass12 = 0.25 * link7_mass11;
-        let link7_mass13 = link7_mass5 - link7_mass12;
-        let link7_mass14 = link5_cos0 * link7_mass8;
-        let link7_mass15 = link5_sin0 * link7_mass11;
-        let link7_mass16 = link7_mass14 - link7_mass15;
-        let link7_mass17 = link5_sin0 * link7_mass8;
-        let link7_mass18 = link5_cos0 * link7_mass11;
-        let link7_mass19 = link7_mass17 + link7_mass18;
-        let link7_mass20 = 0.25 * link7_mass19;
-        let link7_mass21 = link7_mass13 - link7_mass20;
-        let link7_mass22 = link4_mass0 * link7_mass16;
-        let link7_mass23 = link4_mass1 * link7_mass19;
-        let link7_mass24 = link7_mass22 + link7_mass23;
-        let link7_mass25 = link7_mass21 - link7_mass24;
-        let link7_mass26 = link4_mass5 * link7_mass16;
-        let link7_mass27 = link4_mass8 * link7_mass19;
-        let link7_mass28 = link7_mass26 + link7_mass27;
-        let link7_mass29 = link7_mass21 - link7_mass28;
-        let link7_mass30 = link4_mass12 * link7_mass16;
-        let link7_mass31 = link4_mass15 * link7_mass19;
-        let link7_mass32 = link7_mass30 + link7_mass31;
-        let link7_mass33 = link7_mass21 - link7_mass32;
-        let link7_mass34 = link7_mass3 + link7_mass3;
-        let link7_mass35 = 0.25 * link7_mass34;
-        let link7_mass36 = link8_mass46 - link7_mass35;
-        let link7_mass37 = link7_mass3 - 0.45;
-        let link7_mass38 = link7_mass36 + 0.10835;
-        // link6: mass matrix by composite inertias
-        let link6_mass0 = link6_sin0 * link7_mass37;
-        let link6_mass1 = link7_mass6 - link6_mass0;
-        let link6_mass2 = link6_cos0 * link7_mass37;
-        let link6_mass3 = link7_mass9 + link6_mass2;
-        let link6_mass4 = 0.25 * link6_mass3;
-        let link6_mass5 = link7_mass38 - link6_mass4;
-        let link6_mass6 = link5_cos0 * link6_mass1;
-        let link6_mass7 = link5_sin0 * link6_mass3;
-        let link6_mass8 = link6_mass6 - link6_mass7;
-        let link6_mass9 = link5_sin0 * link6_mass1;
-        let link6_mass10 = link5_cos0 * link6_mass3;
-        let link6_mass11 = link6_mass9 + link6_mass10;
-        let link6_mass12 = 0.25 * link6_mass11;
-        let link6_mass13 = link6_mass5 - link6_mass12;
-        let link6_mass14 = link4_mass0 * link6_mass8;
-        let link6_mass15 = link4_mass1 * link6_mass11;
-        let link6_mass16 = link6_mass14 + link6_mass15;
-        let link6_mass17 = link6_mass13 - link6_mass16;
-        let link6_mass18 = link4_mass5 * link6_mass8;
-        let link6_mass19 = link4_mass8 * link6_mass11;
-        let link6_mass20 = link6_mass18 + link6_mass19;
-        let link6_mass21 = link6_mass13 - link6_mass20;
-        let link6_mass22 = link4_mass12 * link6_mass8;
-        let link6_mass23 = link4_mass15 * link6_mass11;
-        let link6_mass24 = link6_mass22 + link6_mass23;
-        let link6_mass25 = link6_mass13 - link6_mass24;
-        let link6_mass26 = link6_mass3 + link6_mass3;
-        let link6_mass27 = 0.25 * link6_mass26;
-        let link6_mass28 = link7_mass38 - link6_mass27;
-        let link6_mass29 = link6_mass3 - 0.55;
-        let link6_mass30 = link6_mass28 + 0.13335;
-        // link5: mass matrix by composite inertias
-        let link5_mass0 = link5_sin0 * link6_mass29;
-        let link5_mass1 = link6_mass6 - link5_mass0;
-        let link5_mass2 = link5_cos0 * link6_mass29;
-        let link5_mass3 = link6_mass9 + link5_mass2;
-        let link5_mass4 = 0.25 * link5_mass3;
-        let link5_mass5 = link6_mass30 - link5_mass4;
-        let link5_mass6 = link4_mass0 * link5_mass1;
-        let link5_mass7 = link4_mass1 * link5_mass3;
-        let link5_mass8 = link5_mass6 + link5_mass7;
-        let link5_mass9 = link5_mass5 - link5_mass8;
-        let link5_mass10 = link4_mass5 * link5_mass1;
-        let link5_mass11 = link4_mass8 * link5_mass3;
-        let link5_mass12 = link5_mass10 + link5_mass11;
-        let link5_mass13 = link5_mass5 - link5_mass12;
-        let link5_mass14 = link4_mass12 * link5_mass1;
-        let link5_mass15 = link4_mass15 * link5_mass3;
-        let link5_mass16 = link5_mass14 + link5_mass15;
-        let link5_mass17 = link5_mass5 - link5_mass16;
-        let link5_mass18 = link5_mass3 + link5_mass3;
-        let link5_mass19 = 0.25 * link5_mass18;
-        let link5_mass20 = link6_mass30 - link5_mass19;
-        let link5_mass21 = link5_mass3 - 0.65;
-        let link5_mass22 = link5_mass20 + 0.15835;
-        // link4: mass matrix by composite inertias
-        let link4_mass16 = link4_mass1 * link5_mass21;
-        let link4_mass17 = link5_mass6 + link4_mass16;
-        let link4_mass18 = link5_mass22 - link4_mass17;
-        let link4_mass19 = link4_mass8 * link5_mass21;
-        let link4_mass20 = link5_mass10 + link4_mass19;
-        let link4_mass21 = link5_mass22 - link4_mass20;
-        let link4_mass22 = link4_mass15 * link5_mass21;
-        let link4_mass23 = link5_mass14 + link4_mass22;
-        let link4_mass24 = link5_mass22 - link4_mass23;
-        let link4_mass25 = link4_cos0 * link5_mass1;
-        let link4_mass26 = link4_sin0 * link5_mass21;
-        let link4_mass27 = link4_mass25 - link4_mass26;
-        let link4_mass28 = link4_sin0 * link5_mass1;
-        let link4_mass29 = link4_cos0 * link5_mass21;
-        let link4_mass30 = link4_mass28 + link4_mass29;
-        let link4_mass31 = link4_mass30 + link4_mass30;
-        let link4_mass32 = 0.25 * link4_mass31;
-        let link4_mass33 = link5_mass22 - link4_mass32;
-        let link4_mass34 = link4_mass30 - 0.75;
-        let link4_mass35 = link4_mass33 + 0.18334999999999999;
-        // link3: mass matrix by composite inertias
-        let link3_mass9 = link3_mass0 * link4_mass27;
-        let link3_mass10 = link3_mass1 * link4_mass34;
-        let link3_mass11 = link3_mass9 + link3_mass10;
-        let link3_mass12 = link4_mass35 - link3_mass11;
-        let link3_mass13 = link3_mass5 * link4_mass27;
-        let link3_mass14 = link3_mass8 * link4_mass34;
-        let link3_mass15 = link3_mass13 + link3_mass14;
-        let link3_mass16 = link4_mass35 - link3_mass15;
-        let link3_mass17 = link3_cos0 * link4_mass27;
-        let link3_mass18 = link3_sin0 * link4_mass34;
-        let link3_mass19 = link3_mass17 - link3_mass18;
-        let link3_mass20 = link3_sin0 * link4_mass27;
-        let link3_mass21 = link3_cos0 * link4_mass34;
-        let link3_mass22 = link3_mass20 + link3_mass21;
-        let link3_mass23 = link3_mass22 + link3_mass22;
-        let link3_mass24 = 0.25 * link3_mass23;
-        let link3_mass25 = link4_mass35 - link3_mass24;
-        let link3_mass26 = link3_mass22 - 0.85;
-        let link3_mass27 = link3_mass25 + 0.20834999999999998;
-        // link2: mass matrix by composite inertias
-        let link2_mass2 = link2_mass0 * link3_mass19;
-        let link2_mass3 = link2_mass1 * link3_mass26;
-        let link2_mass4 = link2_mass2 + link2_mass3;
-        let link2_mass5 = link3_mass27 - link2_mass4;
-        let link2_mass6 = link2_sin0 * link3_mass19;
-        let link2_mass7 = link2_cos0 * link3_mass26;
-        let link2_mass8 = link2_mass6 + link2_mass7;
-        let link2_mass9 = link2_mass8 + link2_mass8;
-        let link2_mass10 = 0.25 * link2_mass9;
-        let link2_mass11 = link3_mass27 - link2_mass10;
-        let link2_mass12 = link2_mass11 + 0.23334999999999997;
-        m[0][0] = link2_mass12;
-        m[0][1] = link2_mass5;
-        m[0][2] = link3_mass16;
-        m[0][3] = link4_mass24;
-        m[0][4] = link5_mass17;
-        m[0][5] = link6_mass25;
-        m[0][6] = link7_mass33;
-        m[0][7] = link8_mass41;
-        m[0][8] = link9_mass49;
-        m[0][9] = link10_mass55;
-        m[1][0] = link2_mass5;
-        m[1][1] = link3_mass27;
-        m[1][2] = link3_mass12;
-        m[1][3] = link4_mass21;
-        m[1][4] = link5_mass13;
-        m[1][5] = link6_mass21;
-        m[1][6] = link7_mass29;
-        m[1][7] = link8_mass37;
-        m[1][8] = link9_mass45;
-        m[1][9] = link10_mass51;
-        m[2][0] = link3_mass16;
-        m[2][1] = link3_mass12;
-        m[2][2] = link4_mass35;
-        m[2][3] = link4_mass18;
-        m[2][4] = link5_mass9;
-        m[2][5] = link6_mass17;
-        m[2][6] = link7_mass25;
-        m[2][7] = link8_mass33;
-        m[2][8] = link9_mass41;
-        m[2][9] = link10_mass47;
-        m[3][0] = link4_mass24;
-        m[3][1] = link4_mass21;
-        m[3][2] = link4_mass18;
-        m[3][3] = link5_mass22;
-        m[3][4] = link5_mass5;
-        m[3][5] = link6_mass13;
-        m[3][6] = link7_mass21;
-        m[3][7] = link8_mass29;
-        m[3][8] = link9_mass37;
-        m[3][9] = link10_mass43;
-        m[4][0] = link5_mass17;
-        m[4][1] = link5_mass13;
-        m[4][2] = link5_mass9;
-        m[4][3] = link5_mass5;
-        m[4][4] = link6_mass30;
-        m[4][5] = link6_mass5;
-        m[4][6] = link7_mass13;
-        m[4][7] = link8_mass21;
-        m[4][8] = link9_mass29;
-        m[4][9] = link10_mass35;
-        m[5][0] = link6_mass25;
-        m[5][1] = link6_mass21;
-        m[5][2] = link6_mass17;
-        m[5][3] = link6_mass13;
-        m[5][4] = link6_mass5;
-        m[5][5] = link7_mass38;
-        m[5][6] = link7_mass5;
-        m[5][7] = link8_mass13;
-        m[5][8] = link9_mass21;
-        m[5][9] = link10_mass27;
-        m[6][0] = link7_mass33;
-        m[6][1] = link7_mass29;
-        m[6][2] = link7_mass25;
-        m[6][3] = link7_mass21;
-        m[6][4] = link7_mass13;
-        m[6][5] = link7_mass5;
-        m[6][6] = link8_mass46;
-        m[6][7] = link8_mass5;
-        m[6][8] = link9_mass13;
-        m[6][9] = link10_mass19;
-        m[7][0] = link8_mass41;
-        m[7][1] = link8_mass37;
-        m[7][2] = link8_mass33;
-        m[7][3] = link8_mass29;
-        m[7][4] = link8_mass21;
-        m[7][5] = link8_mass13;
-        m[7][6] = link8_mass5;
-        m[7][7] = link9_mass54;
-        m[7][8] = link9_mass5;
-        m[7][9] = link10_mass11;
-        m[8][0] = link9_mass49;
-        m[8][1] = link9_mass45;
-        m[8][2] = link9_mass41;
-        m[8][3] = link9_mass37;
-        m[8][4] = link9_mass29;
-        m[8][5] = link9_mass21;
-        m[8][6] = link9_mass13;
-        m[8][7] = link9_mass5;
-        m[8][8] = link10_mass60;
-        m[8][9] = link10_mass3;
-        m[9][0] = link10_mass55;
-        m[9][1] = link10_mass51;
-        m[9][2] = link10_mass47;
-        m[9][3] = link10_mass43;
-        m[9][4] = link10_mass35;
-        m[9][5] = link10_mass27;
-        m[9][6] = link10_mass19;
-        m[9][7] = link10_mass11;
-        m[9][8] = link10_mass3;
-        m[9][9] = 0.00835;
+        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 9];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_1;
+            angles[1][l] = q_2;
+            angles[2][l] = q_3;
+            angles[3][l] = q_4;
+            angles[4][l] = q_5;
+            angles[5][l] = q_6;
+            angles[6][l] = q_7;
+            angles[7][l] = q_8;
+            angles[8][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
+        let mut results = [[0.0; LANES]; 100];
+        for l in 0..LANES {
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[0][l];
+            let link2_cos0 = cosines[0][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[1][l];
+            let link3_cos0 = cosines[1][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[2][l];
+            let link4_cos0 = cosines[2][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[3][l];
+            let link5_cos0 = cosines[3][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[4][l];
+            let link6_cos0 = cosines[4][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[5][l];
+            let link7_cos0 = cosines[5][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[6][l];
+            let link8_cos0 = cosines[6][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[7][l];
+            let link9_cos0 = cosines[7][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[8][l];
+            let link10_cos0 = cosines[8][l];
+            // link2: mass matrix by composite inertias
+            let link2_mass0 = 0.25 * link2_sin0;
+            let link2_mass1 = 0.25 * link2_cos0;
+            // link3: mass matrix by composite inertias
+            let link3_mass0 = 0.25 * link3_sin0;
+            let link3_mass1 = 0.25 * link3_cos0;
+            let link3_mass2 = link2_mass1 + 0.25;
+            let link3_mass3 = link3_cos0 * link2_mass0;
+            let link3_mass4 = link3_sin0 * link3_mass2;
+            let link3_mass5 = link3_mass3 + link3_mass4;
+            let link3_mass6 = link3_cos0 * link3_mass2;
+            let link3_mass7 = link3_sin0 * link2_mass0;
+            let link3_mass8 = link3_mass6 - link3_mass7;
+            // link4: mass matrix by composite inertias
+            let link4_mass0 = 0.25 * link4_sin0;
+            let link4_mass1 = 0.25 * link4_cos0;
+            let link4_mass2 = link3_mass1 + 0.25;
+            let link4_mass3 = link4_cos0 * link3_mass0;
+            let link4_mass4 = link4_sin0 * link4_mass2;
+            let link4_mass5 = link4_mass3 + link4_mass4;
+            let link4_mass6 = link4_cos0 * link4_mass2;
+            let link4_mass7 = link4_sin0 * link3_mass0;
+            let link4_mass8 = link4_mass6 - link4_mass7;
+            let link4_mass9 = link3_mass8 + 0.25;
+            let link4_mass10 = link4_cos0 * link3_mass5;
+            let link4_mass11 = link4_sin0 * link4_mass9;
+            let link4_mass12 = link4_mass10 + link4_mass11;
+            let link4_mass13 = link4_cos0 * link4_mass9;
+            let link4_mass14 = link4_sin0 * link3_mass5;
+            let link4_mass15 = link4_mass13 - link4_mass14;
+            // link10: mass matrix by composite inertias
+            let link10_mass0 = 0.05 * link10_sin0;
+            let link10_mass1 = 0.05 * link10_cos0;
+            let link10_mass2 = 0.25 * link10_mass1;
+            let link10_mass3 = link10_mass2 + 0.00835;
+            let link10_mass4 = link9_cos0 * link10_mass0;
+            let link10_mass5 = link9_sin0 * link10_mass1;
+            let link10_mass6 = link10_mass4 + link10_mass5;
+            let link10_mass7 = link9_sin0 * link10_mass0;
+            let link10_mass8 = link9_cos0 * link10_mass1;
+            let link10_mass9 = link10_mass7 - link10_mass8;
+            let link10_mass10 = 0.25 * link10_mass9;
+            let link10_mass11 = link10_mass3 - link10_mass10;
+            let link10_mass12 = link8_cos0 * link10_mass6;
+            let link10_mass13 = link8_sin0 * link10_mass9;
+            let link10_mass14 = link10_mass12 - link10_mass13;
+            let link10_mass15 = link8_sin0 * link10_mass6;
+            let link10_mass16 = link8_cos0 * link10_mass9;
+            let link10_mass17 = link10_mass15 + link10_mass16;
+            let link10_mass18 = 0.25 * link10_mass17;
+            let link10_mass19 = link10_mass11 - link10_mass18;
+            let link10_mass20 = link7_cos0 * link10_mass14;
+            let link10_mass21 = link7_sin0 * link10_mass17;
+            let link10_mass22 = link10_mass20 - link10_mass21;
+            let link10_mass23 = link7_sin0 * link10_mass14;
+            let link10_mass24 = link7_cos0 * link10_mass17;
+            let link10_mass25 = link10_mass23 + link10_mass24;
+            let link10_mass26 = 0.25 * link10_mass25;
+            let link10_mass27 = link10_mass19 - link10_mass26;
+            let link10_mass28 = link6_cos0 * link10_mass22;
+            let link10_mass29 = link6_sin0 * link10_mass25;
+            let link10_mass30 = link10_mass28 - link10_mass29;
+            let link10_mass31 = link6_sin0 * link10_mass22;
+            let link10_mass32 = link6_cos0 * link10_mass25;
+            let link10_mass33 = link10_mass31 + link10_mass32;
+            let link10_mass34 = 0.25 * link10_mass33;
+            let link10_mass35 = link10_mass27 - link10_mass34;
+            let link10_mass36 = link5_cos0 * link10_mass30;
+            let link10_mass37 = link5_sin0 * link10_mass33;
+            let link10_mass38 = link10_mass36 - link10_mass37;
+            let link10_mass39 = link5_sin0 * link10_mass30;
+            let link10_mass40 = link5_cos0 * link10_mass33;
+            let link10_mass41 = link10_mass39 + link10_mass40;
+            let link10_mass42 = 0.25 * link10_mass41;
+            let link10_mass43 = link10_mass35 - link10_mass42;
+            let link10_mass44 = link4_mass0 * link10_mass38;
+            let link10_mass45 = link4_mass1 * link10_mass41;
+            let link10_mass46 = link10_mass44 + link10_mass45;
+            let link10_mass47 = link10_mass43 - link10_mass46;
+            let link10_mass48 = link4_mass5 * link10_mass38;
+            let link10_mass49 = link4_mass8 * link10_mass41;
+            let link10_mass50 = link10_mass48 + link10_mass49;
+            let link10_mass51 = link10_mass43 - link10_mass50;
+            let link10_mass52 = link4_mass12 * link10_mass38;
+            let link10_mass53 = link4_mass15 * link10_mass41;
+            let link10_mass54 = link10_mass52 + link10_mass53;
+            let link10_mass55 = link10_mass43 - link10_mass54;
+            let link10_mass56 = link10_mass1 + link10_mass1;
+            let link10_mass57 = 0.25 * link10_mass56;
+            let link10_mass58 = link10_mass57 + 0.00835;
+            let link10_mass59 = link10_mass1 + 0.15000000000000002;
+            let link10_mass60 = link10_mass58 + 0.033350000000000005;
+            // link9: mass matrix by composite inertias
+            let link9_mass0 = link9_sin0 * link10_mass59;
+            let link9_mass1 = link10_mass4 + link9_mass0;
+            let link9_mass2 = link9_cos0 * link10_mass59;
+            let link9_mass3 = link10_mass7 - link9_mass2;
+            let link9_mass4 = 0.25 * link9_mass3;
+            let link9_mass5 = link10_mass60 - link9_mass4;
+            let link9_mass6 = link8_cos0 * link9_mass1;
+            let link9_mass7 = link8_sin0 * link9_mass3;
+            let link9_mass8 = link9_mass6 - link9_mass7;
+            let link9_mass9 = link8_sin0 * link9_mass1;
+            let link9_mass10 = link8_cos0 * link9_mass3;
+            let link9_mass11 = link9_mass9 + link9_mass10;
+            let link9_mass12 = 0.25 * link9_mass11;
+            let link9_mass13 = link9_mass5 - link9_mass12;
+            let link9_mass14 = link7_cos0 * link9_mass8;
+            let link9_mass15 = link7_sin0 * link9_mass11;
+            let link9_mass16 = link9_mass14 - link9_mass15;
+            let link9_mass17 = link7_sin0 * link9_mass8;
+            let link9_mass18 = link7_cos0 * link9_mass11;
+            let link9_mass19 = link9_mass17 + link9_mass18;
+            let link9_mass20 = 0.25 * link9_mass19;
+            let link9_mass21 = link9_mass13 - link9_mass20;
+            let link9_mass22 = link6_cos0 * link9_mass16;
+            let link9_mass23 = link6_sin0 * link9_mass19;
+            let link9_mass24 = link9_mass22 - link9_mass23;
+            let link9_mass25 = link6_sin0 * link9_mass16;
+            let link9_mass26 = link6_cos0 * link9_mass19;
+            let link9_mass27 = link9_mass25 + link9_mass26;
+            let link9_mass28 = 0.25 * link9_mass27;
+            let link9_mass29 = link9_mass21 - link9_mass28;
+            let link9_mass30 = link5_cos0 * link9_mass24;
+            let link9_mass31 = link5_sin0 * link9_mass27;
+            let link9_mass32 = link9_mass30 - link9_mass31;
+            let link9_mass33 = link5_sin0 * link9_mass24;
+            let link9_mass34 = link5_cos0 * link9_mass27;
+            let link9_mass35 = link9_mass33 + link9_mass34;
+            let link9_mass36 = 0.25 * link9_mass35;
+            let link9_mass37 = link9_mass29 - link9_mass36;
+            let link9_mass38 = link4_mass0 * link9_mass32;
+            let link9_mass39 = link4_mass1 * link9_mass35;
+            let link9_mass40 = link9_mass38 + link9_mass39;
+            let link9_mass41 = link9_mass37 - link9_mass40;
+            let link9_mass42 = link4_mass5 * link9_mass32;
+            let link9_mass43 = link4_mass8 * link9_mass35;
+            let link9_mass44 = link9_mass42 + link9_mass43;
+            let link9_mass45 = link9_mass37 - link9_mass44;
+            let link9_mass46 = link4_mass12 * link9_mass32;
+            let link9_mass47 = link4_mass15 * link9_mass35;
+            let link9_mass48 = link9_mass46 + link9_mass47;
+            let link9_mass49 = link9_mass37 - link9_mass48;
+            let link9_mass50 = link9_mass3 + link9_mass3;
+            let link9_mass51 = 0.25 * link9_mass50;
+            let link9_mass52 = link10_mass60 - link9_mass51;
+            let link9_mass53 = link9_mass3 - 0.25;
+            let link9_mass54 = link9_mass52 + 0.05835;
+            // link8: mass matrix by composite inertias
+            let link8_mass0 = link8_sin0 * link9_mass53;
+            let link8_mass1 = link9_mass6 - link8_mass0;
+            let link8_mass2 = link8_cos0 * link9_mass53;
+            let link8_mass3 = link9_mass9 + link8_mass2;
+            let link8_mass4 = 0.25 * link8_mass3;
+            let link8_mass5 = link9_mass54 - link8_mass4;
+            let link8_mass6 = link7_cos0 * link8_mass1;
+            let link8_mass7 = link7_sin0 * link8_mass3;
+            let link8_mass8 = link8_mass6 - link8_mass7;
+            let link8_mass9 = link7_sin0 * link8_mass1;
+            let link8_mass10 = link7_cos0 * link8_mass3;
+            let link8_mass11 = link8_mass9 + link8_mass10;
+            let link8_mass12 = 0.25 * link8_mass11;
+            let link8_mass13 = link8_mass5 - link8_mass12;
+            let link8_mass14 = link6_cos0 * link8_mass8;
+            let link8_mass15 = link6_sin0 * link8_mass11;
+            let link8_mass16 = link8_mass14 - link8_mass15;
+            let link8_mass17 = link6_sin0 * link8_mass8;
+            let link8_mass18 = link6_cos0 * link8_mass11;
+            let link8_mass19 = link8_mass17 + link8_mass18;
+            let link8_mass20 = 0.25 * link8_mass19;
+            let link8_mass21 = link8_mass13 - link8_mass20;
+            let link8_mass22 = link5_cos0 * link8_mass16;
+            let link8_mass23 = link5_sin0 * link8_mass19;
+            let link8_mass24 = link8_mass22 - link8_mass23;
+            let link8_mass25 = link5_sin0 * link8_mass16;
+            let link8_mass26 = link5_cos0 * link8_mass19;
+            let link8_mass27 = link8_mass25 + link8_mass26;
+            let link8_mass28 = 0.25 * link8_mass27;
+            let link8_mass29 = link8_mass21 - link8_mass28;
+            let link8_mass30 = link4_mass0 * link8_mass24;
+            let link8_mass31 = link4_mass1 * link8_mass27;
+            let link8_mass32 = link8_mass30 + link8_mass31;
+            let link8_mass33 = link8_mass29 - link8_mass32;
+            let link8_mass34 = link4_mass5 * link8_mass24;
+            let link8_mass35 = link4_mass8 * link8_mass27;
+            let link8_mass36 = link8_mass34 + link8_mass35;
+            let link8_mass37 = link8_mass29 - link8_mass36;
+            let link8_mass38 = link4_mass12 * link8_mass24;
+            let link8_mass39 = link4_mass15 * link8_mass27;
+            let link8_mass40 = link8_mass38 + link8_mass39;
+            let link8_mass41 = link8_mass29 - link8_mass40;
+            let link8_mass42 = link8_mass3 + link8_mass3;
+            let link8_mass43 = 0.25 * link8_mass42;
+            let link8_mass44 = link9_mass54 - link8_mass43;
+            let link8_mass45 = link8_mass3 - 0.35000000000000003;
+            let link8_mass46 = link8_mass44 + 0.08335000000000001;
+            // link7: mass matrix by composite inertias
+            let link7_mass0 = link7_sin0 * link8_mass45;
+            let link7_mass1 = link8_mass6 - link7_mass0;
+            let link7_mass2 = link7_cos0 * link8_mass45;
+            let link7_mass3 = link8_mass9 + link7_mass2;
+            let link7_mass4 = 0.25 * link7_mass3;
+            let link7_mass5 = link8_mass46 - link7_mass4;
+            let link7_mass6 = link6_cos0 * link7_mass1;
+            let link7_mass7 = link6_sin0 * link7_mass3;
+            let link7_mass8 = link7_mass6 - link7_mass7;
+            let link7_mass9 = link6_sin0 * link7_mass1;
+            let link7_mass10 = link6_cos0 * link7_mass3;
+            let link7_mass11 = link7_mass9 + link7_mass10;
+            let link7_mass12 = 0.25 * link7_mass11;
+            let link7_mass13 = link7_mass5 - link7_mass12;
+            let link7_mass14 = link5_cos0 * link7_mass8;
+            let link7_mass15 = link5_sin0 * link7_mass11;
+            let link7_mass16 = link7_mass14 - link7_mass15;
+            let link7_mass17 = link5_sin0 * link7_mass8;
+            let link7_mass18 = link5_cos0 * link7_mass11;
+            let link7_mass19 = link7_mass17 + link7_mass18;
+            let link7_mass20 = 0.25 * link7_mass19;
+            let link7_mass21 = link7_mass13 - link7_mass20;
+            let link7_mass22 = link4_mass0 * link7_mass16;
+            let link7_mass23 = link4_mass1 * link7_mass19;
+            let link7_mass24 = link7_mass22 + link7_mass23;
+            let link7_mass25 = link7_mass21 - link7_mass24;
+            let link7_mass26 = link4_mass5 * link7_mass16;
+            let link7_mass27 = link4_mass8 * link7_mass19;
+            let link7_mass28 = link7_mass26 + link7_mass27;
+            let link7_mass29 = link7_mass21 - link7_mass28;
+            let link7_mass30 = link4_mass12 * link7_mass16;
+            let link7_mass31 = link4_mass15 * link7_mass19;
+            let link7_mass32 = link7_mass30 + link7_mass31;
+            let link7_mass33 = link7_mass21 - link7_mass32;
+            let link7_mass34 = link7_mass3 + link7_mass3;
+            let link7_mass35 = 0.25 * link7_mass34;
+            let link7_mass36 = link8_mass46 - link7_mass35;
+            let link7_mass37 = link7_mass3 - 0.45;
+            let link7_mass38 = link7_mass36 + 0.10835;
+            // link6: mass matrix by composite inertias
+            let link6_mass0 = link6_sin0 * link7_mass37;
+            let link6_mass1 = link7_mass6 - link6_mass0;
+            let link6_mass2 = link6_cos0 * link7_mass37;
+            let link6_mass3 = link7_mass9 + link6_mass2;
+            let link6_mass4 = 0.25 * link6_mass3;
+            let link6_mass5 = link7_mass38 - link6_mass4;
+            let link6_mass6 = link5_cos0 * link6_mass1;
+            let link6_mass7 = link5_sin0 * link6_mass3;
+            let link6_mass8 = link6_mass6 - link6_mass7;
+            let link6_mass9 = link5_sin0 * link6_mass1;
+            let link6_mass10 = link5_cos0 * link6_mass3;
+            let link6_mass11 = link6_mass9 + link6_mass10;
+            let link6_mass12 = 0.25 * link6_mass11;
+            let link6_mass13 = link6_mass5 - link6_mass12;
+            let link6_mass14 = link4_mass0 * link6_mass8;
+            let link6_mass15 = link4_mass1 * link6_mass11;
+            let link6_mass16 = link6_mass14 + link6_mass15;
+            let link6_mass17 = link6_mass13 - link6_mass16;
+            let link6_mass18 = link4_mass5 * link6_mass8;
+            let link6_mass19 = link4_mass8 * link6_mass11;
+            let link6_mass20 = link6_mass18 + link6_mass19;
+            let link6_mass21 = link6_mass13 - link6_mass20;
+            let link6_mass22 = link4_mass12 * link6_mass8;
+            let link6_mass23 = link4_mass15 * link6_mass11;
+            let link6_mass24 = link6_mass22 + link6_mass23;
+            let link6_mass25 = link6_mass13 - link6_mass24;
+            let link6_mass26 = link6_mass3 + link6_mass3;
+            let link6_mass27 = 0.25 * link6_mass26;
+            let link6_mass28 = link7_mass38 - link6_mass27;
+            let link6_mass29 = link6_mass3 - 0.55;
+            let link6_mass30 = link6_mass28 + 0.13335;
+            // link5: mass matrix by composite inertias
+            let link5_mass0 = link5_sin0 * link6_mass29;
+            let link5_mass1 = link6_mass6 - link5_mass0;
+            let link5_mass2 = link5_cos0 * link6_mass29;
+            let link5_mass3 = link6_mass9 + link5_mass2;
+            let link5_mass4 = 0.25 * link5_mass3;
+            let link5_mass5 = link6_mass30 - link5_mass4;
+            let link5_mass6 = link4_mass0 * link5_mass1;
+            let link5_mass7 = link4_mass1 * link5_mass3;
+            let link5_mass8 = link5_mass6 + link5_mass7;
+            let link5_mass9 = link5_mass5 - link5_mass8;
+            let link5_mass10 = link4_mass5 * link5_mass1;
+            let link5_mass11 = link4_mass8 * link5_mass3;
+            let link5_mass12 = link5_mass10 + link5_mass11;
+            let link5_mass13 = link5_mass5 - link5_mass12;
+            let link5_mass14 = link4_mass12 * link5_mass1;
+            let link5_mass15 = link4_mass15 * link5_mass3;
+            let link5_mass16 = link5_mass14 + link5_mass15;
+            let link5_mass17 = link5_mass5 - link5_mass16;
+            let link5_mass18 = link5_mass3 + link5_mass3;
+            let link5_mass19 = 0.25 * link5_mass18;
+            let link5_mass20 = link6_mass30 - link5_mass19;
+            let link5_mass21 = link5_mass3 - 0.65;
+            let link5_mass22 = link5_mass20 + 0.15835;
+            // link4: mass matrix by composite inertias
+            let link4_mass16 = link4_mass1 * link5_mass21;
+            let link4_mass17 = link5_mass6 + link4_mass16;
+            let link4_mass18 = link5_mass22 - link4_mass17;
+            let link4_mass19 = link4_mass8 * link5_mass21;
+            let link4_mass20 = link5_mass10 + link4_mass19;
+            let link4_mass21 = link5_mass22 - link4_mass20;
+            let link4_mass22 = link4_mass15 * link5_mass21;
+            let link4_mass23 = link5_mass14 + link4_mass22;
+            let link4_mass24 = link5_mass22 - link4_mass23;
+            let link4_mass25 = link4_cos0 * link5_mass1;
+            let link4_mass26 = link4_sin0 * link5_mass21;
+            let link4_mass27 = link4_mass25 - link4_mass26;
+            let link4_mass28 = link4_sin0 * link5_mass1;
+            let link4_mass29 = link4_cos0 * link5_mass21;
+            let link4_mass30 = link4_mass28 + link4_mass29;
+            let link4_mass31 = link4_mass30 + link4_mass30;
+            let link4_mass32 = 0.25 * link4_mass31;
+            let link4_mass33 = link5_mass22 - link4_mass32;
+            let link4_mass34 = link4_mass30 - 0.75;
+            let link4_mass35 = link4_mass33 + 0.18334999999999999;
+            // link3: mass matrix by composite inertias
+            let link3_mass9 = link3_mass0 * link4_mass27;
+            let link3_mass10 = link3_mass1 * link4_mass34;
+            let link3_mass11 = link3_mass9 + link3_mass10;
+            let link3_mass12 = link4_mass35 - link3_mass11;
+            let link3_mass13 = link3_mass5 * link4_mass27;
+            let link3_mass14 = link3_mass8 * link4_mass34;
+            let link3_mass15 = link3_mass13 + link3_mass14;
+            let link3_mass16 = link4_mass35 - link3_mass15;
+            let link3_mass17 = link3_cos0 * link4_mass27;
+            let link3_mass18 = link3_sin0 * link4_mass34;
+            let link3_mass19 = link3_mass17 - link3_mass18;
+            let link3_mass20 = link3_sin0 * link4_mass27;
+            let link3_mass21 = link3_cos0 * link4_mass34;
+            let link3_mass22 = link3_mass20 + link3_mass21;
+            let link3_mass23 = link3_mass22 + link3_mass22;
+            let link3_mass24 = 0.25 * link3_mass23;
+            let link3_mass25 = link4_mass35 - link3_mass24;
+            let link3_mass26 = link3_mass22 - 0.85;
+            let link3_mass27 = link3_mass25 + 0.20834999999999998;
+            // link2: mass matrix by composite inertias
+            let link2_mass2 = link2_mass0 * link3_mass19;
+            let link2_mass3 = link2_mass1 * link3_mass26;
+            let link2_mass4 = link2_mass2 + link2_mass3;
+            let link2_mass5 = link3_mass27 - link2_mass4;
+            let link2_mass6 = link2_sin0 * link3_mass19;
+            let link2_mass7 = link2_cos0 * link3_mass26;
+            let link2_mass8 = link2_mass6 + link2_mass7;
+            let link2_mass9 = link2_mass8 + link2_mass8;
+            let link2_mass10 = 0.25 * link2_mass9;
+            let link2_mass11 = link3_mass27 - link2_mass10;
+            let link2_mass12 = link2_mass11 + 0.23334999999999997;
+            results[0][l] = link2_mass12;
+            results[1][l] = link2_mass5;
+            results[2][l] = link3_mass16;
+            results[3][l] = link4_mass24;
+            results[4][l] = link5_mass17;
+            results[5][l] = link6_mass25;
+            results[6][l] = link7_mass33;
+            results[7][l] = link8_mass41;
+            results[8][l] = link9_mass49;
+            results[9][l] = link10_mass55;
+            results[10][l] = link2_mass5;
+            results[11][l] = link3_mass27;
+            results[12][l] = link3_mass12;
+            results[13][l] = link4_mass21;
+            results[14][l] = link5_mass13;
+            results[15][l] = link6_mass21;
+            results[16][l] = link7_mass29;
+            results[17][l] = link8_mass37;
+            results[18][l] = link9_mass45;
+            results[19][l] = link10_mass51;
+            results[20][l] = link3_mass16;
+            results[21][l] = link3_mass12;
+            results[22][l] = link4_mass35;
+            results[23][l] = link4_mass18;
+            results[24][l] = link5_mass9;
+            results[25][l] = link6_mass17;
+            results[26][l] = link7_mass25;
+            results[27][l] = link8_mass33;
+            results[28][l] = link9_mass41;
+            results[29][l] = link10_mass47;
+            results[30][l] = link4_mass24;
+            results[31][l] = link4_mass21;
+            results[32][l] = link4_mass18;
+            results[33][l] = link5_mass22;
+            results[34][l] = link5_mass5;
+            results[35][l] = link6_mass13;
+            results[36][l] = link7_mass21;
+            results[37][l] = link8_mass29;
+            results[38][l] = link9_mass37;
+            results[39][l] = link10_mass43;
+            results[40][l] = link5_mass17;
+            results[41][l] = link5_mass13;
+            results[42][l] = link5_mass9;
+            results[43][l] = link5_mass5;
+            results[44][l] = link6_mass30;
+            results[45][l] = link6_mass5;
+            results[46][l] = link7_mass13;
+            results[47][l] = link8_mass21;
+            results[48][l] = link9_mass29;
+            results[49][l] = link10_mass35;
+            results[50][l] = link6_mass25;
+            results[51][l] = link6_mass21;
+            results[52][l] = link6_mass17;
+            results[53][l] = link6_mass13;
+            results[54][l] = link6_mass5;
+            results[55][l] = link7_mass38;
+            results[56][l] = link7_mass5;
+            results[57][l] = link8_mass13;
+            results[58][l] = link9_mass21;
+            results[59][l] = link10_mass27;
+            results[60][l] = link7_mass33;
+            results[61][l] = link7_mass29;
+            results[62][l] = link7_mass25;
+            results[63][l] = link7_mass21;
+            results[64][l] = link7_mass13;
+            results[65][l] = link7_mass5;
+            results[66][l] = link8_mass46;
+            results[67][l] = link8_mass5;
+            results[68][l] = link9_mass13;
+            results[69][l] = link10_mass19;
+            results[70][l] = link8_mass41;
+            results[71][l] = link8_mass37;
+            results[72][l] = link8_mass33;
+            results[73][l] = link8_mass29;
+            results[74][l] = link8_mass21;
+            results[75][l] = link8_mass13;
+            results[76][l] = link8_mass5;
+            results[77][l] = link9_mass54;
+            results[78][l] = link9_mass5;
+            results[79][l] = link10_mass11;
+            results[80][l] = link9_mass49;
+            results[81][l] = link9_mass45;
+            results[82][l] = link9_mass41;
+            results[83][l] = link9_mass37;
+            results[84][l] = link9_mass29;
+            results[85][l] = link9_mass21;
+            results[86][l] = link9_mass13;
+            results[87][l] = link9_mass5;
+            results[88][l] = link10_mass60;
+            results[89][l] = link10_mass3;
+            results[90][l] = link10_mass55;
+            results[91][l] = link10_mass51;
+            results[92][l] = link10_mass47;
+            results[93][l] = link10_mass43;
+            results[94][l] = link10_mass35;
+            results[95][l] = link10_mass27;
+            results[96][l] = link10_mass19;
+            results[97][l] = link10_mass11;
+            results[98][l] = link10_mass3;
+            results[99][l] = 0.00835;
+        }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
+        m.give(16, &results[16]);
+        m.give(17, &results[17]);
+        m.give(18, &results[18]);
+        m.give(19, &results[19]);
+        m.give(20, &results[20]);
+        m.give(21, &results[21]);
+        m.give(22, &results[22]);
+        m.give(23, &results[23]);
+        m.give(24, &results[24]);
+        m.give(25, &results[25]);
+        m.give(26, &results[26]);
+        m.give(27, &results[27]);
+        m.give(28, &results[28]);
+        m.give(29, &results[29]);
+        m.give(30, &results[30]);
+        m.give(31, &results[31]);
+        m.give(32, &results[32]);
+        m.give(33, &results[33]);
+        m.give(34, &results[34]);
+        m.give(35, &results[35]);
+        m.give(36, &results[36]);
+        m.give(37, &results[37]);
+        m.give(38, &results[38]);
+        m.give(39, &results[39]);
+        m.give(40, &results[40]);
+        m.give(41, &results[41]);
+        m.give(42, &results[42]);
+        m.give(43, &results[43]);
+        m.give(44, &results[44]);
+        m.give(45, &results[45]);
+        m.give(46, &results[46]);
+        m.give(47, &results[47]);
+        m.give(48, &results[48]);
+        m.give(49, &results[49]);
+        m.give(50, &results[50]);
+        m.give(51, &results[51]);
+        m.give(52, &results[52]);
+        m.give(53, &results[53]);
+        m.give(54, &results[54]);
+        m.give(55, &results[55]);
+        m.give(56, &results[56]);
+        m.give(57, &results[57]);
+        m.give(58, &results[58]);
+        m.give(59, &results[59]);
+        m.give(60, &results[60]);
+        m.give(61, &results[61]);
+        m.give(62, &results[62]);
+        m.give(63, &results[63]);
+        m.give(64, &results[64]);
+        m.give(65, &results[65]);
+        m.give(66, &results[66]);
+        m.give(67, &results[67]);
+        m.give(68, &results[68]);
+        m.give(69, &results[69]);
+        m.give(70, &results[70]);
+        m.give(71, &results[71]);
+        m.give(72, &results[72]);
+        m.give(73, &results[73]);
+        m.give(74, &results[74]);
+        m.give(75, &results[75]);
+        m.give(76, &results[76]);
+        m.give(77, &results[77]);
+        m.give(78, &results[78]);
+        m.give(79, &results[79]);
+        m.give(80, &results[80]);
+        m.give(81, &results[81]);
+        m.give(82, &results[82]);
+        m.give(83, &results[83]);
+        m.give(84, &results[84]);
+        m.give(85, &results[85]);
+        m.give(86, &results[86]);
+        m.give(87, &results[87]);
+        m.give(88, &results[88]);
+        m.give(89, &results[89]);
+        m.give(90, &results[90]);
+        m.give(91, &results[91]);
+        m.give(92, &results[92]);
+        m.give(93, &results[93]);
+        m.give(94, &results[94]);
+        m.give(95, &results[95]);
+        m.give(96, &results[96]);
+        m.give(97, &results[97]);
+        m.give(98, &results[98]);
+        m.give(99, &results[99]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
     /// 257 operations: 114 additions, 143 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 10], v: &[f64; 10], a: &[f64; 10], tau: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        let a_0 = a[0];
-        let a_1 = a[1];
-        let a_2 = a[2];
-        let a_3 = a[3];
-        let a_4 = a[4];
-        let a_5 = a[5];
-        let a_6 = a[6];
-        let a_7 = a[7];
-        let a_8 = a[8];
-        let a_9 = a[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link1: velocity and joint rate (4.40)
-        let link1_vel0 = 9.81 * link1_cos0;
-        let link1_vel1 = 9.81 * link1_sin0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = 0.25 * a_0;
-        let link2_vel2 = link1_vel1 + link2_vel1;
-        let link2_vel3 = 0.25 * link2_vel0;
-        let link2_vel4 = link1_vel0 + link2_vel3;
-        let link2_vel5 = link2_cos0 * link2_vel4;
-        let link2_vel6 = link2_sin0 * link2_vel2;
-        let link2_vel7 = link2_vel5 - link2_vel6;
-        let link2_vel8 = link2_cos0 * link2_vel2;
-        let link2_vel9 = link2_sin0 * link2_vel4;
-        let link2_vel10 = link2_vel8 + link2_vel9;
-        let link2_vel11 = v_0 + v_1;
-        // link2: acceleration
-        let link2_acc0 = a_0 + a_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel11 * link2_vel11;
-        let link3_vel1 = 0.25 * link2_acc0;
-        let link3_vel2 = link2_vel10 + link3_vel1;
-        let link3_vel3 = 0.25 * link3_vel0;
-        let link3_vel4 = link2_vel7 + link3_vel3;
-        let link3_vel5 = link3_cos0 * link3_vel4;
-        let link3_vel6 = link3_sin0 * link3_vel2;
-        let link3_vel7 = link3_vel5 - link3_vel6;
-        let link3_vel8 = link3_cos0 * link3_vel2;
-        let link3_vel9 = link3_sin0 * link3_vel4;
-        let link3_vel10 = link3_vel8 + link3_vel9;
-        let link3_vel11 = v_2 + link2_vel11;
-        // link3: acceleration
-        let link3_acc0 = a_2 + link2_acc0;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel11 * link3_vel11;
-        let link4_vel1 = 0.25 * link3_acc0;
-        let link4_vel2 = link3_vel10 + link4_vel1;
-        let link4_vel3 = 0.25 * link4_vel0;
-        let link4_vel4 = link3_vel7 + link4_vel3;
-        let link4_vel5 = link4_cos0 * link4_vel4;
-        let link4_vel6 = link4_sin0 * link4_vel2;
-        let link4_vel7 = link4_vel5 - link4_vel6;
-        let link4_vel8 = link4_cos0 * link4_vel2;
-        let link4_vel9 = link4_sin0 * link4_vel4;
-        let link4_vel10 = link4_vel8 + link4_vel9;
-        let link4_vel11 = v_3 + link3_vel11;
-        // link4: acceleration
-        let link4_acc0 = a_3 + link3_acc0;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel11 * link4_vel11;
-        let link5_vel1 = 0.25 * link4_acc0;
-        let link5_vel2 = link4_vel10 + link5_vel1;
-        let link5_vel3 = 0.25 * link5_vel0;
-        let link5_vel4 = link4_vel7 + link5_vel3;
-        let link5_vel5 = link5_cos0 * link5_vel4;
-        let link5_vel6 = link5_sin0 * link5_vel2;
-        let link5_vel7 = link5_vel5 - link5_vel6;
-        let link5_vel8 = link5_cos0 * link5_vel2;
-        let link5_vel9 = link5_sin0 * link5_vel4;
-        let link5_vel10 = link5_vel8 + link5_vel9;
-        let link5_vel11 = v_4 + link4_vel11;
-        // link5: acceleration
-        let link5_acc0 = a_4 + link4_acc0;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel11 * link5_vel11;
-        let link6_vel1 = 0.25 * link5_acc0;
-        let link6_vel2 = link5_vel10 + link6_vel1;
-        let link6_vel3 = 0.25 * link6_vel0;
-        let link6_vel4 = link5_vel7 + link6_vel3;
-        let link6_vel5 = link6_cos0 * link6_vel4;
-        let link6_vel6 = link6_sin0 * link6_vel2;
-        let link6_vel7 = link6_vel5 - link6_vel6;
-        let link6_vel8 = link6_cos0 * link6_vel2;
-        let link6_vel9 = link6_sin0 * link6_vel4;
-        let link6_vel10 = link6_vel8 + link6_vel9;
-        let link6_vel11 = v_5 + link5_vel11;
-        // link6: acceleration
-        let link6_acc0 = a_5 + link5_acc0;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel11 * link6_vel11;
-        let link7_vel1 = 0.25 * link6_acc0;
-        let link7_vel2 = link6_vel10 + link7_vel1;
-        let link7_vel3 = 0.25 * link7_vel0;
-        let link7_vel4 = link6_vel7 + link7_vel3;
-        let link7_vel5 = link7_cos0 * link7_vel4;
-        let link7_vel6 = link7_sin0 * link7_vel2;
-        let link7_vel7 = link7_vel5 - link7_vel6;
-        let link7_vel8 = link7_cos0 * link7_vel2;
-        let link7_vel9 = link7_sin0 * link7_vel4;
-        let link7_vel10 = link7_vel8 + link7_vel9;
-        let link7_vel11 = v_6 + link6_vel11;
-        // link7: acceleration
-        let link7_acc0 = a_6 + link6_acc0;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel11 * link7_vel11;
-        let link8_vel1 = 0.25 * link7_acc0;
-        let link8_vel2 = link7_vel10 + link8_vel1;
-        let link8_vel3 = 0.25 * link8_vel0;
-        let link8_vel4 = link7_vel7 + link8_vel3;
-        let link8_vel5 = link8_cos0 * link8_vel4;
-        let link8_vel6 = link8_sin0 * link8_vel2;
-        let link8_vel7 = link8_vel5 - link8_vel6;
-        let link8_vel8 = link8_cos0 * link8_vel2;
-        let link8_vel9 = link8_sin0 * link8_vel4;
-        let link8_vel10 = link8_vel8 + link8_vel9;
-        let link8_vel11 = v_7 + link7_vel11;
-        // link8: acceleration
-        let link8_acc0 = a_7 + link7_acc0;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel11 * link8_vel11;
-        let link9_vel1 = 0.25 * link8_acc0;
-        let link9_vel2 = link8_vel10 + link9_vel1;
-        let link9_vel3 = 0.25 * link9_vel0;
-        let link9_vel4 = link8_vel7 + link9_vel3;
-        let link9_vel5 = link9_cos0 * link9_vel4;
-        let link9_vel6 = link9_sin0 * link9_vel2;
-        let link9_vel7 = link9_vel5 - link9_vel6;
-        let link9_vel8 = link9_cos0 * link9_vel2;
-        let link9_vel9 = link9_sin0 * link9_vel4;
-        let link9_vel10 = link9_vel8 + link9_vel9;
-        let link9_vel11 = v_8 + link8_vel11;
-        // link9: acceleration
-        let link9_acc0 = a_8 + link8_acc0;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel11 * link9_vel11;
-        let link10_vel1 = 0.25 * link9_acc0;
-        let link10_vel2 = link9_vel10 + link10_vel1;
-        let link10_vel3 = 0.25 * link10_vel0;
-        let link10_vel4 = link9_vel7 + link10_vel3;
-        let link10_vel5 = link10_cos0 * link10_vel2;
-        let link10_vel6 = link10_sin0 * link10_vel4;
-        let link10_vel7 = link10_vel5 + link10_vel6;
-        let link10_vel8 = v_9 + link9_vel11;
-        // link10: acceleration
-        let link10_acc0 = a_9 + link9_acc0;
-        // link1: gravity and wrenches
-        let link1_load0 = 0.23334999999999997 * a_0;
-        let link1_load1 = 0.95 * link1_vel1;
-        let link1_load2 = link1_load0 + link1_load1;
-        // link2: gravity and wrenches
-        let link2_load0 = 0.85 * link3_vel0;
-        let link2_load1 = 0.85 * link2_acc0;
-        let link2_load2 = 0.20834999999999998 * link2_acc0;
-        let link2_load3 = 0.85 * link2_vel10;
-        let link2_load4 = link2_load2 + link2_load3;
-        // link3: gravity and wrenches
-        let link3_load0 = 0.75 * link4_vel0;
-        let link3_load1 = 0.75 * link3_acc0;
-        let link3_load2 = 0.18334999999999999 * link3_acc0;
-        let link3_load3 = 0.75 * link3_vel10;
-        let link3_load4 = link3_load2 + link3_load3;
-        // link4: gravity and wrenches
-        let link4_load0 = 0.65 * link5_vel0;
-        let link4_load1 = 0.65 * link4_acc0;
-        let link4_load2 = 0.15835 * link4_acc0;
-        let link4_load3 = 0.65 * link4_vel10;
-        let link4_load4 = link4_load2 + link4_load3;
-        // link5: gravity and wrenches
-        let link5_load0 = 0.55 * link6_vel0;
-        let link5_load1 = 0.55 * link5_acc0;
-        let link5_load2 = 0.13335 * link5_acc0;
-        let link5_load3 = 0.55 * link5_vel10;
-        let link5_load4 = link5_load2 + link5_load3;
-        // link6: gravity and wrenches
-        let link6_load0 = 0.45 * link7_vel0;
-        let link6_load1 = 0.45 * link6_acc0;
-        let link6_load2 = 0.10835 * link6_acc0;
-        let link6_load3 = 0.45 * link6_vel10;
-        let link6_load4 = link6_load2 + link6_load3;
-        // link7: gravity and wrenches
-        let link7_load0 = 0.35000000000000003 * link8_vel0;
-        let link7_load1 = 0.35000000000000003 * link7_acc0;
-        let link7_load2 = 0.08335000000000001 * link7_acc0;
-        let link7_load3 = 0.35000000000000003 * link7_vel10;
-        let link7_load4 = link7_load2 + link7_load3;
-        // link8: gravity and wrenches
-        let link8_load0 = 0.05835 * link8_acc0;
-        let link8_load1 = 0.25 * link8_vel10;
-        let link8_load2 = link8_load0 + link8_load1;
-        // link9: gravity and wrenches
-        let link9_load0 = 0.15000000000000002 * link10_vel0;
-        let link9_load1 = 0.15000000000000002 * link9_acc0;
-        let link9_load2 = 0.033350000000000005 * link9_acc0;
-        let link9_load3 = 0.15000000000000002 * link9_vel10;
-        let link9_load4 = link9_load2 + link9_load3;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel8 * link10_vel8;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_acc0;
-        let link10_load3 = 0.00835 * link10_acc0;
-        let link10_load4 = 0.05 * link10_vel7;
-        let link10_load5 = link10_load3 + link10_load4;
-        let link10_load6 = link10_cos0 * link10_load1;
-        let link10_load7 = link10_sin0 * link10_load2;
-        let link10_load8 = link10_load6 + link10_load7;
-        let link10_load9 = link10_sin0 * link10_load1;
-        let link10_load10 = link10_cos0 * link10_load2;
-        let link10_load11 = link10_load9 - link10_load10;
-        let link10_load12 = 0.25 * link10_load11;
-        let link10_load13 = link10_load5 - link10_load12;
-        let link10_load14 = link9_load0 + link10_load8;
-        let link10_load15 = link9_load1 - link10_load11;
-        let link10_load16 = link9_load4 + link10_load13;
-        // link9: gravity and wrenches
-        let link9_load5 = link9_cos0 * link10_load14;
-        let link9_load6 = link9_sin0 * link10_load15;
-        let link9_load7 = link9_load5 + link9_load6;
-        let link9_load8 = link9_sin0 * link10_load14;
-        let link9_load9 = link9_cos0 * link10_load15;
-        let link9_load10 = link9_load8 - link9_load9;
-        let link9_load11 = 0.25 * link9_load10;
-        let link9_load12 = link10_load16 - link9_load11;
-        let link9_load13 = link9_vel3 + link9_load7;
-        let link9_load14 = link9_vel1 - link9_load10;
-        let link9_load15 = link8_load2 + link9_load12;
-        // link8: gravity and wrenches
-        let link8_load3 = link8_cos0 * link9_load13;
-        let link8_load4 = link8_sin0 * link9_load14;
-        let link8_load5 = link8_load3 + link8_load4;
-        let link8_load6 = link8_sin0 * link9_load13;
-        let link8_load7 = link8_cos0 * link9_load14;
-        let link8_load8 = link8_load6 - link8_load7;
-        let link8_load9 = 0.25 * link8_load8;
-        let link8_load10 = link9_load15 - link8_load9;
-        let link8_load11 = link7_load0 + link8_load5;
-        let link8_load12 = link7_load1 - link8_load8;
-        let link8_load13 = link7_load4 + link8_load10;
-        // link7: gravity and wrenches
-        let link7_load5 = link7_cos0 * link8_load11;
-        let link7_load6 = link7_sin0 * link8_load12;
-        let link7_load7 = link7_load5 + link7_load6;
-        let link7_load8 = link7_sin0 * link8_load11;
-        let link7_load9 = link7_cos0 * link8_load12;
-        let link7_load10 = link7_load8 - link7_load9;
-        let link7_load11 = 0.25 * link7_load10;
-        let link7_load12 = link8_load13 - link7_load11;
-        let link7_load13 = link6_load0 + link7_load7;
-        let link7_load14 = link6_load1 - link7_load10;
-        let link7_load15 = link6_load4 + link7_load12;
-        // link6: gravity and wrenches
-        let link6_load5 = link6_cos0 * link7_load13;
-        let link6_load6 = link6_sin0 * link7_load14;
-        let link6_load7 = link6_load5 + link6_load6;
-        let link6_load8 = link6_sin0 * link7_load13;
-        let link6_load9 = link6_cos0 * link7_load14;
-        let link6_load10 = link6_load8 - link6_load9;
-        let link6_load11 = 0.25 * link6_load10;
-        let link6_load12 = link7_load15 - link6_load11;
-        let link6_load13 = link5_load0 + link6_load7;
-        let link6_load14 = link5_load1 - link6_load10;
-        let link6_load15 = link5_load4 + link6_load12;
-        // link5: gravity and wrenches
-        let link5_load5 = link5_cos0 * link6_load13;
-        let link5_load6 = link5_sin0 * link6_load14;
-        let link5_load7 = link5_load5 + link5_load6;
-        let link5_load8 = link5_sin0 * link6_load13;
-        let link5_load9 = link5_cos0 * link6_load14;
-        let link5_load10 = link5_load8 - link5_load9;
-        let link5_load11 = 0.25 * link5_load10;
-        let link5_load12 = link6_load15 - link5_load11;
-        let link5_load13 = link4_load0 + link5_load7;
-        let link5_load14 = link4_load1 - link5_load10;
-        let link5_load15 = link4_load4 + link5_load12;
-        // link4: gravity and wrenches
-        let link4_load5 = link4_cos0 * link5_load13;
-        let link4_load6 = link4_sin0 * link5_load14;
-        let link4_load7 = link4_load5 + link4_load6;
-        let link4_load8 = link4_sin0 * link5_load13;
-        let link4_load9 = link4_cos0 * link5_load14;
-        let link4_load10 = link4_load8 - link4_load9;
-        let link4_load11 = 0.25 * link4_load10;
-        let link4_load12 = link5_load15 - link4_load11;
-        let link4_load13 = link3_load0 + link4_load7;
-        let link4_load14 = link3_load1 - link4_load10;
-        let link4_load15 = link3_load4 + link4_load12;
-        // link3: gravity and wrenches
-        let link3_load5 = link3_cos0 * link4_load13;
-        let link3_load6 = link3_sin0 * link4_load14;
-        let link3_load7 = link3_load5 + link3_load6;
-        let link3_load8 = link3_sin0 * link4_load13;
-        let link3_load9 = link3_cos0 * link4_load14;
-        let link3_load10 = link3_load8 - link3_load9;
-        let link3_load11 = 0.25 * link3_load10;
-        let link3_load12 = link4_load15 - link3_load11;
-        let link3_load13 = link2_load0 + link3_load7;
-        let link3_load14 = link2_load1 - link3_load10;
-        let link3_load15 = link2_load4 + link3_load12;
-        // link2: gravity and wrenches
-        let link2_load5 = link2_sin0 * link3_load13;
-        let link2_load6 = link2_cos0 * link3_load14;
-        let link2_load7 = link2_load5 - link2_load6;
-        let link2_load8 = 0.25 * link2_load7;
-        let link2_load9 = link3_load15 - link2_load8;
-        let link2_load10 = link1_load2 + link2_load9;
-        tau[0] = link2_load10;
-        tau[1] = link3_load15;
-        tau[2] = link4_load15;
-        tau[3] = link5_load15;
-        tau[4] = link6_load15;
-        tau[5] = link7_load15;
-        tau[6] = link8_load13;
-        tau[7] = link9_load15;
-        tau[8] = link10_load16;
-        tau[9] = link10_load5;
+        Self::inverse_dynamics_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, a, tau);
+    }
+
+    #[inline(always)]
+    fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+            angles[2][l] = q_2;
+            angles[3][l] = q_3;
+            angles[4][l] = q_4;
+            angles[5][l] = q_5;
+            angles[6][l] = q_6;
+            angles[7][l] = q_7;
+            angles[8][l] = q_8;
+            angles[9][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            let a_0 = a.get(0, l);
+            let a_1 = a.get(1, l);
+            let a_2 = a.get(2, l);
+            let a_3 = a.get(3, l);
+            let a_4 = a.get(4, l);
+            let a_5 = a.get(5, l);
+            let a_6 = a.get(6, l);
+            let a_7 = a.get(7, l);
+            let a_8 = a.get(8, l);
+            let a_9 = a.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link1: velocity and joint rate (4.40)
+            let link1_vel0 = 9.81 * link1_cos0;
+            let link1_vel1 = 9.81 * link1_sin0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = 0.25 * a_0;
+            let link2_vel2 = link1_vel1 + link2_vel1;
+            let link2_vel3 = 0.25 * link2_vel0;
+            let link2_vel4 = link1_vel0 + link2_vel3;
+            let link2_vel5 = link2_cos0 * link2_vel4;
+            let link2_vel6 = link2_sin0 * link2_vel2;
+            let link2_vel7 = link2_vel5 - link2_vel6;
+            let link2_vel8 = link2_cos0 * link2_vel2;
+            let link2_vel9 = link2_sin0 * link2_vel4;
+            let link2_vel10 = link2_vel8 + link2_vel9;
+            let link2_vel11 = v_0 + v_1;
+            // link2: acceleration
+            let link2_acc0 = a_0 + a_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel11 * link2_vel11;
+            let link3_vel1 = 0.25 * link2_acc0;
+            let link3_vel2 = link2_vel10 + link3_vel1;
+            let link3_vel3 = 0.25 * link3_vel0;
+            let link3_vel4 = link2_vel7 + link3_vel3;
+            let link3_vel5 = link3_cos0 * link3_vel4;
+            let link3_vel6 = link3_sin0 * link3_vel2;
+            let link3_vel7 = link3_vel5 - link3_vel6;
+            let link3_vel8 = link3_cos0 * link3_vel2;
+            let link3_vel9 = link3_sin0 * link3_vel4;
+            let link3_vel10 = link3_vel8 + link3_vel9;
+            let link3_vel11 = v_2 + link2_vel11;
+            // link3: acceleration
+            let link3_acc0 = a_2 + link2_acc0;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel11 * link3_vel11;
+            let link4_vel1 = 0.25 * link3_acc0;
+            let link4_vel2 = link3_vel10 + link4_vel1;
+            let link4_vel3 = 0.25 * link4_vel0;
+            let link4_vel4 = link3_vel7 + link4_vel3;
+            let link4_vel5 = link4_cos0 * link4_vel4;
+            let link4_vel6 = link4_sin0 * link4_vel2;
+            let link4_vel7 = link4_vel5 - link4_vel6;
+            let link4_vel8 = link4_cos0 * link4_vel2;
+            let link4_vel9 = link4_sin0 * link4_vel4;
+            let link4_vel10 = link4_vel8 + link4_vel9;
+            let link4_vel11 = v_3 + link3_vel11;
+            // link4: acceleration
+            let link4_acc0 = a_3 + link3_acc0;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel11 * link4_vel11;
+            let link5_vel1 = 0.25 * link4_acc0;
+            let link5_vel2 = link4_vel10 + link5_vel1;
+            let link5_vel3 = 0.25 * link5_vel0;
+            let link5_vel4 = link4_vel7 + link5_vel3;
+            let link5_vel5 = link5_cos0 * link5_vel4;
+            let link5_vel6 = link5_sin0 * link5_vel2;
+            let link5_vel7 = link5_vel5 - link5_vel6;
+            let link5_vel8 = link5_cos0 * link5_vel2;
+            let link5_vel9 = link5_sin0 * link5_vel4;
+            let link5_vel10 = link5_vel8 + link5_vel9;
+            let link5_vel11 = v_4 + link4_vel11;
+            // link5: acceleration
+            let link5_acc0 = a_4 + link4_acc0;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel11 * link5_vel11;
+            let link6_vel1 = 0.25 * link5_acc0;
+            let link6_vel2 = link5_vel10 + link6_vel1;
+            let link6_vel3 = 0.25 * link6_vel0;
+            let link6_vel4 = link5_vel7 + link6_vel3;
+            let link6_vel5 = link6_cos0 * link6_vel4;
+            let link6_vel6 = link6_sin0 * link6_vel2;
+            let link6_vel7 = link6_vel5 - link6_vel6;
+            let link6_vel8 = link6_cos0 * link6_vel2;
+            let link6_vel9 = link6_sin0 * link6_vel4;
+            let link6_vel10 = link6_vel8 + link6_vel9;
+            let link6_vel11 = v_5 + link5_vel11;
+            // link6: acceleration
+            let link6_acc0 = a_5 + link5_acc0;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel11 * link6_vel11;
+            let link7_vel1 = 0.25 * link6_acc0;
+            let link7_vel2 = link6_vel10 + link7_vel1;
+            let link7_vel3 = 0.25 * link7_vel0;
+            let link7_vel4 = link6_vel7 + link7_vel3;
+            let link7_vel5 = link7_cos0 * link7_vel4;
+            let link7_vel6 = link7_sin0 * link7_vel2;
+            let link7_vel7 = link7_vel5 - link7_vel6;
+            let link7_vel8 = link7_cos0 * link7_vel2;
+            let link7_vel9 = link7_sin0 * link7_vel4;
+            let link7_vel10 = link7_vel8 + link7_vel9;
+            let link7_vel11 = v_6 + link6_vel11;
+            // link7: acceleration
+            let link7_acc0 = a_6 + link6_acc0;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel11 * link7_vel11;
+            let link8_vel1 = 0.25 * link7_acc0;
+            let link8_vel2 = link7_vel10 + link8_vel1;
+            let link8_vel3 = 0.25 * link8_vel0;
+            let link8_vel4 = link7_vel7 + link8_vel3;
+            let link8_vel5 = link8_cos0 * link8_vel4;
+            let link8_vel6 = link8_sin0 * link8_vel2;
+            let link8_vel7 = link8_vel5 - link8_vel6;
+            let link8_vel8 = link8_cos0 * link8_vel2;
+            let link8_vel9 = link8_sin0 * link8_vel4;
+            let link8_vel10 = link8_vel8 + link8_vel9;
+            let link8_vel11 = v_7 + link7_vel11;
+            // link8: acceleration
+            let link8_acc0 = a_7 + link7_acc0;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel11 * link8_vel11;
+            let link9_vel1 = 0.25 * link8_acc0;
+            let link9_vel2 = link8_vel10 + link9_vel1;
+            let link9_vel3 = 0.25 * link9_vel0;
+            let link9_vel4 = link8_vel7 + link9_vel3;
+            let link9_vel5 = link9_cos0 * link9_vel4;
+            let link9_vel6 = link9_sin0 * link9_vel2;
+            let link9_vel7 = link9_vel5 - link9_vel6;
+            let link9_vel8 = link9_cos0 * link9_vel2;
+            let link9_vel9 = link9_sin0 * link9_vel4;
+            let link9_vel10 = link9_vel8 + link9_vel9;
+            let link9_vel11 = v_8 + link8_vel11;
+            // link9: acceleration
+            let link9_acc0 = a_8 + link8_acc0;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel11 * link9_vel11;
+            let link10_vel1 = 0.25 * link9_acc0;
+            let link10_vel2 = link9_vel10 + link10_vel1;
+            let link10_vel3 = 0.25 * link10_vel0;
+            let link10_vel4 = link9_vel7 + link10_vel3;
+            let link10_vel5 = link10_cos0 * link10_vel2;
+            let link10_vel6 = link10_sin0 * link10_vel4;
+            let link10_vel7 = link10_vel5 + link10_vel6;
+            let link10_vel8 = v_9 + link9_vel11;
+            // link10: acceleration
+            let link10_acc0 = a_9 + link9_acc0;
+            // link1: gravity and wrenches
+            let link1_load0 = 0.23334999999999997 * a_0;
+            let link1_load1 = 0.95 * link1_vel1;
+            let link1_load2 = link1_load0 + link1_load1;
+            // link2: gravity and wrenches
+            let link2_load0 = 0.85 * link3_vel0;
+            let link2_load1 = 0.85 * link2_acc0;
+            let link2_load2 = 0.20834999999999998 * link2_acc0;
+            let link2_load3 = 0.85 * link2_vel10;
+            let link2_load4 = link2_load2 + link2_load3;
+            // link3: gravity and wrenches
+            let link3_load0 = 0.75 * link4_vel0;
+            let link3_load1 = 0.75 * link3_acc0;
+            let link3_load2 = 0.18334999999999999 * link3_acc0;
+            let link3_load3 = 0.75 * link3_vel10;
+            let link3_load4 = link3_load2 + link3_load3;
+            // link4: gravity and wrenches
+            let link4_load0 = 0.65 * link5_vel0;
+            let link4_load1 = 0.65 * link4_acc0;
+            let link4_load2 = 0.15835 * link4_acc0;
+            let link4_load3 = 0.65 * link4_vel10;
+            let link4_load4 = link4_load2 + link4_load3;
+            // link5: gravity and wrenches
+            let link5_load0 = 0.55 * link6_vel0;
+            let link5_load1 = 0.55 * link5_acc0;
+            let link5_load2 = 0.13335 * link5_acc0;
+            let link5_load3 = 0.55 * link5_vel10;
+            let link5_load4 = link5_load2 + link5_load3;
+            // link6: gravity and wrenches
+            let link6_load0 = 0.45 * link7_vel0;
+            let link6_load1 = 0.45 * link6_acc0;
+            let link6_load2 = 0.10835 * link6_acc0;
+            let link6_load3 = 0.45 * link6_vel10;
+            let link6_load4 = link6_load2 + link6_load3;
+            // link7: gravity and wrenches
+            let link7_load0 = 0.35000000000000003 * link8_vel0;
+            let link7_load1 = 0.35000000000000003 * link7_acc0;
+            let link7_load2 = 0.08335000000000001 * link7_acc0;
+            let link7_load3 = 0.35000000000000003 * link7_vel10;
+            let link7_load4 = link7_load2 + link7_load3;
+            // link8: gravity and wrenches
+            let link8_load0 = 0.05835 * link8_acc0;
+            let link8_load1 = 0.25 * link8_vel10;
+            let link8_load2 = link8_load0 + link8_load1;
+            // link9: gravity and wrenches
+            let link9_load0 = 0.15000000000000002 * link10_vel0;
+            let link9_load1 = 0.15000000000000002 * link9_acc0;
+            let link9_load2 = 0.033350000000000005 * link9_acc0;
+            let link9_load3 = 0.15000000000000002 * link9_vel10;
+            let link9_load4 = link9_load2 + link9_load3;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel8 * link10_vel8;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_acc0;
+            let link10_load3 = 0.00835 * link10_acc0;
+            let link10_load4 = 0.05 * link10_vel7;
+            let link10_load5 = link10_load3 + link10_load4;
+            let link10_load6 = link10_cos0 * link10_load1;
+            let link10_load7 = link10_sin0 * link10_load2;
+            let link10_load8 = link10_load6 + link10_load7;
+            let link10_load9 = link10_sin0 * link10_load1;
+            let link10_load10 = link10_cos0 * link10_load2;
+            let link10_load11 = link10_load9 - link10_load10;
+            let link10_load12 = 0.25 * link10_load11;
+            let link10_load13 = link10_load5 - link10_load12;
+            let link10_load14 = link9_load0 + link10_load8;
+            let link10_load15 = link9_load1 - link10_load11;
+            let link10_load16 = link9_load4 + link10_load13;
+            // link9: gravity and wrenches
+            let link9_load5 = link9_cos0 * link10_load14;
+            let link9_load6 = link9_sin0 * link10_load15;
+            let link9_load7 = link9_load5 + link9_load6;
+            let link9_load8 = link9_sin0 * link10_load14;
+            let link9_load9 = link9_cos0 * link10_load15;
+            let link9_load10 = link9_load8 - link9_load9;
+            let link9_load11 = 0.25 * link9_load10;
+            let link9_load12 = link10_load16 - link9_load11;
+            let link9_load13 = link9_vel3 + link9_load7;
+            let link9_load14 = link9_vel1 - link9_load10;
+            let link9_load15 = link8_load2 + link9_load12;
+            // link8: gravity and wrenches
+            let link8_load3 = link8_cos0 * link9_load13;
+            let link8_load4 = link8_sin0 * link9_load14;
+            let link8_load5 = link8_load3 + link8_load4;
+            let link8_load6 = link8_sin0 * link9_load13;
+            let link8_load7 = link8_cos0 * link9_load14;
+            let link8_load8 = link8_load6 - link8_load7;
+            let link8_load9 = 0.25 * link8_load8;
+            let link8_load10 = link9_load15 - link8_load9;
+            let link8_load11 = link7_load0 + link8_load5;
+            let link8_load12 = link7_load1 - link8_load8;
+            let link8_load13 = link7_load4 + link8_load10;
+            // link7: gravity and wrenches
+            let link7_load5 = link7_cos0 * link8_load11;
+            let link7_load6 = link7_sin0 * link8_load12;
+            let link7_load7 = link7_load5 + link7_load6;
+            let link7_load8 = link7_sin0 * link8_load11;
+            let link7_load9 = link7_cos0 * link8_load12;
+            let link7_load10 = link7_load8 - link7_load9;
+            let link7_load11 = 0.25 * link7_load10;
+            let link7_load12 = link8_load13 - link7_load11;
+            let link7_load13 = link6_load0 + link7_load7;
+            let link7_load14 = link6_load1 - link7_load10;
+            let link7_load15 = link6_load4 + link7_load12;
+            // link6: gravity and wrenches
+            let link6_load5 = link6_cos0 * link7_load13;
+            let link6_load6 = link6_sin0 * link7_load14;
+            let link6_load7 = link6_load5 + link6_load6;
+            let link6_load8 = link6_sin0 * link7_load13;
+            let link6_load9 = link6_cos0 * link7_load14;
+            let link6_load10 = link6_load8 - link6_load9;
+            let link6_load11 = 0.25 * link6_load10;
+            let link6_load12 = link7_load15 - link6_load11;
+            let link6_load13 = link5_load0 + link6_load7;
+            let link6_load14 = link5_load1 - link6_load10;
+            let link6_load15 = link5_load4 + link6_load12;
+            // link5: gravity and wrenches
+            let link5_load5 = link5_cos0 * link6_load13;
+            let link5_load6 = link5_sin0 * link6_load14;
+            let link5_load7 = link5_load5 + link5_load6;
+            let link5_load8 = link5_sin0 * link6_load13;
+            let link5_load9 = link5_cos0 * link6_load14;
+            let link5_load10 = link5_load8 - link5_load9;
+            let link5_load11 = 0.25 * link5_load10;
+            let link5_load12 = link6_load15 - link5_load11;
+            let link5_load13 = link4_load0 + link5_load7;
+            let link5_load14 = link4_load1 - link5_load10;
+            let link5_load15 = link4_load4 + link5_load12;
+            // link4: gravity and wrenches
+            let link4_load5 = link4_cos0 * link5_load13;
+            let link4_load6 = link4_sin0 * link5_load14;
+            let link4_load7 = link4_load5 + link4_load6;
+            let link4_load8 = link4_sin0 * link5_load13;
+            let link4_load9 = link4_cos0 * link5_load14;
+            let link4_load10 = link4_load8 - link4_load9;
+            let link4_load11 = 0.25 * link4_load10;
+            let link4_load12 = link5_load15 - link4_load11;
+            let link4_load13 = link3_load0 + link4_load7;
+            let link4_load14 = link3_load1 - link4_load10;
+            let link4_load15 = link3_load4 + link4_load12;
+            // link3: gravity and wrenches
+            let link3_load5 = link3_cos0 * link4_load13;
+            let link3_load6 = link3_sin0 * link4_load14;
+            let link3_load7 = link3_load5 + link3_load6;
+            let link3_load8 = link3_sin0 * link4_load13;
+            let link3_load9 = link3_cos0 * link4_load14;
+            let link3_load10 = link3_load8 - link3_load9;
+            let link3_load11 = 0.25 * link3_load10;
+            let link3_load12 = link4_load15 - link3_load11;
+            let link3_load13 = link2_load0 + link3_load7;
+            let link3_load14 = link2_load1 - link3_load10;
+            let link3_load15 = link2_load4 + link3_load12;
+            // link2: gravity and wrenches
+            let link2_load5 = link2_sin0 * link3_load13;
+            let link2_load6 = link2_cos0 * link3_load14;
+            let link2_load7 = link2_load5 - link2_load6;
+            let link2_load8 = 0.25 * link2_load7;
+            let link2_load9 = link3_load15 - link2_load8;
+            let link2_load10 = link1_load2 + link2_load9;
+            results[0][l] = link2_load10;
+            results[1][l] = link3_load15;
+            results[2][l] = link4_load15;
+            results[3][l] = link5_load15;
+            results[4][l] = link6_load15;
+            results[5][l] = link7_load15;
+            results[6][l] = link8_load13;
+            results[7][l] = link9_load15;
+            results[8][l] = link10_load16;
+            results[9][l] = link10_load5;
+        }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
+        tau.give(4, &results[4]);
+        tau.give(5, &results[5]);
+        tau.give(6, &results[6]);
+        tau.give(7, &results[7]);
+        tau.give(8, &results[8]);
+        tau.give(9, &results[9]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
     /// 190 operations: 76 additions, 114 multiplications, 0 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 10], v: &[f64; 10], h: &mut [f64; 10]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let q_6 = q[6];
-        let q_7 = q[7];
-        let q_8 = q[8];
-        let q_9 = q[9];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        // link1: sine and cosine, rotation
-        let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // link2: sine and cosine, rotation
-        let (link2_sin0, link2_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // link3: sine and cosine, rotation
-        let (link3_sin0, link3_cos0) = ::multibody::runtime::trig::sincos_f64(q_2);
-        // link4: sine and cosine, rotation
-        let (link4_sin0, link4_cos0) = ::multibody::runtime::trig::sincos_f64(q_3);
-        // link5: sine and cosine, rotation
-        let (link5_sin0, link5_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // link6: sine and cosine, rotation
-        let (link6_sin0, link6_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // link7: sine and cosine, rotation
-        let (link7_sin0, link7_cos0) = ::multibody::runtime::trig::sincos_f64(q_6);
-        // link8: sine and cosine, rotation
-        let (link8_sin0, link8_cos0) = ::multibody::runtime::trig::sincos_f64(q_7);
-        // link9: sine and cosine, rotation
-        let (link9_sin0, link9_cos0) = ::multibody::runtime::trig::sincos_f64(q_8);
-        // link10: sine and cosine, rotation
-        let (link10_sin0, link10_cos0) = ::multibody::runtime::trig::sincos_f64(q_9);
-        // link1: velocity and joint rate (4.40)
-        let link1_vel0 = 9.81 * link1_cos0;
-        let link1_vel1 = 9.81 * link1_sin0;
-        // link2: velocity and joint rate (4.40)
-        let link2_vel0 = v_0 * v_0;
-        let link2_vel1 = 0.25 * link2_vel0;
-        let link2_vel2 = link1_vel0 + link2_vel1;
-        let link2_vel3 = link2_cos0 * link2_vel2;
-        let link2_vel4 = link2_sin0 * link1_vel1;
-        let link2_vel5 = link2_vel3 - link2_vel4;
-        let link2_vel6 = link2_cos0 * link1_vel1;
-        let link2_vel7 = link2_sin0 * link2_vel2;
-        let link2_vel8 = link2_vel6 + link2_vel7;
-        let link2_vel9 = v_0 + v_1;
-        // link3: velocity and joint rate (4.40)
-        let link3_vel0 = link2_vel9 * link2_vel9;
-        let link3_vel1 = 0.25 * link3_vel0;
-        let link3_vel2 = link2_vel5 + link3_vel1;
-        let link3_vel3 = link3_cos0 * link3_vel2;
-        let link3_vel4 = link3_sin0 * link2_vel8;
-        let link3_vel5 = link3_vel3 - link3_vel4;
-        let link3_vel6 = link3_cos0 * link2_vel8;
-        let link3_vel7 = link3_sin0 * link3_vel2;
-        let link3_vel8 = link3_vel6 + link3_vel7;
-        let link3_vel9 = v_2 + link2_vel9;
-        // link4: velocity and joint rate (4.40)
-        let link4_vel0 = link3_vel9 * link3_vel9;
-        let link4_vel1 = 0.25 * link4_vel0;
-        let link4_vel2 = link3_vel5 + link4_vel1;
-        let link4_vel3 = link4_cos0 * link4_vel2;
-        let link4_vel4 = link4_sin0 * link3_vel8;
-        let link4_vel5 = link4_vel3 - link4_vel4;
-        let link4_vel6 = link4_cos0 * link3_vel8;
-        let link4_vel7 = link4_sin0 * link4_vel2;
-        let link4_vel8 = link4_vel6 + link4_vel7;
-        let link4_vel9 = v_3 + link3_vel9;
-        // link5: velocity and joint rate (4.40)
-        let link5_vel0 = link4_vel9 * link4_vel9;
-        let link5_vel1 = 0.25 * link5_vel0;
-        let link5_vel2 = link4_vel5 + link5_vel1;
-        let link5_vel3 = link5_cos0 * link5_vel2;
-        let link5_vel4 = link5_sin0 * link4_vel8;
-        let link5_vel5 = link5_vel3 - link5_vel4;
-        let link5_vel6 = link5_cos0 * link4_vel8;
-        let link5_vel7 = link5_sin0 * link5_vel2;
-        let link5_vel8 = link5_vel6 + link5_vel7;
-        let link5_vel9 = v_4 + link4_vel9;
-        // link6: velocity and joint rate (4.40)
-        let link6_vel0 = link5_vel9 * link5_vel9;
-        let link6_vel1 = 0.25 * link6_vel0;
-        let link6_vel2 = link5_vel5 + link6_vel1;
-        let link6_vel3 = link6_cos0 * link6_vel2;
-        let link6_vel4 = link6_sin0 * link5_vel8;
-        let link6_vel5 = link6_vel3 - link6_vel4;
-        let link6_vel6 = link6_cos0 * link5_vel8;
-        let link6_vel7 = link6_sin0 * link6_vel2;
-        let link6_vel8 = link6_vel6 + link6_vel7;
-        let link6_vel9 = v_5 + link5_vel9;
-        // link7: velocity and joint rate (4.40)
-        let link7_vel0 = link6_vel9 * link6_vel9;
-        let link7_vel1 = 0.25 * link7_vel0;
-        let link7_vel2 = link6_vel5 + link7_vel1;
-        let link7_vel3 = link7_cos0 * link7_vel2;
-        let link7_vel4 = link7_sin0 * link6_vel8;
-        let link7_vel5 = link7_vel3 - link7_vel4;
-        let link7_vel6 = link7_cos0 * link6_vel8;
-        let link7_vel7 = link7_sin0 * link7_vel2;
-        let link7_vel8 = link7_vel6 + link7_vel7;
-        let link7_vel9 = v_6 + link6_vel9;
-        // link8: velocity and joint rate (4.40)
-        let link8_vel0 = link7_vel9 * link7_vel9;
-        let link8_vel1 = 0.25 * link8_vel0;
-        let link8_vel2 = link7_vel5 + link8_vel1;
-        let link8_vel3 = link8_cos0 * link8_vel2;
-        let link8_vel4 = link8_sin0 * link7_vel8;
-        let link8_vel5 = link8_vel3 - link8_vel4;
-        let link8_vel6 = link8_cos0 * link7_vel8;
-        let link8_vel7 = link8_sin0 * link8_vel2;
-        let link8_vel8 = link8_vel6 + link8_vel7;
-        let link8_vel9 = v_7 + link7_vel9;
-        // link9: velocity and joint rate (4.40)
-        let link9_vel0 = link8_vel9 * link8_vel9;
-        let link9_vel1 = 0.25 * link9_vel0;
-        let link9_vel2 = link8_vel5 + link9_vel1;
-        let link9_vel3 = link9_cos0 * link9_vel2;
-        let link9_vel4 = link9_sin0 * link8_vel8;
-        let link9_vel5 = link9_vel3 - link9_vel4;
-        let link9_vel6 = link9_cos0 * link8_vel8;
-        let link9_vel7 = link9_sin0 * link9_vel2;
-        let link9_vel8 = link9_vel6 + link9_vel7;
-        let link9_vel9 = v_8 + link8_vel9;
-        // link10: velocity and joint rate (4.40)
-        let link10_vel0 = link9_vel9 * link9_vel9;
-        let link10_vel1 = 0.25 * link10_vel0;
-        let link10_vel2 = link9_vel5 + link10_vel1;
-        let link10_vel3 = link10_cos0 * link9_vel8;
-        let link10_vel4 = link10_sin0 * link10_vel2;
-        let link10_vel5 = link10_vel3 + link10_vel4;
-        let link10_vel6 = v_9 + link9_vel9;
-        // link1: gravity and wrenches
-        let link1_load0 = 0.95 * link1_vel1;
-        // link2: gravity and wrenches
-        let link2_load0 = 0.85 * link3_vel0;
-        let link2_load1 = 0.85 * link2_vel8;
-        // link3: gravity and wrenches
-        let link3_load0 = 0.75 * link4_vel0;
-        let link3_load1 = 0.75 * link3_vel8;
-        // link4: gravity and wrenches
-        let link4_load0 = 0.65 * link5_vel0;
-        let link4_load1 = 0.65 * link4_vel8;
-        // link5: gravity and wrenches
-        let link5_load0 = 0.55 * link6_vel0;
-        let link5_load1 = 0.55 * link5_vel8;
-        // link6: gravity and wrenches
-        let link6_load0 = 0.45 * link7_vel0;
-        let link6_load1 = 0.45 * link6_vel8;
-        // link7: gravity and wrenches
-        let link7_load0 = 0.35000000000000003 * link8_vel0;
-        let link7_load1 = 0.35000000000000003 * link7_vel8;
-        // link8: gravity and wrenches
-        let link8_load0 = 0.25 * link8_vel8;
-        // link9: gravity and wrenches
-        let link9_load0 = 0.15000000000000002 * link10_vel0;
-        let link9_load1 = 0.15000000000000002 * link9_vel8;
-        // link10: gravity and wrenches
-        let link10_load0 = link10_vel6 * link10_vel6;
-        let link10_load1 = 0.05 * link10_load0;
-        let link10_load2 = 0.05 * link10_vel5;
-        let link10_load3 = link10_cos0 * link10_load1;
-        let link10_load4 = link10_sin0 * link10_load1;
-        let link10_load5 = 0.25 * link10_load4;
-        let link10_load6 = link10_load2 - link10_load5;
-        let link10_load7 = link9_load0 + link10_load3;
-        let link10_load8 = link9_load1 + link10_load6;
-        // link9: gravity and wrenches
-        let link9_load2 = link9_cos0 * link10_load7;
-        let link9_load3 = link9_sin0 * link10_load4;
-        let link9_load4 = link9_load2 - link9_load3;
-        let link9_load5 = link9_sin0 * link10_load7;
-        let link9_load6 = link9_cos0 * link10_load4;
-        let link9_load7 = link9_load5 + link9_load6;
-        let link9_load8 = 0.25 * link9_load7;
-        let link9_load9 = link10_load8 - link9_load8;
-        let link9_load10 = link9_vel1 + link9_load4;
-        let link9_load11 = link8_load0 + link9_load9;
-        // link8: gravity and wrenches
-        let link8_load1 = link8_cos0 * link9_load10;
-        let link8_load2 = link8_sin0 * link9_load7;
-        let link8_load3 = link8_load1 - link8_load2;
-        let link8_load4 = link8_sin0 * link9_load10;
-        let link8_load5 = link8_cos0 * link9_load7;
-        let link8_load6 = link8_load4 + link8_load5;
-        let link8_load7 = 0.25 * link8_load6;
-        let link8_load8 = link9_load11 - link8_load7;
-        let link8_load9 = link7_load0 + link8_load3;
-        let link8_load10 = link7_load1 + link8_load8;
-        // link7: gravity and wrenches
-        let link7_load2 = link7_cos0 * link8_load9;
-        let link7_load3 = link7_sin0 * link8_load6;
-        let link7_load4 = link7_load2 - link7_load3;
-        let link7_load5 = link7_sin0 * link8_load9;
-        let link7_load6 = link7_cos0 * link8_load6;
-        let link7_load7 = link7_load5 + link7_load6;
-        let link7_load8 = 0.25 * link7_load7;
-        let link7_load9 = link8_load10 - link7_load8;
-        let link7_load10 = link6_load0 + link7_load4;
-        let link7_load11 = link6_load1 + link7_load9;
-        // link6: gravity and wrenches
-        let link6_load2 = link6_cos0 * link7_load10;
-        let link6_load3 = link6_sin0 * link7_load7;
-        let link6_load4 = link6_load2 - link6_load3;
-        let link6_load5 = link6_sin0 * link7_load10;
-        let link6_load6 = link6_cos0 * link7_load7;
-        let link6_load7 = link6_load5 + link6_load6;
-        let link6_load8 = 0.25 * link6_load7;
-        let link6_load9 = link7_load11 - link6_load8;
-        let link6_load10 = link5_load0 + link6_load4;
-        let link6_load11 = link5_load1 + link6_load9;
-        // link5: gravity and wrenches
-        let link5_load2 = link5_cos0 * link6_load10;
-        let link5_load3 = link5_sin0 * link6_load7;
-        let link5_load4 = link5_load2 - link5_load3;
-        let link5_load5 = link5_sin0 * link6_load10;
-        let link5_load6 = link5_cos0 * link6_load7;
-        let link5_load7 = link5_load5 + link5_load6;
-        let link5_load8 = 0.25 * link5_load7;
-        let link5_load9 = link6_load11 - link5_load8;
-        let link5_load10 = link4_load0 + link5_load4;
-        let link5_load11 = link4_load1 + link5_load9;
-        // link4: gravity and wrenches
-        let link4_load2 = link4_cos0 * link5_load10;
-        let link4_load3 = link4_sin0 * link5_load7;
-        let link4_load4 = link4_load2 - link4_load3;
-        let link4_load5 = link4_sin0 * link5_load10;
-        let link4_load6 = link4_cos0 * link5_load7;
-        let link4_load7 = link4_load5 + link4_load6;
-        let link4_load8 = 0.25 * link4_load7;
-        let link4_load9 = link5_load11 - link4_load8;
-        let link4_load10 = link3_load0 + link4_load4;
-        let link4_load11 = link3_load1 + link4_load9;
-        // link3: gravity and wrenches
-        let link3_load2 = link3_cos0 * link4_load10;
-        let link3_load3 = link3_sin0 * link4_load7;
-        let link3_load4 = link3_load2 - link3_load3;
-        let link3_load5 = link3_sin0 * link4_load10;
-        let link3_load6 = link3_cos0 * link4_load7;
-        let link3_load7 = link3_load5 + link3_load6;
-        let link3_load8 = 0.25 * link3_load7;
-        let link3_load9 = link4_load11 - link3_load8;
-        let link3_load10 = link2_load0 + link3_load4;
-        let link3_load11 = link2_load1 + link3_load9;
-        // link2: gravity and wrenches
-        let link2_load2 = link2_sin0 * link3_load10;
-        let link2_load3 = link2_cos0 * link3_load7;
-        let link2_load4 = link2_load2 + link2_load3;
-        let link2_load5 = 0.25 * link2_load4;
-        let link2_load6 = link3_load11 - link2_load5;
-        let link2_load7 = link1_load0 + link2_load6;
-        h[0] = link2_load7;
-        h[1] = link3_load11;
-        h[2] = link4_load11;
-        h[3] = link5_load11;
-        h[4] = link6_load11;
-        h[5] = link7_load11;
-        h[6] = link8_load10;
-        h[7] = link9_load11;
-        h[8] = link10_load8;
-        h[9] = link10_load2;
+        Self::bias_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, h);
+    }
+
+    #[inline(always)]
+    fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let q_6 = q.get(6, l);
+            let q_7 = q.get(7, l);
+            let q_8 = q.get(8, l);
+            let q_9 = q.get(9, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+            angles[2][l] = q_2;
+            angles[3][l] = q_3;
+            angles[4][l] = q_4;
+            angles[5][l] = q_5;
+            angles[6][l] = q_6;
+            angles[7][l] = q_7;
+            angles[8][l] = q_8;
+            angles[9][l] = q_9;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            // link1: sine and cosine, rotation
+            let link1_sin0 = sines[0][l];
+            let link1_cos0 = cosines[0][l];
+            // link2: sine and cosine, rotation
+            let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
+            // link3: sine and cosine, rotation
+            let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
+            // link4: sine and cosine, rotation
+            let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
+            // link5: sine and cosine, rotation
+            let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_sin0 = sines[6][l];
+            let link7_cos0 = cosines[6][l];
+            // link8: sine and cosine, rotation
+            let link8_sin0 = sines[7][l];
+            let link8_cos0 = cosines[7][l];
+            // link9: sine and cosine, rotation
+            let link9_sin0 = sines[8][l];
+            let link9_cos0 = cosines[8][l];
+            // link10: sine and cosine, rotation
+            let link10_sin0 = sines[9][l];
+            let link10_cos0 = cosines[9][l];
+            // link1: velocity and joint rate (4.40)
+            let link1_vel0 = 9.81 * link1_cos0;
+            let link1_vel1 = 9.81 * link1_sin0;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel0 = v_0 * v_0;
+            let link2_vel1 = 0.25 * link2_vel0;
+            let link2_vel2 = link1_vel0 + link2_vel1;
+            let link2_vel3 = link2_cos0 * link2_vel2;
+            let link2_vel4 = link2_sin0 * link1_vel1;
+            let link2_vel5 = link2_vel3 - link2_vel4;
+            let link2_vel6 = link2_cos0 * link1_vel1;
+            let link2_vel7 = link2_sin0 * link2_vel2;
+            let link2_vel8 = link2_vel6 + link2_vel7;
+            let link2_vel9 = v_0 + v_1;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel0 = link2_vel9 * link2_vel9;
+            let link3_vel1 = 0.25 * link3_vel0;
+            let link3_vel2 = link2_vel5 + link3_vel1;
+            let link3_vel3 = link3_cos0 * link3_vel2;
+            let link3_vel4 = link3_sin0 * link2_vel8;
+            let link3_vel5 = link3_vel3 - link3_vel4;
+            let link3_vel6 = link3_cos0 * link2_vel8;
+            let link3_vel7 = link3_sin0 * link3_vel2;
+            let link3_vel8 = link3_vel6 + link3_vel7;
+            let link3_vel9 = v_2 + link2_vel9;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel0 = link3_vel9 * link3_vel9;
+            let link4_vel1 = 0.25 * link4_vel0;
+            let link4_vel2 = link3_vel5 + link4_vel1;
+            let link4_vel3 = link4_cos0 * link4_vel2;
+            let link4_vel4 = link4_sin0 * link3_vel8;
+            let link4_vel5 = link4_vel3 - link4_vel4;
+            let link4_vel6 = link4_cos0 * link3_vel8;
+            let link4_vel7 = link4_sin0 * link4_vel2;
+            let link4_vel8 = link4_vel6 + link4_vel7;
+            let link4_vel9 = v_3 + link3_vel9;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel0 = link4_vel9 * link4_vel9;
+            let link5_vel1 = 0.25 * link5_vel0;
+            let link5_vel2 = link4_vel5 + link5_vel1;
+            let link5_vel3 = link5_cos0 * link5_vel2;
+            let link5_vel4 = link5_sin0 * link4_vel8;
+            let link5_vel5 = link5_vel3 - link5_vel4;
+            let link5_vel6 = link5_cos0 * link4_vel8;
+            let link5_vel7 = link5_sin0 * link5_vel2;
+            let link5_vel8 = link5_vel6 + link5_vel7;
+            let link5_vel9 = v_4 + link4_vel9;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel0 = link5_vel9 * link5_vel9;
+            let link6_vel1 = 0.25 * link6_vel0;
+            let link6_vel2 = link5_vel5 + link6_vel1;
+            let link6_vel3 = link6_cos0 * link6_vel2;
+            let link6_vel4 = link6_sin0 * link5_vel8;
+            let link6_vel5 = link6_vel3 - link6_vel4;
+            let link6_vel6 = link6_cos0 * link5_vel8;
+            let link6_vel7 = link6_sin0 * link6_vel2;
+            let link6_vel8 = link6_vel6 + link6_vel7;
+            let link6_vel9 = v_5 + link5_vel9;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel0 = link6_vel9 * link6_vel9;
+            let link7_vel1 = 0.25 * link7_vel0;
+            let link7_vel2 = link6_vel5 + link7_vel1;
+            let link7_vel3 = link7_cos0 * link7_vel2;
+            let link7_vel4 = link7_sin0 * link6_vel8;
+            let link7_vel5 = link7_vel3 - link7_vel4;
+            let link7_vel6 = link7_cos0 * link6_vel8;
+            let link7_vel7 = link7_sin0 * link7_vel2;
+            let link7_vel8 = link7_vel6 + link7_vel7;
+            let link7_vel9 = v_6 + link6_vel9;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel0 = link7_vel9 * link7_vel9;
+            let link8_vel1 = 0.25 * link8_vel0;
+            let link8_vel2 = link7_vel5 + link8_vel1;
+            let link8_vel3 = link8_cos0 * link8_vel2;
+            let link8_vel4 = link8_sin0 * link7_vel8;
+            let link8_vel5 = link8_vel3 - link8_vel4;
+            let link8_vel6 = link8_cos0 * link7_vel8;
+            let link8_vel7 = link8_sin0 * link8_vel2;
+            let link8_vel8 = link8_vel6 + link8_vel7;
+            let link8_vel9 = v_7 + link7_vel9;
+            // link9: velocity and joint rate (4.40)
+            let link9_vel0 = link8_vel9 * link8_vel9;
+            let link9_vel1 = 0.25 * link9_vel0;
+            let link9_vel2 = link8_vel5 + link9_vel1;
+            let link9_vel3 = link9_cos0 * link9_vel2;
+            let link9_vel4 = link9_sin0 * link8_vel8;
+            let link9_vel5 = link9_vel3 - link9_vel4;
+            let link9_vel6 = link9_cos0 * link8_vel8;
+            let link9_vel7 = link9_sin0 * link9_vel2;
+            let link9_vel8 = link9_vel6 + link9_vel7;
+            let link9_vel9 = v_8 + link8_vel9;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = link9_vel9 * link9_vel9;
+            let link10_vel1 = 0.25 * link10_vel0;
+            let link10_vel2 = link9_vel5 + link10_vel1;
+            let link10_vel3 = link10_cos0 * link9_vel8;
+            let link10_vel4 = link10_sin0 * link10_vel2;
+            let link10_vel5 = link10_vel3 + link10_vel4;
+            let link10_vel6 = v_9 + link9_vel9;
+            // link1: gravity and wrenches
+            let link1_load0 = 0.95 * link1_vel1;
+            // link2: gravity and wrenches
+            let link2_load0 = 0.85 * link3_vel0;
+            let link2_load1 = 0.85 * link2_vel8;
+            // link3: gravity and wrenches
+            let link3_load0 = 0.75 * link4_vel0;
+            let link3_load1 = 0.75 * link3_vel8;
+            // link4: gravity and wrenches
+            let link4_load0 = 0.65 * link5_vel0;
+            let link4_load1 = 0.65 * link4_vel8;
+            // link5: gravity and wrenches
+            let link5_load0 = 0.55 * link6_vel0;
+            let link5_load1 = 0.55 * link5_vel8;
+            // link6: gravity and wrenches
+            let link6_load0 = 0.45 * link7_vel0;
+            let link6_load1 = 0.45 * link6_vel8;
+            // link7: gravity and wrenches
+            let link7_load0 = 0.35000000000000003 * link8_vel0;
+            let link7_load1 = 0.35000000000000003 * link7_vel8;
+            // link8: gravity and wrenches
+            let link8_load0 = 0.25 * link8_vel8;
+            // link9: gravity and wrenches
+            let link9_load0 = 0.15000000000000002 * link10_vel0;
+            let link9_load1 = 0.15000000000000002 * link9_vel8;
+            // link10: gravity and wrenches
+            let link10_load0 = link10_vel6 * link10_vel6;
+            let link10_load1 = 0.05 * link10_load0;
+            let link10_load2 = 0.05 * link10_vel5;
+            let link10_load3 = link10_cos0 * link10_load1;
+            let link10_load4 = link10_sin0 * link10_load1;
+            let link10_load5 = 0.25 * link10_load4;
+            let link10_load6 = link10_load2 - link10_load5;
+            let link10_load7 = link9_load0 + link10_load3;
+            let link10_load8 = link9_load1 + link10_load6;
+            // link9: gravity and wrenches
+            let link9_load2 = link9_cos0 * link10_load7;
+            let link9_load3 = link9_sin0 * link10_load4;
+            let link9_load4 = link9_load2 - link9_load3;
+            let link9_load5 = link9_sin0 * link10_load7;
+            let link9_load6 = link9_cos0 * link10_load4;
+            let link9_load7 = link9_load5 + link9_load6;
+            let link9_load8 = 0.25 * link9_load7;
+            let link9_load9 = link10_load8 - link9_load8;
+            let link9_load10 = link9_vel1 + link9_load4;
+            let link9_load11 = link8_load0 + link9_load9;
+            // link8: gravity and wrenches
+            let link8_load1 = link8_cos0 * link9_load10;
+            let link8_load2 = link8_sin0 * link9_load7;
+            let link8_load3 = link8_load1 - link8_load2;
+            let link8_load4 = link8_sin0 * link9_load10;
+            let link8_load5 = link8_cos0 * link9_load7;
+            let link8_load6 = link8_load4 + link8_load5;
+            let link8_load7 = 0.25 * link8_load6;
+            let link8_load8 = link9_load11 - link8_load7;
+            let link8_load9 = link7_load0 + link8_load3;
+            let link8_load10 = link7_load1 + link8_load8;
+            // link7: gravity and wrenches
+            let link7_load2 = link7_cos0 * link8_load9;
+            let link7_load3 = link7_sin0 * link8_load6;
+            let link7_load4 = link7_load2 - link7_load3;
+            let link7_load5 = link7_sin0 * link8_load9;
+            let link7_load6 = link7_cos0 * link8_load6;
+            let link7_load7 = link7_load5 + link7_load6;
+            let link7_load8 = 0.25 * link7_load7;
+            let link7_load9 = link8_load10 - link7_load8;
+            let link7_load10 = link6_load0 + link7_load4;
+            let link7_load11 = link6_load1 + link7_load9;
+            // link6: gravity and wrenches
+            let link6_load2 = link6_cos0 * link7_load10;
+            let link6_load3 = link6_sin0 * link7_load7;
+            let link6_load4 = link6_load2 - link6_load3;
+            let link6_load5 = link6_sin0 * link7_load10;
+            let link6_load6 = link6_cos0 * link7_load7;
+            let link6_load7 = link6_load5 + link6_load6;
+            let link6_load8 = 0.25 * link6_load7;
+            let link6_load9 = link7_load11 - link6_load8;
+            let link6_load10 = link5_load0 + link6_load4;
+            let link6_load11 = link5_load1 + link6_load9;
+            // link5: gravity and wrenches
+            let link5_load2 = link5_cos0 * link6_load10;
+            let link5_load3 = link5_sin0 * link6_load7;
+            let link5_load4 = link5_load2 - link5_load3;
+            let link5_load5 = link5_sin0 * link6_load10;
+            let link5_load6 = link5_cos0 * link6_load7;
+            let link5_load7 = link5_load5 + link5_load6;
+            let link5_load8 = 0.25 * link5_load7;
+            let link5_load9 = link6_load11 - link5_load8;
+            let link5_load10 = link4_load0 + link5_load4;
+            let link5_load11 = link4_load1 + link5_load9;
+            // link4: gravity and wrenches
+            let link4_load2 = link4_cos0 * link5_load10;
+            let link4_load3 = link4_sin0 * link5_load7;
+            let link4_load4 = link4_load2 - link4_load3;
+            let link4_load5 = link4_sin0 * link5_load10;
+            let link4_load6 = link4_cos0 * link5_load7;
+            let link4_load7 = link4_load5 + link4_load6;
+            let link4_load8 = 0.25 * link4_load7;
+            let link4_load9 = link5_load11 - link4_load8;
+            let link4_load10 = link3_load0 + link4_load4;
+            let link4_load11 = link3_load1 + link4_load9;
+            // link3: gravity and wrenches
+            let link3_load2 = link3_cos0 * link4_load10;
+            let link3_load3 = link3_sin0 * link4_load7;
+            let link3_load4 = link3_load2 - link3_load3;
+            let link3_load5 = link3_sin0 * link4_load10;
+            let link3_load6 = link3_cos0 * link4_load7;
+            let link3_load7 = link3_load5 + link3_load6;
+            let link3_load8 = 0.25 * link3_load7;
+            let link3_load9 = link4_load11 - link3_load8;
+            let link3_load10 = link2_load0 + link3_load4;
+            let link3_load11 = link2_load1 + link3_load9;
+            // link2: gravity and wrenches
+            let link2_load2 = link2_sin0 * link3_load10;
+            let link2_load3 = link2_cos0 * link3_load7;
+            let link2_load4 = link2_load2 + link2_load3;
+            let link2_load5 = 0.25 * link2_load4;
+            let link2_load6 = link3_load11 - link2_load5;
+            let link2_load7 = link1_load0 + link2_load6;
+            results[0][l] = link2_load7;
+            results[1][l] = link3_load11;
+            results[2][l] = link4_load11;
+            results[3][l] = link5_load11;
+            results[4][l] = link6_load11;
+            results[5][l] = link7_load11;
+            results[6][l] = link8_load10;
+            results[7][l] = link9_load11;
+            results[8][l] = link10_load8;
+            results[9][l] = link10_load2;
+        }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
+        h.give(4, &results[4]);
+        h.give(5, &results[5]);
+        h.give(6, &results[6]);
+        h.give(7, &results[7]);
+        h.give(8, &results[8]);
+        h.give(9, &results[9]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
     #[inline]
     pub fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let v_6 = v[6];
-        let v_7 = v[7];
-        let v_8 = v[8];
-        let v_9 = v[9];
-        qd[0] = v_0;
-        qd[1] = v_1;
-        qd[2] = v_2;
-        qd[3] = v_3;
-        qd[4] = v_4;
-        qd[5] = v_5;
-        qd[6] = v_6;
-        qd[7] = v_7;
-        qd[8] = v_8;
-        qd[9] = v_9;
+        Self::coordinate_rates_kernel::<::multibody::runtime::kernel::Plain, 1>(v, qd);
+    }
+
+    #[inline(always)]
+    fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 10];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let v_6 = v.get(6, l);
+            let v_7 = v.get(7, l);
+            let v_8 = v.get(8, l);
+            let v_9 = v.get(9, l);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
+            results[6][l] = v_6;
+            results[7][l] = v_7;
+            results[8][l] = v_8;
+            results[9][l] = v_9;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        qd.give(6, &results[6]);
+        qd.give(7, &results[7]);
+        qd.give(8, &results[8]);
+        qd.give(9, &results[9]);
+    }
+
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> Chain10PlanarLanes<LANES> {
+        Chain10PlanarLanes { tau: self.tau.map(|x| [x; LANES]) }
+    }
+
+    /// Rates of any number of states, given as columns: `q[k][s]` is coordinate `k` of state `s`. Joint forces are a column each; the fields of
+    /// `self` are the same for all states. 8 states are computed at a time.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    pub fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        ::multibody::runtime::batch::run::<f64, 8, 10, 10, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
+            ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
+        })
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<0, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, tau, qd, pd,): (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)) {
+        Self::rates_kernel::<A, LANES>(q, p, tau, qd, pd);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<1, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, v,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::velocities_kernel::<A, LANES>(q, p, v);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<2, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, p,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::momenta_kernel::<A, LANES>(q, v, p);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, result);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<4, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, a,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::accelerations_kernel::<A, LANES>(q, v, tau, a);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<5, LANES, (&'a P0, &'a mut P1,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, m,): (&'a P0, &'a mut P1,)) {
+        Self::mass_matrix_kernel::<A, LANES>(q, m);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<6, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, a, tau,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::inverse_dynamics_kernel::<A, LANES>(q, v, a, tau);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<7, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, h,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_kernel::<A, LANES>(q, v, h);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<8, LANES, (&'a P0, &'a mut P1,)> for Chain10Planar {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((v, qd,): (&'a P0, &'a mut P1,)) {
+        Self::coordinate_rates_kernel::<A, LANES>(v, qd);
+    }
+}
+
+/// `LANES` states of [`Chain10Planar`] at once, side by side in vector registers. In every array the last index is the lane:
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+#[derive(Clone, Debug, PartialEq)]
+#[rustfmt::skip]
+pub struct Chain10PlanarLanes<const LANES: usize> {
+    /// Joint forces, N m or N, one for each velocity.
+    pub tau: [[f64; LANES]; 10],
+}
+
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[rustfmt::skip]
+impl<const LANES: usize> Chain10PlanarLanes<LANES> {
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {
+        Chain10Planar::new().lanes()
+    }
+
+    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    #[inline]
+    pub fn rates(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10], qd: &mut [[f64; LANES]; 10], pd: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+    }
+
+    /// Velocities from momenta: `(q, p) → v`.
+    #[inline]
+    pub fn velocities(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10], v: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 1, LANES, f64, _>((q, p, v,));
+    }
+
+    /// Momenta from velocities: `p = M(q) v`.
+    #[inline]
+    pub fn momenta(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], p: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 2, LANES, f64, _>((q, v, p,));
+    }
+
+    /// Kinetic and potential energy, J.
+    #[inline]
+    pub fn energy(&self, q: &[[f64; LANES]; 10], p: &[[f64; LANES]; 10]) -> [[f64; LANES]; 2] {
+        let mut result = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 3, LANES, f64, _>((q, p, &mut result,));
+        result
+    }
+
+    /// Accelerations: `(q, v) → v̇`.
+    #[inline]
+    pub fn accelerations(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], a: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 4, LANES, f64, _>((q, v, &self.tau, a,));
+    }
+
+    /// Mass matrix, by rows.
+    #[inline]
+    pub fn mass_matrix(&self, q: &[[f64; LANES]; 10], m: &mut [[[f64; LANES]; 10]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 5, LANES, f64, _>((q, m.as_flattened_mut(),));
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], a: &[[f64; LANES]; 10], tau: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 6, LANES, f64, _>((q, v, a, tau,));
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    #[inline]
+    pub fn bias(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], h: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 7, LANES, f64, _>((q, v, h,));
+    }
+
+    /// Coordinate rates of given velocities: `q̇ = N(q) v`.
+    #[inline]
+    pub fn coordinate_rates(&self, q: &[[f64; LANES]; 10], v: &[[f64; LANES]; 10], qd: &mut [[f64; LANES]; 10]) {
+        ::multibody::runtime::kernel::call_lanes::<Chain10Planar, 8, LANES, f64, _>((v, qd,));
+    }
+}
+
+#[rustfmt::skip]
+impl<const LANES: usize> ::core::default::Default for Chain10PlanarLanes<LANES> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -4337,5 +4947,13 @@ impl ::multibody::runtime::System for Chain10Planar {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::batch::RatesBatch<f64, 10, 10, 10> for Chain10Planar {
+    fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        let _ = tau;
+        Self::rates_batch(self, q, p, tau, qd, pd)
     }
 }

@@ -68,612 +68,1167 @@ impl DoublePendulum {
     /// 32 operations: 14 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_sin0;
-        let lower_inertia1 = 0.5 * lower_cos0;
-        let lower_inertia2 = lower_inertia1 + lower_inertia1;
-        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
-        let lower_inertia4 = lower_inertia1 + 1.5;
-        let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
-        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
-        // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
-        let upper_pivot1 = lower_inertia6 * upper_pivot0;
-        let upper_pivot2 = lower_inertia5 - upper_pivot1;
-        let upper_pivot3 = 1.0 / upper_pivot2;
-        // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = 2.9994001199760048 * p_1;
-        let upper_rest1 = lower_inertia6 * upper_rest0;
-        let upper_rest2 = p_0 - upper_rest1;
-        let upper_rest3 = upper_pivot3 * upper_rest2;
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = upper_pivot0 * upper_rest3;
-        let upper_vel1 = upper_rest0 - upper_vel0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = upper_rest3 + upper_vel1;
-        // upper: gravity and wrenches
-        let upper_load0 = 9.81 * upper_cos0;
-        let upper_load1 = 9.81 * upper_sin0;
-        // lower: gravity and wrenches
-        let lower_load0 = lower_cos0 * upper_load1;
-        let lower_load1 = lower_sin0 * upper_load0;
-        let lower_load2 = lower_load0 + lower_load1;
-        // upper: momentum rate (4.36)
-        let upper_pdot0 = lower_inertia4 * upper_load1;
-        let upper_pdot1 = lower_inertia0 * upper_load0;
-        let upper_pdot2 = upper_pdot0 + upper_pdot1;
-        // lower: momentum rate (4.36)
-        let lower_pdot0 = lower_inertia0 * lower_vel0;
-        let lower_pdot1 = upper_rest3 * lower_pdot0;
-        let lower_pdot2 = 0.5 * lower_load2;
-        let lower_pdot3 = lower_pdot1 + lower_pdot2;
-        let lower_pdot4 = tau_0 - upper_pdot2;
-        let lower_pdot5 = tau_1 - lower_pdot3;
-        qd[0] = upper_rest3;
-        qd[1] = upper_vel1;
-        pd[0] = lower_pdot4;
-        pd[1] = lower_pdot5;
+        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+    }
+
+    #[inline(always)]
+    fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia0 = 0.5 * lower_sin0;
+            let lower_inertia1 = 0.5 * lower_cos0;
+            let lower_inertia2 = lower_inertia1 + lower_inertia1;
+            let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
+            let lower_inertia4 = lower_inertia1 + 1.5;
+            let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
+            let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+            // upper: U, Mj, k and the reduced inertia M' (4.44)
+            let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
+            let upper_pivot1 = lower_inertia6 * upper_pivot0;
+            let upper_pivot2 = lower_inertia5 - upper_pivot1;
+            let upper_pivot3 = 1.0 / upper_pivot2;
+            // upper: momentum remainder D, D' (4.45, 4.49)
+            let upper_rest0 = 2.9994001199760048 * p_1;
+            let upper_rest1 = lower_inertia6 * upper_rest0;
+            let upper_rest2 = p_0 - upper_rest1;
+            let upper_rest3 = upper_pivot3 * upper_rest2;
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = upper_pivot0 * upper_rest3;
+            let upper_vel1 = upper_rest0 - upper_vel0;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = upper_rest3 + upper_vel1;
+            // upper: gravity and wrenches
+            let upper_load0 = 9.81 * upper_cos0;
+            let upper_load1 = 9.81 * upper_sin0;
+            // lower: gravity and wrenches
+            let lower_load0 = lower_cos0 * upper_load1;
+            let lower_load1 = lower_sin0 * upper_load0;
+            let lower_load2 = lower_load0 + lower_load1;
+            // upper: momentum rate (4.36)
+            let upper_pdot0 = lower_inertia4 * upper_load1;
+            let upper_pdot1 = lower_inertia0 * upper_load0;
+            let upper_pdot2 = upper_pdot0 + upper_pdot1;
+            // lower: momentum rate (4.36)
+            let lower_pdot0 = lower_inertia0 * lower_vel0;
+            let lower_pdot1 = upper_rest3 * lower_pdot0;
+            let lower_pdot2 = 0.5 * lower_load2;
+            let lower_pdot3 = lower_pdot1 + lower_pdot2;
+            let lower_pdot4 = tau_0 - upper_pdot2;
+            let lower_pdot5 = tau_1 - lower_pdot3;
+            results[0][l] = upper_rest3;
+            results[1][l] = upper_vel1;
+            results[2][l] = lower_pdot4;
+            results[3][l] = lower_pdot5;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        pd.give(0, &results[2]);
+        pd.give(1, &results[3]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 15 operations: 7 additions, 7 multiplications, 1 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 2], p: &[f64; 2], v: &mut [f64; 2]) {
-        let q_1 = q[1];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        // lower: sine and cosine, rotation
-        let (_, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_cos0;
-        let lower_inertia1 = lower_inertia0 + lower_inertia0;
-        let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
-        let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
-        let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
-        // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
-        let upper_pivot1 = lower_inertia4 * upper_pivot0;
-        let upper_pivot2 = lower_inertia3 - upper_pivot1;
-        let upper_pivot3 = 1.0 / upper_pivot2;
-        // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = 2.9994001199760048 * p_1;
-        let upper_rest1 = lower_inertia4 * upper_rest0;
-        let upper_rest2 = p_0 - upper_rest1;
-        let upper_rest3 = upper_pivot3 * upper_rest2;
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = upper_pivot0 * upper_rest3;
-        let upper_vel1 = upper_rest0 - upper_vel0;
-        v[0] = upper_rest3;
-        v[1] = upper_vel1;
+        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+    }
+
+    #[inline(always)]
+    fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            // lower: sine and cosine, rotation
+            let lower_cos0 = cosines[0][l];
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia0 = 0.5 * lower_cos0;
+            let lower_inertia1 = lower_inertia0 + lower_inertia0;
+            let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
+            let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
+            let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
+            // upper: U, Mj, k and the reduced inertia M' (4.44)
+            let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
+            let upper_pivot1 = lower_inertia4 * upper_pivot0;
+            let upper_pivot2 = lower_inertia3 - upper_pivot1;
+            let upper_pivot3 = 1.0 / upper_pivot2;
+            // upper: momentum remainder D, D' (4.45, 4.49)
+            let upper_rest0 = 2.9994001199760048 * p_1;
+            let upper_rest1 = lower_inertia4 * upper_rest0;
+            let upper_rest2 = p_0 - upper_rest1;
+            let upper_rest3 = upper_pivot3 * upper_rest2;
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = upper_pivot0 * upper_rest3;
+            let upper_vel1 = upper_rest0 - upper_vel0;
+            results[0][l] = upper_rest3;
+            results[1][l] = upper_vel1;
+        }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 10 operations: 4 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn momenta(&self, q: &[f64; 2], v: &[f64; 2], p: &mut [f64; 2]) {
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        // lower: sine and cosine, rotation
-        let (_, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * lower_cos0;
-        let lower_vel1 = v_0 + v_1;
-        // upper: momentum
-        let upper_mom0 = 1.3334000000000001 * v_0;
-        // lower: momentum
-        let lower_mom0 = 0.33340000000000003 * lower_vel1;
-        let lower_mom1 = 0.5 * lower_vel1;
-        let lower_mom2 = 0.5 * lower_vel0;
-        let lower_mom3 = lower_mom0 + lower_mom2;
-        let lower_mom4 = lower_cos0 * lower_mom1;
-        let lower_mom5 = lower_mom3 + lower_mom4;
-        let lower_mom6 = upper_mom0 + lower_mom5;
-        p[0] = lower_mom6;
-        p[1] = lower_mom3;
+        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+    }
+
+    #[inline(always)]
+    fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            // lower: sine and cosine, rotation
+            let lower_cos0 = cosines[0][l];
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * lower_cos0;
+            let lower_vel1 = v_0 + v_1;
+            // upper: momentum
+            let upper_mom0 = 1.3334000000000001 * v_0;
+            // lower: momentum
+            let lower_mom0 = 0.33340000000000003 * lower_vel1;
+            let lower_mom1 = 0.5 * lower_vel1;
+            let lower_mom2 = 0.5 * lower_vel0;
+            let lower_mom3 = lower_mom0 + lower_mom2;
+            let lower_mom4 = lower_cos0 * lower_mom1;
+            let lower_mom5 = lower_mom3 + lower_mom4;
+            let lower_mom6 = upper_mom0 + lower_mom5;
+            results[0][l] = lower_mom6;
+            results[1][l] = lower_mom3;
+        }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
     }
 
     /// Kinetic and potential energy, J.
     /// 25 operations: 10 additions, 14 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 2], p: &[f64; 2]) -> [f64; 2] {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_sin0;
-        let lower_inertia1 = 0.5 * lower_cos0;
-        let lower_inertia2 = lower_inertia1 + lower_inertia1;
-        let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
-        let lower_inertia4 = lower_inertia1 + 1.5;
-        let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
-        let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
-        // upper: inertia carried to the parent, M* (4.48)
-        let upper_inertia0 = upper_sin0 * lower_inertia0;
-        let upper_inertia1 = upper_cos0 * lower_inertia4;
-        let upper_inertia2 = upper_inertia0 - upper_inertia1;
-        // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
-        let upper_pivot1 = lower_inertia6 * upper_pivot0;
-        let upper_pivot2 = lower_inertia5 - upper_pivot1;
-        let upper_pivot3 = 1.0 / upper_pivot2;
-        // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = 2.9994001199760048 * p_1;
-        let upper_rest1 = lower_inertia6 * upper_rest0;
-        let upper_rest2 = p_0 - upper_rest1;
-        let upper_rest3 = upper_pivot3 * upper_rest2;
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = upper_pivot0 * upper_rest3;
-        let upper_vel1 = upper_rest0 - upper_vel0;
-        // upper: energy
-        let upper_energy0 = p_0 * upper_rest3;
-        // lower: energy
-        let lower_energy0 = p_1 * upper_vel1;
-        let lower_energy1 = upper_energy0 + lower_energy0;
-        let lower_energy2 = 0.5 * lower_energy1;
-        // ground: energy
-        let ground_energy0 = 9.81 * upper_inertia2;
-        let kinetic = lower_energy2;
-        let potential = ground_energy0;
-        [kinetic, potential]
+        let mut result = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
+        result
+    }
+
+    #[inline(always)]
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia0 = 0.5 * lower_sin0;
+            let lower_inertia1 = 0.5 * lower_cos0;
+            let lower_inertia2 = lower_inertia1 + lower_inertia1;
+            let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
+            let lower_inertia4 = lower_inertia1 + 1.5;
+            let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
+            let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+            // upper: inertia carried to the parent, M* (4.48)
+            let upper_inertia0 = upper_sin0 * lower_inertia0;
+            let upper_inertia1 = upper_cos0 * lower_inertia4;
+            let upper_inertia2 = upper_inertia0 - upper_inertia1;
+            // upper: U, Mj, k and the reduced inertia M' (4.44)
+            let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
+            let upper_pivot1 = lower_inertia6 * upper_pivot0;
+            let upper_pivot2 = lower_inertia5 - upper_pivot1;
+            let upper_pivot3 = 1.0 / upper_pivot2;
+            // upper: momentum remainder D, D' (4.45, 4.49)
+            let upper_rest0 = 2.9994001199760048 * p_1;
+            let upper_rest1 = lower_inertia6 * upper_rest0;
+            let upper_rest2 = p_0 - upper_rest1;
+            let upper_rest3 = upper_pivot3 * upper_rest2;
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = upper_pivot0 * upper_rest3;
+            let upper_vel1 = upper_rest0 - upper_vel0;
+            // upper: energy
+            let upper_energy0 = p_0 * upper_rest3;
+            // lower: energy
+            let lower_energy0 = p_1 * upper_vel1;
+            let lower_energy1 = upper_energy0 + lower_energy0;
+            let lower_energy2 = 0.5 * lower_energy1;
+            // ground: energy
+            let ground_energy0 = 9.81 * upper_inertia2;
+            results[0][l] = lower_energy2;
+            results[1][l] = ground_energy0;
+        }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
     /// 29 operations: 11 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_cos0;
-        // lower: U, Mj, k and the reduced inertia M' (4.44)
-        let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
-        let lower_pivot1 = lower_inertia0 * lower_pivot0;
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
-        // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia1;
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = 9.81 * upper_cos0;
-        let upper_vel1 = 9.81 * upper_sin0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * v_0;
-        let lower_vel1 = upper_vel0 + lower_vel0;
-        let lower_vel2 = lower_cos0 * upper_vel1;
-        let lower_vel3 = lower_sin0 * lower_vel1;
-        let lower_vel4 = lower_vel2 + lower_vel3;
-        let lower_vel5 = v_0 + v_1;
-        // upper: gravity and wrenches
-        let upper_load0 = 1.5 * upper_vel1;
-        // lower: gravity and wrenches
-        let lower_load0 = lower_vel5 * lower_vel5;
-        let lower_load1 = 0.5 * lower_load0;
-        let lower_load2 = 0.5 * lower_vel4;
-        // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = lower_sin0 * lower_load1;
-        let lower_rest1 = tau_1 - lower_load2;
-        let lower_rest2 = 2.9994001199760048 * lower_rest1;
-        let lower_rest3 = lower_inertia0 * lower_rest2;
-        let lower_rest4 = lower_rest0 - lower_rest3;
-        let lower_rest5 = tau_1 - lower_rest4;
-        let lower_rest6 = upper_load0 + lower_rest5;
-        // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_0 - lower_rest6;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
-        // lower: acceleration
-        let lower_acc0 = lower_pivot0 * upper_rest1;
-        let lower_acc1 = lower_rest2 + lower_acc0;
-        let lower_acc2 = upper_rest1 + lower_acc1;
-        a[0] = -upper_rest1;
-        a[1] = lower_acc2;
+        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+    }
+
+    #[inline(always)]
+    fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia0 = 0.5 * lower_cos0;
+            // lower: U, Mj, k and the reduced inertia M' (4.44)
+            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
+            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
+            // upper: U, Mj, k and the reduced inertia M' (4.44)
+            let upper_pivot0 = 1.0 / lower_inertia1;
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = 9.81 * upper_cos0;
+            let upper_vel1 = 9.81 * upper_sin0;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * v_0;
+            let lower_vel1 = upper_vel0 + lower_vel0;
+            let lower_vel2 = lower_cos0 * upper_vel1;
+            let lower_vel3 = lower_sin0 * lower_vel1;
+            let lower_vel4 = lower_vel2 + lower_vel3;
+            let lower_vel5 = v_0 + v_1;
+            // upper: gravity and wrenches
+            let upper_load0 = 1.5 * upper_vel1;
+            // lower: gravity and wrenches
+            let lower_load0 = lower_vel5 * lower_vel5;
+            let lower_load1 = 0.5 * lower_load0;
+            let lower_load2 = 0.5 * lower_vel4;
+            // lower: momentum remainder D, D' (4.45, 4.49)
+            let lower_rest0 = lower_sin0 * lower_load1;
+            let lower_rest1 = tau_1 - lower_load2;
+            let lower_rest2 = 2.9994001199760048 * lower_rest1;
+            let lower_rest3 = lower_inertia0 * lower_rest2;
+            let lower_rest4 = lower_rest0 - lower_rest3;
+            let lower_rest5 = tau_1 - lower_rest4;
+            let lower_rest6 = upper_load0 + lower_rest5;
+            // upper: momentum remainder D, D' (4.45, 4.49)
+            let upper_rest0 = tau_0 - lower_rest6;
+            let upper_rest1 = upper_pivot0 * upper_rest0;
+            // lower: acceleration
+            let lower_acc0 = lower_pivot0 * upper_rest1;
+            let lower_acc1 = lower_rest2 + lower_acc0;
+            let lower_acc2 = upper_rest1 + lower_acc1;
+            results[0][l] = -upper_rest1;
+            results[1][l] = lower_acc2;
+        }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
     /// 59 operations: 27 additions, 31 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia0 = 0.5 * lower_cos0;
-        // lower: U, Mj, k and the reduced inertia M' (4.44)
-        let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
-        let lower_pivot1 = lower_inertia0 * lower_pivot0;
-        // lower: inertia carried to the parent, M* (4.48)
-        let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
-        // upper: U, Mj, k and the reduced inertia M' (4.44)
-        let upper_pivot0 = 1.0 / lower_inertia1;
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = 9.81 * upper_cos0;
-        let upper_vel1 = 9.81 * upper_sin0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * v_0;
-        let lower_vel1 = upper_vel0 + lower_vel0;
-        let lower_vel2 = lower_cos0 * lower_vel1;
-        let lower_vel3 = lower_cos0 * upper_vel1;
-        let lower_vel4 = lower_sin0 * lower_vel1;
-        let lower_vel5 = lower_vel3 + lower_vel4;
-        let lower_vel6 = v_0 + v_1;
-        // upper: gravity and wrenches
-        let upper_load0 = 1.5 * upper_vel1;
-        // lower: gravity and wrenches
-        let lower_load0 = lower_vel6 * lower_vel6;
-        let lower_load1 = 0.5 * lower_load0;
-        let lower_load2 = 0.5 * lower_vel5;
-        // lower: momentum remainder D, D' (4.45, 4.49)
-        let lower_rest0 = lower_sin0 * lower_load1;
-        let lower_rest1 = tau_1 - lower_load2;
-        let lower_rest2 = 2.9994001199760048 * lower_rest1;
-        let lower_rest3 = lower_inertia0 * lower_rest2;
-        let lower_rest4 = lower_rest0 - lower_rest3;
-        let lower_rest5 = tau_1 - lower_rest4;
-        let lower_rest6 = upper_load0 + lower_rest5;
-        // upper: momentum remainder D, D' (4.45, 4.49)
-        let upper_rest0 = tau_0 - lower_rest6;
-        let upper_rest1 = upper_pivot0 * upper_rest0;
-        // lower: acceleration
-        let lower_acc0 = lower_pivot0 * upper_rest1;
-        let lower_acc1 = lower_rest2 + lower_acc0;
-        let lower_acc2 = upper_rest1 + lower_acc1;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel7 = upper_vel1 - upper_rest1;
-        let lower_vel8 = lower_sin0 * lower_vel7;
-        let lower_vel9 = lower_vel2 - lower_vel8;
-        let lower_vel10 = lower_cos0 * lower_vel7;
-        let lower_vel11 = lower_vel4 + lower_vel10;
-        // lower: acceleration
-        let lower_acc3 = upper_rest1 - lower_acc2;
-        // upper: gravity and wrenches
-        let upper_load1 = 0.5 * lower_vel0;
-        let upper_load2 = upper_vel0 + upper_load1;
-        let upper_load3 = 0.5 * upper_rest1;
-        let upper_load4 = upper_vel1 - upper_load3;
-        let upper_load5 = 0.33340000000000003 * upper_rest1;
-        let upper_load6 = 0.5 * upper_vel1;
-        let upper_load7 = upper_load5 - upper_load6;
-        // lower: gravity and wrenches
-        let lower_load3 = lower_load1 + lower_vel9;
-        let lower_load4 = 0.5 * lower_acc3;
-        let lower_load5 = lower_vel11 - lower_load4;
-        let lower_load6 = 0.33340000000000003 * lower_acc3;
-        let lower_load7 = 0.5 * lower_vel11;
-        let lower_load8 = lower_load6 - lower_load7;
-        let lower_load9 = lower_cos0 * lower_load3;
-        let lower_load10 = lower_sin0 * lower_load5;
-        let lower_load11 = lower_load9 + lower_load10;
-        let lower_load12 = lower_sin0 * lower_load3;
-        let lower_load13 = lower_cos0 * lower_load5;
-        let lower_load14 = lower_load12 - lower_load13;
-        let lower_load15 = lower_load8 + lower_load14;
-        let lower_load16 = upper_load2 + lower_load11;
-        let lower_load17 = lower_load14 - upper_load4;
-        let lower_load18 = upper_load7 + lower_load15;
-        reactions[0][0] = lower_load17;
-        reactions[0][1] = 0.0;
-        reactions[0][2] = lower_load16;
-        reactions[0][3] = 0.0;
-        reactions[0][4] = -lower_load18;
-        reactions[0][5] = 0.0;
-        reactions[1][0] = -lower_load5;
-        reactions[1][1] = 0.0;
-        reactions[1][2] = lower_load3;
-        reactions[1][3] = 0.0;
-        reactions[1][4] = -lower_load8;
-        reactions[1][5] = 0.0;
+        Self::reactions_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, reactions.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 12];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia0 = 0.5 * lower_cos0;
+            // lower: U, Mj, k and the reduced inertia M' (4.44)
+            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
+            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            // lower: inertia carried to the parent, M* (4.48)
+            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
+            // upper: U, Mj, k and the reduced inertia M' (4.44)
+            let upper_pivot0 = 1.0 / lower_inertia1;
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = 9.81 * upper_cos0;
+            let upper_vel1 = 9.81 * upper_sin0;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * v_0;
+            let lower_vel1 = upper_vel0 + lower_vel0;
+            let lower_vel2 = lower_cos0 * lower_vel1;
+            let lower_vel3 = lower_cos0 * upper_vel1;
+            let lower_vel4 = lower_sin0 * lower_vel1;
+            let lower_vel5 = lower_vel3 + lower_vel4;
+            let lower_vel6 = v_0 + v_1;
+            // upper: gravity and wrenches
+            let upper_load0 = 1.5 * upper_vel1;
+            // lower: gravity and wrenches
+            let lower_load0 = lower_vel6 * lower_vel6;
+            let lower_load1 = 0.5 * lower_load0;
+            let lower_load2 = 0.5 * lower_vel5;
+            // lower: momentum remainder D, D' (4.45, 4.49)
+            let lower_rest0 = lower_sin0 * lower_load1;
+            let lower_rest1 = tau_1 - lower_load2;
+            let lower_rest2 = 2.9994001199760048 * lower_rest1;
+            let lower_rest3 = lower_inertia0 * lower_rest2;
+            let lower_rest4 = lower_rest0 - lower_rest3;
+            let lower_rest5 = tau_1 - lower_rest4;
+            let lower_rest6 = upper_load0 + lower_rest5;
+            // upper: momentum remainder D, D' (4.45, 4.49)
+            let upper_rest0 = tau_0 - lower_rest6;
+            let upper_rest1 = upper_pivot0 * upper_rest0;
+            // lower: acceleration
+            let lower_acc0 = lower_pivot0 * upper_rest1;
+            let lower_acc1 = lower_rest2 + lower_acc0;
+            let lower_acc2 = upper_rest1 + lower_acc1;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel7 = upper_vel1 - upper_rest1;
+            let lower_vel8 = lower_sin0 * lower_vel7;
+            let lower_vel9 = lower_vel2 - lower_vel8;
+            let lower_vel10 = lower_cos0 * lower_vel7;
+            let lower_vel11 = lower_vel4 + lower_vel10;
+            // lower: acceleration
+            let lower_acc3 = upper_rest1 - lower_acc2;
+            // upper: gravity and wrenches
+            let upper_load1 = 0.5 * lower_vel0;
+            let upper_load2 = upper_vel0 + upper_load1;
+            let upper_load3 = 0.5 * upper_rest1;
+            let upper_load4 = upper_vel1 - upper_load3;
+            let upper_load5 = 0.33340000000000003 * upper_rest1;
+            let upper_load6 = 0.5 * upper_vel1;
+            let upper_load7 = upper_load5 - upper_load6;
+            // lower: gravity and wrenches
+            let lower_load3 = lower_load1 + lower_vel9;
+            let lower_load4 = 0.5 * lower_acc3;
+            let lower_load5 = lower_vel11 - lower_load4;
+            let lower_load6 = 0.33340000000000003 * lower_acc3;
+            let lower_load7 = 0.5 * lower_vel11;
+            let lower_load8 = lower_load6 - lower_load7;
+            let lower_load9 = lower_cos0 * lower_load3;
+            let lower_load10 = lower_sin0 * lower_load5;
+            let lower_load11 = lower_load9 + lower_load10;
+            let lower_load12 = lower_sin0 * lower_load3;
+            let lower_load13 = lower_cos0 * lower_load5;
+            let lower_load14 = lower_load12 - lower_load13;
+            let lower_load15 = lower_load8 + lower_load14;
+            let lower_load16 = upper_load2 + lower_load11;
+            let lower_load17 = lower_load14 - upper_load4;
+            let lower_load18 = upper_load7 + lower_load15;
+            results[0][l] = lower_load17;
+            results[1][l] = 0.0;
+            results[2][l] = lower_load16;
+            results[3][l] = 0.0;
+            results[4][l] = -lower_load18;
+            results[5][l] = 0.0;
+            results[6][l] = -lower_load5;
+            results[7][l] = 0.0;
+            results[8][l] = lower_load3;
+            results[9][l] = 0.0;
+            results[10][l] = -lower_load8;
+            results[11][l] = 0.0;
+        }
+        reactions.give(0, &results[0]);
+        reactions.give(1, &results[1]);
+        reactions.give(2, &results[2]);
+        reactions.give(3, &results[3]);
+        reactions.give(4, &results[4]);
+        reactions.give(5, &results[5]);
+        reactions.give(6, &results[6]);
+        reactions.give(7, &results[7]);
+        reactions.give(8, &results[8]);
+        reactions.give(9, &results[9]);
+        reactions.give(10, &results[10]);
+        reactions.give(11, &results[11]);
     }
 
     /// Mass matrix, by rows.
     /// 5 operations: 4 additions, 1 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn mass_matrix(&self, q: &[f64; 2], m: &mut [[f64; 2]; 2]) {
-        let q_1 = q[1];
-        // lower: sine and cosine, rotation
-        let (_, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: mass matrix by composite inertias
-        let lower_mass0 = 0.5 * lower_cos0;
-        let lower_mass1 = lower_mass0 + 0.33340000000000003;
-        let lower_mass2 = lower_mass0 + lower_mass0;
-        let lower_mass3 = lower_mass2 + 0.33340000000000003;
-        let lower_mass4 = lower_mass3 + 1.3334000000000001;
-        m[0][0] = lower_mass4;
-        m[0][1] = lower_mass1;
-        m[1][0] = lower_mass1;
-        m[1][1] = 0.33340000000000003;
+        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            // lower: sine and cosine, rotation
+            let lower_cos0 = cosines[0][l];
+            // lower: mass matrix by composite inertias
+            let lower_mass0 = 0.5 * lower_cos0;
+            let lower_mass1 = lower_mass0 + 0.33340000000000003;
+            let lower_mass2 = lower_mass0 + lower_mass0;
+            let lower_mass3 = lower_mass2 + 0.33340000000000003;
+            let lower_mass4 = lower_mass3 + 1.3334000000000001;
+            results[0][l] = lower_mass4;
+            results[1][l] = lower_mass1;
+            results[2][l] = lower_mass1;
+            results[3][l] = 0.33340000000000003;
+        }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
     }
 
     /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
     /// 12 operations: 6 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 2], v: &[f64; 2], rotation: &mut [[[f64; 3]; 3]; 3], position: &mut [[f64; 3]; 3], velocity: &mut [[f64; 6]; 3]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * lower_sin0;
-        let lower_vel1 = v_0 * lower_cos0;
-        let lower_vel2 = v_0 + v_1;
-        // lower: placement
-        let lower_place0 = upper_sin0 * lower_cos0;
-        let lower_place1 = upper_cos0 * lower_sin0;
-        let lower_place2 = lower_place0 + lower_place1;
-        let lower_place3 = upper_cos0 * lower_cos0;
-        let lower_place4 = upper_sin0 * lower_sin0;
-        let lower_place5 = lower_place3 - lower_place4;
-        let lower_place6 = upper_sin0 + lower_place2;
-        let lower_place7 = upper_cos0 + lower_place5;
-        let lower_place8 = lower_vel1 + lower_vel2;
-        rotation[0][0][0] = upper_cos0;
-        rotation[0][0][1] = 0.0;
-        rotation[0][0][2] = upper_sin0;
-        rotation[0][1][0] = 0.0;
-        rotation[0][1][1] = 1.0;
-        rotation[0][1][2] = 0.0;
-        rotation[0][2][0] = -upper_sin0;
-        rotation[0][2][1] = 0.0;
-        rotation[0][2][2] = upper_cos0;
-        rotation[1][0][0] = lower_place5;
-        rotation[1][0][1] = 0.0;
-        rotation[1][0][2] = lower_place2;
-        rotation[1][1][0] = 0.0;
-        rotation[1][1][1] = 1.0;
-        rotation[1][1][2] = 0.0;
-        rotation[1][2][0] = -lower_place2;
-        rotation[1][2][1] = 0.0;
-        rotation[1][2][2] = lower_place5;
-        rotation[2][0][0] = lower_place5;
-        rotation[2][0][1] = 0.0;
-        rotation[2][0][2] = lower_place2;
-        rotation[2][1][0] = 0.0;
-        rotation[2][1][1] = 1.0;
-        rotation[2][1][2] = 0.0;
-        rotation[2][2][0] = -lower_place2;
-        rotation[2][2][1] = 0.0;
-        rotation[2][2][2] = lower_place5;
-        position[0][0] = 0.0;
-        position[0][1] = 0.0;
-        position[0][2] = 0.0;
-        position[1][0] = -upper_sin0;
-        position[1][1] = 0.0;
-        position[1][2] = -upper_cos0;
-        position[2][0] = -lower_place6;
-        position[2][1] = 0.0;
-        position[2][2] = -lower_place7;
-        velocity[0][0] = 0.0;
-        velocity[0][1] = 0.0;
-        velocity[0][2] = 0.0;
-        velocity[0][3] = 0.0;
-        velocity[0][4] = v_0;
-        velocity[0][5] = 0.0;
-        velocity[1][0] = -lower_vel1;
-        velocity[1][1] = 0.0;
-        velocity[1][2] = -lower_vel0;
-        velocity[1][3] = 0.0;
-        velocity[1][4] = lower_vel2;
-        velocity[1][5] = 0.0;
-        velocity[2][0] = -lower_place8;
-        velocity[2][1] = 0.0;
-        velocity[2][2] = -lower_vel0;
-        velocity[2][3] = 0.0;
-        velocity[2][4] = lower_vel2;
-        velocity[2][5] = 0.0;
+        Self::frames_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 54];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * lower_sin0;
+            let lower_vel1 = v_0 * lower_cos0;
+            let lower_vel2 = v_0 + v_1;
+            // lower: placement
+            let lower_place0 = upper_sin0 * lower_cos0;
+            let lower_place1 = upper_cos0 * lower_sin0;
+            let lower_place2 = lower_place0 + lower_place1;
+            let lower_place3 = upper_cos0 * lower_cos0;
+            let lower_place4 = upper_sin0 * lower_sin0;
+            let lower_place5 = lower_place3 - lower_place4;
+            let lower_place6 = upper_sin0 + lower_place2;
+            let lower_place7 = upper_cos0 + lower_place5;
+            let lower_place8 = lower_vel1 + lower_vel2;
+            results[0][l] = upper_cos0;
+            results[1][l] = 0.0;
+            results[2][l] = upper_sin0;
+            results[3][l] = 0.0;
+            results[4][l] = 1.0;
+            results[5][l] = 0.0;
+            results[6][l] = -upper_sin0;
+            results[7][l] = 0.0;
+            results[8][l] = upper_cos0;
+            results[9][l] = lower_place5;
+            results[10][l] = 0.0;
+            results[11][l] = lower_place2;
+            results[12][l] = 0.0;
+            results[13][l] = 1.0;
+            results[14][l] = 0.0;
+            results[15][l] = -lower_place2;
+            results[16][l] = 0.0;
+            results[17][l] = lower_place5;
+            results[18][l] = lower_place5;
+            results[19][l] = 0.0;
+            results[20][l] = lower_place2;
+            results[21][l] = 0.0;
+            results[22][l] = 1.0;
+            results[23][l] = 0.0;
+            results[24][l] = -lower_place2;
+            results[25][l] = 0.0;
+            results[26][l] = lower_place5;
+            results[27][l] = 0.0;
+            results[28][l] = 0.0;
+            results[29][l] = 0.0;
+            results[30][l] = -upper_sin0;
+            results[31][l] = 0.0;
+            results[32][l] = -upper_cos0;
+            results[33][l] = -lower_place6;
+            results[34][l] = 0.0;
+            results[35][l] = -lower_place7;
+            results[36][l] = 0.0;
+            results[37][l] = 0.0;
+            results[38][l] = 0.0;
+            results[39][l] = 0.0;
+            results[40][l] = v_0;
+            results[41][l] = 0.0;
+            results[42][l] = -lower_vel1;
+            results[43][l] = 0.0;
+            results[44][l] = -lower_vel0;
+            results[45][l] = 0.0;
+            results[46][l] = lower_vel2;
+            results[47][l] = 0.0;
+            results[48][l] = -lower_place8;
+            results[49][l] = 0.0;
+            results[50][l] = -lower_vel0;
+            results[51][l] = 0.0;
+            results[52][l] = lower_vel2;
+            results[53][l] = 0.0;
+        }
+        rotation.give(0, &results[0]);
+        rotation.give(1, &results[1]);
+        rotation.give(2, &results[2]);
+        rotation.give(3, &results[3]);
+        rotation.give(4, &results[4]);
+        rotation.give(5, &results[5]);
+        rotation.give(6, &results[6]);
+        rotation.give(7, &results[7]);
+        rotation.give(8, &results[8]);
+        rotation.give(9, &results[9]);
+        rotation.give(10, &results[10]);
+        rotation.give(11, &results[11]);
+        rotation.give(12, &results[12]);
+        rotation.give(13, &results[13]);
+        rotation.give(14, &results[14]);
+        rotation.give(15, &results[15]);
+        rotation.give(16, &results[16]);
+        rotation.give(17, &results[17]);
+        rotation.give(18, &results[18]);
+        rotation.give(19, &results[19]);
+        rotation.give(20, &results[20]);
+        rotation.give(21, &results[21]);
+        rotation.give(22, &results[22]);
+        rotation.give(23, &results[23]);
+        rotation.give(24, &results[24]);
+        rotation.give(25, &results[25]);
+        rotation.give(26, &results[26]);
+        position.give(0, &results[27]);
+        position.give(1, &results[28]);
+        position.give(2, &results[29]);
+        position.give(3, &results[30]);
+        position.give(4, &results[31]);
+        position.give(5, &results[32]);
+        position.give(6, &results[33]);
+        position.give(7, &results[34]);
+        position.give(8, &results[35]);
+        velocity.give(0, &results[36]);
+        velocity.give(1, &results[37]);
+        velocity.give(2, &results[38]);
+        velocity.give(3, &results[39]);
+        velocity.give(4, &results[40]);
+        velocity.give(5, &results[41]);
+        velocity.give(6, &results[42]);
+        velocity.give(7, &results[43]);
+        velocity.give(8, &results[44]);
+        velocity.give(9, &results[45]);
+        velocity.give(10, &results[46]);
+        velocity.give(11, &results[47]);
+        velocity.give(12, &results[48]);
+        velocity.give(13, &results[49]);
+        velocity.give(14, &results[50]);
+        velocity.give(15, &results[51]);
+        velocity.give(16, &results[52]);
+        velocity.give(17, &results[53]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
     /// 24 operations: 10 additions, 14 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 2], v: &[f64; 2], a: &[f64; 2], tau: &mut [f64; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let a_0 = a[0];
-        let a_1 = a[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = 9.81 * upper_cos0;
-        let upper_vel1 = 9.81 * upper_sin0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * v_0;
-        let lower_vel1 = a_0 + upper_vel1;
-        let lower_vel2 = upper_vel0 + lower_vel0;
-        let lower_vel3 = lower_cos0 * lower_vel1;
-        let lower_vel4 = lower_sin0 * lower_vel2;
-        let lower_vel5 = lower_vel3 + lower_vel4;
-        let lower_vel6 = v_0 + v_1;
-        // lower: acceleration
-        let lower_acc0 = a_0 + a_1;
-        // upper: gravity and wrenches
-        let upper_load0 = 1.3334000000000001 * a_0;
-        let upper_load1 = 1.5 * upper_vel1;
-        let upper_load2 = upper_load0 + upper_load1;
-        // lower: gravity and wrenches
-        let lower_load0 = lower_vel6 * lower_vel6;
-        let lower_load1 = 0.5 * lower_load0;
-        let lower_load2 = 0.5 * lower_acc0;
-        let lower_load3 = 0.33340000000000003 * lower_acc0;
-        let lower_load4 = 0.5 * lower_vel5;
-        let lower_load5 = lower_load3 + lower_load4;
-        let lower_load6 = lower_sin0 * lower_load1;
-        let lower_load7 = lower_cos0 * lower_load2;
-        let lower_load8 = lower_load6 - lower_load7;
-        let lower_load9 = lower_load5 - lower_load8;
-        let lower_load10 = upper_load2 + lower_load9;
-        tau[0] = lower_load10;
-        tau[1] = lower_load5;
+        Self::inverse_dynamics_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, a, tau);
+    }
+
+    #[inline(always)]
+    fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let a_0 = a.get(0, l);
+            let a_1 = a.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = 9.81 * upper_cos0;
+            let upper_vel1 = 9.81 * upper_sin0;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * v_0;
+            let lower_vel1 = a_0 + upper_vel1;
+            let lower_vel2 = upper_vel0 + lower_vel0;
+            let lower_vel3 = lower_cos0 * lower_vel1;
+            let lower_vel4 = lower_sin0 * lower_vel2;
+            let lower_vel5 = lower_vel3 + lower_vel4;
+            let lower_vel6 = v_0 + v_1;
+            // lower: acceleration
+            let lower_acc0 = a_0 + a_1;
+            // upper: gravity and wrenches
+            let upper_load0 = 1.3334000000000001 * a_0;
+            let upper_load1 = 1.5 * upper_vel1;
+            let upper_load2 = upper_load0 + upper_load1;
+            // lower: gravity and wrenches
+            let lower_load0 = lower_vel6 * lower_vel6;
+            let lower_load1 = 0.5 * lower_load0;
+            let lower_load2 = 0.5 * lower_acc0;
+            let lower_load3 = 0.33340000000000003 * lower_acc0;
+            let lower_load4 = 0.5 * lower_vel5;
+            let lower_load5 = lower_load3 + lower_load4;
+            let lower_load6 = lower_sin0 * lower_load1;
+            let lower_load7 = lower_cos0 * lower_load2;
+            let lower_load8 = lower_load6 - lower_load7;
+            let lower_load9 = lower_load5 - lower_load8;
+            let lower_load10 = upper_load2 + lower_load9;
+            results[0][l] = lower_load10;
+            results[1][l] = lower_load5;
+        }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
     /// 15 operations: 5 additions, 10 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 2], v: &[f64; 2], h: &mut [f64; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        // upper: sine and cosine, rotation
-        let (upper_sin0, upper_cos0) = ::multibody::runtime::trig::sincos_f64(q_0);
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // upper: velocity and joint rate (4.40)
-        let upper_vel0 = 9.81 * upper_cos0;
-        let upper_vel1 = 9.81 * upper_sin0;
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * v_0;
-        let lower_vel1 = upper_vel0 + lower_vel0;
-        let lower_vel2 = lower_cos0 * upper_vel1;
-        let lower_vel3 = lower_sin0 * lower_vel1;
-        let lower_vel4 = lower_vel2 + lower_vel3;
-        let lower_vel5 = v_0 + v_1;
-        // upper: gravity and wrenches
-        let upper_load0 = 1.5 * upper_vel1;
-        // lower: gravity and wrenches
-        let lower_load0 = lower_vel5 * lower_vel5;
-        let lower_load1 = 0.5 * lower_load0;
-        let lower_load2 = 0.5 * lower_vel4;
-        let lower_load3 = lower_sin0 * lower_load1;
-        let lower_load4 = lower_load2 - lower_load3;
-        let lower_load5 = upper_load0 + lower_load4;
-        h[0] = lower_load5;
-        h[1] = lower_load2;
+        Self::bias_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, h);
+    }
+
+    #[inline(always)]
+    fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_0;
+            angles[1][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            // upper: sine and cosine, rotation
+            let upper_sin0 = sines[0][l];
+            let upper_cos0 = cosines[0][l];
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[1][l];
+            let lower_cos0 = cosines[1][l];
+            // upper: velocity and joint rate (4.40)
+            let upper_vel0 = 9.81 * upper_cos0;
+            let upper_vel1 = 9.81 * upper_sin0;
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * v_0;
+            let lower_vel1 = upper_vel0 + lower_vel0;
+            let lower_vel2 = lower_cos0 * upper_vel1;
+            let lower_vel3 = lower_sin0 * lower_vel1;
+            let lower_vel4 = lower_vel2 + lower_vel3;
+            let lower_vel5 = v_0 + v_1;
+            // upper: gravity and wrenches
+            let upper_load0 = 1.5 * upper_vel1;
+            // lower: gravity and wrenches
+            let lower_load0 = lower_vel5 * lower_vel5;
+            let lower_load1 = 0.5 * lower_load0;
+            let lower_load2 = 0.5 * lower_vel4;
+            let lower_load3 = lower_sin0 * lower_load1;
+            let lower_load4 = lower_load2 - lower_load3;
+            let lower_load5 = upper_load0 + lower_load4;
+            results[0][l] = lower_load5;
+            results[1][l] = lower_load2;
+        }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
     }
 
     /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
     /// 7 operations: 3 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn jacobians(&self, q: &[f64; 2], jacobian: &mut [[[f64; 2]; 6]; 3]) {
-        let q_1 = q[1];
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: Jacobian
-        let lower_jac0 = lower_cos0 + 1.0;
-        // upper: Jacobian
-        let upper_jac0 = lower_cos0 * lower_jac0;
-        let upper_jac1 = lower_sin0 * lower_sin0;
-        let upper_jac2 = upper_jac0 + upper_jac1;
-        let upper_jac3 = lower_sin0 * lower_jac0;
-        let upper_jac4 = lower_sin0 * lower_cos0;
-        let upper_jac5 = upper_jac4 - upper_jac3;
-        jacobian[0][0][0] = 0.0;
-        jacobian[0][0][1] = 0.0;
-        jacobian[0][1][0] = 0.0;
-        jacobian[0][1][1] = 0.0;
-        jacobian[0][2][0] = 0.0;
-        jacobian[0][2][1] = 0.0;
-        jacobian[0][3][0] = 0.0;
-        jacobian[0][3][1] = 0.0;
-        jacobian[0][4][0] = 1.0;
-        jacobian[0][4][1] = 0.0;
-        jacobian[0][5][0] = 0.0;
-        jacobian[0][5][1] = 0.0;
-        jacobian[1][0][0] = -lower_cos0;
-        jacobian[1][0][1] = 0.0;
-        jacobian[1][1][0] = 0.0;
-        jacobian[1][1][1] = 0.0;
-        jacobian[1][2][0] = -lower_sin0;
-        jacobian[1][2][1] = 0.0;
-        jacobian[1][3][0] = 0.0;
-        jacobian[1][3][1] = 0.0;
-        jacobian[1][4][0] = 1.0;
-        jacobian[1][4][1] = 1.0;
-        jacobian[1][5][0] = 0.0;
-        jacobian[1][5][1] = 0.0;
-        jacobian[2][0][0] = -upper_jac2;
-        jacobian[2][0][1] = -1.0;
-        jacobian[2][1][0] = 0.0;
-        jacobian[2][1][1] = 0.0;
-        jacobian[2][2][0] = upper_jac5;
-        jacobian[2][2][1] = 0.0;
-        jacobian[2][3][0] = 0.0;
-        jacobian[2][3][1] = 0.0;
-        jacobian[2][4][0] = 1.0;
-        jacobian[2][4][1] = 1.0;
-        jacobian[2][5][0] = 0.0;
-        jacobian[2][5][1] = 0.0;
+        Self::jacobians_kernel::<::multibody::runtime::kernel::Plain, 1>(q, jacobian.as_flattened_mut().as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 36];
+        for l in 0..LANES {
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[0][l];
+            let lower_cos0 = cosines[0][l];
+            // lower: Jacobian
+            let lower_jac0 = lower_cos0 + 1.0;
+            // upper: Jacobian
+            let upper_jac0 = lower_cos0 * lower_jac0;
+            let upper_jac1 = lower_sin0 * lower_sin0;
+            let upper_jac2 = upper_jac0 + upper_jac1;
+            let upper_jac3 = lower_sin0 * lower_jac0;
+            let upper_jac4 = lower_sin0 * lower_cos0;
+            let upper_jac5 = upper_jac4 - upper_jac3;
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = 0.0;
+            results[7][l] = 0.0;
+            results[8][l] = 1.0;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = -lower_cos0;
+            results[13][l] = 0.0;
+            results[14][l] = 0.0;
+            results[15][l] = 0.0;
+            results[16][l] = -lower_sin0;
+            results[17][l] = 0.0;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 1.0;
+            results[21][l] = 1.0;
+            results[22][l] = 0.0;
+            results[23][l] = 0.0;
+            results[24][l] = -upper_jac2;
+            results[25][l] = -1.0;
+            results[26][l] = 0.0;
+            results[27][l] = 0.0;
+            results[28][l] = upper_jac5;
+            results[29][l] = 0.0;
+            results[30][l] = 0.0;
+            results[31][l] = 0.0;
+            results[32][l] = 1.0;
+            results[33][l] = 1.0;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0;
+        }
+        jacobian.give(0, &results[0]);
+        jacobian.give(1, &results[1]);
+        jacobian.give(2, &results[2]);
+        jacobian.give(3, &results[3]);
+        jacobian.give(4, &results[4]);
+        jacobian.give(5, &results[5]);
+        jacobian.give(6, &results[6]);
+        jacobian.give(7, &results[7]);
+        jacobian.give(8, &results[8]);
+        jacobian.give(9, &results[9]);
+        jacobian.give(10, &results[10]);
+        jacobian.give(11, &results[11]);
+        jacobian.give(12, &results[12]);
+        jacobian.give(13, &results[13]);
+        jacobian.give(14, &results[14]);
+        jacobian.give(15, &results[15]);
+        jacobian.give(16, &results[16]);
+        jacobian.give(17, &results[17]);
+        jacobian.give(18, &results[18]);
+        jacobian.give(19, &results[19]);
+        jacobian.give(20, &results[20]);
+        jacobian.give(21, &results[21]);
+        jacobian.give(22, &results[22]);
+        jacobian.give(23, &results[23]);
+        jacobian.give(24, &results[24]);
+        jacobian.give(25, &results[25]);
+        jacobian.give(26, &results[26]);
+        jacobian.give(27, &results[27]);
+        jacobian.give(28, &results[28]);
+        jacobian.give(29, &results[29]);
+        jacobian.give(30, &results[30]);
+        jacobian.give(31, &results[31]);
+        jacobian.give(32, &results[32]);
+        jacobian.give(33, &results[33]);
+        jacobian.give(34, &results[34]);
+        jacobian.give(35, &results[35]);
     }
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     /// 6 operations: 2 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn drifts(&self, q: &[f64; 2], v: &[f64; 2], drift: &mut [[f64; 6]; 3]) {
-        let q_1 = q[1];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        // lower: sine and cosine, rotation
-        let (lower_sin0, lower_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        // lower: velocity and joint rate (4.40)
-        let lower_vel0 = v_0 * v_0;
-        let lower_vel1 = lower_cos0 * lower_vel0;
-        let lower_vel2 = lower_sin0 * lower_vel0;
-        let lower_vel3 = v_0 + v_1;
-        // lower: acceleration
-        let lower_acc0 = lower_vel3 * lower_vel3;
-        let lower_acc1 = lower_vel1 + lower_acc0;
-        drift[0][0] = 0.0;
-        drift[0][1] = 0.0;
-        drift[0][2] = 0.0;
-        drift[0][3] = 0.0;
-        drift[0][4] = 0.0;
-        drift[0][5] = 0.0;
-        drift[1][0] = -lower_vel2;
-        drift[1][1] = 0.0;
-        drift[1][2] = lower_vel1;
-        drift[1][3] = 0.0;
-        drift[1][4] = 0.0;
-        drift[1][5] = 0.0;
-        drift[2][0] = -lower_vel2;
-        drift[2][1] = 0.0;
-        drift[2][2] = lower_acc1;
-        drift[2][3] = 0.0;
-        drift[2][4] = 0.0;
-        drift[2][5] = 0.0;
+        Self::drifts_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            angles[0][l] = q_1;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 18];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            // lower: sine and cosine, rotation
+            let lower_sin0 = sines[0][l];
+            let lower_cos0 = cosines[0][l];
+            // lower: velocity and joint rate (4.40)
+            let lower_vel0 = v_0 * v_0;
+            let lower_vel1 = lower_cos0 * lower_vel0;
+            let lower_vel2 = lower_sin0 * lower_vel0;
+            let lower_vel3 = v_0 + v_1;
+            // lower: acceleration
+            let lower_acc0 = lower_vel3 * lower_vel3;
+            let lower_acc1 = lower_vel1 + lower_acc0;
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = -lower_vel2;
+            results[7][l] = 0.0;
+            results[8][l] = lower_vel1;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = -lower_vel2;
+            results[13][l] = 0.0;
+            results[14][l] = lower_acc1;
+            results[15][l] = 0.0;
+            results[16][l] = 0.0;
+            results[17][l] = 0.0;
+        }
+        drift.give(0, &results[0]);
+        drift.give(1, &results[1]);
+        drift.give(2, &results[2]);
+        drift.give(3, &results[3]);
+        drift.give(4, &results[4]);
+        drift.give(5, &results[5]);
+        drift.give(6, &results[6]);
+        drift.give(7, &results[7]);
+        drift.give(8, &results[8]);
+        drift.give(9, &results[9]);
+        drift.give(10, &results[10]);
+        drift.give(11, &results[11]);
+        drift.give(12, &results[12]);
+        drift.give(13, &results[13]);
+        drift.give(14, &results[14]);
+        drift.give(15, &results[15]);
+        drift.give(16, &results[16]);
+        drift.give(17, &results[17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
     #[inline]
     pub fn coordinate_rates(&self, q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
-        let v_0 = v[0];
-        let v_1 = v[1];
-        qd[0] = v_0;
-        qd[1] = v_1;
+        Self::coordinate_rates_kernel::<::multibody::runtime::kernel::Plain, 1>(v, qd);
+    }
+
+    #[inline(always)]
+    fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+    }
+
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> DoublePendulumLanes<LANES> {
+        DoublePendulumLanes { tau: self.tau.map(|x| [x; LANES]) }
+    }
+
+    /// Rates of any number of states, given as columns: `q[k][s]` is coordinate `k` of state `s`. Joint forces are a column each; the fields of
+    /// `self` are the same for all states. 8 states are computed at a time.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    pub fn rates_batch(&self, q: [&[f64]; 2], p: [&[f64]; 2], tau: [&[f64]; 2], qd: [&mut [f64]; 2], pd: [&mut [f64]; 2]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        ::multibody::runtime::batch::run::<f64, 8, 2, 2, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
+            ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
+        })
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<0, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, tau, qd, pd,): (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)) {
+        Self::rates_kernel::<A, LANES>(q, p, tau, qd, pd);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<1, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, v,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::velocities_kernel::<A, LANES>(q, p, v);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<2, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, p,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::momenta_kernel::<A, LANES>(q, v, p);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, result);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<4, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, a,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::accelerations_kernel::<A, LANES>(q, v, tau, a);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<5, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, reactions,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::reactions_kernel::<A, LANES>(q, v, tau, reactions);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<6, LANES, (&'a P0, &'a mut P1,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, m,): (&'a P0, &'a mut P1,)) {
+        Self::mass_matrix_kernel::<A, LANES>(q, m);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<7, LANES, (&'a P0, &'a P1, &'a mut P2, &'a mut P3, &'a mut P4,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, rotation, position, velocity,): (&'a P0, &'a P1, &'a mut P2, &'a mut P3, &'a mut P4,)) {
+        Self::frames_kernel::<A, LANES>(q, v, rotation, position, velocity);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<8, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, a, tau,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::inverse_dynamics_kernel::<A, LANES>(q, v, a, tau);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<9, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, h,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_kernel::<A, LANES>(q, v, h);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<10, LANES, (&'a P0, &'a mut P1,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, jacobian,): (&'a P0, &'a mut P1,)) {
+        Self::jacobians_kernel::<A, LANES>(q, jacobian);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::drifts_kernel::<A, LANES>(q, v, drift);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<12, LANES, (&'a P0, &'a mut P1,)> for DoublePendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((v, qd,): (&'a P0, &'a mut P1,)) {
+        Self::coordinate_rates_kernel::<A, LANES>(v, qd);
+    }
+}
+
+/// `LANES` states of [`DoublePendulum`] at once, side by side in vector registers. In every array the last index is the lane:
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+#[derive(Clone, Debug, PartialEq)]
+#[rustfmt::skip]
+pub struct DoublePendulumLanes<const LANES: usize> {
+    /// Joint forces, N m or N, one for each velocity.
+    pub tau: [[f64; LANES]; 2],
+}
+
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[rustfmt::skip]
+impl<const LANES: usize> DoublePendulumLanes<LANES> {
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {
+        DoublePendulum::new().lanes()
+    }
+
+    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    #[inline]
+    pub fn rates(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2], qd: &mut [[f64; LANES]; 2], pd: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+    }
+
+    /// Velocities from momenta: `(q, p) → v`.
+    #[inline]
+    pub fn velocities(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2], v: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 1, LANES, f64, _>((q, p, v,));
+    }
+
+    /// Momenta from velocities: `p = M(q) v`.
+    #[inline]
+    pub fn momenta(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], p: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 2, LANES, f64, _>((q, v, p,));
+    }
+
+    /// Kinetic and potential energy, J.
+    #[inline]
+    pub fn energy(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
+        let mut result = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 3, LANES, f64, _>((q, p, &mut result,));
+        result
+    }
+
+    /// Accelerations: `(q, v) → v̇`.
+    #[inline]
+    pub fn accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], a: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 4, LANES, f64, _>((q, v, &self.tau, a,));
+    }
+
+    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    #[inline]
+    pub fn reactions(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], reactions: &mut [[[f64; LANES]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 5, LANES, f64, _>((q, v, &self.tau, reactions.as_flattened_mut(),));
+    }
+
+    /// Mass matrix, by rows.
+    #[inline]
+    pub fn mass_matrix(&self, q: &[[f64; LANES]; 2], m: &mut [[[f64; LANES]; 2]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
+    }
+
+    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    #[inline]
+    pub fn frames(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], rotation: &mut [[[[f64; LANES]; 3]; 3]; 3], position: &mut [[[f64; LANES]; 3]; 3], velocity: &mut [[[f64; LANES]; 6]; 3]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], a: &[[f64; LANES]; 2], tau: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 8, LANES, f64, _>((q, v, a, tau,));
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    #[inline]
+    pub fn bias(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], h: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 9, LANES, f64, _>((q, v, h,));
+    }
+
+    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    #[inline]
+    pub fn jacobians(&self, q: &[[f64; LANES]; 2], jacobian: &mut [[[[f64; LANES]; 2]; 6]; 3]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 10, LANES, f64, _>((q, jacobian.as_flattened_mut().as_flattened_mut(),));
+    }
+
+    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    #[inline]
+    pub fn drifts(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], drift: &mut [[[f64; LANES]; 6]; 3]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
+    }
+
+    /// Coordinate rates of given velocities: `q̇ = N(q) v`.
+    #[inline]
+    pub fn coordinate_rates(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], qd: &mut [[f64; LANES]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 12, LANES, f64, _>((v, qd,));
+    }
+}
+
+#[rustfmt::skip]
+impl<const LANES: usize> ::core::default::Default for DoublePendulumLanes<LANES> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -710,5 +1265,13 @@ impl ::multibody::runtime::System for DoublePendulum {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::batch::RatesBatch<f64, 2, 2, 2> for DoublePendulum {
+    fn rates_batch(&self, q: [&[f64]; 2], p: [&[f64]; 2], tau: [&[f64]; 2], qd: [&mut [f64]; 2], pd: [&mut [f64]; 2]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        let _ = tau;
+        Self::rates_batch(self, q, p, tau, qd, pd)
     }
 }

@@ -66,1509 +66,2071 @@ impl SphericalPendulum {
     /// 132 operations: 54 additions, 75 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_1 * bob_pose2;
-        let bob_pose7 = q_3 * bob_pose0;
-        let bob_pose8 = q_3 * bob_pose1;
-        let bob_pose9 = bob_pose5 - bob_pose8;
-        let bob_pose10 = bob_pose6 + bob_pose7;
-        let bob_pose11 = bob_pose3 + bob_pose4;
-        let bob_pose12 = bob_pose11 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = tail_cos0 + tail_cos0;
-        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-        let tail_inertia5 = tail_inertia3 + tail_inertia4;
-        let tail_inertia6 = tail_sin0 * tail_inertia5;
-        let tail_inertia7 = tail_cos0 * tail_inertia5;
-        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
-        // tail: U, Mj, k and the reduced inertia M' (4.44)
-        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-        let tail_pivot1 = 36.10108303249097 * tail_inertia2;
-        let tail_pivot2 = tail_inertia1 * tail_pivot0;
-        let tail_pivot3 = tail_inertia1 * tail_pivot1;
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia10 = 0.8 * tail_pivot2;
-        let tail_inertia11 = 0.8 * tail_inertia2;
-        let tail_inertia12 = tail_inertia8 + tail_inertia11;
-        let tail_inertia13 = tail_inertia1 + tail_inertia1;
-        let tail_inertia14 = 0.8 * tail_inertia13;
-        let tail_inertia15 = tail_inertia9 + tail_inertia14;
-        let tail_inertia16 = 0.8 * tail_inertia10;
-        let tail_inertia17 = tail_inertia1 + 0.88;
-        let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
-        let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
-        let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
-        // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia18;
-        let bob_pivot1 = tail_inertia12 * bob_pivot0;
-        let bob_pivot2 = tail_inertia12 * bob_pivot1;
-        let bob_pivot3 = tail_inertia20 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia19;
-        let bob_pivot5 = 1.0 / bob_pivot3;
-        // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = tail_inertia1 * tail_rest0;
-        let tail_rest2 = tail_inertia2 * tail_rest0;
-        let tail_rest3 = 0.8 * tail_rest1;
-        let tail_rest4 = p_3 + tail_rest3;
-        // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia12 * bob_rest0;
-        let bob_rest2 = p_1 - tail_rest4;
-        let bob_rest3 = bob_pivot4 * bob_rest2;
-        let bob_rest4 = p_2 - bob_rest1;
-        let bob_rest5 = bob_pivot5 * bob_rest4;
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = bob_pivot1 * bob_rest5;
-        let bob_vel1 = bob_rest0 + bob_vel0;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = 0.8 * bob_rest3;
-        let tail_vel1 = 0.8 * bob_vel1;
-        let tail_vel2 = tail_pivot0 * tail_vel0;
-        let tail_vel3 = tail_rest0 + tail_vel2;
-        let tail_vel4 = bob_rest3 + tail_vel3;
-        // bob: coordinate rates
-        let bob_rate0 = q_1 * bob_rest5;
-        let bob_rate1 = q_2 * bob_rest3;
-        let bob_rate2 = bob_rate0 - bob_rate1;
-        let bob_rate3 = q_2 * bob_vel1;
-        let bob_rate4 = q_0 * bob_rest5;
-        let bob_rate5 = bob_rate3 + bob_rate4;
-        let bob_rate6 = q_0 * bob_rest3;
-        let bob_rate7 = q_1 * bob_vel1;
-        let bob_rate8 = bob_rate6 + bob_rate7;
-        let bob_rate9 = q_3 * bob_vel1;
-        let bob_rate10 = bob_rate2 - bob_rate9;
-        let bob_rate11 = 0.5 * bob_rate10;
-        let bob_rate12 = q_3 * bob_rest3;
-        let bob_rate13 = bob_rate5 - bob_rate12;
-        let bob_rate14 = 0.5 * bob_rate13;
-        let bob_rate15 = q_3 * bob_rest5;
-        let bob_rate16 = bob_rate8 + bob_rate15;
-        let bob_rate17 = 0.5 * bob_rate16;
-        let bob_rate18 = q_0 * bob_vel1;
-        let bob_rate19 = q_1 * bob_rest3;
-        let bob_rate20 = bob_rate18 - bob_rate19;
-        let bob_rate21 = q_2 * bob_rest5;
-        let bob_rate22 = bob_rate20 - bob_rate21;
-        let bob_rate23 = 0.5 * bob_rate22;
-        // bob: gravity and wrenches
-        let bob_load0 = 9.81 * bob_pose9;
-        let bob_load1 = 9.81 * bob_pose10;
-        let bob_load2 = 9.81 * bob_pose12;
-        // tail: gravity and wrenches
-        let tail_load0 = tail_cos0 * bob_load2;
-        let tail_load1 = tail_sin0 * bob_load0;
-        let tail_load2 = tail_load0 - tail_load1;
-        // bob: momentum rate (4.36)
-        let bob_pdot0 = p_2 * bob_rest3;
-        let bob_pdot1 = p_1 * bob_rest5;
-        let bob_pdot2 = bob_pdot0 - bob_pdot1;
-        let bob_pdot3 = p_0 * bob_rest5;
-        let bob_pdot4 = p_2 * bob_vel1;
-        let bob_pdot5 = bob_pdot3 + bob_pdot4;
-        let bob_pdot6 = p_1 * bob_vel1;
-        let bob_pdot7 = p_0 * bob_rest3;
-        let bob_pdot8 = bob_pdot6 + bob_pdot7;
-        let bob_pdot9 = tail_inertia17 * bob_load1;
-        let bob_pdot10 = tail_inertia17 * bob_load0;
-        let bob_pdot11 = tail_inertia2 * bob_load2;
-        let bob_pdot12 = bob_pdot10 - bob_pdot11;
-        let bob_pdot13 = tail_inertia2 * bob_load1;
-        let bob_pdot14 = bob_pdot2 - bob_pdot9;
-        let bob_pdot15 = bob_pdot5 + bob_pdot12;
-        let bob_pdot16 = bob_pdot8 + bob_pdot13;
-        // tail: momentum rate (4.36)
-        let tail_pdot0 = tail_inertia6 + tail_inertia9;
-        let tail_pdot1 = tail_pivot3 * tail_vel0;
-        let tail_pdot2 = tail_rest2 + tail_pdot1;
-        let tail_pdot3 = tail_inertia8 * bob_vel1;
-        let tail_pdot4 = bob_rest5 * tail_pdot0;
-        let tail_pdot5 = tail_pdot3 + tail_pdot4;
-        let tail_pdot6 = tail_inertia2 * tail_vel1;
-        let tail_pdot7 = tail_pdot5 + tail_pdot6;
-        let tail_pdot8 = tail_inertia8 * bob_rest5;
-        let tail_pdot9 = tail_inertia1 * tail_vel1;
-        let tail_pdot10 = tail_pdot8 - tail_pdot9;
-        let tail_pdot11 = tail_vel0 * tail_pdot2;
-        let tail_pdot12 = bob_vel1 * tail_pdot7;
-        let tail_pdot13 = tail_pdot11 - tail_pdot12;
-        let tail_pdot14 = bob_rest5 * tail_pdot10;
-        let tail_pdot15 = tail_pdot13 + tail_pdot14;
-        let tail_pdot16 = 0.1004987562112089 * tail_load2;
-        let tail_pdot17 = tail_pdot15 + tail_pdot16;
-        let tail_pdot18 = tau_0 + bob_pdot14;
-        let tail_pdot19 = tau_1 + bob_pdot15;
-        let tail_pdot20 = tau_2 - bob_pdot16;
-        let tail_pdot21 = tau_3 - tail_pdot17;
-        qd[0] = -bob_rate11;
-        qd[1] = bob_rate14;
-        qd[2] = -bob_rate17;
-        qd[3] = -bob_rate23;
-        qd[4] = tail_vel4;
-        pd[0] = tail_pdot18;
-        pd[1] = tail_pdot19;
-        pd[2] = tail_pdot20;
-        pd[3] = tail_pdot21;
+        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+    }
+
+    #[inline(always)]
+    fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 9];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_1 * bob_pose2;
+            let bob_pose7 = q_3 * bob_pose0;
+            let bob_pose8 = q_3 * bob_pose1;
+            let bob_pose9 = bob_pose5 - bob_pose8;
+            let bob_pose10 = bob_pose6 + bob_pose7;
+            let bob_pose11 = bob_pose3 + bob_pose4;
+            let bob_pose12 = bob_pose11 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia0 = tail_cos0 + tail_cos0;
+            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+            let tail_inertia5 = tail_inertia3 + tail_inertia4;
+            let tail_inertia6 = tail_sin0 * tail_inertia5;
+            let tail_inertia7 = tail_cos0 * tail_inertia5;
+            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            // tail: U, Mj, k and the reduced inertia M' (4.44)
+            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+            let tail_pivot1 = 36.10108303249097 * tail_inertia2;
+            let tail_pivot2 = tail_inertia1 * tail_pivot0;
+            let tail_pivot3 = tail_inertia1 * tail_pivot1;
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia10 = 0.8 * tail_pivot2;
+            let tail_inertia11 = 0.8 * tail_inertia2;
+            let tail_inertia12 = tail_inertia8 + tail_inertia11;
+            let tail_inertia13 = tail_inertia1 + tail_inertia1;
+            let tail_inertia14 = 0.8 * tail_inertia13;
+            let tail_inertia15 = tail_inertia9 + tail_inertia14;
+            let tail_inertia16 = 0.8 * tail_inertia10;
+            let tail_inertia17 = tail_inertia1 + 0.88;
+            let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
+            let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
+            let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
+            // bob: U, Mj, k and the reduced inertia M' (4.44)
+            let bob_pivot0 = 1.0 / tail_inertia18;
+            let bob_pivot1 = tail_inertia12 * bob_pivot0;
+            let bob_pivot2 = tail_inertia12 * bob_pivot1;
+            let bob_pivot3 = tail_inertia20 + bob_pivot2;
+            let bob_pivot4 = 1.0 / tail_inertia19;
+            let bob_pivot5 = 1.0 / bob_pivot3;
+            // tail: momentum remainder D, D' (4.45, 4.49)
+            let tail_rest0 = 36.10108303249097 * p_3;
+            let tail_rest1 = tail_inertia1 * tail_rest0;
+            let tail_rest2 = tail_inertia2 * tail_rest0;
+            let tail_rest3 = 0.8 * tail_rest1;
+            let tail_rest4 = p_3 + tail_rest3;
+            // bob: momentum remainder D, D' (4.45, 4.49)
+            let bob_rest0 = p_0 * bob_pivot0;
+            let bob_rest1 = tail_inertia12 * bob_rest0;
+            let bob_rest2 = p_1 - tail_rest4;
+            let bob_rest3 = bob_pivot4 * bob_rest2;
+            let bob_rest4 = p_2 - bob_rest1;
+            let bob_rest5 = bob_pivot5 * bob_rest4;
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = bob_pivot1 * bob_rest5;
+            let bob_vel1 = bob_rest0 + bob_vel0;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = 0.8 * bob_rest3;
+            let tail_vel1 = 0.8 * bob_vel1;
+            let tail_vel2 = tail_pivot0 * tail_vel0;
+            let tail_vel3 = tail_rest0 + tail_vel2;
+            let tail_vel4 = bob_rest3 + tail_vel3;
+            // bob: coordinate rates
+            let bob_rate0 = q_1 * bob_rest5;
+            let bob_rate1 = q_2 * bob_rest3;
+            let bob_rate2 = bob_rate0 - bob_rate1;
+            let bob_rate3 = q_2 * bob_vel1;
+            let bob_rate4 = q_0 * bob_rest5;
+            let bob_rate5 = bob_rate3 + bob_rate4;
+            let bob_rate6 = q_0 * bob_rest3;
+            let bob_rate7 = q_1 * bob_vel1;
+            let bob_rate8 = bob_rate6 + bob_rate7;
+            let bob_rate9 = q_3 * bob_vel1;
+            let bob_rate10 = bob_rate2 - bob_rate9;
+            let bob_rate11 = 0.5 * bob_rate10;
+            let bob_rate12 = q_3 * bob_rest3;
+            let bob_rate13 = bob_rate5 - bob_rate12;
+            let bob_rate14 = 0.5 * bob_rate13;
+            let bob_rate15 = q_3 * bob_rest5;
+            let bob_rate16 = bob_rate8 + bob_rate15;
+            let bob_rate17 = 0.5 * bob_rate16;
+            let bob_rate18 = q_0 * bob_vel1;
+            let bob_rate19 = q_1 * bob_rest3;
+            let bob_rate20 = bob_rate18 - bob_rate19;
+            let bob_rate21 = q_2 * bob_rest5;
+            let bob_rate22 = bob_rate20 - bob_rate21;
+            let bob_rate23 = 0.5 * bob_rate22;
+            // bob: gravity and wrenches
+            let bob_load0 = 9.81 * bob_pose9;
+            let bob_load1 = 9.81 * bob_pose10;
+            let bob_load2 = 9.81 * bob_pose12;
+            // tail: gravity and wrenches
+            let tail_load0 = tail_cos0 * bob_load2;
+            let tail_load1 = tail_sin0 * bob_load0;
+            let tail_load2 = tail_load0 - tail_load1;
+            // bob: momentum rate (4.36)
+            let bob_pdot0 = p_2 * bob_rest3;
+            let bob_pdot1 = p_1 * bob_rest5;
+            let bob_pdot2 = bob_pdot0 - bob_pdot1;
+            let bob_pdot3 = p_0 * bob_rest5;
+            let bob_pdot4 = p_2 * bob_vel1;
+            let bob_pdot5 = bob_pdot3 + bob_pdot4;
+            let bob_pdot6 = p_1 * bob_vel1;
+            let bob_pdot7 = p_0 * bob_rest3;
+            let bob_pdot8 = bob_pdot6 + bob_pdot7;
+            let bob_pdot9 = tail_inertia17 * bob_load1;
+            let bob_pdot10 = tail_inertia17 * bob_load0;
+            let bob_pdot11 = tail_inertia2 * bob_load2;
+            let bob_pdot12 = bob_pdot10 - bob_pdot11;
+            let bob_pdot13 = tail_inertia2 * bob_load1;
+            let bob_pdot14 = bob_pdot2 - bob_pdot9;
+            let bob_pdot15 = bob_pdot5 + bob_pdot12;
+            let bob_pdot16 = bob_pdot8 + bob_pdot13;
+            // tail: momentum rate (4.36)
+            let tail_pdot0 = tail_inertia6 + tail_inertia9;
+            let tail_pdot1 = tail_pivot3 * tail_vel0;
+            let tail_pdot2 = tail_rest2 + tail_pdot1;
+            let tail_pdot3 = tail_inertia8 * bob_vel1;
+            let tail_pdot4 = bob_rest5 * tail_pdot0;
+            let tail_pdot5 = tail_pdot3 + tail_pdot4;
+            let tail_pdot6 = tail_inertia2 * tail_vel1;
+            let tail_pdot7 = tail_pdot5 + tail_pdot6;
+            let tail_pdot8 = tail_inertia8 * bob_rest5;
+            let tail_pdot9 = tail_inertia1 * tail_vel1;
+            let tail_pdot10 = tail_pdot8 - tail_pdot9;
+            let tail_pdot11 = tail_vel0 * tail_pdot2;
+            let tail_pdot12 = bob_vel1 * tail_pdot7;
+            let tail_pdot13 = tail_pdot11 - tail_pdot12;
+            let tail_pdot14 = bob_rest5 * tail_pdot10;
+            let tail_pdot15 = tail_pdot13 + tail_pdot14;
+            let tail_pdot16 = 0.1004987562112089 * tail_load2;
+            let tail_pdot17 = tail_pdot15 + tail_pdot16;
+            let tail_pdot18 = tau_0 + bob_pdot14;
+            let tail_pdot19 = tau_1 + bob_pdot15;
+            let tail_pdot20 = tau_2 - bob_pdot16;
+            let tail_pdot21 = tau_3 - tail_pdot17;
+            results[0][l] = -bob_rate11;
+            results[1][l] = bob_rate14;
+            results[2][l] = -bob_rate17;
+            results[3][l] = -bob_rate23;
+            results[4][l] = tail_vel4;
+            results[5][l] = tail_pdot18;
+            results[6][l] = tail_pdot19;
+            results[7][l] = tail_pdot20;
+            results[8][l] = tail_pdot21;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        pd.give(0, &results[5]);
+        pd.give(1, &results[6]);
+        pd.give(2, &results[7]);
+        pd.give(3, &results[8]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 45 operations: 18 additions, 24 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 5], p: &[f64; 4], v: &mut [f64; 4]) {
-        let q_4 = q[4];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = tail_cos0 + tail_cos0;
-        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-        let tail_inertia5 = tail_inertia3 + tail_inertia4;
-        let tail_inertia6 = tail_sin0 * tail_inertia5;
-        let tail_inertia7 = tail_cos0 * tail_inertia5;
-        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
-        // tail: U, Mj, k and the reduced inertia M' (4.44)
-        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-        let tail_pivot1 = tail_inertia1 * tail_pivot0;
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia10 = 0.8 * tail_pivot1;
-        let tail_inertia11 = 0.8 * tail_inertia2;
-        let tail_inertia12 = tail_inertia8 + tail_inertia11;
-        let tail_inertia13 = tail_inertia1 + tail_inertia1;
-        let tail_inertia14 = 0.8 * tail_inertia13;
-        let tail_inertia15 = tail_inertia9 + tail_inertia14;
-        let tail_inertia16 = 0.8 * tail_inertia10;
-        let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-        let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-        let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
-        // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia17;
-        let bob_pivot1 = tail_inertia12 * bob_pivot0;
-        let bob_pivot2 = tail_inertia12 * bob_pivot1;
-        let bob_pivot3 = tail_inertia19 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia18;
-        let bob_pivot5 = 1.0 / bob_pivot3;
-        // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = tail_inertia1 * tail_rest0;
-        let tail_rest2 = 0.8 * tail_rest1;
-        let tail_rest3 = p_3 + tail_rest2;
-        // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia12 * bob_rest0;
-        let bob_rest2 = p_1 - tail_rest3;
-        let bob_rest3 = bob_pivot4 * bob_rest2;
-        let bob_rest4 = p_2 - bob_rest1;
-        let bob_rest5 = bob_pivot5 * bob_rest4;
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = bob_pivot1 * bob_rest5;
-        let bob_vel1 = bob_rest0 + bob_vel0;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = 0.8 * bob_rest3;
-        let tail_vel1 = tail_pivot0 * tail_vel0;
-        let tail_vel2 = tail_rest0 + tail_vel1;
-        let tail_vel3 = bob_rest3 + tail_vel2;
-        v[0] = bob_vel1;
-        v[1] = -bob_rest3;
-        v[2] = -bob_rest5;
-        v[3] = tail_vel3;
+        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+    }
+
+    #[inline(always)]
+    fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia0 = tail_cos0 + tail_cos0;
+            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+            let tail_inertia5 = tail_inertia3 + tail_inertia4;
+            let tail_inertia6 = tail_sin0 * tail_inertia5;
+            let tail_inertia7 = tail_cos0 * tail_inertia5;
+            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            // tail: U, Mj, k and the reduced inertia M' (4.44)
+            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia10 = 0.8 * tail_pivot1;
+            let tail_inertia11 = 0.8 * tail_inertia2;
+            let tail_inertia12 = tail_inertia8 + tail_inertia11;
+            let tail_inertia13 = tail_inertia1 + tail_inertia1;
+            let tail_inertia14 = 0.8 * tail_inertia13;
+            let tail_inertia15 = tail_inertia9 + tail_inertia14;
+            let tail_inertia16 = 0.8 * tail_inertia10;
+            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
+            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
+            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            // bob: U, Mj, k and the reduced inertia M' (4.44)
+            let bob_pivot0 = 1.0 / tail_inertia17;
+            let bob_pivot1 = tail_inertia12 * bob_pivot0;
+            let bob_pivot2 = tail_inertia12 * bob_pivot1;
+            let bob_pivot3 = tail_inertia19 + bob_pivot2;
+            let bob_pivot4 = 1.0 / tail_inertia18;
+            let bob_pivot5 = 1.0 / bob_pivot3;
+            // tail: momentum remainder D, D' (4.45, 4.49)
+            let tail_rest0 = 36.10108303249097 * p_3;
+            let tail_rest1 = tail_inertia1 * tail_rest0;
+            let tail_rest2 = 0.8 * tail_rest1;
+            let tail_rest3 = p_3 + tail_rest2;
+            // bob: momentum remainder D, D' (4.45, 4.49)
+            let bob_rest0 = p_0 * bob_pivot0;
+            let bob_rest1 = tail_inertia12 * bob_rest0;
+            let bob_rest2 = p_1 - tail_rest3;
+            let bob_rest3 = bob_pivot4 * bob_rest2;
+            let bob_rest4 = p_2 - bob_rest1;
+            let bob_rest5 = bob_pivot5 * bob_rest4;
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = bob_pivot1 * bob_rest5;
+            let bob_vel1 = bob_rest0 + bob_vel0;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = 0.8 * bob_rest3;
+            let tail_vel1 = tail_pivot0 * tail_vel0;
+            let tail_vel2 = tail_rest0 + tail_vel1;
+            let tail_vel3 = bob_rest3 + tail_vel2;
+            results[0][l] = bob_vel1;
+            results[1][l] = -bob_rest3;
+            results[2][l] = -bob_rest5;
+            results[3][l] = tail_vel3;
+        }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 39 operations: 14 additions, 25 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn momenta(&self, q: &[f64; 5], v: &[f64; 4], p: &mut [f64; 4]) {
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = 0.8 * v_1;
-        let tail_vel1 = 0.8 * v_0;
-        let tail_vel2 = tail_sin0 * tail_vel0;
-        let tail_vel3 = v_0 * tail_cos0;
-        let tail_vel4 = v_2 * tail_sin0;
-        let tail_vel5 = tail_vel3 - tail_vel4;
-        let tail_vel6 = v_2 * tail_cos0;
-        let tail_vel7 = v_0 * tail_sin0;
-        let tail_vel8 = tail_vel6 + tail_vel7;
-        let tail_vel9 = v_1 + v_3;
-        // bob: momentum
-        let bob_mom0 = 0.6101920792079208 * v_0;
-        let bob_mom1 = 0.5770000000000001 * v_1;
-        let bob_mom2 = 0.0401920792079208 * v_2;
-        // tail: momentum
-        let tail_mom0 = 0.026984158415841585 * tail_vel5;
-        let tail_mom1 = 0.0003792079207920793 * tail_vel8;
-        let tail_mom2 = tail_mom0 - tail_mom1;
-        let tail_mom3 = 0.0003792079207920793 * tail_vel5;
-        let tail_mom4 = 0.027700000000000002 * tail_vel9;
-        let tail_mom5 = 0.1004987562112089 * tail_vel9;
-        let tail_mom6 = 0.1004987562112089 * tail_vel8;
-        let tail_mom7 = 0.1004987562112089 * tail_vel1;
-        let tail_mom8 = 0.1004987562112089 * tail_vel2;
-        let tail_mom9 = tail_mom3 + tail_mom7;
-        let tail_mom10 = tail_mom4 + tail_mom8;
-        let tail_mom11 = tail_sin0 * tail_mom5;
-        let tail_mom12 = tail_cos0 * tail_mom2;
-        let tail_mom13 = tail_sin0 * tail_mom9;
-        let tail_mom14 = tail_mom12 - tail_mom13;
-        let tail_mom15 = tail_sin0 * tail_mom2;
-        let tail_mom16 = tail_cos0 * tail_mom9;
-        let tail_mom17 = tail_mom15 + tail_mom16;
-        let tail_mom18 = 0.8 * tail_mom6;
-        let tail_mom19 = tail_mom14 - tail_mom18;
-        let tail_mom20 = 0.8 * tail_mom11;
-        let tail_mom21 = tail_mom10 + tail_mom20;
-        let tail_mom22 = bob_mom0 - tail_mom19;
-        let tail_mom23 = bob_mom1 + tail_mom21;
-        let tail_mom24 = bob_mom2 + tail_mom17;
-        p[0] = tail_mom22;
-        p[1] = tail_mom23;
-        p[2] = tail_mom24;
-        p[3] = tail_mom10;
+        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+    }
+
+    #[inline(always)]
+    fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = 0.8 * v_1;
+            let tail_vel1 = 0.8 * v_0;
+            let tail_vel2 = tail_sin0 * tail_vel0;
+            let tail_vel3 = v_0 * tail_cos0;
+            let tail_vel4 = v_2 * tail_sin0;
+            let tail_vel5 = tail_vel3 - tail_vel4;
+            let tail_vel6 = v_2 * tail_cos0;
+            let tail_vel7 = v_0 * tail_sin0;
+            let tail_vel8 = tail_vel6 + tail_vel7;
+            let tail_vel9 = v_1 + v_3;
+            // bob: momentum
+            let bob_mom0 = 0.6101920792079208 * v_0;
+            let bob_mom1 = 0.5770000000000001 * v_1;
+            let bob_mom2 = 0.0401920792079208 * v_2;
+            // tail: momentum
+            let tail_mom0 = 0.026984158415841585 * tail_vel5;
+            let tail_mom1 = 0.0003792079207920793 * tail_vel8;
+            let tail_mom2 = tail_mom0 - tail_mom1;
+            let tail_mom3 = 0.0003792079207920793 * tail_vel5;
+            let tail_mom4 = 0.027700000000000002 * tail_vel9;
+            let tail_mom5 = 0.1004987562112089 * tail_vel9;
+            let tail_mom6 = 0.1004987562112089 * tail_vel8;
+            let tail_mom7 = 0.1004987562112089 * tail_vel1;
+            let tail_mom8 = 0.1004987562112089 * tail_vel2;
+            let tail_mom9 = tail_mom3 + tail_mom7;
+            let tail_mom10 = tail_mom4 + tail_mom8;
+            let tail_mom11 = tail_sin0 * tail_mom5;
+            let tail_mom12 = tail_cos0 * tail_mom2;
+            let tail_mom13 = tail_sin0 * tail_mom9;
+            let tail_mom14 = tail_mom12 - tail_mom13;
+            let tail_mom15 = tail_sin0 * tail_mom2;
+            let tail_mom16 = tail_cos0 * tail_mom9;
+            let tail_mom17 = tail_mom15 + tail_mom16;
+            let tail_mom18 = 0.8 * tail_mom6;
+            let tail_mom19 = tail_mom14 - tail_mom18;
+            let tail_mom20 = 0.8 * tail_mom11;
+            let tail_mom21 = tail_mom10 + tail_mom20;
+            let tail_mom22 = bob_mom0 - tail_mom19;
+            let tail_mom23 = bob_mom1 + tail_mom21;
+            let tail_mom24 = bob_mom2 + tail_mom17;
+            results[0][l] = tail_mom22;
+            results[1][l] = tail_mom23;
+            results[2][l] = tail_mom24;
+            results[3][l] = tail_mom10;
+        }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
     }
 
     /// Kinetic and potential energy, J.
     /// 69 operations: 30 additions, 36 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 5], p: &[f64; 4]) -> [f64; 2] {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_3 * bob_pose1;
-        let bob_pose7 = bob_pose5 - bob_pose6;
-        let bob_pose8 = bob_pose3 + bob_pose4;
-        let bob_pose9 = bob_pose8 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = tail_cos0 + tail_cos0;
-        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-        let tail_inertia5 = tail_inertia3 + tail_inertia4;
-        let tail_inertia6 = tail_sin0 * tail_inertia5;
-        let tail_inertia7 = tail_cos0 * tail_inertia5;
-        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
-        // tail: U, Mj, k and the reduced inertia M' (4.44)
-        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-        let tail_pivot1 = tail_inertia1 * tail_pivot0;
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia10 = 0.8 * tail_pivot1;
-        let tail_inertia11 = 0.8 * tail_inertia2;
-        let tail_inertia12 = tail_inertia8 + tail_inertia11;
-        let tail_inertia13 = tail_inertia1 + tail_inertia1;
-        let tail_inertia14 = 0.8 * tail_inertia13;
-        let tail_inertia15 = tail_inertia9 + tail_inertia14;
-        let tail_inertia16 = 0.8 * tail_inertia10;
-        let tail_inertia17 = tail_inertia1 + 0.88;
-        let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
-        let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
-        let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
-        // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia18;
-        let bob_pivot1 = tail_inertia12 * bob_pivot0;
-        let bob_pivot2 = tail_inertia12 * bob_pivot1;
-        let bob_pivot3 = tail_inertia20 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia19;
-        let bob_pivot5 = 1.0 / bob_pivot3;
-        // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = 36.10108303249097 * p_3;
-        let tail_rest1 = tail_inertia1 * tail_rest0;
-        let tail_rest2 = 0.8 * tail_rest1;
-        let tail_rest3 = p_3 + tail_rest2;
-        // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = p_0 * bob_pivot0;
-        let bob_rest1 = tail_inertia12 * bob_rest0;
-        let bob_rest2 = p_1 - tail_rest3;
-        let bob_rest3 = bob_pivot4 * bob_rest2;
-        let bob_rest4 = p_2 - bob_rest1;
-        let bob_rest5 = bob_pivot5 * bob_rest4;
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = bob_pivot1 * bob_rest5;
-        let bob_vel1 = bob_rest0 + bob_vel0;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = 0.8 * bob_rest3;
-        let tail_vel1 = tail_pivot0 * tail_vel0;
-        let tail_vel2 = tail_rest0 + tail_vel1;
-        let tail_vel3 = bob_rest3 + tail_vel2;
-        // bob: energy
-        let bob_energy0 = p_0 * bob_vel1;
-        let bob_energy1 = p_1 * bob_rest3;
-        let bob_energy2 = bob_energy0 - bob_energy1;
-        let bob_energy3 = p_2 * bob_rest5;
-        let bob_energy4 = bob_energy2 - bob_energy3;
-        // tail: energy
-        let tail_energy0 = p_3 * tail_vel3;
-        let tail_energy1 = bob_energy4 + tail_energy0;
-        let tail_energy2 = 0.5 * tail_energy1;
-        // bob: gravity and wrenches
-        let bob_load0 = bob_pose7 * tail_inertia2;
-        let bob_load1 = bob_pose9 * tail_inertia17;
-        let bob_load2 = bob_load0 + bob_load1;
-        let bob_load3 = bob_load2 + 3.4;
-        // ground: energy
-        let ground_energy0 = 9.81 * bob_load3;
-        let kinetic = tail_energy2;
-        let potential = ground_energy0;
-        [kinetic, potential]
+        let mut result = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
+        result
+    }
+
+    #[inline(always)]
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_3 * bob_pose1;
+            let bob_pose7 = bob_pose5 - bob_pose6;
+            let bob_pose8 = bob_pose3 + bob_pose4;
+            let bob_pose9 = bob_pose8 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia0 = tail_cos0 + tail_cos0;
+            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+            let tail_inertia5 = tail_inertia3 + tail_inertia4;
+            let tail_inertia6 = tail_sin0 * tail_inertia5;
+            let tail_inertia7 = tail_cos0 * tail_inertia5;
+            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            // tail: U, Mj, k and the reduced inertia M' (4.44)
+            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia10 = 0.8 * tail_pivot1;
+            let tail_inertia11 = 0.8 * tail_inertia2;
+            let tail_inertia12 = tail_inertia8 + tail_inertia11;
+            let tail_inertia13 = tail_inertia1 + tail_inertia1;
+            let tail_inertia14 = 0.8 * tail_inertia13;
+            let tail_inertia15 = tail_inertia9 + tail_inertia14;
+            let tail_inertia16 = 0.8 * tail_inertia10;
+            let tail_inertia17 = tail_inertia1 + 0.88;
+            let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
+            let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
+            let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
+            // bob: U, Mj, k and the reduced inertia M' (4.44)
+            let bob_pivot0 = 1.0 / tail_inertia18;
+            let bob_pivot1 = tail_inertia12 * bob_pivot0;
+            let bob_pivot2 = tail_inertia12 * bob_pivot1;
+            let bob_pivot3 = tail_inertia20 + bob_pivot2;
+            let bob_pivot4 = 1.0 / tail_inertia19;
+            let bob_pivot5 = 1.0 / bob_pivot3;
+            // tail: momentum remainder D, D' (4.45, 4.49)
+            let tail_rest0 = 36.10108303249097 * p_3;
+            let tail_rest1 = tail_inertia1 * tail_rest0;
+            let tail_rest2 = 0.8 * tail_rest1;
+            let tail_rest3 = p_3 + tail_rest2;
+            // bob: momentum remainder D, D' (4.45, 4.49)
+            let bob_rest0 = p_0 * bob_pivot0;
+            let bob_rest1 = tail_inertia12 * bob_rest0;
+            let bob_rest2 = p_1 - tail_rest3;
+            let bob_rest3 = bob_pivot4 * bob_rest2;
+            let bob_rest4 = p_2 - bob_rest1;
+            let bob_rest5 = bob_pivot5 * bob_rest4;
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = bob_pivot1 * bob_rest5;
+            let bob_vel1 = bob_rest0 + bob_vel0;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = 0.8 * bob_rest3;
+            let tail_vel1 = tail_pivot0 * tail_vel0;
+            let tail_vel2 = tail_rest0 + tail_vel1;
+            let tail_vel3 = bob_rest3 + tail_vel2;
+            // bob: energy
+            let bob_energy0 = p_0 * bob_vel1;
+            let bob_energy1 = p_1 * bob_rest3;
+            let bob_energy2 = bob_energy0 - bob_energy1;
+            let bob_energy3 = p_2 * bob_rest5;
+            let bob_energy4 = bob_energy2 - bob_energy3;
+            // tail: energy
+            let tail_energy0 = p_3 * tail_vel3;
+            let tail_energy1 = bob_energy4 + tail_energy0;
+            let tail_energy2 = 0.5 * tail_energy1;
+            // bob: gravity and wrenches
+            let bob_load0 = bob_pose7 * tail_inertia2;
+            let bob_load1 = bob_pose9 * tail_inertia17;
+            let bob_load2 = bob_load0 + bob_load1;
+            let bob_load3 = bob_load2 + 3.4;
+            // ground: energy
+            let ground_energy0 = 9.81 * bob_load3;
+            results[0][l] = tail_energy2;
+            results[1][l] = ground_energy0;
+        }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
     /// 138 operations: 56 additions, 79 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_1 * bob_pose2;
-        let bob_pose7 = q_3 * bob_pose0;
-        let bob_pose8 = q_3 * bob_pose1;
-        let bob_pose9 = bob_pose5 - bob_pose8;
-        let bob_pose10 = bob_pose6 + bob_pose7;
-        let bob_pose11 = bob_pose3 + bob_pose4;
-        let bob_pose12 = bob_pose11 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = tail_cos0 + tail_cos0;
-        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-        let tail_inertia5 = tail_inertia3 + tail_inertia4;
-        let tail_inertia6 = tail_sin0 * tail_inertia5;
-        let tail_inertia7 = tail_cos0 * tail_inertia5;
-        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
-        // tail: U, Mj, k and the reduced inertia M' (4.44)
-        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-        let tail_pivot1 = tail_inertia1 * tail_pivot0;
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia10 = 0.8 * tail_pivot1;
-        let tail_inertia11 = 0.8 * tail_inertia2;
-        let tail_inertia12 = tail_inertia8 + tail_inertia11;
-        let tail_inertia13 = tail_inertia1 + tail_inertia1;
-        let tail_inertia14 = 0.8 * tail_inertia13;
-        let tail_inertia15 = tail_inertia9 + tail_inertia14;
-        let tail_inertia16 = 0.8 * tail_inertia10;
-        let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-        let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-        let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
-        // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia17;
-        let bob_pivot1 = tail_inertia12 * bob_pivot0;
-        let bob_pivot2 = tail_inertia12 * bob_pivot1;
-        let bob_pivot3 = tail_inertia19 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia18;
-        let bob_pivot5 = 1.0 / bob_pivot3;
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = 9.81 * bob_pose9;
-        let bob_vel1 = 9.81 * bob_pose10;
-        let bob_vel2 = 9.81 * bob_pose12;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = v_0 * v_2;
-        let tail_vel1 = v_1 * v_2;
-        let tail_vel2 = v_0 * v_0;
-        let tail_vel3 = v_1 * v_1;
-        let tail_vel4 = tail_vel2 + tail_vel3;
-        let tail_vel5 = 0.8 * tail_vel0;
-        let tail_vel6 = bob_vel0 - tail_vel5;
-        let tail_vel7 = 0.8 * tail_vel1;
-        let tail_vel8 = bob_vel1 - tail_vel7;
-        let tail_vel9 = 0.8 * tail_vel4;
-        let tail_vel10 = bob_vel2 - tail_vel9;
-        let tail_vel11 = v_0 * tail_cos0;
-        let tail_vel12 = v_2 * tail_sin0;
-        let tail_vel13 = tail_vel11 - tail_vel12;
-        let tail_vel14 = v_2 * tail_cos0;
-        let tail_vel15 = v_0 * tail_sin0;
-        let tail_vel16 = tail_vel14 + tail_vel15;
-        let tail_vel17 = tail_cos0 * tail_vel10;
-        let tail_vel18 = tail_sin0 * tail_vel6;
-        let tail_vel19 = tail_vel17 - tail_vel18;
-        let tail_vel20 = v_1 + v_3;
-        // tail: acceleration
-        let tail_acc0 = v_3 * tail_vel16;
-        let tail_acc1 = v_3 * tail_vel13;
-        let tail_acc2 = tail_vel13 * tail_vel20;
-        let tail_acc3 = tail_vel16 * tail_vel20;
-        let tail_acc4 = tail_vel13 * tail_vel13;
-        let tail_acc5 = tail_vel16 * tail_vel16;
-        // bob: gravity and wrenches
-        let bob_load0 = v_0 * v_1;
-        let bob_load1 = 0.5368079207920793 * tail_vel1;
-        let bob_load2 = 0.5700000000000001 * tail_vel0;
-        let bob_load3 = 0.03319207920792078 * bob_load0;
-        let bob_load4 = 0.88 * bob_vel1;
-        let bob_load5 = 0.88 * bob_vel0;
-        let bob_load6 = bob_load1 - bob_load4;
-        let bob_load7 = bob_load2 - bob_load5;
-        // tail: gravity and wrenches
-        let tail_load0 = tail_vel20 * tail_vel20;
-        let tail_load1 = tail_vel13 * tail_vel16;
-        let tail_load2 = tail_acc5 + tail_load0;
-        let tail_load3 = tail_acc1 + tail_acc2;
-        let tail_load4 = tail_acc0 + tail_acc3;
-        let tail_load5 = 0.1004987562112089 * tail_load2;
-        let tail_load6 = 0.1004987562112089 * tail_load1;
-        let tail_load7 = 0.1004987562112089 * tail_load3;
-        let tail_load8 = 0.026984158415841585 * tail_acc0;
-        let tail_load9 = 0.027700000000000002 * tail_acc3;
-        let tail_load10 = tail_load8 - tail_load9;
-        let tail_load11 = 0.0003792079207920793 * tail_load3;
-        let tail_load12 = tail_load10 + tail_load11;
-        let tail_load13 = 0.05468415841584159 * tail_acc2;
-        let tail_load14 = 0.0003792079207920793 * tail_load4;
-        let tail_load15 = tail_load13 - tail_load14;
-        let tail_load16 = 0.026984158415841585 * tail_load1;
-        let tail_load17 = tail_acc4 - tail_acc5;
-        let tail_load18 = 0.0003792079207920793 * tail_load17;
-        let tail_load19 = tail_load16 + tail_load18;
-        let tail_load20 = 0.1004987562112089 * tail_vel8;
-        let tail_load21 = 0.1004987562112089 * tail_vel19;
-        let tail_load22 = tail_load15 + tail_load20;
-        let tail_load23 = tail_load19 - tail_load21;
-        // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = tail_cos0 * tail_load5;
-        let tail_rest1 = tail_sin0 * tail_load6;
-        let tail_rest2 = tail_rest0 - tail_rest1;
-        let tail_rest3 = tail_cos0 * tail_load12;
-        let tail_rest4 = tail_sin0 * tail_load22;
-        let tail_rest5 = tail_rest3 + tail_rest4;
-        let tail_rest6 = tail_sin0 * tail_load12;
-        let tail_rest7 = tail_cos0 * tail_load22;
-        let tail_rest8 = tail_rest6 - tail_rest7;
-        let tail_rest9 = tau_3 + tail_load23;
-        let tail_rest10 = 36.10108303249097 * tail_rest9;
-        let tail_rest11 = tail_inertia1 * tail_rest10;
-        let tail_rest12 = tail_rest2 + tail_rest11;
-        let tail_rest13 = 0.8 * tail_load7;
-        let tail_rest14 = tail_rest5 + tail_rest13;
-        let tail_rest15 = 0.8 * tail_rest12;
-        let tail_rest16 = tau_3 + tail_rest15;
-        let tail_rest17 = bob_load6 - tail_rest14;
-        let tail_rest18 = bob_load7 + tail_rest16;
-        let tail_rest19 = bob_load3 + tail_rest8;
-        // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = tau_0 + tail_rest17;
-        let bob_rest1 = bob_pivot0 * bob_rest0;
-        let bob_rest2 = tail_inertia12 * bob_rest1;
-        let bob_rest3 = tail_rest19 - bob_rest2;
-        let bob_rest4 = tau_1 - tail_rest18;
-        let bob_rest5 = bob_pivot4 * bob_rest4;
-        let bob_rest6 = tau_2 + bob_rest3;
-        let bob_rest7 = bob_pivot5 * bob_rest6;
-        // bob: acceleration
-        let bob_acc0 = bob_pivot1 * bob_rest7;
-        let bob_acc1 = bob_rest1 + bob_acc0;
-        // tail: acceleration
-        let tail_acc6 = 0.8 * bob_rest5;
-        let tail_acc7 = tail_pivot0 * tail_acc6;
-        let tail_acc8 = tail_rest10 + tail_acc7;
-        let tail_acc9 = bob_rest5 + tail_acc8;
-        a[0] = bob_acc1;
-        a[1] = -bob_rest5;
-        a[2] = -bob_rest7;
-        a[3] = tail_acc9;
+        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+    }
+
+    #[inline(always)]
+    fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_1 * bob_pose2;
+            let bob_pose7 = q_3 * bob_pose0;
+            let bob_pose8 = q_3 * bob_pose1;
+            let bob_pose9 = bob_pose5 - bob_pose8;
+            let bob_pose10 = bob_pose6 + bob_pose7;
+            let bob_pose11 = bob_pose3 + bob_pose4;
+            let bob_pose12 = bob_pose11 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia0 = tail_cos0 + tail_cos0;
+            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+            let tail_inertia5 = tail_inertia3 + tail_inertia4;
+            let tail_inertia6 = tail_sin0 * tail_inertia5;
+            let tail_inertia7 = tail_cos0 * tail_inertia5;
+            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            // tail: U, Mj, k and the reduced inertia M' (4.44)
+            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia10 = 0.8 * tail_pivot1;
+            let tail_inertia11 = 0.8 * tail_inertia2;
+            let tail_inertia12 = tail_inertia8 + tail_inertia11;
+            let tail_inertia13 = tail_inertia1 + tail_inertia1;
+            let tail_inertia14 = 0.8 * tail_inertia13;
+            let tail_inertia15 = tail_inertia9 + tail_inertia14;
+            let tail_inertia16 = 0.8 * tail_inertia10;
+            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
+            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
+            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            // bob: U, Mj, k and the reduced inertia M' (4.44)
+            let bob_pivot0 = 1.0 / tail_inertia17;
+            let bob_pivot1 = tail_inertia12 * bob_pivot0;
+            let bob_pivot2 = tail_inertia12 * bob_pivot1;
+            let bob_pivot3 = tail_inertia19 + bob_pivot2;
+            let bob_pivot4 = 1.0 / tail_inertia18;
+            let bob_pivot5 = 1.0 / bob_pivot3;
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = 9.81 * bob_pose9;
+            let bob_vel1 = 9.81 * bob_pose10;
+            let bob_vel2 = 9.81 * bob_pose12;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = v_0 * v_2;
+            let tail_vel1 = v_1 * v_2;
+            let tail_vel2 = v_0 * v_0;
+            let tail_vel3 = v_1 * v_1;
+            let tail_vel4 = tail_vel2 + tail_vel3;
+            let tail_vel5 = 0.8 * tail_vel0;
+            let tail_vel6 = bob_vel0 - tail_vel5;
+            let tail_vel7 = 0.8 * tail_vel1;
+            let tail_vel8 = bob_vel1 - tail_vel7;
+            let tail_vel9 = 0.8 * tail_vel4;
+            let tail_vel10 = bob_vel2 - tail_vel9;
+            let tail_vel11 = v_0 * tail_cos0;
+            let tail_vel12 = v_2 * tail_sin0;
+            let tail_vel13 = tail_vel11 - tail_vel12;
+            let tail_vel14 = v_2 * tail_cos0;
+            let tail_vel15 = v_0 * tail_sin0;
+            let tail_vel16 = tail_vel14 + tail_vel15;
+            let tail_vel17 = tail_cos0 * tail_vel10;
+            let tail_vel18 = tail_sin0 * tail_vel6;
+            let tail_vel19 = tail_vel17 - tail_vel18;
+            let tail_vel20 = v_1 + v_3;
+            // tail: acceleration
+            let tail_acc0 = v_3 * tail_vel16;
+            let tail_acc1 = v_3 * tail_vel13;
+            let tail_acc2 = tail_vel13 * tail_vel20;
+            let tail_acc3 = tail_vel16 * tail_vel20;
+            let tail_acc4 = tail_vel13 * tail_vel13;
+            let tail_acc5 = tail_vel16 * tail_vel16;
+            // bob: gravity and wrenches
+            let bob_load0 = v_0 * v_1;
+            let bob_load1 = 0.5368079207920793 * tail_vel1;
+            let bob_load2 = 0.5700000000000001 * tail_vel0;
+            let bob_load3 = 0.03319207920792078 * bob_load0;
+            let bob_load4 = 0.88 * bob_vel1;
+            let bob_load5 = 0.88 * bob_vel0;
+            let bob_load6 = bob_load1 - bob_load4;
+            let bob_load7 = bob_load2 - bob_load5;
+            // tail: gravity and wrenches
+            let tail_load0 = tail_vel20 * tail_vel20;
+            let tail_load1 = tail_vel13 * tail_vel16;
+            let tail_load2 = tail_acc5 + tail_load0;
+            let tail_load3 = tail_acc1 + tail_acc2;
+            let tail_load4 = tail_acc0 + tail_acc3;
+            let tail_load5 = 0.1004987562112089 * tail_load2;
+            let tail_load6 = 0.1004987562112089 * tail_load1;
+            let tail_load7 = 0.1004987562112089 * tail_load3;
+            let tail_load8 = 0.026984158415841585 * tail_acc0;
+            let tail_load9 = 0.027700000000000002 * tail_acc3;
+            let tail_load10 = tail_load8 - tail_load9;
+            let tail_load11 = 0.0003792079207920793 * tail_load3;
+            let tail_load12 = tail_load10 + tail_load11;
+            let tail_load13 = 0.05468415841584159 * tail_acc2;
+            let tail_load14 = 0.0003792079207920793 * tail_load4;
+            let tail_load15 = tail_load13 - tail_load14;
+            let tail_load16 = 0.026984158415841585 * tail_load1;
+            let tail_load17 = tail_acc4 - tail_acc5;
+            let tail_load18 = 0.0003792079207920793 * tail_load17;
+            let tail_load19 = tail_load16 + tail_load18;
+            let tail_load20 = 0.1004987562112089 * tail_vel8;
+            let tail_load21 = 0.1004987562112089 * tail_vel19;
+            let tail_load22 = tail_load15 + tail_load20;
+            let tail_load23 = tail_load19 - tail_load21;
+            // tail: momentum remainder D, D' (4.45, 4.49)
+            let tail_rest0 = tail_cos0 * tail_load5;
+            let tail_rest1 = tail_sin0 * tail_load6;
+            let tail_rest2 = tail_rest0 - tail_rest1;
+            let tail_rest3 = tail_cos0 * tail_load12;
+            let tail_rest4 = tail_sin0 * tail_load22;
+            let tail_rest5 = tail_rest3 + tail_rest4;
+            let tail_rest6 = tail_sin0 * tail_load12;
+            let tail_rest7 = tail_cos0 * tail_load22;
+            let tail_rest8 = tail_rest6 - tail_rest7;
+            let tail_rest9 = tau_3 + tail_load23;
+            let tail_rest10 = 36.10108303249097 * tail_rest9;
+            let tail_rest11 = tail_inertia1 * tail_rest10;
+            let tail_rest12 = tail_rest2 + tail_rest11;
+            let tail_rest13 = 0.8 * tail_load7;
+            let tail_rest14 = tail_rest5 + tail_rest13;
+            let tail_rest15 = 0.8 * tail_rest12;
+            let tail_rest16 = tau_3 + tail_rest15;
+            let tail_rest17 = bob_load6 - tail_rest14;
+            let tail_rest18 = bob_load7 + tail_rest16;
+            let tail_rest19 = bob_load3 + tail_rest8;
+            // bob: momentum remainder D, D' (4.45, 4.49)
+            let bob_rest0 = tau_0 + tail_rest17;
+            let bob_rest1 = bob_pivot0 * bob_rest0;
+            let bob_rest2 = tail_inertia12 * bob_rest1;
+            let bob_rest3 = tail_rest19 - bob_rest2;
+            let bob_rest4 = tau_1 - tail_rest18;
+            let bob_rest5 = bob_pivot4 * bob_rest4;
+            let bob_rest6 = tau_2 + bob_rest3;
+            let bob_rest7 = bob_pivot5 * bob_rest6;
+            // bob: acceleration
+            let bob_acc0 = bob_pivot1 * bob_rest7;
+            let bob_acc1 = bob_rest1 + bob_acc0;
+            // tail: acceleration
+            let tail_acc6 = 0.8 * bob_rest5;
+            let tail_acc7 = tail_pivot0 * tail_acc6;
+            let tail_acc8 = tail_rest10 + tail_acc7;
+            let tail_acc9 = bob_rest5 + tail_acc8;
+            results[0][l] = bob_acc1;
+            results[1][l] = -bob_rest5;
+            results[2][l] = -bob_rest7;
+            results[3][l] = tail_acc9;
+        }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
     }
 
     /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
     /// 242 operations: 105 additions, 134 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 5], v: &[f64; 4], reactions: &mut [[f64; 6]; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_1 * bob_pose2;
-        let bob_pose7 = q_3 * bob_pose0;
-        let bob_pose8 = q_3 * bob_pose1;
-        let bob_pose9 = bob_pose5 - bob_pose8;
-        let bob_pose10 = bob_pose6 + bob_pose7;
-        let bob_pose11 = bob_pose3 + bob_pose4;
-        let bob_pose12 = bob_pose11 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia0 = tail_cos0 + tail_cos0;
-        let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-        let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-        let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-        let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-        let tail_inertia5 = tail_inertia3 + tail_inertia4;
-        let tail_inertia6 = tail_sin0 * tail_inertia5;
-        let tail_inertia7 = tail_cos0 * tail_inertia5;
-        let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-        let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
-        // tail: U, Mj, k and the reduced inertia M' (4.44)
-        let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-        let tail_pivot1 = tail_inertia1 * tail_pivot0;
-        // tail: inertia carried to the parent, M* (4.48)
-        let tail_inertia10 = 0.8 * tail_pivot1;
-        let tail_inertia11 = 0.8 * tail_inertia2;
-        let tail_inertia12 = tail_inertia8 + tail_inertia11;
-        let tail_inertia13 = tail_inertia1 + tail_inertia1;
-        let tail_inertia14 = 0.8 * tail_inertia13;
-        let tail_inertia15 = tail_inertia9 + tail_inertia14;
-        let tail_inertia16 = 0.8 * tail_inertia10;
-        let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-        let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-        let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
-        // bob: U, Mj, k and the reduced inertia M' (4.44)
-        let bob_pivot0 = 1.0 / tail_inertia17;
-        let bob_pivot1 = tail_inertia12 * bob_pivot0;
-        let bob_pivot2 = tail_inertia12 * bob_pivot1;
-        let bob_pivot3 = tail_inertia19 + bob_pivot2;
-        let bob_pivot4 = 1.0 / tail_inertia18;
-        let bob_pivot5 = 1.0 / bob_pivot3;
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = 9.81 * bob_pose9;
-        let bob_vel1 = 9.81 * bob_pose10;
-        let bob_vel2 = 9.81 * bob_pose12;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = v_0 * v_2;
-        let tail_vel1 = v_1 * v_2;
-        let tail_vel2 = v_0 * v_0;
-        let tail_vel3 = v_1 * v_1;
-        let tail_vel4 = tail_vel2 + tail_vel3;
-        let tail_vel5 = 0.8 * tail_vel0;
-        let tail_vel6 = bob_vel0 - tail_vel5;
-        let tail_vel7 = 0.8 * tail_vel1;
-        let tail_vel8 = bob_vel1 - tail_vel7;
-        let tail_vel9 = 0.8 * tail_vel4;
-        let tail_vel10 = bob_vel2 - tail_vel9;
-        let tail_vel11 = v_0 * tail_cos0;
-        let tail_vel12 = v_2 * tail_sin0;
-        let tail_vel13 = tail_vel11 - tail_vel12;
-        let tail_vel14 = v_2 * tail_cos0;
-        let tail_vel15 = v_0 * tail_sin0;
-        let tail_vel16 = tail_vel14 + tail_vel15;
-        let tail_vel17 = tail_sin0 * tail_vel10;
-        let tail_vel18 = tail_cos0 * tail_vel10;
-        let tail_vel19 = tail_sin0 * tail_vel6;
-        let tail_vel20 = tail_vel18 - tail_vel19;
-        let tail_vel21 = v_1 + v_3;
-        // tail: acceleration
-        let tail_acc0 = v_3 * tail_vel16;
-        let tail_acc1 = v_3 * tail_vel13;
-        let tail_acc2 = tail_vel13 * tail_vel21;
-        let tail_acc3 = tail_vel16 * tail_vel21;
-        let tail_acc4 = tail_vel13 * tail_vel13;
-        let tail_acc5 = tail_vel16 * tail_vel16;
-        // bob: gravity and wrenches
-        let bob_load0 = v_0 * v_1;
-        let bob_load1 = 0.5368079207920793 * tail_vel1;
-        let bob_load2 = 0.5700000000000001 * tail_vel0;
-        let bob_load3 = 0.03319207920792078 * bob_load0;
-        let bob_load4 = 0.88 * bob_vel1;
-        let bob_load5 = 0.88 * bob_vel0;
-        let bob_load6 = bob_load1 - bob_load4;
-        let bob_load7 = bob_load2 - bob_load5;
-        // tail: gravity and wrenches
-        let tail_load0 = tail_vel21 * tail_vel21;
-        let tail_load1 = tail_vel13 * tail_vel16;
-        let tail_load2 = tail_acc5 + tail_load0;
-        let tail_load3 = tail_acc1 + tail_acc2;
-        let tail_load4 = tail_acc0 + tail_acc3;
-        let tail_load5 = 0.1004987562112089 * tail_load2;
-        let tail_load6 = 0.1004987562112089 * tail_load1;
-        let tail_load7 = 0.1004987562112089 * tail_load3;
-        let tail_load8 = 0.026984158415841585 * tail_acc0;
-        let tail_load9 = 0.027700000000000002 * tail_acc3;
-        let tail_load10 = tail_load8 - tail_load9;
-        let tail_load11 = 0.0003792079207920793 * tail_load3;
-        let tail_load12 = tail_load10 + tail_load11;
-        let tail_load13 = 0.05468415841584159 * tail_acc2;
-        let tail_load14 = 0.0003792079207920793 * tail_load4;
-        let tail_load15 = tail_load13 - tail_load14;
-        let tail_load16 = 0.026984158415841585 * tail_load1;
-        let tail_load17 = tail_acc4 - tail_acc5;
-        let tail_load18 = 0.0003792079207920793 * tail_load17;
-        let tail_load19 = tail_load16 + tail_load18;
-        let tail_load20 = 0.1004987562112089 * tail_vel8;
-        let tail_load21 = 0.1004987562112089 * tail_vel20;
-        let tail_load22 = tail_load15 + tail_load20;
-        let tail_load23 = tail_load19 - tail_load21;
-        // tail: momentum remainder D, D' (4.45, 4.49)
-        let tail_rest0 = tail_cos0 * tail_load5;
-        let tail_rest1 = tail_sin0 * tail_load6;
-        let tail_rest2 = tail_rest0 - tail_rest1;
-        let tail_rest3 = tail_cos0 * tail_load12;
-        let tail_rest4 = tail_sin0 * tail_load22;
-        let tail_rest5 = tail_rest3 + tail_rest4;
-        let tail_rest6 = tail_sin0 * tail_load12;
-        let tail_rest7 = tail_cos0 * tail_load22;
-        let tail_rest8 = tail_rest6 - tail_rest7;
-        let tail_rest9 = tau_3 + tail_load23;
-        let tail_rest10 = 36.10108303249097 * tail_rest9;
-        let tail_rest11 = tail_inertia1 * tail_rest10;
-        let tail_rest12 = tail_rest2 + tail_rest11;
-        let tail_rest13 = 0.8 * tail_load7;
-        let tail_rest14 = tail_rest5 + tail_rest13;
-        let tail_rest15 = 0.8 * tail_rest12;
-        let tail_rest16 = tau_3 + tail_rest15;
-        let tail_rest17 = bob_load6 - tail_rest14;
-        let tail_rest18 = bob_load7 + tail_rest16;
-        let tail_rest19 = bob_load3 + tail_rest8;
-        // bob: momentum remainder D, D' (4.45, 4.49)
-        let bob_rest0 = tau_0 + tail_rest17;
-        let bob_rest1 = bob_pivot0 * bob_rest0;
-        let bob_rest2 = tail_inertia12 * bob_rest1;
-        let bob_rest3 = tail_rest19 - bob_rest2;
-        let bob_rest4 = tau_1 - tail_rest18;
-        let bob_rest5 = bob_pivot4 * bob_rest4;
-        let bob_rest6 = tau_2 + bob_rest3;
-        let bob_rest7 = bob_pivot5 * bob_rest6;
-        // bob: acceleration
-        let bob_acc0 = bob_pivot1 * bob_rest7;
-        let bob_acc1 = bob_rest1 + bob_acc0;
-        // tail: acceleration
-        let tail_acc6 = 0.8 * bob_rest5;
-        let tail_acc7 = tail_pivot0 * tail_acc6;
-        let tail_acc8 = tail_rest10 + tail_acc7;
-        let tail_acc9 = bob_rest5 + tail_acc8;
-        let tail_acc10 = tail_cos0 * bob_acc1;
-        let tail_acc11 = tail_sin0 * bob_rest7;
-        let tail_acc12 = tail_acc10 + tail_acc11;
-        let tail_acc13 = tail_cos0 * bob_rest7;
-        let tail_acc14 = tail_sin0 * bob_acc1;
-        let tail_acc15 = tail_acc13 - tail_acc14;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel22 = tail_vel0 - bob_rest5;
-        let tail_vel23 = tail_vel1 - bob_acc1;
-        let tail_vel24 = 0.8 * tail_vel22;
-        let tail_vel25 = bob_vel0 - tail_vel24;
-        let tail_vel26 = 0.8 * tail_vel23;
-        let tail_vel27 = bob_vel1 - tail_vel26;
-        let tail_vel28 = tail_cos0 * tail_vel25;
-        let tail_vel29 = tail_vel17 + tail_vel28;
-        let tail_vel30 = tail_sin0 * tail_vel25;
-        let tail_vel31 = tail_vel18 - tail_vel30;
-        // tail: acceleration
-        let tail_acc16 = tail_acc0 - tail_acc12;
-        let tail_acc17 = tail_acc1 - tail_acc15;
-        let tail_acc18 = bob_rest5 - tail_acc9;
-        // bob: gravity and wrenches
-        let bob_load8 = 1.2 * bob_vel0;
-        let bob_load9 = 0.48 * tail_vel22;
-        let bob_load10 = bob_load8 - bob_load9;
-        let bob_load11 = 1.2 * bob_vel1;
-        let bob_load12 = 0.48 * tail_vel23;
-        let bob_load13 = bob_load11 - bob_load12;
-        let bob_load14 = 1.2 * bob_vel2;
-        let bob_load15 = 0.48 * tail_vel4;
-        let bob_load16 = bob_load14 - bob_load15;
-        let bob_load17 = 0.262 * bob_acc1;
-        let bob_load18 = 0.245 * tail_vel1;
-        let bob_load19 = bob_load17 - bob_load18;
-        let bob_load20 = 0.257 * bob_rest5;
-        let bob_load21 = 0.25 * tail_vel0;
-        let bob_load22 = bob_load20 - bob_load21;
-        let bob_load23 = 0.012 * bob_rest7;
-        let bob_load24 = 0.0050000000000000044 * bob_load0;
-        let bob_load25 = bob_load23 + bob_load24;
-        let bob_load26 = 0.48 * bob_vel1;
-        let bob_load27 = 0.48 * bob_vel0;
-        let bob_load28 = bob_load19 + bob_load26;
-        let bob_load29 = bob_load22 + bob_load27;
-        // tail: gravity and wrenches
-        let tail_load24 = tail_load1 + tail_acc18;
-        let tail_load25 = tail_acc2 + tail_acc17;
-        let tail_load26 = tail_acc3 + tail_acc16;
-        let tail_load27 = 0.5 * tail_vel29;
-        let tail_load28 = tail_load5 - tail_load27;
-        let tail_load29 = 0.5 * tail_vel31;
-        let tail_load30 = 0.1004987562112089 * tail_load24;
-        let tail_load31 = tail_load29 - tail_load30;
-        let tail_load32 = 0.5 * tail_vel27;
-        let tail_load33 = 0.1004987562112089 * tail_load25;
-        let tail_load34 = tail_load32 + tail_load33;
-        let tail_load35 = 0.001207920792079208 * tail_acc16;
-        let tail_load36 = 0.0004920792079207911 * tail_acc3;
-        let tail_load37 = tail_load35 - tail_load36;
-        let tail_load38 = 0.0003792079207920793 * tail_load25;
-        let tail_load39 = tail_load37 - tail_load38;
-        let tail_load40 = 0.028192079207920794 * tail_acc17;
-        let tail_load41 = 0.026492079207920793 * tail_acc2;
-        let tail_load42 = tail_load40 + tail_load41;
-        let tail_load43 = 0.0003792079207920793 * tail_load26;
-        let tail_load44 = tail_load42 - tail_load43;
-        let tail_load45 = 0.027700000000000002 * tail_acc18;
-        let tail_load46 = tail_load16 + tail_load45;
-        let tail_load47 = tail_load18 + tail_load46;
-        let tail_load48 = 0.1004987562112089 * tail_vel27;
-        let tail_load49 = 0.1004987562112089 * tail_vel31;
-        let tail_load50 = tail_load44 + tail_load48;
-        let tail_load51 = tail_load47 - tail_load49;
-        let tail_load52 = tail_cos0 * tail_load28;
-        let tail_load53 = tail_sin0 * tail_load31;
-        let tail_load54 = tail_load52 + tail_load53;
-        let tail_load55 = tail_sin0 * tail_load28;
-        let tail_load56 = tail_cos0 * tail_load31;
-        let tail_load57 = tail_load55 - tail_load56;
-        let tail_load58 = tail_cos0 * tail_load39;
-        let tail_load59 = tail_sin0 * tail_load50;
-        let tail_load60 = tail_load58 - tail_load59;
-        let tail_load61 = tail_sin0 * tail_load39;
-        let tail_load62 = tail_cos0 * tail_load50;
-        let tail_load63 = tail_load61 + tail_load62;
-        let tail_load64 = 0.8 * tail_load34;
-        let tail_load65 = tail_load60 - tail_load64;
-        let tail_load66 = 0.8 * tail_load54;
-        let tail_load67 = tail_load51 - tail_load66;
-        let tail_load68 = bob_load10 - tail_load54;
-        let tail_load69 = bob_load13 + tail_load34;
-        let tail_load70 = tail_load57 - bob_load16;
-        let tail_load71 = bob_load28 - tail_load65;
-        let tail_load72 = bob_load29 + tail_load67;
-        let tail_load73 = tail_load63 - bob_load25;
-        // tail: reaction wrench (4.66)
-        let tail_react0 = 0.09950371902099892 * tail_load28;
-        let tail_react1 = 0.9950371902099892 * tail_load31;
-        let tail_react2 = tail_react0 + tail_react1;
-        let tail_react3 = 0.9950371902099892 * tail_load28;
-        let tail_react4 = 0.09950371902099892 * tail_load31;
-        let tail_react5 = tail_react3 - tail_react4;
-        let tail_react6 = 0.09950371902099892 * tail_load39;
-        let tail_react7 = 0.9950371902099892 * tail_load50;
-        let tail_react8 = tail_react7 - tail_react6;
-        let tail_react9 = 0.9950371902099892 * tail_load39;
-        let tail_react10 = 0.09950371902099892 * tail_load50;
-        let tail_react11 = tail_react9 + tail_react10;
-        reactions[0][0] = tail_load68;
-        reactions[0][1] = tail_load69;
-        reactions[0][2] = tail_load70;
-        reactions[0][3] = tail_load71;
-        reactions[0][4] = -tail_load72;
-        reactions[0][5] = tail_load73;
-        reactions[1][0] = -tail_react2;
-        reactions[1][1] = tail_load34;
-        reactions[1][2] = tail_react5;
-        reactions[1][3] = tail_react8;
-        reactions[1][4] = -tail_load51;
-        reactions[1][5] = tail_react11;
+        Self::reactions_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, reactions.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 12];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_1 * bob_pose2;
+            let bob_pose7 = q_3 * bob_pose0;
+            let bob_pose8 = q_3 * bob_pose1;
+            let bob_pose9 = bob_pose5 - bob_pose8;
+            let bob_pose10 = bob_pose6 + bob_pose7;
+            let bob_pose11 = bob_pose3 + bob_pose4;
+            let bob_pose12 = bob_pose11 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia0 = tail_cos0 + tail_cos0;
+            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
+            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
+            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
+            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
+            let tail_inertia5 = tail_inertia3 + tail_inertia4;
+            let tail_inertia6 = tail_sin0 * tail_inertia5;
+            let tail_inertia7 = tail_cos0 * tail_inertia5;
+            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
+            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            // tail: U, Mj, k and the reduced inertia M' (4.44)
+            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
+            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            // tail: inertia carried to the parent, M* (4.48)
+            let tail_inertia10 = 0.8 * tail_pivot1;
+            let tail_inertia11 = 0.8 * tail_inertia2;
+            let tail_inertia12 = tail_inertia8 + tail_inertia11;
+            let tail_inertia13 = tail_inertia1 + tail_inertia1;
+            let tail_inertia14 = 0.8 * tail_inertia13;
+            let tail_inertia15 = tail_inertia9 + tail_inertia14;
+            let tail_inertia16 = 0.8 * tail_inertia10;
+            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
+            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
+            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            // bob: U, Mj, k and the reduced inertia M' (4.44)
+            let bob_pivot0 = 1.0 / tail_inertia17;
+            let bob_pivot1 = tail_inertia12 * bob_pivot0;
+            let bob_pivot2 = tail_inertia12 * bob_pivot1;
+            let bob_pivot3 = tail_inertia19 + bob_pivot2;
+            let bob_pivot4 = 1.0 / tail_inertia18;
+            let bob_pivot5 = 1.0 / bob_pivot3;
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = 9.81 * bob_pose9;
+            let bob_vel1 = 9.81 * bob_pose10;
+            let bob_vel2 = 9.81 * bob_pose12;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = v_0 * v_2;
+            let tail_vel1 = v_1 * v_2;
+            let tail_vel2 = v_0 * v_0;
+            let tail_vel3 = v_1 * v_1;
+            let tail_vel4 = tail_vel2 + tail_vel3;
+            let tail_vel5 = 0.8 * tail_vel0;
+            let tail_vel6 = bob_vel0 - tail_vel5;
+            let tail_vel7 = 0.8 * tail_vel1;
+            let tail_vel8 = bob_vel1 - tail_vel7;
+            let tail_vel9 = 0.8 * tail_vel4;
+            let tail_vel10 = bob_vel2 - tail_vel9;
+            let tail_vel11 = v_0 * tail_cos0;
+            let tail_vel12 = v_2 * tail_sin0;
+            let tail_vel13 = tail_vel11 - tail_vel12;
+            let tail_vel14 = v_2 * tail_cos0;
+            let tail_vel15 = v_0 * tail_sin0;
+            let tail_vel16 = tail_vel14 + tail_vel15;
+            let tail_vel17 = tail_sin0 * tail_vel10;
+            let tail_vel18 = tail_cos0 * tail_vel10;
+            let tail_vel19 = tail_sin0 * tail_vel6;
+            let tail_vel20 = tail_vel18 - tail_vel19;
+            let tail_vel21 = v_1 + v_3;
+            // tail: acceleration
+            let tail_acc0 = v_3 * tail_vel16;
+            let tail_acc1 = v_3 * tail_vel13;
+            let tail_acc2 = tail_vel13 * tail_vel21;
+            let tail_acc3 = tail_vel16 * tail_vel21;
+            let tail_acc4 = tail_vel13 * tail_vel13;
+            let tail_acc5 = tail_vel16 * tail_vel16;
+            // bob: gravity and wrenches
+            let bob_load0 = v_0 * v_1;
+            let bob_load1 = 0.5368079207920793 * tail_vel1;
+            let bob_load2 = 0.5700000000000001 * tail_vel0;
+            let bob_load3 = 0.03319207920792078 * bob_load0;
+            let bob_load4 = 0.88 * bob_vel1;
+            let bob_load5 = 0.88 * bob_vel0;
+            let bob_load6 = bob_load1 - bob_load4;
+            let bob_load7 = bob_load2 - bob_load5;
+            // tail: gravity and wrenches
+            let tail_load0 = tail_vel21 * tail_vel21;
+            let tail_load1 = tail_vel13 * tail_vel16;
+            let tail_load2 = tail_acc5 + tail_load0;
+            let tail_load3 = tail_acc1 + tail_acc2;
+            let tail_load4 = tail_acc0 + tail_acc3;
+            let tail_load5 = 0.1004987562112089 * tail_load2;
+            let tail_load6 = 0.1004987562112089 * tail_load1;
+            let tail_load7 = 0.1004987562112089 * tail_load3;
+            let tail_load8 = 0.026984158415841585 * tail_acc0;
+            let tail_load9 = 0.027700000000000002 * tail_acc3;
+            let tail_load10 = tail_load8 - tail_load9;
+            let tail_load11 = 0.0003792079207920793 * tail_load3;
+            let tail_load12 = tail_load10 + tail_load11;
+            let tail_load13 = 0.05468415841584159 * tail_acc2;
+            let tail_load14 = 0.0003792079207920793 * tail_load4;
+            let tail_load15 = tail_load13 - tail_load14;
+            let tail_load16 = 0.026984158415841585 * tail_load1;
+            let tail_load17 = tail_acc4 - tail_acc5;
+            let tail_load18 = 0.0003792079207920793 * tail_load17;
+            let tail_load19 = tail_load16 + tail_load18;
+            let tail_load20 = 0.1004987562112089 * tail_vel8;
+            let tail_load21 = 0.1004987562112089 * tail_vel20;
+            let tail_load22 = tail_load15 + tail_load20;
+            let tail_load23 = tail_load19 - tail_load21;
+            // tail: momentum remainder D, D' (4.45, 4.49)
+            let tail_rest0 = tail_cos0 * tail_load5;
+            let tail_rest1 = tail_sin0 * tail_load6;
+            let tail_rest2 = tail_rest0 - tail_rest1;
+            let tail_rest3 = tail_cos0 * tail_load12;
+            let tail_rest4 = tail_sin0 * tail_load22;
+            let tail_rest5 = tail_rest3 + tail_rest4;
+            let tail_rest6 = tail_sin0 * tail_load12;
+            let tail_rest7 = tail_cos0 * tail_load22;
+            let tail_rest8 = tail_rest6 - tail_rest7;
+            let tail_rest9 = tau_3 + tail_load23;
+            let tail_rest10 = 36.10108303249097 * tail_rest9;
+            let tail_rest11 = tail_inertia1 * tail_rest10;
+            let tail_rest12 = tail_rest2 + tail_rest11;
+            let tail_rest13 = 0.8 * tail_load7;
+            let tail_rest14 = tail_rest5 + tail_rest13;
+            let tail_rest15 = 0.8 * tail_rest12;
+            let tail_rest16 = tau_3 + tail_rest15;
+            let tail_rest17 = bob_load6 - tail_rest14;
+            let tail_rest18 = bob_load7 + tail_rest16;
+            let tail_rest19 = bob_load3 + tail_rest8;
+            // bob: momentum remainder D, D' (4.45, 4.49)
+            let bob_rest0 = tau_0 + tail_rest17;
+            let bob_rest1 = bob_pivot0 * bob_rest0;
+            let bob_rest2 = tail_inertia12 * bob_rest1;
+            let bob_rest3 = tail_rest19 - bob_rest2;
+            let bob_rest4 = tau_1 - tail_rest18;
+            let bob_rest5 = bob_pivot4 * bob_rest4;
+            let bob_rest6 = tau_2 + bob_rest3;
+            let bob_rest7 = bob_pivot5 * bob_rest6;
+            // bob: acceleration
+            let bob_acc0 = bob_pivot1 * bob_rest7;
+            let bob_acc1 = bob_rest1 + bob_acc0;
+            // tail: acceleration
+            let tail_acc6 = 0.8 * bob_rest5;
+            let tail_acc7 = tail_pivot0 * tail_acc6;
+            let tail_acc8 = tail_rest10 + tail_acc7;
+            let tail_acc9 = bob_rest5 + tail_acc8;
+            let tail_acc10 = tail_cos0 * bob_acc1;
+            let tail_acc11 = tail_sin0 * bob_rest7;
+            let tail_acc12 = tail_acc10 + tail_acc11;
+            let tail_acc13 = tail_cos0 * bob_rest7;
+            let tail_acc14 = tail_sin0 * bob_acc1;
+            let tail_acc15 = tail_acc13 - tail_acc14;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel22 = tail_vel0 - bob_rest5;
+            let tail_vel23 = tail_vel1 - bob_acc1;
+            let tail_vel24 = 0.8 * tail_vel22;
+            let tail_vel25 = bob_vel0 - tail_vel24;
+            let tail_vel26 = 0.8 * tail_vel23;
+            let tail_vel27 = bob_vel1 - tail_vel26;
+            let tail_vel28 = tail_cos0 * tail_vel25;
+            let tail_vel29 = tail_vel17 + tail_vel28;
+            let tail_vel30 = tail_sin0 * tail_vel25;
+            let tail_vel31 = tail_vel18 - tail_vel30;
+            // tail: acceleration
+            let tail_acc16 = tail_acc0 - tail_acc12;
+            let tail_acc17 = tail_acc1 - tail_acc15;
+            let tail_acc18 = bob_rest5 - tail_acc9;
+            // bob: gravity and wrenches
+            let bob_load8 = 1.2 * bob_vel0;
+            let bob_load9 = 0.48 * tail_vel22;
+            let bob_load10 = bob_load8 - bob_load9;
+            let bob_load11 = 1.2 * bob_vel1;
+            let bob_load12 = 0.48 * tail_vel23;
+            let bob_load13 = bob_load11 - bob_load12;
+            let bob_load14 = 1.2 * bob_vel2;
+            let bob_load15 = 0.48 * tail_vel4;
+            let bob_load16 = bob_load14 - bob_load15;
+            let bob_load17 = 0.262 * bob_acc1;
+            let bob_load18 = 0.245 * tail_vel1;
+            let bob_load19 = bob_load17 - bob_load18;
+            let bob_load20 = 0.257 * bob_rest5;
+            let bob_load21 = 0.25 * tail_vel0;
+            let bob_load22 = bob_load20 - bob_load21;
+            let bob_load23 = 0.012 * bob_rest7;
+            let bob_load24 = 0.0050000000000000044 * bob_load0;
+            let bob_load25 = bob_load23 + bob_load24;
+            let bob_load26 = 0.48 * bob_vel1;
+            let bob_load27 = 0.48 * bob_vel0;
+            let bob_load28 = bob_load19 + bob_load26;
+            let bob_load29 = bob_load22 + bob_load27;
+            // tail: gravity and wrenches
+            let tail_load24 = tail_load1 + tail_acc18;
+            let tail_load25 = tail_acc2 + tail_acc17;
+            let tail_load26 = tail_acc3 + tail_acc16;
+            let tail_load27 = 0.5 * tail_vel29;
+            let tail_load28 = tail_load5 - tail_load27;
+            let tail_load29 = 0.5 * tail_vel31;
+            let tail_load30 = 0.1004987562112089 * tail_load24;
+            let tail_load31 = tail_load29 - tail_load30;
+            let tail_load32 = 0.5 * tail_vel27;
+            let tail_load33 = 0.1004987562112089 * tail_load25;
+            let tail_load34 = tail_load32 + tail_load33;
+            let tail_load35 = 0.001207920792079208 * tail_acc16;
+            let tail_load36 = 0.0004920792079207911 * tail_acc3;
+            let tail_load37 = tail_load35 - tail_load36;
+            let tail_load38 = 0.0003792079207920793 * tail_load25;
+            let tail_load39 = tail_load37 - tail_load38;
+            let tail_load40 = 0.028192079207920794 * tail_acc17;
+            let tail_load41 = 0.026492079207920793 * tail_acc2;
+            let tail_load42 = tail_load40 + tail_load41;
+            let tail_load43 = 0.0003792079207920793 * tail_load26;
+            let tail_load44 = tail_load42 - tail_load43;
+            let tail_load45 = 0.027700000000000002 * tail_acc18;
+            let tail_load46 = tail_load16 + tail_load45;
+            let tail_load47 = tail_load18 + tail_load46;
+            let tail_load48 = 0.1004987562112089 * tail_vel27;
+            let tail_load49 = 0.1004987562112089 * tail_vel31;
+            let tail_load50 = tail_load44 + tail_load48;
+            let tail_load51 = tail_load47 - tail_load49;
+            let tail_load52 = tail_cos0 * tail_load28;
+            let tail_load53 = tail_sin0 * tail_load31;
+            let tail_load54 = tail_load52 + tail_load53;
+            let tail_load55 = tail_sin0 * tail_load28;
+            let tail_load56 = tail_cos0 * tail_load31;
+            let tail_load57 = tail_load55 - tail_load56;
+            let tail_load58 = tail_cos0 * tail_load39;
+            let tail_load59 = tail_sin0 * tail_load50;
+            let tail_load60 = tail_load58 - tail_load59;
+            let tail_load61 = tail_sin0 * tail_load39;
+            let tail_load62 = tail_cos0 * tail_load50;
+            let tail_load63 = tail_load61 + tail_load62;
+            let tail_load64 = 0.8 * tail_load34;
+            let tail_load65 = tail_load60 - tail_load64;
+            let tail_load66 = 0.8 * tail_load54;
+            let tail_load67 = tail_load51 - tail_load66;
+            let tail_load68 = bob_load10 - tail_load54;
+            let tail_load69 = bob_load13 + tail_load34;
+            let tail_load70 = tail_load57 - bob_load16;
+            let tail_load71 = bob_load28 - tail_load65;
+            let tail_load72 = bob_load29 + tail_load67;
+            let tail_load73 = tail_load63 - bob_load25;
+            // tail: reaction wrench (4.66)
+            let tail_react0 = 0.09950371902099892 * tail_load28;
+            let tail_react1 = 0.9950371902099892 * tail_load31;
+            let tail_react2 = tail_react0 + tail_react1;
+            let tail_react3 = 0.9950371902099892 * tail_load28;
+            let tail_react4 = 0.09950371902099892 * tail_load31;
+            let tail_react5 = tail_react3 - tail_react4;
+            let tail_react6 = 0.09950371902099892 * tail_load39;
+            let tail_react7 = 0.9950371902099892 * tail_load50;
+            let tail_react8 = tail_react7 - tail_react6;
+            let tail_react9 = 0.9950371902099892 * tail_load39;
+            let tail_react10 = 0.09950371902099892 * tail_load50;
+            let tail_react11 = tail_react9 + tail_react10;
+            results[0][l] = tail_load68;
+            results[1][l] = tail_load69;
+            results[2][l] = tail_load70;
+            results[3][l] = tail_load71;
+            results[4][l] = -tail_load72;
+            results[5][l] = tail_load73;
+            results[6][l] = -tail_react2;
+            results[7][l] = tail_load34;
+            results[8][l] = tail_react5;
+            results[9][l] = tail_react8;
+            results[10][l] = -tail_load51;
+            results[11][l] = tail_react11;
+        }
+        reactions.give(0, &results[0]);
+        reactions.give(1, &results[1]);
+        reactions.give(2, &results[2]);
+        reactions.give(3, &results[3]);
+        reactions.give(4, &results[4]);
+        reactions.give(5, &results[5]);
+        reactions.give(6, &results[6]);
+        reactions.give(7, &results[7]);
+        reactions.give(8, &results[8]);
+        reactions.give(9, &results[9]);
+        reactions.give(10, &results[10]);
+        reactions.give(11, &results[11]);
     }
 
     /// Mass matrix, by rows.
     /// 25 operations: 16 additions, 9 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn mass_matrix(&self, q: &[f64; 5], m: &mut [[f64; 4]; 4]) {
-        let q_4 = q[4];
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: mass matrix by composite inertias
-        let tail_mass0 = 0.1004987562112089 * tail_sin0;
-        let tail_mass1 = 0.1004987562112089 * tail_cos0;
-        let tail_mass2 = 0.8 * tail_mass0;
-        let tail_mass3 = tail_mass2 + 0.027700000000000002;
-        let tail_mass4 = tail_cos0 + tail_cos0;
-        let tail_mass5 = 0.026984158415841585 * tail_sin0;
-        let tail_mass6 = 0.0003792079207920793 * tail_mass4;
-        let tail_mass7 = tail_mass5 + tail_mass6;
-        let tail_mass8 = tail_sin0 * tail_mass7;
-        let tail_mass9 = tail_cos0 * tail_mass7;
-        let tail_mass10 = tail_mass9 - 0.0003792079207920793;
-        let tail_mass11 = tail_mass8 - 0.026984158415841585;
-        let tail_mass12 = tail_mass8 + 0.027700000000000002;
-        let tail_mass13 = tail_mass8 - tail_mass12;
-        let tail_mass14 = tail_mass12 - 0.027700000000000002;
-        let tail_mass15 = 0.8 * tail_mass1;
-        let tail_mass16 = tail_mass10 + tail_mass15;
-        let tail_mass17 = tail_mass0 + tail_mass0;
-        let tail_mass18 = 0.8 * tail_mass17;
-        let tail_mass19 = tail_mass11 + tail_mass18;
-        let tail_mass20 = tail_mass13 - tail_mass18;
-        let tail_mass21 = tail_mass19 + 0.6101920792079208;
-        let tail_mass22 = 0.5770000000000001 - tail_mass20;
-        let tail_mass23 = 0.0401920792079208 - tail_mass14;
-        m[0][0] = tail_mass21;
-        m[0][1] = 0.0;
-        m[0][2] = tail_mass16;
-        m[0][3] = 0.0;
-        m[1][0] = 0.0;
-        m[1][1] = tail_mass22;
-        m[1][2] = 0.0;
-        m[1][3] = tail_mass3;
-        m[2][0] = tail_mass16;
-        m[2][1] = 0.0;
-        m[2][2] = tail_mass23;
-        m[2][3] = 0.0;
-        m[3][0] = 0.0;
-        m[3][1] = tail_mass3;
-        m[3][2] = 0.0;
-        m[3][3] = 0.027700000000000002;
+        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 16];
+        for l in 0..LANES {
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: mass matrix by composite inertias
+            let tail_mass0 = 0.1004987562112089 * tail_sin0;
+            let tail_mass1 = 0.1004987562112089 * tail_cos0;
+            let tail_mass2 = 0.8 * tail_mass0;
+            let tail_mass3 = tail_mass2 + 0.027700000000000002;
+            let tail_mass4 = tail_cos0 + tail_cos0;
+            let tail_mass5 = 0.026984158415841585 * tail_sin0;
+            let tail_mass6 = 0.0003792079207920793 * tail_mass4;
+            let tail_mass7 = tail_mass5 + tail_mass6;
+            let tail_mass8 = tail_sin0 * tail_mass7;
+            let tail_mass9 = tail_cos0 * tail_mass7;
+            let tail_mass10 = tail_mass9 - 0.0003792079207920793;
+            let tail_mass11 = tail_mass8 - 0.026984158415841585;
+            let tail_mass12 = tail_mass8 + 0.027700000000000002;
+            let tail_mass13 = tail_mass8 - tail_mass12;
+            let tail_mass14 = tail_mass12 - 0.027700000000000002;
+            let tail_mass15 = 0.8 * tail_mass1;
+            let tail_mass16 = tail_mass10 + tail_mass15;
+            let tail_mass17 = tail_mass0 + tail_mass0;
+            let tail_mass18 = 0.8 * tail_mass17;
+            let tail_mass19 = tail_mass11 + tail_mass18;
+            let tail_mass20 = tail_mass13 - tail_mass18;
+            let tail_mass21 = tail_mass19 + 0.6101920792079208;
+            let tail_mass22 = 0.5770000000000001 - tail_mass20;
+            let tail_mass23 = 0.0401920792079208 - tail_mass14;
+            results[0][l] = tail_mass21;
+            results[1][l] = 0.0;
+            results[2][l] = tail_mass16;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = tail_mass22;
+            results[6][l] = 0.0;
+            results[7][l] = tail_mass3;
+            results[8][l] = tail_mass16;
+            results[9][l] = 0.0;
+            results[10][l] = tail_mass23;
+            results[11][l] = 0.0;
+            results[12][l] = 0.0;
+            results[13][l] = tail_mass3;
+            results[14][l] = 0.0;
+            results[15][l] = 0.027700000000000002;
+        }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
     }
 
     /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
     /// 88 operations: 36 additions, 52 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 5], v: &[f64; 4], rotation: &mut [[[f64; 3]; 3]; 2], position: &mut [[f64; 3]; 2], velocity: &mut [[f64; 6]; 2]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_2 * bob_pose2;
-        let bob_pose6 = q_0 * bob_pose1;
-        let bob_pose7 = q_0 * bob_pose2;
-        let bob_pose8 = q_1 * bob_pose2;
-        let bob_pose9 = q_3 * bob_pose0;
-        let bob_pose10 = q_3 * bob_pose1;
-        let bob_pose11 = q_3 * bob_pose2;
-        let bob_pose12 = bob_pose4 + bob_pose5;
-        let bob_pose13 = bob_pose12 - 1.0;
-        let bob_pose14 = bob_pose6 - bob_pose11;
-        let bob_pose15 = bob_pose7 + bob_pose10;
-        let bob_pose16 = bob_pose6 + bob_pose11;
-        let bob_pose17 = bob_pose3 + bob_pose5;
-        let bob_pose18 = 1.0 - bob_pose17;
-        let bob_pose19 = bob_pose8 - bob_pose9;
-        let bob_pose20 = bob_pose7 - bob_pose10;
-        let bob_pose21 = bob_pose8 + bob_pose9;
-        let bob_pose22 = bob_pose3 + bob_pose4;
-        let bob_pose23 = bob_pose22 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = 0.8 * v_1;
-        let tail_vel1 = 0.8 * v_0;
-        let tail_vel2 = tail_cos0 * tail_vel0;
-        let tail_vel3 = tail_sin0 * tail_vel0;
-        let tail_vel4 = v_0 * tail_cos0;
-        let tail_vel5 = v_2 * tail_sin0;
-        let tail_vel6 = tail_vel4 - tail_vel5;
-        let tail_vel7 = v_2 * tail_cos0;
-        let tail_vel8 = v_0 * tail_sin0;
-        let tail_vel9 = tail_vel7 + tail_vel8;
-        let tail_vel10 = v_1 + v_3;
-        // tail: placement
-        let tail_place0 = 0.8 * bob_pose15;
-        let tail_place1 = 0.8 * bob_pose19;
-        let tail_place2 = 0.8 * bob_pose23;
-        let tail_place3 = tail_place2 + 2.0;
-        let tail_place4 = bob_pose13 * tail_cos0;
-        let tail_place5 = bob_pose15 * tail_sin0;
-        let tail_place6 = tail_place4 + tail_place5;
-        let tail_place7 = bob_pose15 * tail_cos0;
-        let tail_place8 = bob_pose13 * tail_sin0;
-        let tail_place9 = tail_place7 - tail_place8;
-        let tail_place10 = bob_pose16 * tail_cos0;
-        let tail_place11 = bob_pose19 * tail_sin0;
-        let tail_place12 = tail_place10 - tail_place11;
-        let tail_place13 = bob_pose19 * tail_cos0;
-        let tail_place14 = bob_pose16 * tail_sin0;
-        let tail_place15 = tail_place13 + tail_place14;
-        let tail_place16 = bob_pose20 * tail_cos0;
-        let tail_place17 = bob_pose23 * tail_sin0;
-        let tail_place18 = tail_place16 + tail_place17;
-        let tail_place19 = bob_pose23 * tail_cos0;
-        let tail_place20 = bob_pose20 * tail_sin0;
-        let tail_place21 = tail_place19 - tail_place20;
-        let tail_place22 = 0.09950371902099892 * tail_place6;
-        let tail_place23 = 0.9950371902099892 * tail_place9;
-        let tail_place24 = tail_place23 - tail_place22;
-        let tail_place25 = 0.9950371902099892 * tail_place6;
-        let tail_place26 = 0.09950371902099892 * tail_place9;
-        let tail_place27 = tail_place25 + tail_place26;
-        let tail_place28 = 0.09950371902099892 * tail_place12;
-        let tail_place29 = 0.9950371902099892 * tail_place15;
-        let tail_place30 = tail_place28 + tail_place29;
-        let tail_place31 = 0.9950371902099892 * tail_place12;
-        let tail_place32 = 0.09950371902099892 * tail_place15;
-        let tail_place33 = tail_place32 - tail_place31;
-        let tail_place34 = 0.09950371902099892 * tail_place18;
-        let tail_place35 = 0.9950371902099892 * tail_place21;
-        let tail_place36 = tail_place34 - tail_place35;
-        let tail_place37 = 0.9950371902099892 * tail_place18;
-        let tail_place38 = 0.09950371902099892 * tail_place21;
-        let tail_place39 = tail_place37 + tail_place38;
-        let tail_place40 = 0.09950371902099892 * tail_vel2;
-        let tail_place41 = 0.9950371902099892 * tail_vel3;
-        let tail_place42 = tail_place40 + tail_place41;
-        let tail_place43 = 0.9950371902099892 * tail_vel2;
-        let tail_place44 = 0.09950371902099892 * tail_vel3;
-        let tail_place45 = tail_place43 - tail_place44;
-        let tail_place46 = 0.09950371902099892 * tail_vel6;
-        let tail_place47 = 0.9950371902099892 * tail_vel9;
-        let tail_place48 = tail_place46 + tail_place47;
-        let tail_place49 = 0.9950371902099892 * tail_vel6;
-        let tail_place50 = 0.09950371902099892 * tail_vel9;
-        let tail_place51 = tail_place50 - tail_place49;
-        rotation[0][0][0] = -bob_pose13;
-        rotation[0][0][1] = bob_pose14;
-        rotation[0][0][2] = bob_pose15;
-        rotation[0][1][0] = bob_pose16;
-        rotation[0][1][1] = bob_pose18;
-        rotation[0][1][2] = bob_pose19;
-        rotation[0][2][0] = bob_pose20;
-        rotation[0][2][1] = bob_pose21;
-        rotation[0][2][2] = -bob_pose23;
-        rotation[1][0][0] = tail_place24;
-        rotation[1][0][1] = bob_pose14;
-        rotation[1][0][2] = tail_place27;
-        rotation[1][1][0] = tail_place30;
-        rotation[1][1][1] = bob_pose18;
-        rotation[1][1][2] = tail_place33;
-        rotation[1][2][0] = tail_place36;
-        rotation[1][2][1] = bob_pose21;
-        rotation[1][2][2] = -tail_place39;
-        position[0][0] = 0.0;
-        position[0][1] = 0.0;
-        position[0][2] = 2.0;
-        position[1][0] = -tail_place0;
-        position[1][1] = -tail_place1;
-        position[1][2] = tail_place3;
-        velocity[0][0] = 0.0;
-        velocity[0][1] = 0.0;
-        velocity[0][2] = 0.0;
-        velocity[0][3] = v_0;
-        velocity[0][4] = v_1;
-        velocity[0][5] = v_2;
-        velocity[1][0] = -tail_place42;
-        velocity[1][1] = tail_vel1;
-        velocity[1][2] = tail_place45;
-        velocity[1][3] = tail_place48;
-        velocity[1][4] = tail_vel10;
-        velocity[1][5] = tail_place51;
+        Self::frames_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 36];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_2 * bob_pose2;
+            let bob_pose6 = q_0 * bob_pose1;
+            let bob_pose7 = q_0 * bob_pose2;
+            let bob_pose8 = q_1 * bob_pose2;
+            let bob_pose9 = q_3 * bob_pose0;
+            let bob_pose10 = q_3 * bob_pose1;
+            let bob_pose11 = q_3 * bob_pose2;
+            let bob_pose12 = bob_pose4 + bob_pose5;
+            let bob_pose13 = bob_pose12 - 1.0;
+            let bob_pose14 = bob_pose6 - bob_pose11;
+            let bob_pose15 = bob_pose7 + bob_pose10;
+            let bob_pose16 = bob_pose6 + bob_pose11;
+            let bob_pose17 = bob_pose3 + bob_pose5;
+            let bob_pose18 = 1.0 - bob_pose17;
+            let bob_pose19 = bob_pose8 - bob_pose9;
+            let bob_pose20 = bob_pose7 - bob_pose10;
+            let bob_pose21 = bob_pose8 + bob_pose9;
+            let bob_pose22 = bob_pose3 + bob_pose4;
+            let bob_pose23 = bob_pose22 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = 0.8 * v_1;
+            let tail_vel1 = 0.8 * v_0;
+            let tail_vel2 = tail_cos0 * tail_vel0;
+            let tail_vel3 = tail_sin0 * tail_vel0;
+            let tail_vel4 = v_0 * tail_cos0;
+            let tail_vel5 = v_2 * tail_sin0;
+            let tail_vel6 = tail_vel4 - tail_vel5;
+            let tail_vel7 = v_2 * tail_cos0;
+            let tail_vel8 = v_0 * tail_sin0;
+            let tail_vel9 = tail_vel7 + tail_vel8;
+            let tail_vel10 = v_1 + v_3;
+            // tail: placement
+            let tail_place0 = 0.8 * bob_pose15;
+            let tail_place1 = 0.8 * bob_pose19;
+            let tail_place2 = 0.8 * bob_pose23;
+            let tail_place3 = tail_place2 + 2.0;
+            let tail_place4 = bob_pose13 * tail_cos0;
+            let tail_place5 = bob_pose15 * tail_sin0;
+            let tail_place6 = tail_place4 + tail_place5;
+            let tail_place7 = bob_pose15 * tail_cos0;
+            let tail_place8 = bob_pose13 * tail_sin0;
+            let tail_place9 = tail_place7 - tail_place8;
+            let tail_place10 = bob_pose16 * tail_cos0;
+            let tail_place11 = bob_pose19 * tail_sin0;
+            let tail_place12 = tail_place10 - tail_place11;
+            let tail_place13 = bob_pose19 * tail_cos0;
+            let tail_place14 = bob_pose16 * tail_sin0;
+            let tail_place15 = tail_place13 + tail_place14;
+            let tail_place16 = bob_pose20 * tail_cos0;
+            let tail_place17 = bob_pose23 * tail_sin0;
+            let tail_place18 = tail_place16 + tail_place17;
+            let tail_place19 = bob_pose23 * tail_cos0;
+            let tail_place20 = bob_pose20 * tail_sin0;
+            let tail_place21 = tail_place19 - tail_place20;
+            let tail_place22 = 0.09950371902099892 * tail_place6;
+            let tail_place23 = 0.9950371902099892 * tail_place9;
+            let tail_place24 = tail_place23 - tail_place22;
+            let tail_place25 = 0.9950371902099892 * tail_place6;
+            let tail_place26 = 0.09950371902099892 * tail_place9;
+            let tail_place27 = tail_place25 + tail_place26;
+            let tail_place28 = 0.09950371902099892 * tail_place12;
+            let tail_place29 = 0.9950371902099892 * tail_place15;
+            let tail_place30 = tail_place28 + tail_place29;
+            let tail_place31 = 0.9950371902099892 * tail_place12;
+            let tail_place32 = 0.09950371902099892 * tail_place15;
+            let tail_place33 = tail_place32 - tail_place31;
+            let tail_place34 = 0.09950371902099892 * tail_place18;
+            let tail_place35 = 0.9950371902099892 * tail_place21;
+            let tail_place36 = tail_place34 - tail_place35;
+            let tail_place37 = 0.9950371902099892 * tail_place18;
+            let tail_place38 = 0.09950371902099892 * tail_place21;
+            let tail_place39 = tail_place37 + tail_place38;
+            let tail_place40 = 0.09950371902099892 * tail_vel2;
+            let tail_place41 = 0.9950371902099892 * tail_vel3;
+            let tail_place42 = tail_place40 + tail_place41;
+            let tail_place43 = 0.9950371902099892 * tail_vel2;
+            let tail_place44 = 0.09950371902099892 * tail_vel3;
+            let tail_place45 = tail_place43 - tail_place44;
+            let tail_place46 = 0.09950371902099892 * tail_vel6;
+            let tail_place47 = 0.9950371902099892 * tail_vel9;
+            let tail_place48 = tail_place46 + tail_place47;
+            let tail_place49 = 0.9950371902099892 * tail_vel6;
+            let tail_place50 = 0.09950371902099892 * tail_vel9;
+            let tail_place51 = tail_place50 - tail_place49;
+            results[0][l] = -bob_pose13;
+            results[1][l] = bob_pose14;
+            results[2][l] = bob_pose15;
+            results[3][l] = bob_pose16;
+            results[4][l] = bob_pose18;
+            results[5][l] = bob_pose19;
+            results[6][l] = bob_pose20;
+            results[7][l] = bob_pose21;
+            results[8][l] = -bob_pose23;
+            results[9][l] = tail_place24;
+            results[10][l] = bob_pose14;
+            results[11][l] = tail_place27;
+            results[12][l] = tail_place30;
+            results[13][l] = bob_pose18;
+            results[14][l] = tail_place33;
+            results[15][l] = tail_place36;
+            results[16][l] = bob_pose21;
+            results[17][l] = -tail_place39;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 2.0;
+            results[21][l] = -tail_place0;
+            results[22][l] = -tail_place1;
+            results[23][l] = tail_place3;
+            results[24][l] = 0.0;
+            results[25][l] = 0.0;
+            results[26][l] = 0.0;
+            results[27][l] = v_0;
+            results[28][l] = v_1;
+            results[29][l] = v_2;
+            results[30][l] = -tail_place42;
+            results[31][l] = tail_vel1;
+            results[32][l] = tail_place45;
+            results[33][l] = tail_place48;
+            results[34][l] = tail_vel10;
+            results[35][l] = tail_place51;
+        }
+        rotation.give(0, &results[0]);
+        rotation.give(1, &results[1]);
+        rotation.give(2, &results[2]);
+        rotation.give(3, &results[3]);
+        rotation.give(4, &results[4]);
+        rotation.give(5, &results[5]);
+        rotation.give(6, &results[6]);
+        rotation.give(7, &results[7]);
+        rotation.give(8, &results[8]);
+        rotation.give(9, &results[9]);
+        rotation.give(10, &results[10]);
+        rotation.give(11, &results[11]);
+        rotation.give(12, &results[12]);
+        rotation.give(13, &results[13]);
+        rotation.give(14, &results[14]);
+        rotation.give(15, &results[15]);
+        rotation.give(16, &results[16]);
+        rotation.give(17, &results[17]);
+        position.give(0, &results[18]);
+        position.give(1, &results[19]);
+        position.give(2, &results[20]);
+        position.give(3, &results[21]);
+        position.give(4, &results[22]);
+        position.give(5, &results[23]);
+        velocity.give(0, &results[24]);
+        velocity.give(1, &results[25]);
+        velocity.give(2, &results[26]);
+        velocity.give(3, &results[27]);
+        velocity.give(4, &results[28]);
+        velocity.give(5, &results[29]);
+        velocity.give(6, &results[30]);
+        velocity.give(7, &results[31]);
+        velocity.give(8, &results[32]);
+        velocity.give(9, &results[33]);
+        velocity.give(10, &results[34]);
+        velocity.give(11, &results[35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
     /// 112 operations: 48 additions, 64 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 5], v: &[f64; 4], a: &[f64; 4], tau: &mut [f64; 4]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let a_0 = a[0];
-        let a_1 = a[1];
-        let a_2 = a[2];
-        let a_3 = a[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_1 * bob_pose2;
-        let bob_pose7 = q_3 * bob_pose0;
-        let bob_pose8 = q_3 * bob_pose1;
-        let bob_pose9 = bob_pose5 - bob_pose8;
-        let bob_pose10 = bob_pose6 + bob_pose7;
-        let bob_pose11 = bob_pose3 + bob_pose4;
-        let bob_pose12 = bob_pose11 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = 9.81 * bob_pose9;
-        let bob_vel1 = 9.81 * bob_pose10;
-        let bob_vel2 = 9.81 * bob_pose12;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = v_0 * v_2;
-        let tail_vel1 = a_1 + tail_vel0;
-        let tail_vel2 = v_1 * v_2;
-        let tail_vel3 = a_0 - tail_vel2;
-        let tail_vel4 = v_0 * v_0;
-        let tail_vel5 = v_1 * v_1;
-        let tail_vel6 = tail_vel4 + tail_vel5;
-        let tail_vel7 = 0.8 * tail_vel1;
-        let tail_vel8 = bob_vel0 - tail_vel7;
-        let tail_vel9 = 0.8 * tail_vel3;
-        let tail_vel10 = bob_vel1 + tail_vel9;
-        let tail_vel11 = 0.8 * tail_vel6;
-        let tail_vel12 = bob_vel2 - tail_vel11;
-        let tail_vel13 = v_0 * tail_cos0;
-        let tail_vel14 = v_2 * tail_sin0;
-        let tail_vel15 = tail_vel13 - tail_vel14;
-        let tail_vel16 = v_2 * tail_cos0;
-        let tail_vel17 = v_0 * tail_sin0;
-        let tail_vel18 = tail_vel16 + tail_vel17;
-        let tail_vel19 = a_0 * tail_cos0;
-        let tail_vel20 = a_2 * tail_sin0;
-        let tail_vel21 = tail_vel19 - tail_vel20;
-        let tail_vel22 = a_2 * tail_cos0;
-        let tail_vel23 = a_0 * tail_sin0;
-        let tail_vel24 = tail_vel22 + tail_vel23;
-        let tail_vel25 = tail_cos0 * tail_vel12;
-        let tail_vel26 = tail_sin0 * tail_vel8;
-        let tail_vel27 = tail_vel25 - tail_vel26;
-        let tail_vel28 = v_1 + v_3;
-        // tail: acceleration
-        let tail_acc0 = v_3 * tail_vel18;
-        let tail_acc1 = v_3 * tail_vel15;
-        let tail_acc2 = tail_vel21 - tail_acc0;
-        let tail_acc3 = tail_vel24 + tail_acc1;
-        let tail_acc4 = a_1 + a_3;
-        let tail_acc5 = tail_vel15 * tail_vel28;
-        let tail_acc6 = tail_vel18 * tail_vel28;
-        let tail_acc7 = tail_vel15 * tail_vel15;
-        let tail_acc8 = tail_vel18 * tail_vel18;
-        // bob: gravity and wrenches
-        let bob_load0 = v_0 * v_1;
-        let bob_load1 = 0.6101920792079208 * a_0;
-        let bob_load2 = 0.5368079207920793 * tail_vel2;
-        let bob_load3 = bob_load1 - bob_load2;
-        let bob_load4 = 0.5770000000000001 * a_1;
-        let bob_load5 = 0.5700000000000001 * tail_vel0;
-        let bob_load6 = bob_load4 + bob_load5;
-        let bob_load7 = 0.0401920792079208 * a_2;
-        let bob_load8 = 0.03319207920792078 * bob_load0;
-        let bob_load9 = bob_load7 - bob_load8;
-        let bob_load10 = 0.88 * bob_vel1;
-        let bob_load11 = 0.88 * bob_vel0;
-        let bob_load12 = bob_load3 + bob_load10;
-        let bob_load13 = bob_load6 - bob_load11;
-        // tail: gravity and wrenches
-        let tail_load0 = tail_vel28 * tail_vel28;
-        let tail_load1 = tail_vel15 * tail_vel18;
-        let tail_load2 = tail_acc8 + tail_load0;
-        let tail_load3 = tail_acc4 - tail_load1;
-        let tail_load4 = tail_acc3 + tail_acc5;
-        let tail_load5 = tail_acc2 - tail_acc6;
-        let tail_load6 = 0.1004987562112089 * tail_load2;
-        let tail_load7 = 0.1004987562112089 * tail_load3;
-        let tail_load8 = 0.1004987562112089 * tail_load4;
-        let tail_load9 = 0.026984158415841585 * tail_acc2;
-        let tail_load10 = 0.027700000000000002 * tail_acc6;
-        let tail_load11 = tail_load9 + tail_load10;
-        let tail_load12 = 0.0003792079207920793 * tail_load4;
-        let tail_load13 = tail_load11 - tail_load12;
-        let tail_load14 = 0.05468415841584159 * tail_acc5;
-        let tail_load15 = 0.0003792079207920793 * tail_load5;
-        let tail_load16 = tail_load14 + tail_load15;
-        let tail_load17 = 0.027700000000000002 * tail_acc4;
-        let tail_load18 = 0.026984158415841585 * tail_load1;
-        let tail_load19 = tail_load17 - tail_load18;
-        let tail_load20 = tail_acc7 - tail_acc8;
-        let tail_load21 = 0.0003792079207920793 * tail_load20;
-        let tail_load22 = tail_load19 - tail_load21;
-        let tail_load23 = 0.1004987562112089 * tail_vel10;
-        let tail_load24 = 0.1004987562112089 * tail_vel27;
-        let tail_load25 = tail_load16 + tail_load23;
-        let tail_load26 = tail_load22 + tail_load24;
-        let tail_load27 = tail_cos0 * tail_load6;
-        let tail_load28 = tail_sin0 * tail_load7;
-        let tail_load29 = tail_load27 + tail_load28;
-        let tail_load30 = tail_cos0 * tail_load13;
-        let tail_load31 = tail_sin0 * tail_load25;
-        let tail_load32 = tail_load30 - tail_load31;
-        let tail_load33 = tail_sin0 * tail_load13;
-        let tail_load34 = tail_cos0 * tail_load25;
-        let tail_load35 = tail_load33 + tail_load34;
-        let tail_load36 = 0.8 * tail_load8;
-        let tail_load37 = tail_load32 - tail_load36;
-        let tail_load38 = 0.8 * tail_load29;
-        let tail_load39 = tail_load26 + tail_load38;
-        let tail_load40 = bob_load12 - tail_load37;
-        let tail_load41 = bob_load13 + tail_load39;
-        let tail_load42 = bob_load9 + tail_load35;
-        tau[0] = tail_load40;
-        tau[1] = tail_load41;
-        tau[2] = tail_load42;
-        tau[3] = tail_load26;
+        Self::inverse_dynamics_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, a, tau);
+    }
+
+    #[inline(always)]
+    fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let a_0 = a.get(0, l);
+            let a_1 = a.get(1, l);
+            let a_2 = a.get(2, l);
+            let a_3 = a.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_1 * bob_pose2;
+            let bob_pose7 = q_3 * bob_pose0;
+            let bob_pose8 = q_3 * bob_pose1;
+            let bob_pose9 = bob_pose5 - bob_pose8;
+            let bob_pose10 = bob_pose6 + bob_pose7;
+            let bob_pose11 = bob_pose3 + bob_pose4;
+            let bob_pose12 = bob_pose11 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = 9.81 * bob_pose9;
+            let bob_vel1 = 9.81 * bob_pose10;
+            let bob_vel2 = 9.81 * bob_pose12;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = v_0 * v_2;
+            let tail_vel1 = a_1 + tail_vel0;
+            let tail_vel2 = v_1 * v_2;
+            let tail_vel3 = a_0 - tail_vel2;
+            let tail_vel4 = v_0 * v_0;
+            let tail_vel5 = v_1 * v_1;
+            let tail_vel6 = tail_vel4 + tail_vel5;
+            let tail_vel7 = 0.8 * tail_vel1;
+            let tail_vel8 = bob_vel0 - tail_vel7;
+            let tail_vel9 = 0.8 * tail_vel3;
+            let tail_vel10 = bob_vel1 + tail_vel9;
+            let tail_vel11 = 0.8 * tail_vel6;
+            let tail_vel12 = bob_vel2 - tail_vel11;
+            let tail_vel13 = v_0 * tail_cos0;
+            let tail_vel14 = v_2 * tail_sin0;
+            let tail_vel15 = tail_vel13 - tail_vel14;
+            let tail_vel16 = v_2 * tail_cos0;
+            let tail_vel17 = v_0 * tail_sin0;
+            let tail_vel18 = tail_vel16 + tail_vel17;
+            let tail_vel19 = a_0 * tail_cos0;
+            let tail_vel20 = a_2 * tail_sin0;
+            let tail_vel21 = tail_vel19 - tail_vel20;
+            let tail_vel22 = a_2 * tail_cos0;
+            let tail_vel23 = a_0 * tail_sin0;
+            let tail_vel24 = tail_vel22 + tail_vel23;
+            let tail_vel25 = tail_cos0 * tail_vel12;
+            let tail_vel26 = tail_sin0 * tail_vel8;
+            let tail_vel27 = tail_vel25 - tail_vel26;
+            let tail_vel28 = v_1 + v_3;
+            // tail: acceleration
+            let tail_acc0 = v_3 * tail_vel18;
+            let tail_acc1 = v_3 * tail_vel15;
+            let tail_acc2 = tail_vel21 - tail_acc0;
+            let tail_acc3 = tail_vel24 + tail_acc1;
+            let tail_acc4 = a_1 + a_3;
+            let tail_acc5 = tail_vel15 * tail_vel28;
+            let tail_acc6 = tail_vel18 * tail_vel28;
+            let tail_acc7 = tail_vel15 * tail_vel15;
+            let tail_acc8 = tail_vel18 * tail_vel18;
+            // bob: gravity and wrenches
+            let bob_load0 = v_0 * v_1;
+            let bob_load1 = 0.6101920792079208 * a_0;
+            let bob_load2 = 0.5368079207920793 * tail_vel2;
+            let bob_load3 = bob_load1 - bob_load2;
+            let bob_load4 = 0.5770000000000001 * a_1;
+            let bob_load5 = 0.5700000000000001 * tail_vel0;
+            let bob_load6 = bob_load4 + bob_load5;
+            let bob_load7 = 0.0401920792079208 * a_2;
+            let bob_load8 = 0.03319207920792078 * bob_load0;
+            let bob_load9 = bob_load7 - bob_load8;
+            let bob_load10 = 0.88 * bob_vel1;
+            let bob_load11 = 0.88 * bob_vel0;
+            let bob_load12 = bob_load3 + bob_load10;
+            let bob_load13 = bob_load6 - bob_load11;
+            // tail: gravity and wrenches
+            let tail_load0 = tail_vel28 * tail_vel28;
+            let tail_load1 = tail_vel15 * tail_vel18;
+            let tail_load2 = tail_acc8 + tail_load0;
+            let tail_load3 = tail_acc4 - tail_load1;
+            let tail_load4 = tail_acc3 + tail_acc5;
+            let tail_load5 = tail_acc2 - tail_acc6;
+            let tail_load6 = 0.1004987562112089 * tail_load2;
+            let tail_load7 = 0.1004987562112089 * tail_load3;
+            let tail_load8 = 0.1004987562112089 * tail_load4;
+            let tail_load9 = 0.026984158415841585 * tail_acc2;
+            let tail_load10 = 0.027700000000000002 * tail_acc6;
+            let tail_load11 = tail_load9 + tail_load10;
+            let tail_load12 = 0.0003792079207920793 * tail_load4;
+            let tail_load13 = tail_load11 - tail_load12;
+            let tail_load14 = 0.05468415841584159 * tail_acc5;
+            let tail_load15 = 0.0003792079207920793 * tail_load5;
+            let tail_load16 = tail_load14 + tail_load15;
+            let tail_load17 = 0.027700000000000002 * tail_acc4;
+            let tail_load18 = 0.026984158415841585 * tail_load1;
+            let tail_load19 = tail_load17 - tail_load18;
+            let tail_load20 = tail_acc7 - tail_acc8;
+            let tail_load21 = 0.0003792079207920793 * tail_load20;
+            let tail_load22 = tail_load19 - tail_load21;
+            let tail_load23 = 0.1004987562112089 * tail_vel10;
+            let tail_load24 = 0.1004987562112089 * tail_vel27;
+            let tail_load25 = tail_load16 + tail_load23;
+            let tail_load26 = tail_load22 + tail_load24;
+            let tail_load27 = tail_cos0 * tail_load6;
+            let tail_load28 = tail_sin0 * tail_load7;
+            let tail_load29 = tail_load27 + tail_load28;
+            let tail_load30 = tail_cos0 * tail_load13;
+            let tail_load31 = tail_sin0 * tail_load25;
+            let tail_load32 = tail_load30 - tail_load31;
+            let tail_load33 = tail_sin0 * tail_load13;
+            let tail_load34 = tail_cos0 * tail_load25;
+            let tail_load35 = tail_load33 + tail_load34;
+            let tail_load36 = 0.8 * tail_load8;
+            let tail_load37 = tail_load32 - tail_load36;
+            let tail_load38 = 0.8 * tail_load29;
+            let tail_load39 = tail_load26 + tail_load38;
+            let tail_load40 = bob_load12 - tail_load37;
+            let tail_load41 = bob_load13 + tail_load39;
+            let tail_load42 = bob_load9 + tail_load35;
+            results[0][l] = tail_load40;
+            results[1][l] = tail_load41;
+            results[2][l] = tail_load42;
+            results[3][l] = tail_load26;
+        }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
     /// 92 operations: 36 additions, 56 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 5], v: &[f64; 4], h: &mut [f64; 4]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        // bob: sine and cosine, rotation
-        let bob_pose0 = q_0 + q_0;
-        let bob_pose1 = q_1 + q_1;
-        let bob_pose2 = q_2 + q_2;
-        let bob_pose3 = q_0 * bob_pose0;
-        let bob_pose4 = q_1 * bob_pose1;
-        let bob_pose5 = q_0 * bob_pose2;
-        let bob_pose6 = q_1 * bob_pose2;
-        let bob_pose7 = q_3 * bob_pose0;
-        let bob_pose8 = q_3 * bob_pose1;
-        let bob_pose9 = bob_pose5 - bob_pose8;
-        let bob_pose10 = bob_pose6 + bob_pose7;
-        let bob_pose11 = bob_pose3 + bob_pose4;
-        let bob_pose12 = bob_pose11 - 1.0;
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // bob: velocity and joint rate (4.40)
-        let bob_vel0 = 9.81 * bob_pose9;
-        let bob_vel1 = 9.81 * bob_pose10;
-        let bob_vel2 = 9.81 * bob_pose12;
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = v_0 * v_2;
-        let tail_vel1 = v_1 * v_2;
-        let tail_vel2 = v_0 * v_0;
-        let tail_vel3 = v_1 * v_1;
-        let tail_vel4 = tail_vel2 + tail_vel3;
-        let tail_vel5 = 0.8 * tail_vel0;
-        let tail_vel6 = bob_vel0 - tail_vel5;
-        let tail_vel7 = 0.8 * tail_vel1;
-        let tail_vel8 = bob_vel1 - tail_vel7;
-        let tail_vel9 = 0.8 * tail_vel4;
-        let tail_vel10 = bob_vel2 - tail_vel9;
-        let tail_vel11 = v_0 * tail_cos0;
-        let tail_vel12 = v_2 * tail_sin0;
-        let tail_vel13 = tail_vel11 - tail_vel12;
-        let tail_vel14 = v_2 * tail_cos0;
-        let tail_vel15 = v_0 * tail_sin0;
-        let tail_vel16 = tail_vel14 + tail_vel15;
-        let tail_vel17 = tail_cos0 * tail_vel10;
-        let tail_vel18 = tail_sin0 * tail_vel6;
-        let tail_vel19 = tail_vel17 - tail_vel18;
-        let tail_vel20 = v_1 + v_3;
-        // tail: acceleration
-        let tail_acc0 = v_3 * tail_vel16;
-        let tail_acc1 = v_3 * tail_vel13;
-        let tail_acc2 = tail_vel13 * tail_vel20;
-        let tail_acc3 = tail_vel16 * tail_vel20;
-        let tail_acc4 = tail_vel13 * tail_vel13;
-        let tail_acc5 = tail_vel16 * tail_vel16;
-        // bob: gravity and wrenches
-        let bob_load0 = v_0 * v_1;
-        let bob_load1 = 0.5368079207920793 * tail_vel1;
-        let bob_load2 = 0.5700000000000001 * tail_vel0;
-        let bob_load3 = 0.03319207920792078 * bob_load0;
-        let bob_load4 = 0.88 * bob_vel1;
-        let bob_load5 = 0.88 * bob_vel0;
-        let bob_load6 = bob_load1 - bob_load4;
-        let bob_load7 = bob_load2 - bob_load5;
-        // tail: gravity and wrenches
-        let tail_load0 = tail_vel20 * tail_vel20;
-        let tail_load1 = tail_vel13 * tail_vel16;
-        let tail_load2 = tail_acc5 + tail_load0;
-        let tail_load3 = tail_acc1 + tail_acc2;
-        let tail_load4 = tail_acc0 + tail_acc3;
-        let tail_load5 = 0.1004987562112089 * tail_load2;
-        let tail_load6 = 0.1004987562112089 * tail_load1;
-        let tail_load7 = 0.1004987562112089 * tail_load3;
-        let tail_load8 = 0.026984158415841585 * tail_acc0;
-        let tail_load9 = 0.027700000000000002 * tail_acc3;
-        let tail_load10 = tail_load8 - tail_load9;
-        let tail_load11 = 0.0003792079207920793 * tail_load3;
-        let tail_load12 = tail_load10 + tail_load11;
-        let tail_load13 = 0.05468415841584159 * tail_acc2;
-        let tail_load14 = 0.0003792079207920793 * tail_load4;
-        let tail_load15 = tail_load13 - tail_load14;
-        let tail_load16 = 0.026984158415841585 * tail_load1;
-        let tail_load17 = tail_acc4 - tail_acc5;
-        let tail_load18 = 0.0003792079207920793 * tail_load17;
-        let tail_load19 = tail_load16 + tail_load18;
-        let tail_load20 = 0.1004987562112089 * tail_vel8;
-        let tail_load21 = 0.1004987562112089 * tail_vel19;
-        let tail_load22 = tail_load15 + tail_load20;
-        let tail_load23 = tail_load19 - tail_load21;
-        let tail_load24 = tail_cos0 * tail_load5;
-        let tail_load25 = tail_sin0 * tail_load6;
-        let tail_load26 = tail_load24 - tail_load25;
-        let tail_load27 = tail_cos0 * tail_load12;
-        let tail_load28 = tail_sin0 * tail_load22;
-        let tail_load29 = tail_load27 + tail_load28;
-        let tail_load30 = tail_sin0 * tail_load12;
-        let tail_load31 = tail_cos0 * tail_load22;
-        let tail_load32 = tail_load30 - tail_load31;
-        let tail_load33 = 0.8 * tail_load7;
-        let tail_load34 = tail_load29 + tail_load33;
-        let tail_load35 = 0.8 * tail_load26;
-        let tail_load36 = tail_load23 - tail_load35;
-        let tail_load37 = tail_load34 - bob_load6;
-        let tail_load38 = bob_load7 - tail_load36;
-        let tail_load39 = bob_load3 + tail_load32;
-        h[0] = tail_load37;
-        h[1] = tail_load38;
-        h[2] = -tail_load39;
-        h[3] = -tail_load23;
+        Self::bias_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, h);
+    }
+
+    #[inline(always)]
+    fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 4];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            // bob: sine and cosine, rotation
+            let bob_pose0 = q_0 + q_0;
+            let bob_pose1 = q_1 + q_1;
+            let bob_pose2 = q_2 + q_2;
+            let bob_pose3 = q_0 * bob_pose0;
+            let bob_pose4 = q_1 * bob_pose1;
+            let bob_pose5 = q_0 * bob_pose2;
+            let bob_pose6 = q_1 * bob_pose2;
+            let bob_pose7 = q_3 * bob_pose0;
+            let bob_pose8 = q_3 * bob_pose1;
+            let bob_pose9 = bob_pose5 - bob_pose8;
+            let bob_pose10 = bob_pose6 + bob_pose7;
+            let bob_pose11 = bob_pose3 + bob_pose4;
+            let bob_pose12 = bob_pose11 - 1.0;
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // bob: velocity and joint rate (4.40)
+            let bob_vel0 = 9.81 * bob_pose9;
+            let bob_vel1 = 9.81 * bob_pose10;
+            let bob_vel2 = 9.81 * bob_pose12;
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = v_0 * v_2;
+            let tail_vel1 = v_1 * v_2;
+            let tail_vel2 = v_0 * v_0;
+            let tail_vel3 = v_1 * v_1;
+            let tail_vel4 = tail_vel2 + tail_vel3;
+            let tail_vel5 = 0.8 * tail_vel0;
+            let tail_vel6 = bob_vel0 - tail_vel5;
+            let tail_vel7 = 0.8 * tail_vel1;
+            let tail_vel8 = bob_vel1 - tail_vel7;
+            let tail_vel9 = 0.8 * tail_vel4;
+            let tail_vel10 = bob_vel2 - tail_vel9;
+            let tail_vel11 = v_0 * tail_cos0;
+            let tail_vel12 = v_2 * tail_sin0;
+            let tail_vel13 = tail_vel11 - tail_vel12;
+            let tail_vel14 = v_2 * tail_cos0;
+            let tail_vel15 = v_0 * tail_sin0;
+            let tail_vel16 = tail_vel14 + tail_vel15;
+            let tail_vel17 = tail_cos0 * tail_vel10;
+            let tail_vel18 = tail_sin0 * tail_vel6;
+            let tail_vel19 = tail_vel17 - tail_vel18;
+            let tail_vel20 = v_1 + v_3;
+            // tail: acceleration
+            let tail_acc0 = v_3 * tail_vel16;
+            let tail_acc1 = v_3 * tail_vel13;
+            let tail_acc2 = tail_vel13 * tail_vel20;
+            let tail_acc3 = tail_vel16 * tail_vel20;
+            let tail_acc4 = tail_vel13 * tail_vel13;
+            let tail_acc5 = tail_vel16 * tail_vel16;
+            // bob: gravity and wrenches
+            let bob_load0 = v_0 * v_1;
+            let bob_load1 = 0.5368079207920793 * tail_vel1;
+            let bob_load2 = 0.5700000000000001 * tail_vel0;
+            let bob_load3 = 0.03319207920792078 * bob_load0;
+            let bob_load4 = 0.88 * bob_vel1;
+            let bob_load5 = 0.88 * bob_vel0;
+            let bob_load6 = bob_load1 - bob_load4;
+            let bob_load7 = bob_load2 - bob_load5;
+            // tail: gravity and wrenches
+            let tail_load0 = tail_vel20 * tail_vel20;
+            let tail_load1 = tail_vel13 * tail_vel16;
+            let tail_load2 = tail_acc5 + tail_load0;
+            let tail_load3 = tail_acc1 + tail_acc2;
+            let tail_load4 = tail_acc0 + tail_acc3;
+            let tail_load5 = 0.1004987562112089 * tail_load2;
+            let tail_load6 = 0.1004987562112089 * tail_load1;
+            let tail_load7 = 0.1004987562112089 * tail_load3;
+            let tail_load8 = 0.026984158415841585 * tail_acc0;
+            let tail_load9 = 0.027700000000000002 * tail_acc3;
+            let tail_load10 = tail_load8 - tail_load9;
+            let tail_load11 = 0.0003792079207920793 * tail_load3;
+            let tail_load12 = tail_load10 + tail_load11;
+            let tail_load13 = 0.05468415841584159 * tail_acc2;
+            let tail_load14 = 0.0003792079207920793 * tail_load4;
+            let tail_load15 = tail_load13 - tail_load14;
+            let tail_load16 = 0.026984158415841585 * tail_load1;
+            let tail_load17 = tail_acc4 - tail_acc5;
+            let tail_load18 = 0.0003792079207920793 * tail_load17;
+            let tail_load19 = tail_load16 + tail_load18;
+            let tail_load20 = 0.1004987562112089 * tail_vel8;
+            let tail_load21 = 0.1004987562112089 * tail_vel19;
+            let tail_load22 = tail_load15 + tail_load20;
+            let tail_load23 = tail_load19 - tail_load21;
+            let tail_load24 = tail_cos0 * tail_load5;
+            let tail_load25 = tail_sin0 * tail_load6;
+            let tail_load26 = tail_load24 - tail_load25;
+            let tail_load27 = tail_cos0 * tail_load12;
+            let tail_load28 = tail_sin0 * tail_load22;
+            let tail_load29 = tail_load27 + tail_load28;
+            let tail_load30 = tail_sin0 * tail_load12;
+            let tail_load31 = tail_cos0 * tail_load22;
+            let tail_load32 = tail_load30 - tail_load31;
+            let tail_load33 = 0.8 * tail_load7;
+            let tail_load34 = tail_load29 + tail_load33;
+            let tail_load35 = 0.8 * tail_load26;
+            let tail_load36 = tail_load23 - tail_load35;
+            let tail_load37 = tail_load34 - bob_load6;
+            let tail_load38 = bob_load7 - tail_load36;
+            let tail_load39 = bob_load3 + tail_load32;
+            results[0][l] = tail_load37;
+            results[1][l] = tail_load38;
+            results[2][l] = -tail_load39;
+            results[3][l] = -tail_load23;
+        }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
     }
 
     /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
     /// 9 operations: 3 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn jacobians(&self, q: &[f64; 5], jacobian: &mut [[[f64; 4]; 6]; 2]) {
-        let q_4 = q[4];
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: Jacobian
-        let tail_jac0 = 0.09950371902099892 * tail_cos0;
-        let tail_jac1 = 0.9950371902099892 * tail_sin0;
-        let tail_jac2 = tail_jac0 + tail_jac1;
-        let tail_jac3 = 0.09950371902099892 * tail_sin0;
-        let tail_jac4 = 0.9950371902099892 * tail_cos0;
-        let tail_jac5 = tail_jac3 - tail_jac4;
-        // bob: Jacobian
-        let bob_jac0 = 0.8 * tail_jac2;
-        let bob_jac1 = 0.8 * tail_jac5;
-        jacobian[0][0][0] = 0.0;
-        jacobian[0][0][1] = 0.0;
-        jacobian[0][0][2] = 0.0;
-        jacobian[0][0][3] = 0.0;
-        jacobian[0][1][0] = 0.0;
-        jacobian[0][1][1] = 0.0;
-        jacobian[0][1][2] = 0.0;
-        jacobian[0][1][3] = 0.0;
-        jacobian[0][2][0] = 0.0;
-        jacobian[0][2][1] = 0.0;
-        jacobian[0][2][2] = 0.0;
-        jacobian[0][2][3] = 0.0;
-        jacobian[0][3][0] = 1.0;
-        jacobian[0][3][1] = 0.0;
-        jacobian[0][3][2] = 0.0;
-        jacobian[0][3][3] = 0.0;
-        jacobian[0][4][0] = 0.0;
-        jacobian[0][4][1] = 1.0;
-        jacobian[0][4][2] = 0.0;
-        jacobian[0][4][3] = 0.0;
-        jacobian[0][5][0] = 0.0;
-        jacobian[0][5][1] = 0.0;
-        jacobian[0][5][2] = 1.0;
-        jacobian[0][5][3] = 0.0;
-        jacobian[1][0][0] = 0.0;
-        jacobian[1][0][1] = -bob_jac0;
-        jacobian[1][0][2] = 0.0;
-        jacobian[1][0][3] = 0.0;
-        jacobian[1][1][0] = 0.8;
-        jacobian[1][1][1] = 0.0;
-        jacobian[1][1][2] = 0.0;
-        jacobian[1][1][3] = 0.0;
-        jacobian[1][2][0] = 0.0;
-        jacobian[1][2][1] = -bob_jac1;
-        jacobian[1][2][2] = 0.0;
-        jacobian[1][2][3] = 0.0;
-        jacobian[1][3][0] = tail_jac2;
-        jacobian[1][3][1] = 0.0;
-        jacobian[1][3][2] = -tail_jac5;
-        jacobian[1][3][3] = 0.0;
-        jacobian[1][4][0] = 0.0;
-        jacobian[1][4][1] = 1.0;
-        jacobian[1][4][2] = 0.0;
-        jacobian[1][4][3] = 1.0;
-        jacobian[1][5][0] = tail_jac5;
-        jacobian[1][5][1] = 0.0;
-        jacobian[1][5][2] = tail_jac2;
-        jacobian[1][5][3] = 0.0;
+        Self::jacobians_kernel::<::multibody::runtime::kernel::Plain, 1>(q, jacobian.as_flattened_mut().as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 48];
+        for l in 0..LANES {
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: Jacobian
+            let tail_jac0 = 0.09950371902099892 * tail_cos0;
+            let tail_jac1 = 0.9950371902099892 * tail_sin0;
+            let tail_jac2 = tail_jac0 + tail_jac1;
+            let tail_jac3 = 0.09950371902099892 * tail_sin0;
+            let tail_jac4 = 0.9950371902099892 * tail_cos0;
+            let tail_jac5 = tail_jac3 - tail_jac4;
+            // bob: Jacobian
+            let bob_jac0 = 0.8 * tail_jac2;
+            let bob_jac1 = 0.8 * tail_jac5;
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = 0.0;
+            results[7][l] = 0.0;
+            results[8][l] = 0.0;
+            results[9][l] = 0.0;
+            results[10][l] = 0.0;
+            results[11][l] = 0.0;
+            results[12][l] = 1.0;
+            results[13][l] = 0.0;
+            results[14][l] = 0.0;
+            results[15][l] = 0.0;
+            results[16][l] = 0.0;
+            results[17][l] = 1.0;
+            results[18][l] = 0.0;
+            results[19][l] = 0.0;
+            results[20][l] = 0.0;
+            results[21][l] = 0.0;
+            results[22][l] = 1.0;
+            results[23][l] = 0.0;
+            results[24][l] = 0.0;
+            results[25][l] = -bob_jac0;
+            results[26][l] = 0.0;
+            results[27][l] = 0.0;
+            results[28][l] = 0.8;
+            results[29][l] = 0.0;
+            results[30][l] = 0.0;
+            results[31][l] = 0.0;
+            results[32][l] = 0.0;
+            results[33][l] = -bob_jac1;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0;
+            results[36][l] = tail_jac2;
+            results[37][l] = 0.0;
+            results[38][l] = -tail_jac5;
+            results[39][l] = 0.0;
+            results[40][l] = 0.0;
+            results[41][l] = 1.0;
+            results[42][l] = 0.0;
+            results[43][l] = 1.0;
+            results[44][l] = tail_jac5;
+            results[45][l] = 0.0;
+            results[46][l] = tail_jac2;
+            results[47][l] = 0.0;
+        }
+        jacobian.give(0, &results[0]);
+        jacobian.give(1, &results[1]);
+        jacobian.give(2, &results[2]);
+        jacobian.give(3, &results[3]);
+        jacobian.give(4, &results[4]);
+        jacobian.give(5, &results[5]);
+        jacobian.give(6, &results[6]);
+        jacobian.give(7, &results[7]);
+        jacobian.give(8, &results[8]);
+        jacobian.give(9, &results[9]);
+        jacobian.give(10, &results[10]);
+        jacobian.give(11, &results[11]);
+        jacobian.give(12, &results[12]);
+        jacobian.give(13, &results[13]);
+        jacobian.give(14, &results[14]);
+        jacobian.give(15, &results[15]);
+        jacobian.give(16, &results[16]);
+        jacobian.give(17, &results[17]);
+        jacobian.give(18, &results[18]);
+        jacobian.give(19, &results[19]);
+        jacobian.give(20, &results[20]);
+        jacobian.give(21, &results[21]);
+        jacobian.give(22, &results[22]);
+        jacobian.give(23, &results[23]);
+        jacobian.give(24, &results[24]);
+        jacobian.give(25, &results[25]);
+        jacobian.give(26, &results[26]);
+        jacobian.give(27, &results[27]);
+        jacobian.give(28, &results[28]);
+        jacobian.give(29, &results[29]);
+        jacobian.give(30, &results[30]);
+        jacobian.give(31, &results[31]);
+        jacobian.give(32, &results[32]);
+        jacobian.give(33, &results[33]);
+        jacobian.give(34, &results[34]);
+        jacobian.give(35, &results[35]);
+        jacobian.give(36, &results[36]);
+        jacobian.give(37, &results[37]);
+        jacobian.give(38, &results[38]);
+        jacobian.give(39, &results[39]);
+        jacobian.give(40, &results[40]);
+        jacobian.give(41, &results[41]);
+        jacobian.give(42, &results[42]);
+        jacobian.give(43, &results[43]);
+        jacobian.give(44, &results[44]);
+        jacobian.give(45, &results[45]);
+        jacobian.give(46, &results[46]);
+        jacobian.give(47, &results[47]);
     }
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     /// 35 operations: 10 additions, 25 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn drifts(&self, q: &[f64; 5], v: &[f64; 4], drift: &mut [[f64; 6]; 2]) {
-        let q_4 = q[4];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        // tail: sine and cosine, rotation
-        let tail_pose0 = q_4 + 1.4711276743037347;
-        let (tail_sin0, tail_cos0) = ::multibody::runtime::trig::sincos_f64(tail_pose0);
-        // tail: velocity and joint rate (4.40)
-        let tail_vel0 = v_0 * v_2;
-        let tail_vel1 = v_1 * v_2;
-        let tail_vel2 = v_0 * v_0;
-        let tail_vel3 = v_1 * v_1;
-        let tail_vel4 = tail_vel2 + tail_vel3;
-        let tail_vel5 = 0.8 * tail_vel0;
-        let tail_vel6 = 0.8 * tail_vel1;
-        let tail_vel7 = 0.8 * tail_vel4;
-        let tail_vel8 = v_0 * tail_cos0;
-        let tail_vel9 = v_2 * tail_sin0;
-        let tail_vel10 = tail_vel8 - tail_vel9;
-        let tail_vel11 = v_2 * tail_cos0;
-        let tail_vel12 = v_0 * tail_sin0;
-        let tail_vel13 = tail_vel11 + tail_vel12;
-        let tail_vel14 = tail_cos0 * tail_vel5;
-        let tail_vel15 = tail_sin0 * tail_vel7;
-        let tail_vel16 = tail_vel14 + tail_vel15;
-        let tail_vel17 = tail_cos0 * tail_vel7;
-        let tail_vel18 = tail_sin0 * tail_vel5;
-        let tail_vel19 = tail_vel17 - tail_vel18;
-        // tail: acceleration
-        let tail_acc0 = v_3 * tail_vel13;
-        let tail_acc1 = v_3 * tail_vel10;
-        let tail_acc2 = 0.09950371902099892 * tail_acc0;
-        let tail_acc3 = 0.9950371902099892 * tail_acc1;
-        let tail_acc4 = tail_acc3 - tail_acc2;
-        let tail_acc5 = 0.9950371902099892 * tail_acc0;
-        let tail_acc6 = 0.09950371902099892 * tail_acc1;
-        let tail_acc7 = tail_acc5 + tail_acc6;
-        let tail_acc8 = 0.09950371902099892 * tail_vel16;
-        let tail_acc9 = 0.9950371902099892 * tail_vel19;
-        let tail_acc10 = tail_acc9 - tail_acc8;
-        let tail_acc11 = 0.9950371902099892 * tail_vel16;
-        let tail_acc12 = 0.09950371902099892 * tail_vel19;
-        let tail_acc13 = tail_acc11 + tail_acc12;
-        drift[0][0] = 0.0;
-        drift[0][1] = 0.0;
-        drift[0][2] = 0.0;
-        drift[0][3] = 0.0;
-        drift[0][4] = 0.0;
-        drift[0][5] = 0.0;
-        drift[1][0] = tail_acc10;
-        drift[1][1] = -tail_vel6;
-        drift[1][2] = tail_acc13;
-        drift[1][3] = tail_acc4;
-        drift[1][4] = 0.0;
-        drift[1][5] = tail_acc7;
+        Self::drifts_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 1];
+        for l in 0..LANES {
+            let q_4 = q.get(4, l);
+            let tail_pose0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut results = [[0.0; LANES]; 12];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            // tail: sine and cosine, rotation
+            let tail_sin0 = sines[0][l];
+            let tail_cos0 = cosines[0][l];
+            // tail: velocity and joint rate (4.40)
+            let tail_vel0 = v_0 * v_2;
+            let tail_vel1 = v_1 * v_2;
+            let tail_vel2 = v_0 * v_0;
+            let tail_vel3 = v_1 * v_1;
+            let tail_vel4 = tail_vel2 + tail_vel3;
+            let tail_vel5 = 0.8 * tail_vel0;
+            let tail_vel6 = 0.8 * tail_vel1;
+            let tail_vel7 = 0.8 * tail_vel4;
+            let tail_vel8 = v_0 * tail_cos0;
+            let tail_vel9 = v_2 * tail_sin0;
+            let tail_vel10 = tail_vel8 - tail_vel9;
+            let tail_vel11 = v_2 * tail_cos0;
+            let tail_vel12 = v_0 * tail_sin0;
+            let tail_vel13 = tail_vel11 + tail_vel12;
+            let tail_vel14 = tail_cos0 * tail_vel5;
+            let tail_vel15 = tail_sin0 * tail_vel7;
+            let tail_vel16 = tail_vel14 + tail_vel15;
+            let tail_vel17 = tail_cos0 * tail_vel7;
+            let tail_vel18 = tail_sin0 * tail_vel5;
+            let tail_vel19 = tail_vel17 - tail_vel18;
+            // tail: acceleration
+            let tail_acc0 = v_3 * tail_vel13;
+            let tail_acc1 = v_3 * tail_vel10;
+            let tail_acc2 = 0.09950371902099892 * tail_acc0;
+            let tail_acc3 = 0.9950371902099892 * tail_acc1;
+            let tail_acc4 = tail_acc3 - tail_acc2;
+            let tail_acc5 = 0.9950371902099892 * tail_acc0;
+            let tail_acc6 = 0.09950371902099892 * tail_acc1;
+            let tail_acc7 = tail_acc5 + tail_acc6;
+            let tail_acc8 = 0.09950371902099892 * tail_vel16;
+            let tail_acc9 = 0.9950371902099892 * tail_vel19;
+            let tail_acc10 = tail_acc9 - tail_acc8;
+            let tail_acc11 = 0.9950371902099892 * tail_vel16;
+            let tail_acc12 = 0.09950371902099892 * tail_vel19;
+            let tail_acc13 = tail_acc11 + tail_acc12;
+            results[0][l] = 0.0;
+            results[1][l] = 0.0;
+            results[2][l] = 0.0;
+            results[3][l] = 0.0;
+            results[4][l] = 0.0;
+            results[5][l] = 0.0;
+            results[6][l] = tail_acc10;
+            results[7][l] = -tail_vel6;
+            results[8][l] = tail_acc13;
+            results[9][l] = tail_acc4;
+            results[10][l] = 0.0;
+            results[11][l] = tail_acc7;
+        }
+        drift.give(0, &results[0]);
+        drift.give(1, &results[1]);
+        drift.give(2, &results[2]);
+        drift.give(3, &results[3]);
+        drift.give(4, &results[4]);
+        drift.give(5, &results[5]);
+        drift.give(6, &results[6]);
+        drift.give(7, &results[7]);
+        drift.give(8, &results[8]);
+        drift.give(9, &results[9]);
+        drift.give(10, &results[10]);
+        drift.give(11, &results[11]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
     /// 24 operations: 8 additions, 16 multiplications, 0 divisions; apart: 0 square roots, 0 sine-cosine pairs.
     #[inline]
     pub fn coordinate_rates(&self, q: &[f64; 5], v: &[f64; 4], qd: &mut [f64; 5]) {
-        let q_0 = q[0];
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        // bob: coordinate rates
-        let bob_rate0 = q_1 * v_2;
-        let bob_rate1 = q_2 * v_1;
-        let bob_rate2 = bob_rate0 - bob_rate1;
-        let bob_rate3 = q_2 * v_0;
-        let bob_rate4 = q_0 * v_2;
-        let bob_rate5 = bob_rate3 - bob_rate4;
-        let bob_rate6 = q_0 * v_1;
-        let bob_rate7 = q_1 * v_0;
-        let bob_rate8 = bob_rate6 - bob_rate7;
-        let bob_rate9 = q_3 * v_0;
-        let bob_rate10 = bob_rate2 + bob_rate9;
-        let bob_rate11 = 0.5 * bob_rate10;
-        let bob_rate12 = q_3 * v_1;
-        let bob_rate13 = bob_rate5 + bob_rate12;
-        let bob_rate14 = 0.5 * bob_rate13;
-        let bob_rate15 = q_3 * v_2;
-        let bob_rate16 = bob_rate8 + bob_rate15;
-        let bob_rate17 = 0.5 * bob_rate16;
-        let bob_rate18 = q_0 * v_0;
-        let bob_rate19 = q_1 * v_1;
-        let bob_rate20 = bob_rate18 + bob_rate19;
-        let bob_rate21 = q_2 * v_2;
-        let bob_rate22 = bob_rate20 + bob_rate21;
-        let bob_rate23 = 0.5 * bob_rate22;
-        qd[0] = bob_rate11;
-        qd[1] = bob_rate14;
-        qd[2] = bob_rate17;
-        qd[3] = -bob_rate23;
-        qd[4] = v_3;
+        Self::coordinate_rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, qd);
+    }
+
+    #[inline(always)]
+    fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_0 = q.get(0, l);
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            // bob: coordinate rates
+            let bob_rate0 = q_1 * v_2;
+            let bob_rate1 = q_2 * v_1;
+            let bob_rate2 = bob_rate0 - bob_rate1;
+            let bob_rate3 = q_2 * v_0;
+            let bob_rate4 = q_0 * v_2;
+            let bob_rate5 = bob_rate3 - bob_rate4;
+            let bob_rate6 = q_0 * v_1;
+            let bob_rate7 = q_1 * v_0;
+            let bob_rate8 = bob_rate6 - bob_rate7;
+            let bob_rate9 = q_3 * v_0;
+            let bob_rate10 = bob_rate2 + bob_rate9;
+            let bob_rate11 = 0.5 * bob_rate10;
+            let bob_rate12 = q_3 * v_1;
+            let bob_rate13 = bob_rate5 + bob_rate12;
+            let bob_rate14 = 0.5 * bob_rate13;
+            let bob_rate15 = q_3 * v_2;
+            let bob_rate16 = bob_rate8 + bob_rate15;
+            let bob_rate17 = 0.5 * bob_rate16;
+            let bob_rate18 = q_0 * v_0;
+            let bob_rate19 = q_1 * v_1;
+            let bob_rate20 = bob_rate18 + bob_rate19;
+            let bob_rate21 = q_2 * v_2;
+            let bob_rate22 = bob_rate20 + bob_rate21;
+            let bob_rate23 = 0.5 * bob_rate22;
+            results[0][l] = bob_rate11;
+            results[1][l] = bob_rate14;
+            results[2][l] = bob_rate17;
+            results[3][l] = -bob_rate23;
+            results[4][l] = v_3;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+    }
+
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> SphericalPendulumLanes<LANES> {
+        SphericalPendulumLanes { tau: self.tau.map(|x| [x; LANES]) }
+    }
+
+    /// Rates of any number of states, given as columns: `q[k][s]` is coordinate `k` of state `s`. Joint forces are a column each; the fields of
+    /// `self` are the same for all states. 8 states are computed at a time.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    pub fn rates_batch(&self, q: [&[f64]; 5], p: [&[f64]; 4], tau: [&[f64]; 4], qd: [&mut [f64]; 5], pd: [&mut [f64]; 4]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        ::multibody::runtime::batch::run::<f64, 8, 5, 4, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
+            ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
+        })
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<0, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, tau, qd, pd,): (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)) {
+        Self::rates_kernel::<A, LANES>(q, p, tau, qd, pd);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<1, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, v,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::velocities_kernel::<A, LANES>(q, p, v);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<2, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, p,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::momenta_kernel::<A, LANES>(q, v, p);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, result);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<4, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, a,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::accelerations_kernel::<A, LANES>(q, v, tau, a);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<5, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, reactions,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::reactions_kernel::<A, LANES>(q, v, tau, reactions);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<6, LANES, (&'a P0, &'a mut P1,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, m,): (&'a P0, &'a mut P1,)) {
+        Self::mass_matrix_kernel::<A, LANES>(q, m);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<7, LANES, (&'a P0, &'a P1, &'a mut P2, &'a mut P3, &'a mut P4,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, rotation, position, velocity,): (&'a P0, &'a P1, &'a mut P2, &'a mut P3, &'a mut P4,)) {
+        Self::frames_kernel::<A, LANES>(q, v, rotation, position, velocity);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<8, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, a, tau,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::inverse_dynamics_kernel::<A, LANES>(q, v, a, tau);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<9, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, h,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_kernel::<A, LANES>(q, v, h);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<10, LANES, (&'a P0, &'a mut P1,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, jacobian,): (&'a P0, &'a mut P1,)) {
+        Self::jacobians_kernel::<A, LANES>(q, jacobian);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::drifts_kernel::<A, LANES>(q, v, drift);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<12, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, qd,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::coordinate_rates_kernel::<A, LANES>(q, v, qd);
+    }
+}
+
+/// `LANES` states of [`SphericalPendulum`] at once, side by side in vector registers. In every array the last index is the lane:
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+#[derive(Clone, Debug, PartialEq)]
+#[rustfmt::skip]
+pub struct SphericalPendulumLanes<const LANES: usize> {
+    /// Joint forces, N m or N, one for each velocity.
+    pub tau: [[f64; LANES]; 4],
+}
+
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[rustfmt::skip]
+impl<const LANES: usize> SphericalPendulumLanes<LANES> {
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {
+        SphericalPendulum::new().lanes()
+    }
+
+    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    #[inline]
+    pub fn rates(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4], qd: &mut [[f64; LANES]; 5], pd: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+    }
+
+    /// Velocities from momenta: `(q, p) → v`.
+    #[inline]
+    pub fn velocities(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4], v: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 1, LANES, f64, _>((q, p, v,));
+    }
+
+    /// Momenta from velocities: `p = M(q) v`.
+    #[inline]
+    pub fn momenta(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], p: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 2, LANES, f64, _>((q, v, p,));
+    }
+
+    /// Kinetic and potential energy, J.
+    #[inline]
+    pub fn energy(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4]) -> [[f64; LANES]; 2] {
+        let mut result = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 3, LANES, f64, _>((q, p, &mut result,));
+        result
+    }
+
+    /// Accelerations: `(q, v) → v̇`.
+    #[inline]
+    pub fn accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], a: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 4, LANES, f64, _>((q, v, &self.tau, a,));
+    }
+
+    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    #[inline]
+    pub fn reactions(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], reactions: &mut [[[f64; LANES]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 5, LANES, f64, _>((q, v, &self.tau, reactions.as_flattened_mut(),));
+    }
+
+    /// Mass matrix, by rows.
+    #[inline]
+    pub fn mass_matrix(&self, q: &[[f64; LANES]; 5], m: &mut [[[f64; LANES]; 4]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
+    }
+
+    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    #[inline]
+    pub fn frames(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], rotation: &mut [[[[f64; LANES]; 3]; 3]; 2], position: &mut [[[f64; LANES]; 3]; 2], velocity: &mut [[[f64; LANES]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], a: &[[f64; LANES]; 4], tau: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 8, LANES, f64, _>((q, v, a, tau,));
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    #[inline]
+    pub fn bias(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], h: &mut [[f64; LANES]; 4]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 9, LANES, f64, _>((q, v, h,));
+    }
+
+    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    #[inline]
+    pub fn jacobians(&self, q: &[[f64; LANES]; 5], jacobian: &mut [[[[f64; LANES]; 4]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 10, LANES, f64, _>((q, jacobian.as_flattened_mut().as_flattened_mut(),));
+    }
+
+    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    #[inline]
+    pub fn drifts(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], drift: &mut [[[f64; LANES]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
+    }
+
+    /// Coordinate rates of given velocities: `q̇ = N(q) v`.
+    #[inline]
+    pub fn coordinate_rates(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], qd: &mut [[f64; LANES]; 5]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 12, LANES, f64, _>((q, v, qd,));
+    }
+}
+
+#[rustfmt::skip]
+impl<const LANES: usize> ::core::default::Default for SphericalPendulumLanes<LANES> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -1605,5 +2167,13 @@ impl ::multibody::runtime::System for SphericalPendulum {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 5], v: &[f64; 4], qd: &mut [f64; 5]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::batch::RatesBatch<f64, 5, 4, 4> for SphericalPendulum {
+    fn rates_batch(&self, q: [&[f64]; 5], p: [&[f64]; 4], tau: [&[f64]; 4], qd: [&mut [f64]; 5], pd: [&mut [f64]; 4]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        let _ = tau;
+        Self::rates_batch(self, q, p, tau, qd, pd)
     }
 }

@@ -74,2102 +74,2542 @@ impl Ur5 {
     /// 264 operations: 118 additions, 141 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-        let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-        let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-        let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-        let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-        let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-        let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-        let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
-        // wrist_3_link: inertia carried to the parent, M* (4.48)
-        let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-        let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-        let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-        let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-        let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-        let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-        let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-        let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-        let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
-        // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-        let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-        let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-        let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-        let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-        let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-        let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
-        let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
-        // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-        let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-        let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-        let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-        let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
-        // forearm_link: inertia carried to the parent, M* (4.48)
-        let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-        let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-        let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-        let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-        let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-        let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-        let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-        let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia17;
-        let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
-        let forearm_link_inertia9 = upper_arm_link_pose5 + wrist_1_link_inertia19;
-        let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
-        // upper_arm_link: inertia carried to the parent, M* (4.48)
-        let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
-        let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
-        let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-        let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-        let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-        let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-        let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-        let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-        let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-        let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-        let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-        let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-        let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-        let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
-        let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-        let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
-        let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-        let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-        let ground_pivot16 = 1.0 / ground_pivot3;
-        let ground_pivot17 = ground_pivot6 * ground_pivot16;
-        let ground_pivot18 = ground_pivot6 * ground_pivot17;
-        let ground_pivot19 = ground_pivot11 - ground_pivot18;
-        let ground_pivot20 = ground_pivot9 * ground_pivot16;
-        let ground_pivot21 = ground_pivot6 * ground_pivot20;
-        let ground_pivot22 = ground_pivot13 - ground_pivot21;
-        let ground_pivot23 = ground_pivot9 * ground_pivot20;
-        let ground_pivot24 = ground_pivot15 - ground_pivot23;
-        let ground_pivot25 = 1.0 / ground_pivot19;
-        let ground_pivot26 = ground_pivot22 * ground_pivot25;
-        let ground_pivot27 = ground_pivot22 * ground_pivot26;
-        let ground_pivot28 = ground_pivot24 - ground_pivot27;
-        let ground_pivot29 = 1.0 / ground_pivot28;
-        // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-        // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-        // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_1_link_rest0 = p_4 * wrist_1_link_sin0;
-        let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_2_link_rest4;
-        let wrist_1_link_rest2 = p_4 * wrist_1_link_cos0;
-        let wrist_1_link_rest3 = wrist_1_link_rest1 + wrist_1_link_rest2;
-        // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-        let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-        let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-        let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-        let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-        let shoulder_link_rest7 = wrist_1_link_rest3 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-        let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-        let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-        let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-        let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-        let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-        let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-        let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-        let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-        let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-        let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-        let ground_vel2 = ground_pivot17 * ground_vel1;
-        let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-        let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-        let ground_vel5 = ground_vel3 - ground_vel4;
-        let ground_vel6 = ground_pivot1 * ground_vel5;
-        let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-        let ground_vel8 = ground_pivot4 * ground_vel1;
-        let ground_vel9 = ground_vel7 - ground_vel8;
-        let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-        let ground_vel11 = ground_vel9 - ground_vel10;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = forearm_link_pose1 * ground_vel1;
-        let forearm_link_vel1 = forearm_link_pose1 * shoulder_link_rest19;
-        let forearm_link_vel2 = forearm_link_pose2 * ground_vel1;
-        let forearm_link_vel3 = ground_vel1 + ground_vel5;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
-        let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
-        let wrist_1_link_vel2 = wrist_1_link_pose1 * shoulder_link_rest19;
-        let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
-        let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
-        let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
-        let wrist_1_link_vel6 = ground_vel11 + forearm_link_vel3;
-        let wrist_1_link_vel7 = wrist_1_link_sin0 * shoulder_link_rest19;
-        let wrist_1_link_vel8 = wrist_1_link_cos0 * shoulder_link_rest19;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel7;
-        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel6;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-        let wrist_2_link_vel4 = wrist_1_link_vel8 - wrist_2_link_vel3;
-        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel7;
-        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel6;
-        let wrist_2_link_vel7 = wrist_2_link_vel5 + wrist_2_link_vel6;
-        let wrist_2_link_vel8 = wrist_2_link_cos0 * wrist_1_link_vel6;
-        let wrist_2_link_vel9 = wrist_2_link_sin0 * wrist_1_link_vel7;
-        let wrist_2_link_vel10 = wrist_2_link_vel8 - wrist_2_link_vel9;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel10;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load0 = 9.81 * wrist_1_link_sin0;
-        // upper_arm_link: momentum
-        let upper_arm_link_mom0 = upper_arm_link_pose3 * shoulder_link_rest19;
-        let upper_arm_link_mom1 = upper_arm_link_pose4 * ground_vel1;
-        let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
-        // forearm_link: momentum
-        let forearm_link_mom0 = forearm_link_pose7 * shoulder_link_rest19;
-        let forearm_link_mom1 = forearm_link_pose8 * forearm_link_vel3;
-        let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
-        let forearm_link_mom3 = forearm_link_pose3 * forearm_link_vel3;
-        let forearm_link_mom4 = forearm_link_pose4 * forearm_link_vel3;
-        let forearm_link_mom5 = forearm_link_pose4 * shoulder_link_rest19;
-        let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel1;
-        let forearm_link_mom7 = forearm_link_mom2 + forearm_link_mom6;
-        // wrist_1_link: momentum
-        let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel7;
-        let wrist_1_link_mom1 = 0.01778473500000001 * wrist_1_link_vel6;
-        let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel7;
-        let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel3;
-        let wrist_1_link_mom4 = wrist_1_link_mom0 - wrist_1_link_mom3;
-        // wrist_2_link: momentum
-        let wrist_2_link_mom0 = wrist_2_link_pivot4 * wrist_1_link_vel7;
-        let wrist_2_link_mom1 = wrist_2_link_pivot6 * wrist_1_link_vel6;
-        let wrist_2_link_mom2 = wrist_2_link_mom0 + wrist_2_link_mom1;
-        let wrist_2_link_mom3 = wrist_2_link_pivot6 * wrist_1_link_vel7;
-        let wrist_2_link_mom4 = wrist_2_link_rest4 - wrist_2_link_mom2;
-        let wrist_2_link_mom5 = wrist_1_link_mom4 - wrist_2_link_mom4;
-        // wrist_1_link: momentum
-        let wrist_1_link_mom5 = wrist_1_link_cos0 * wrist_1_link_mom1;
-        let wrist_1_link_mom6 = wrist_1_link_sin0 * wrist_1_link_mom1;
-        let wrist_1_link_mom7 = wrist_1_link_cos0 * wrist_2_link_mom5;
-        let wrist_1_link_mom8 = wrist_1_link_rest0 + wrist_1_link_mom7;
-        let wrist_1_link_mom9 = 0.10915 * wrist_1_link_mom6;
-        let wrist_1_link_mom10 = wrist_1_link_mom8 - wrist_1_link_mom9;
-        let wrist_1_link_mom11 = wrist_1_link_pose2 * wrist_1_link_mom2;
-        let wrist_1_link_mom12 = wrist_1_link_mom10 + wrist_1_link_mom11;
-        let wrist_1_link_mom13 = forearm_link_mom3 + wrist_1_link_mom5;
-        let wrist_1_link_mom14 = forearm_link_mom4 - wrist_1_link_mom6;
-        let wrist_1_link_mom15 = forearm_link_mom5 - wrist_1_link_mom2;
-        let wrist_1_link_mom16 = forearm_link_mom7 - wrist_1_link_mom12;
-        // forearm_link: momentum
-        let forearm_link_mom8 = forearm_link_pose2 * wrist_1_link_mom15;
-        let forearm_link_mom9 = wrist_1_link_mom16 + forearm_link_mom8;
-        let forearm_link_mom10 = upper_arm_link_mom2 + forearm_link_mom9;
-        // shoulder_link: momentum rate (4.36)
-        let shoulder_link_pdot0 = 9.81 * forearm_link_inertia7;
-        // upper_arm_link: momentum rate (4.36)
-        let upper_arm_link_pdot0 = shoulder_link_rest19 * forearm_link_mom10;
-        let upper_arm_link_pdot1 = shoulder_link_pdot0 - upper_arm_link_pdot0;
-        // forearm_link: momentum rate (4.36)
-        let forearm_link_pdot0 = 9.81 * wrist_1_link_inertia17;
-        let forearm_link_pdot1 = forearm_link_vel2 * wrist_1_link_mom14;
-        let forearm_link_pdot2 = forearm_link_vel0 * wrist_1_link_mom13;
-        let forearm_link_pdot3 = forearm_link_pdot1 - forearm_link_pdot2;
-        let forearm_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom16;
-        let forearm_link_pdot5 = forearm_link_pdot3 - forearm_link_pdot4;
-        let forearm_link_pdot6 = forearm_link_pdot0 + forearm_link_pdot5;
-        // wrist_1_link: momentum rate (4.36)
-        let wrist_1_link_pdot0 = 0.01778473500000001 * wrist_1_link_load0;
-        let wrist_1_link_pdot1 = wrist_1_link_vel5 * wrist_1_link_mom6;
-        let wrist_1_link_pdot2 = wrist_1_link_vel1 * wrist_1_link_mom5;
-        let wrist_1_link_pdot3 = wrist_1_link_pdot1 + wrist_1_link_pdot2;
-        let wrist_1_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom10;
-        let wrist_1_link_pdot5 = wrist_1_link_pdot3 - wrist_1_link_pdot4;
-        let wrist_1_link_pdot6 = wrist_1_link_pdot0 + wrist_1_link_pdot5;
-        // wrist_2_link: momentum rate (4.36)
-        let wrist_2_link_pdot0 = wrist_2_link_pivot4 - wrist_2_link_pivot8;
-        let wrist_2_link_pdot1 = wrist_1_link_vel6 * wrist_2_link_pdot0;
-        let wrist_2_link_pdot2 = wrist_2_link_mom3 - wrist_2_link_pdot1;
-        let wrist_2_link_pdot3 = wrist_2_link_rest6 + wrist_2_link_pdot2;
-        let wrist_2_link_pdot4 = wrist_2_link_rest4 - wrist_2_link_mom1;
-        let wrist_2_link_pdot5 = wrist_1_link_vel7 * wrist_2_link_pdot3;
-        let wrist_2_link_pdot6 = wrist_1_link_vel6 * wrist_2_link_pdot4;
-        let wrist_2_link_pdot7 = wrist_2_link_pdot5 + wrist_2_link_pdot6;
-        // wrist_3_link: momentum rate (4.36)
-        let wrist_3_link_pdot0 = wrist_3_link_inertia1 + wrist_3_link_inertia3;
-        let wrist_3_link_pdot1 = wrist_3_link_inertia2 * wrist_2_link_vel7;
-        let wrist_3_link_pdot2 = wrist_2_link_vel3 * wrist_3_link_pdot0;
-        let wrist_3_link_pdot3 = wrist_3_link_pdot1 + wrist_3_link_pdot2;
-        let wrist_3_link_pdot4 = wrist_3_link_inertia2 * wrist_2_link_vel3;
-        let wrist_3_link_pdot5 = wrist_2_link_vel7 * wrist_3_link_pdot3;
-        let wrist_3_link_pdot6 = wrist_2_link_vel3 * wrist_3_link_pdot4;
-        let wrist_3_link_pdot7 = wrist_3_link_pdot5 - wrist_3_link_pdot6;
-        let wrist_3_link_pdot8 = tau_1 + upper_arm_link_pdot1;
-        let wrist_3_link_pdot9 = tau_2 + forearm_link_pdot6;
-        let wrist_3_link_pdot10 = tau_3 - wrist_1_link_pdot6;
-        let wrist_3_link_pdot11 = tau_4 - wrist_2_link_pdot7;
-        let wrist_3_link_pdot12 = tau_5 + wrist_3_link_pdot7;
-        qd[0] = shoulder_link_rest19;
-        qd[1] = ground_vel1;
-        qd[2] = ground_vel5;
-        qd[3] = ground_vel11;
-        qd[4] = wrist_2_link_vel4;
-        qd[5] = wrist_3_link_vel0;
-        pd[0] = tau_0;
-        pd[1] = wrist_3_link_pdot8;
-        pd[2] = wrist_3_link_pdot9;
-        pd[3] = wrist_3_link_pdot10;
-        pd[4] = wrist_3_link_pdot11;
-        pd[5] = wrist_3_link_pdot12;
+        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+    }
+
+    #[inline(always)]
+    fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 12];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
+            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
+            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
+            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
+            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
+            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
+            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
+            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            // wrist_3_link: inertia carried to the parent, M* (4.48)
+            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
+            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
+            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
+            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
+            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
+            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
+            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
+            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
+            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
+            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
+            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
+            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
+            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
+            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
+            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
+            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
+            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
+            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
+            let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
+            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
+            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
+            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
+            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
+            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            // forearm_link: inertia carried to the parent, M* (4.48)
+            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
+            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
+            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
+            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
+            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
+            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
+            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
+            let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia17;
+            let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
+            let forearm_link_inertia9 = upper_arm_link_pose5 + wrist_1_link_inertia19;
+            let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
+            // upper_arm_link: inertia carried to the parent, M* (4.48)
+            let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
+            let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
+            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
+            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
+            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
+            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
+            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
+            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
+            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
+            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
+            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
+            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
+            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
+            let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
+            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
+            let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
+            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
+            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
+            let ground_pivot16 = 1.0 / ground_pivot3;
+            let ground_pivot17 = ground_pivot6 * ground_pivot16;
+            let ground_pivot18 = ground_pivot6 * ground_pivot17;
+            let ground_pivot19 = ground_pivot11 - ground_pivot18;
+            let ground_pivot20 = ground_pivot9 * ground_pivot16;
+            let ground_pivot21 = ground_pivot6 * ground_pivot20;
+            let ground_pivot22 = ground_pivot13 - ground_pivot21;
+            let ground_pivot23 = ground_pivot9 * ground_pivot20;
+            let ground_pivot24 = ground_pivot15 - ground_pivot23;
+            let ground_pivot25 = 1.0 / ground_pivot19;
+            let ground_pivot26 = ground_pivot22 * ground_pivot25;
+            let ground_pivot27 = ground_pivot22 * ground_pivot26;
+            let ground_pivot28 = ground_pivot24 - ground_pivot27;
+            let ground_pivot29 = 1.0 / ground_pivot28;
+            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
+            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
+            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_1_link_rest0 = p_4 * wrist_1_link_sin0;
+            let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_2_link_rest4;
+            let wrist_1_link_rest2 = p_4 * wrist_1_link_cos0;
+            let wrist_1_link_rest3 = wrist_1_link_rest1 + wrist_1_link_rest2;
+            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
+            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
+            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
+            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
+            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
+            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
+            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
+            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
+            let shoulder_link_rest7 = wrist_1_link_rest3 - shoulder_link_rest6;
+            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
+            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
+            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
+            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
+            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
+            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
+            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
+            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
+            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
+            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
+            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
+            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
+            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
+            let ground_vel2 = ground_pivot17 * ground_vel1;
+            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
+            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot1 * ground_vel5;
+            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
+            let ground_vel8 = ground_pivot4 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = forearm_link_pose1 * ground_vel1;
+            let forearm_link_vel1 = forearm_link_pose1 * shoulder_link_rest19;
+            let forearm_link_vel2 = forearm_link_pose2 * ground_vel1;
+            let forearm_link_vel3 = ground_vel1 + ground_vel5;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
+            let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
+            let wrist_1_link_vel2 = wrist_1_link_pose1 * shoulder_link_rest19;
+            let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
+            let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
+            let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
+            let wrist_1_link_vel6 = ground_vel11 + forearm_link_vel3;
+            let wrist_1_link_vel7 = wrist_1_link_sin0 * shoulder_link_rest19;
+            let wrist_1_link_vel8 = wrist_1_link_cos0 * shoulder_link_rest19;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel7;
+            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel6;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+            let wrist_2_link_vel4 = wrist_1_link_vel8 - wrist_2_link_vel3;
+            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel7;
+            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel6;
+            let wrist_2_link_vel7 = wrist_2_link_vel5 + wrist_2_link_vel6;
+            let wrist_2_link_vel8 = wrist_2_link_cos0 * wrist_1_link_vel6;
+            let wrist_2_link_vel9 = wrist_2_link_sin0 * wrist_1_link_vel7;
+            let wrist_2_link_vel10 = wrist_2_link_vel8 - wrist_2_link_vel9;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel10;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load0 = 9.81 * wrist_1_link_sin0;
+            // upper_arm_link: momentum
+            let upper_arm_link_mom0 = upper_arm_link_pose3 * shoulder_link_rest19;
+            let upper_arm_link_mom1 = upper_arm_link_pose4 * ground_vel1;
+            let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
+            // forearm_link: momentum
+            let forearm_link_mom0 = forearm_link_pose7 * shoulder_link_rest19;
+            let forearm_link_mom1 = forearm_link_pose8 * forearm_link_vel3;
+            let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
+            let forearm_link_mom3 = forearm_link_pose3 * forearm_link_vel3;
+            let forearm_link_mom4 = forearm_link_pose4 * forearm_link_vel3;
+            let forearm_link_mom5 = forearm_link_pose4 * shoulder_link_rest19;
+            let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel1;
+            let forearm_link_mom7 = forearm_link_mom2 + forearm_link_mom6;
+            // wrist_1_link: momentum
+            let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel7;
+            let wrist_1_link_mom1 = 0.01778473500000001 * wrist_1_link_vel6;
+            let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel7;
+            let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel3;
+            let wrist_1_link_mom4 = wrist_1_link_mom0 - wrist_1_link_mom3;
+            // wrist_2_link: momentum
+            let wrist_2_link_mom0 = wrist_2_link_pivot4 * wrist_1_link_vel7;
+            let wrist_2_link_mom1 = wrist_2_link_pivot6 * wrist_1_link_vel6;
+            let wrist_2_link_mom2 = wrist_2_link_mom0 + wrist_2_link_mom1;
+            let wrist_2_link_mom3 = wrist_2_link_pivot6 * wrist_1_link_vel7;
+            let wrist_2_link_mom4 = wrist_2_link_rest4 - wrist_2_link_mom2;
+            let wrist_2_link_mom5 = wrist_1_link_mom4 - wrist_2_link_mom4;
+            // wrist_1_link: momentum
+            let wrist_1_link_mom5 = wrist_1_link_cos0 * wrist_1_link_mom1;
+            let wrist_1_link_mom6 = wrist_1_link_sin0 * wrist_1_link_mom1;
+            let wrist_1_link_mom7 = wrist_1_link_cos0 * wrist_2_link_mom5;
+            let wrist_1_link_mom8 = wrist_1_link_rest0 + wrist_1_link_mom7;
+            let wrist_1_link_mom9 = 0.10915 * wrist_1_link_mom6;
+            let wrist_1_link_mom10 = wrist_1_link_mom8 - wrist_1_link_mom9;
+            let wrist_1_link_mom11 = wrist_1_link_pose2 * wrist_1_link_mom2;
+            let wrist_1_link_mom12 = wrist_1_link_mom10 + wrist_1_link_mom11;
+            let wrist_1_link_mom13 = forearm_link_mom3 + wrist_1_link_mom5;
+            let wrist_1_link_mom14 = forearm_link_mom4 - wrist_1_link_mom6;
+            let wrist_1_link_mom15 = forearm_link_mom5 - wrist_1_link_mom2;
+            let wrist_1_link_mom16 = forearm_link_mom7 - wrist_1_link_mom12;
+            // forearm_link: momentum
+            let forearm_link_mom8 = forearm_link_pose2 * wrist_1_link_mom15;
+            let forearm_link_mom9 = wrist_1_link_mom16 + forearm_link_mom8;
+            let forearm_link_mom10 = upper_arm_link_mom2 + forearm_link_mom9;
+            // shoulder_link: momentum rate (4.36)
+            let shoulder_link_pdot0 = 9.81 * forearm_link_inertia7;
+            // upper_arm_link: momentum rate (4.36)
+            let upper_arm_link_pdot0 = shoulder_link_rest19 * forearm_link_mom10;
+            let upper_arm_link_pdot1 = shoulder_link_pdot0 - upper_arm_link_pdot0;
+            // forearm_link: momentum rate (4.36)
+            let forearm_link_pdot0 = 9.81 * wrist_1_link_inertia17;
+            let forearm_link_pdot1 = forearm_link_vel2 * wrist_1_link_mom14;
+            let forearm_link_pdot2 = forearm_link_vel0 * wrist_1_link_mom13;
+            let forearm_link_pdot3 = forearm_link_pdot1 - forearm_link_pdot2;
+            let forearm_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom16;
+            let forearm_link_pdot5 = forearm_link_pdot3 - forearm_link_pdot4;
+            let forearm_link_pdot6 = forearm_link_pdot0 + forearm_link_pdot5;
+            // wrist_1_link: momentum rate (4.36)
+            let wrist_1_link_pdot0 = 0.01778473500000001 * wrist_1_link_load0;
+            let wrist_1_link_pdot1 = wrist_1_link_vel5 * wrist_1_link_mom6;
+            let wrist_1_link_pdot2 = wrist_1_link_vel1 * wrist_1_link_mom5;
+            let wrist_1_link_pdot3 = wrist_1_link_pdot1 + wrist_1_link_pdot2;
+            let wrist_1_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom10;
+            let wrist_1_link_pdot5 = wrist_1_link_pdot3 - wrist_1_link_pdot4;
+            let wrist_1_link_pdot6 = wrist_1_link_pdot0 + wrist_1_link_pdot5;
+            // wrist_2_link: momentum rate (4.36)
+            let wrist_2_link_pdot0 = wrist_2_link_pivot4 - wrist_2_link_pivot8;
+            let wrist_2_link_pdot1 = wrist_1_link_vel6 * wrist_2_link_pdot0;
+            let wrist_2_link_pdot2 = wrist_2_link_mom3 - wrist_2_link_pdot1;
+            let wrist_2_link_pdot3 = wrist_2_link_rest6 + wrist_2_link_pdot2;
+            let wrist_2_link_pdot4 = wrist_2_link_rest4 - wrist_2_link_mom1;
+            let wrist_2_link_pdot5 = wrist_1_link_vel7 * wrist_2_link_pdot3;
+            let wrist_2_link_pdot6 = wrist_1_link_vel6 * wrist_2_link_pdot4;
+            let wrist_2_link_pdot7 = wrist_2_link_pdot5 + wrist_2_link_pdot6;
+            // wrist_3_link: momentum rate (4.36)
+            let wrist_3_link_pdot0 = wrist_3_link_inertia1 + wrist_3_link_inertia3;
+            let wrist_3_link_pdot1 = wrist_3_link_inertia2 * wrist_2_link_vel7;
+            let wrist_3_link_pdot2 = wrist_2_link_vel3 * wrist_3_link_pdot0;
+            let wrist_3_link_pdot3 = wrist_3_link_pdot1 + wrist_3_link_pdot2;
+            let wrist_3_link_pdot4 = wrist_3_link_inertia2 * wrist_2_link_vel3;
+            let wrist_3_link_pdot5 = wrist_2_link_vel7 * wrist_3_link_pdot3;
+            let wrist_3_link_pdot6 = wrist_2_link_vel3 * wrist_3_link_pdot4;
+            let wrist_3_link_pdot7 = wrist_3_link_pdot5 - wrist_3_link_pdot6;
+            let wrist_3_link_pdot8 = tau_1 + upper_arm_link_pdot1;
+            let wrist_3_link_pdot9 = tau_2 + forearm_link_pdot6;
+            let wrist_3_link_pdot10 = tau_3 - wrist_1_link_pdot6;
+            let wrist_3_link_pdot11 = tau_4 - wrist_2_link_pdot7;
+            let wrist_3_link_pdot12 = tau_5 + wrist_3_link_pdot7;
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_vel1;
+            results[2][l] = ground_vel5;
+            results[3][l] = ground_vel11;
+            results[4][l] = wrist_2_link_vel4;
+            results[5][l] = wrist_3_link_vel0;
+            results[6][l] = tau_0;
+            results[7][l] = wrist_3_link_pdot8;
+            results[8][l] = wrist_3_link_pdot9;
+            results[9][l] = wrist_3_link_pdot10;
+            results[10][l] = wrist_3_link_pdot11;
+            results[11][l] = wrist_3_link_pdot12;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+        pd.give(0, &results[6]);
+        pd.give(1, &results[7]);
+        pd.give(2, &results[8]);
+        pd.give(3, &results[9]);
+        pd.give(4, &results[10]);
+        pd.give(5, &results[11]);
     }
 
     /// Velocities from momenta: `(q, p) → v`.
     /// 169 operations: 77 additions, 87 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 6], p: &[f64; 6], v: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-        let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-        let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
-        // wrist_3_link: inertia carried to the parent, M* (4.48)
-        let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-        let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-        let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-        let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-        let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-        let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-        let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-        let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-        let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
-        // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-        let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-        let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-        let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-        let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-        let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-        let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
-        let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
-        // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-        let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-        let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-        let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-        let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
-        // forearm_link: inertia carried to the parent, M* (4.48)
-        let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-        let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-        let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-        let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-        let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-        let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-        let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-        let forearm_link_inertia7 = upper_arm_link_pose1 + forearm_link_inertia5;
-        let forearm_link_inertia8 = upper_arm_link_pose2 + wrist_1_link_inertia19;
-        let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
-        // upper_arm_link: inertia carried to the parent, M* (4.48)
-        let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
-        let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
-        let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-        let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-        let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-        let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-        let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-        let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-        let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-        let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-        let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-        let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-        let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-        let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
-        let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-        let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
-        let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-        let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-        let ground_pivot16 = 1.0 / ground_pivot3;
-        let ground_pivot17 = ground_pivot6 * ground_pivot16;
-        let ground_pivot18 = ground_pivot6 * ground_pivot17;
-        let ground_pivot19 = ground_pivot11 - ground_pivot18;
-        let ground_pivot20 = ground_pivot9 * ground_pivot16;
-        let ground_pivot21 = ground_pivot6 * ground_pivot20;
-        let ground_pivot22 = ground_pivot13 - ground_pivot21;
-        let ground_pivot23 = ground_pivot9 * ground_pivot20;
-        let ground_pivot24 = ground_pivot15 - ground_pivot23;
-        let ground_pivot25 = 1.0 / ground_pivot19;
-        let ground_pivot26 = ground_pivot22 * ground_pivot25;
-        let ground_pivot27 = ground_pivot22 * ground_pivot26;
-        let ground_pivot28 = ground_pivot24 - ground_pivot27;
-        let ground_pivot29 = 1.0 / ground_pivot28;
-        // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-        // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-        // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
-        let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
-        let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-        // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-        let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-        let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-        let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-        let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-        let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-        let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-        let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-        let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-        let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-        let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-        let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-        let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-        let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-        let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-        let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-        let ground_vel2 = ground_pivot17 * ground_vel1;
-        let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-        let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-        let ground_vel5 = ground_vel3 - ground_vel4;
-        let ground_vel6 = ground_pivot1 * ground_vel5;
-        let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-        let ground_vel8 = ground_pivot4 * ground_vel1;
-        let ground_vel9 = ground_vel7 - ground_vel8;
-        let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-        let ground_vel11 = ground_vel9 - ground_vel10;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = ground_vel1 + ground_vel5;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
-        let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
-        let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
-        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-        let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
-        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
-        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
-        let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
-        v[0] = shoulder_link_rest19;
-        v[1] = ground_vel1;
-        v[2] = ground_vel5;
-        v[3] = ground_vel11;
-        v[4] = wrist_2_link_vel4;
-        v[5] = wrist_3_link_vel0;
+        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+    }
+
+    #[inline(always)]
+    fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
+            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
+            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            // wrist_3_link: inertia carried to the parent, M* (4.48)
+            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
+            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
+            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
+            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
+            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
+            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
+            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
+            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
+            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
+            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
+            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
+            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
+            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
+            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
+            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
+            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
+            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
+            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
+            let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
+            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
+            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
+            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
+            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
+            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            // forearm_link: inertia carried to the parent, M* (4.48)
+            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
+            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
+            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
+            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
+            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
+            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
+            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
+            let forearm_link_inertia7 = upper_arm_link_pose1 + forearm_link_inertia5;
+            let forearm_link_inertia8 = upper_arm_link_pose2 + wrist_1_link_inertia19;
+            let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
+            // upper_arm_link: inertia carried to the parent, M* (4.48)
+            let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
+            let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
+            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
+            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
+            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
+            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
+            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
+            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
+            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
+            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
+            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
+            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
+            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
+            let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
+            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
+            let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
+            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
+            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
+            let ground_pivot16 = 1.0 / ground_pivot3;
+            let ground_pivot17 = ground_pivot6 * ground_pivot16;
+            let ground_pivot18 = ground_pivot6 * ground_pivot17;
+            let ground_pivot19 = ground_pivot11 - ground_pivot18;
+            let ground_pivot20 = ground_pivot9 * ground_pivot16;
+            let ground_pivot21 = ground_pivot6 * ground_pivot20;
+            let ground_pivot22 = ground_pivot13 - ground_pivot21;
+            let ground_pivot23 = ground_pivot9 * ground_pivot20;
+            let ground_pivot24 = ground_pivot15 - ground_pivot23;
+            let ground_pivot25 = 1.0 / ground_pivot19;
+            let ground_pivot26 = ground_pivot22 * ground_pivot25;
+            let ground_pivot27 = ground_pivot22 * ground_pivot26;
+            let ground_pivot28 = ground_pivot24 - ground_pivot27;
+            let ground_pivot29 = 1.0 / ground_pivot28;
+            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
+            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
+            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
+            let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
+            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
+            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
+            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
+            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
+            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
+            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
+            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
+            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
+            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
+            let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
+            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
+            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
+            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
+            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
+            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
+            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
+            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
+            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
+            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
+            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
+            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
+            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
+            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
+            let ground_vel2 = ground_pivot17 * ground_vel1;
+            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
+            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot1 * ground_vel5;
+            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
+            let ground_vel8 = ground_pivot4 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = ground_vel1 + ground_vel5;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
+            let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
+            let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
+            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+            let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
+            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
+            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
+            let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_vel1;
+            results[2][l] = ground_vel5;
+            results[3][l] = ground_vel11;
+            results[4][l] = wrist_2_link_vel4;
+            results[5][l] = wrist_3_link_vel0;
+        }
+        v.give(0, &results[0]);
+        v.give(1, &results[1]);
+        v.give(2, &results[2]);
+        v.give(3, &results[3]);
+        v.give(4, &results[4]);
+        v.give(5, &results[5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 116 operations: 45 additions, 71 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn momenta(&self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-        let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = v_1 * forearm_link_pose1;
-        let forearm_link_vel1 = v_0 * forearm_link_pose1;
-        let forearm_link_vel2 = v_1 * forearm_link_pose2;
-        let forearm_link_vel3 = v_1 + v_2;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
-        let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
-        let wrist_1_link_vel2 = v_0 * wrist_1_link_pose1;
-        let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
-        let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
-        let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
-        let wrist_1_link_vel6 = 0.10915 * v_0;
-        let wrist_1_link_vel7 = wrist_1_link_vel5 + wrist_1_link_vel6;
-        let wrist_1_link_vel8 = wrist_1_link_cos0 * wrist_1_link_vel7;
-        let wrist_1_link_vel9 = wrist_1_link_sin0 * wrist_1_link_vel1;
-        let wrist_1_link_vel10 = wrist_1_link_vel8 - wrist_1_link_vel9;
-        let wrist_1_link_vel11 = v_0 * wrist_1_link_sin0;
-        let wrist_1_link_vel12 = v_0 * wrist_1_link_cos0;
-        let wrist_1_link_vel13 = v_3 + forearm_link_vel3;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel11;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel13;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel13;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel11;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = v_4 - wrist_1_link_vel12;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-        let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel6;
-        let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-        let wrist_3_link_vel3 = v_5 + wrist_2_link_vel5;
-        // shoulder_link: momentum
-        let shoulder_link_mom0 = 2.7644263025275 * v_0;
-        // upper_arm_link: momentum
-        let upper_arm_link_mom0 = v_0 * upper_arm_link_pose1;
-        let upper_arm_link_mom1 = v_1 * upper_arm_link_pose2;
-        let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
-        let upper_arm_link_mom3 = v_0 * upper_arm_link_pose2;
-        let upper_arm_link_mom4 = 1.7701269384099998 * v_1;
-        let upper_arm_link_mom5 = upper_arm_link_mom3 + upper_arm_link_mom4;
-        // forearm_link: momentum
-        let forearm_link_mom0 = v_0 * forearm_link_pose6;
-        let forearm_link_mom1 = forearm_link_pose7 * forearm_link_vel3;
-        let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
-        let forearm_link_mom3 = v_0 * forearm_link_pose7;
-        let forearm_link_mom4 = 0.59565195167475 * forearm_link_vel3;
-        let forearm_link_mom5 = forearm_link_mom3 + forearm_link_mom4;
-        let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel3;
-        let forearm_link_mom7 = forearm_link_pose4 * forearm_link_vel3;
-        let forearm_link_mom8 = v_0 * forearm_link_pose4;
-        let forearm_link_mom9 = forearm_link_pose4 * forearm_link_vel1;
-        let forearm_link_mom10 = forearm_link_pose4 * forearm_link_vel0;
-        let forearm_link_mom11 = forearm_link_pose3 * forearm_link_vel2;
-        let forearm_link_mom12 = forearm_link_mom10 + forearm_link_mom11;
-        let forearm_link_mom13 = forearm_link_mom2 - forearm_link_mom9;
-        let forearm_link_mom14 = forearm_link_mom5 + forearm_link_mom12;
-        // wrist_1_link: momentum
-        let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel11;
-        let wrist_1_link_mom1 = 0.22402883622975 * wrist_1_link_vel13;
-        let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel13;
-        let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel11;
-        let wrist_1_link_mom4 = 0.01778473500000001 * wrist_1_link_vel3;
-        let wrist_1_link_mom5 = 0.01778473500000001 * wrist_1_link_vel10;
-        let wrist_1_link_mom6 = wrist_1_link_mom0 - wrist_1_link_mom4;
-        let wrist_1_link_mom7 = wrist_1_link_mom1 + wrist_1_link_mom5;
-        // wrist_2_link: momentum
-        let wrist_2_link_mom0 = 0.033822000000000005 * wrist_2_link_vel2;
-        let wrist_2_link_mom1 = 0.253242 * wrist_2_link_vel6;
-        // wrist_3_link: momentum
-        let wrist_3_link_mom0 = 0.016685526854599998 * wrist_3_link_vel2;
-        let wrist_3_link_mom1 = 0.0171364731454 * wrist_3_link_vel3;
-        let wrist_3_link_mom2 = wrist_3_link_cos0 * wrist_3_link_mom0;
-        let wrist_3_link_mom3 = wrist_3_link_sin0 * wrist_3_link_mom0;
-        let wrist_3_link_mom4 = wrist_2_link_mom0 - wrist_3_link_mom2;
-        let wrist_3_link_mom5 = wrist_2_link_mom1 + wrist_3_link_mom3;
-        // wrist_2_link: momentum
-        let wrist_2_link_mom2 = wrist_2_link_cos0 * wrist_3_link_mom4;
-        let wrist_2_link_mom3 = wrist_2_link_sin0 * wrist_3_link_mom1;
-        let wrist_2_link_mom4 = wrist_2_link_mom2 - wrist_2_link_mom3;
-        let wrist_2_link_mom5 = wrist_2_link_sin0 * wrist_3_link_mom4;
-        let wrist_2_link_mom6 = wrist_2_link_cos0 * wrist_3_link_mom1;
-        let wrist_2_link_mom7 = wrist_2_link_mom5 + wrist_2_link_mom6;
-        let wrist_2_link_mom8 = wrist_1_link_mom6 + wrist_2_link_mom4;
-        let wrist_2_link_mom9 = wrist_1_link_mom7 + wrist_2_link_mom7;
-        // wrist_1_link: momentum
-        let wrist_1_link_mom8 = wrist_1_link_cos0 * wrist_1_link_mom2;
-        let wrist_1_link_mom9 = wrist_1_link_sin0 * wrist_1_link_mom2;
-        let wrist_1_link_mom10 = wrist_1_link_sin0 * wrist_2_link_mom8;
-        let wrist_1_link_mom11 = wrist_1_link_cos0 * wrist_3_link_mom5;
-        let wrist_1_link_mom12 = wrist_1_link_mom10 - wrist_1_link_mom11;
-        let wrist_1_link_mom13 = 0.10915 * wrist_1_link_mom8;
-        let wrist_1_link_mom14 = wrist_1_link_mom12 + wrist_1_link_mom13;
-        let wrist_1_link_mom15 = wrist_1_link_pose2 * wrist_1_link_mom8;
-        let wrist_1_link_mom16 = wrist_2_link_mom9 + wrist_1_link_mom15;
-        let wrist_1_link_mom17 = wrist_1_link_pose1 * wrist_1_link_mom3;
-        let wrist_1_link_mom18 = wrist_1_link_mom14 - wrist_1_link_mom17;
-        let wrist_1_link_mom19 = wrist_1_link_pose1 * wrist_1_link_mom9;
-        let wrist_1_link_mom20 = wrist_1_link_mom16 - wrist_1_link_mom19;
-        let wrist_1_link_mom21 = forearm_link_mom6 + wrist_1_link_mom8;
-        let wrist_1_link_mom22 = forearm_link_mom7 - wrist_1_link_mom9;
-        let wrist_1_link_mom23 = forearm_link_mom8 - wrist_1_link_mom3;
-        let wrist_1_link_mom24 = forearm_link_mom13 - wrist_1_link_mom18;
-        let wrist_1_link_mom25 = forearm_link_mom14 + wrist_1_link_mom20;
-        // forearm_link: momentum
-        let forearm_link_mom15 = forearm_link_pose2 * wrist_1_link_mom21;
-        let forearm_link_mom16 = wrist_1_link_mom25 + forearm_link_mom15;
-        let forearm_link_mom17 = forearm_link_pose1 * wrist_1_link_mom23;
-        let forearm_link_mom18 = wrist_1_link_mom24 - forearm_link_mom17;
-        let forearm_link_mom19 = forearm_link_pose1 * wrist_1_link_mom22;
-        let forearm_link_mom20 = forearm_link_mom16 + forearm_link_mom19;
-        let forearm_link_mom21 = upper_arm_link_mom2 + forearm_link_mom18;
-        let forearm_link_mom22 = upper_arm_link_mom5 + forearm_link_mom20;
-        // upper_arm_link: momentum
-        let upper_arm_link_mom6 = shoulder_link_mom0 - forearm_link_mom21;
-        p[0] = upper_arm_link_mom6;
-        p[1] = forearm_link_mom22;
-        p[2] = wrist_1_link_mom25;
-        p[3] = wrist_2_link_mom9;
-        p[4] = wrist_3_link_mom5;
-        p[5] = wrist_3_link_mom1;
+        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+    }
+
+    #[inline(always)]
+    fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
+            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = v_1 * forearm_link_pose1;
+            let forearm_link_vel1 = v_0 * forearm_link_pose1;
+            let forearm_link_vel2 = v_1 * forearm_link_pose2;
+            let forearm_link_vel3 = v_1 + v_2;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
+            let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
+            let wrist_1_link_vel2 = v_0 * wrist_1_link_pose1;
+            let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
+            let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
+            let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
+            let wrist_1_link_vel6 = 0.10915 * v_0;
+            let wrist_1_link_vel7 = wrist_1_link_vel5 + wrist_1_link_vel6;
+            let wrist_1_link_vel8 = wrist_1_link_cos0 * wrist_1_link_vel7;
+            let wrist_1_link_vel9 = wrist_1_link_sin0 * wrist_1_link_vel1;
+            let wrist_1_link_vel10 = wrist_1_link_vel8 - wrist_1_link_vel9;
+            let wrist_1_link_vel11 = v_0 * wrist_1_link_sin0;
+            let wrist_1_link_vel12 = v_0 * wrist_1_link_cos0;
+            let wrist_1_link_vel13 = v_3 + forearm_link_vel3;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel11;
+            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel13;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel13;
+            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel11;
+            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
+            let wrist_2_link_vel6 = v_4 - wrist_1_link_vel12;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
+            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel6;
+            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
+            let wrist_3_link_vel3 = v_5 + wrist_2_link_vel5;
+            // shoulder_link: momentum
+            let shoulder_link_mom0 = 2.7644263025275 * v_0;
+            // upper_arm_link: momentum
+            let upper_arm_link_mom0 = v_0 * upper_arm_link_pose1;
+            let upper_arm_link_mom1 = v_1 * upper_arm_link_pose2;
+            let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
+            let upper_arm_link_mom3 = v_0 * upper_arm_link_pose2;
+            let upper_arm_link_mom4 = 1.7701269384099998 * v_1;
+            let upper_arm_link_mom5 = upper_arm_link_mom3 + upper_arm_link_mom4;
+            // forearm_link: momentum
+            let forearm_link_mom0 = v_0 * forearm_link_pose6;
+            let forearm_link_mom1 = forearm_link_pose7 * forearm_link_vel3;
+            let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
+            let forearm_link_mom3 = v_0 * forearm_link_pose7;
+            let forearm_link_mom4 = 0.59565195167475 * forearm_link_vel3;
+            let forearm_link_mom5 = forearm_link_mom3 + forearm_link_mom4;
+            let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel3;
+            let forearm_link_mom7 = forearm_link_pose4 * forearm_link_vel3;
+            let forearm_link_mom8 = v_0 * forearm_link_pose4;
+            let forearm_link_mom9 = forearm_link_pose4 * forearm_link_vel1;
+            let forearm_link_mom10 = forearm_link_pose4 * forearm_link_vel0;
+            let forearm_link_mom11 = forearm_link_pose3 * forearm_link_vel2;
+            let forearm_link_mom12 = forearm_link_mom10 + forearm_link_mom11;
+            let forearm_link_mom13 = forearm_link_mom2 - forearm_link_mom9;
+            let forearm_link_mom14 = forearm_link_mom5 + forearm_link_mom12;
+            // wrist_1_link: momentum
+            let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel11;
+            let wrist_1_link_mom1 = 0.22402883622975 * wrist_1_link_vel13;
+            let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel13;
+            let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel11;
+            let wrist_1_link_mom4 = 0.01778473500000001 * wrist_1_link_vel3;
+            let wrist_1_link_mom5 = 0.01778473500000001 * wrist_1_link_vel10;
+            let wrist_1_link_mom6 = wrist_1_link_mom0 - wrist_1_link_mom4;
+            let wrist_1_link_mom7 = wrist_1_link_mom1 + wrist_1_link_mom5;
+            // wrist_2_link: momentum
+            let wrist_2_link_mom0 = 0.033822000000000005 * wrist_2_link_vel2;
+            let wrist_2_link_mom1 = 0.253242 * wrist_2_link_vel6;
+            // wrist_3_link: momentum
+            let wrist_3_link_mom0 = 0.016685526854599998 * wrist_3_link_vel2;
+            let wrist_3_link_mom1 = 0.0171364731454 * wrist_3_link_vel3;
+            let wrist_3_link_mom2 = wrist_3_link_cos0 * wrist_3_link_mom0;
+            let wrist_3_link_mom3 = wrist_3_link_sin0 * wrist_3_link_mom0;
+            let wrist_3_link_mom4 = wrist_2_link_mom0 - wrist_3_link_mom2;
+            let wrist_3_link_mom5 = wrist_2_link_mom1 + wrist_3_link_mom3;
+            // wrist_2_link: momentum
+            let wrist_2_link_mom2 = wrist_2_link_cos0 * wrist_3_link_mom4;
+            let wrist_2_link_mom3 = wrist_2_link_sin0 * wrist_3_link_mom1;
+            let wrist_2_link_mom4 = wrist_2_link_mom2 - wrist_2_link_mom3;
+            let wrist_2_link_mom5 = wrist_2_link_sin0 * wrist_3_link_mom4;
+            let wrist_2_link_mom6 = wrist_2_link_cos0 * wrist_3_link_mom1;
+            let wrist_2_link_mom7 = wrist_2_link_mom5 + wrist_2_link_mom6;
+            let wrist_2_link_mom8 = wrist_1_link_mom6 + wrist_2_link_mom4;
+            let wrist_2_link_mom9 = wrist_1_link_mom7 + wrist_2_link_mom7;
+            // wrist_1_link: momentum
+            let wrist_1_link_mom8 = wrist_1_link_cos0 * wrist_1_link_mom2;
+            let wrist_1_link_mom9 = wrist_1_link_sin0 * wrist_1_link_mom2;
+            let wrist_1_link_mom10 = wrist_1_link_sin0 * wrist_2_link_mom8;
+            let wrist_1_link_mom11 = wrist_1_link_cos0 * wrist_3_link_mom5;
+            let wrist_1_link_mom12 = wrist_1_link_mom10 - wrist_1_link_mom11;
+            let wrist_1_link_mom13 = 0.10915 * wrist_1_link_mom8;
+            let wrist_1_link_mom14 = wrist_1_link_mom12 + wrist_1_link_mom13;
+            let wrist_1_link_mom15 = wrist_1_link_pose2 * wrist_1_link_mom8;
+            let wrist_1_link_mom16 = wrist_2_link_mom9 + wrist_1_link_mom15;
+            let wrist_1_link_mom17 = wrist_1_link_pose1 * wrist_1_link_mom3;
+            let wrist_1_link_mom18 = wrist_1_link_mom14 - wrist_1_link_mom17;
+            let wrist_1_link_mom19 = wrist_1_link_pose1 * wrist_1_link_mom9;
+            let wrist_1_link_mom20 = wrist_1_link_mom16 - wrist_1_link_mom19;
+            let wrist_1_link_mom21 = forearm_link_mom6 + wrist_1_link_mom8;
+            let wrist_1_link_mom22 = forearm_link_mom7 - wrist_1_link_mom9;
+            let wrist_1_link_mom23 = forearm_link_mom8 - wrist_1_link_mom3;
+            let wrist_1_link_mom24 = forearm_link_mom13 - wrist_1_link_mom18;
+            let wrist_1_link_mom25 = forearm_link_mom14 + wrist_1_link_mom20;
+            // forearm_link: momentum
+            let forearm_link_mom15 = forearm_link_pose2 * wrist_1_link_mom21;
+            let forearm_link_mom16 = wrist_1_link_mom25 + forearm_link_mom15;
+            let forearm_link_mom17 = forearm_link_pose1 * wrist_1_link_mom23;
+            let forearm_link_mom18 = wrist_1_link_mom24 - forearm_link_mom17;
+            let forearm_link_mom19 = forearm_link_pose1 * wrist_1_link_mom22;
+            let forearm_link_mom20 = forearm_link_mom16 + forearm_link_mom19;
+            let forearm_link_mom21 = upper_arm_link_mom2 + forearm_link_mom18;
+            let forearm_link_mom22 = upper_arm_link_mom5 + forearm_link_mom20;
+            // upper_arm_link: momentum
+            let upper_arm_link_mom6 = shoulder_link_mom0 - forearm_link_mom21;
+            results[0][l] = upper_arm_link_mom6;
+            results[1][l] = forearm_link_mom22;
+            results[2][l] = wrist_1_link_mom25;
+            results[3][l] = wrist_2_link_mom9;
+            results[4][l] = wrist_3_link_mom5;
+            results[5][l] = wrist_3_link_mom1;
+        }
+        p.give(0, &results[0]);
+        p.give(1, &results[1]);
+        p.give(2, &results[2]);
+        p.give(3, &results[3]);
+        p.give(4, &results[4]);
+        p.give(5, &results[5]);
     }
 
     /// Kinetic and potential energy, J.
     /// 185 operations: 84 additions, 96 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let p_0 = p[0];
-        let p_1 = p[1];
-        let p_2 = p[2];
-        let p_3 = p[3];
-        let p_4 = p[4];
-        let p_5 = p[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_sin0;
-        let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-        let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-        let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
-        // wrist_3_link: inertia carried to the parent, M* (4.48)
-        let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-        let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-        let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-        let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-        let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-        let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-        let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-        let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-        let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
-        // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-        let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-        let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-        let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-        let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-        let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-        let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
-        let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
-        // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-        let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-        let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-        let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-        let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
-        // forearm_link: inertia carried to the parent, M* (4.48)
-        let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-        let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-        let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-        let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-        let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-        let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-        let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-        let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia16;
-        let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
-        let forearm_link_inertia9 = upper_arm_link_pose3 + wrist_1_link_inertia19;
-        let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
-        // upper_arm_link: inertia carried to the parent, M* (4.48)
-        let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
-        let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
-        let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-        let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-        let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-        let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-        let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-        let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-        let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-        let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-        let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-        let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-        let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-        let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
-        let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-        let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
-        let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-        let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-        let ground_pivot16 = 1.0 / ground_pivot3;
-        let ground_pivot17 = ground_pivot6 * ground_pivot16;
-        let ground_pivot18 = ground_pivot6 * ground_pivot17;
-        let ground_pivot19 = ground_pivot11 - ground_pivot18;
-        let ground_pivot20 = ground_pivot9 * ground_pivot16;
-        let ground_pivot21 = ground_pivot6 * ground_pivot20;
-        let ground_pivot22 = ground_pivot13 - ground_pivot21;
-        let ground_pivot23 = ground_pivot9 * ground_pivot20;
-        let ground_pivot24 = ground_pivot15 - ground_pivot23;
-        let ground_pivot25 = 1.0 / ground_pivot19;
-        let ground_pivot26 = ground_pivot22 * ground_pivot25;
-        let ground_pivot27 = ground_pivot22 * ground_pivot26;
-        let ground_pivot28 = ground_pivot24 - ground_pivot27;
-        let ground_pivot29 = 1.0 / ground_pivot28;
-        // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-        // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-        let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-        let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-        let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-        let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-        let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-        let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-        // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
-        let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
-        let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-        // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-        let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-        let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-        let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-        let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-        let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-        let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-        let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-        let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-        let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-        let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-        let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-        let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-        let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-        let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-        let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
-        // ground: velocity and joint rate (4.40)
-        let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-        let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-        let ground_vel2 = ground_pivot17 * ground_vel1;
-        let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-        let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-        let ground_vel5 = ground_vel3 - ground_vel4;
-        let ground_vel6 = ground_pivot1 * ground_vel5;
-        let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-        let ground_vel8 = ground_pivot4 * ground_vel1;
-        let ground_vel9 = ground_vel7 - ground_vel8;
-        let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-        let ground_vel11 = ground_vel9 - ground_vel10;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = ground_vel1 + ground_vel5;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
-        let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
-        let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
-        let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-        let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
-        let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
-        let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
-        let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
-        // wrist_2_link: energy
-        let wrist_2_link_energy0 = p_4 * wrist_2_link_vel4;
-        // wrist_3_link: energy
-        let wrist_3_link_energy0 = p_5 * wrist_3_link_vel0;
-        let wrist_3_link_energy1 = wrist_2_link_energy0 + wrist_3_link_energy0;
-        let wrist_3_link_energy2 = p_3 * ground_vel11;
-        let wrist_3_link_energy3 = wrist_3_link_energy1 + wrist_3_link_energy2;
-        let wrist_3_link_energy4 = p_2 * ground_vel5;
-        let wrist_3_link_energy5 = wrist_3_link_energy3 + wrist_3_link_energy4;
-        let wrist_3_link_energy6 = p_1 * ground_vel1;
-        let wrist_3_link_energy7 = wrist_3_link_energy5 + wrist_3_link_energy6;
-        let wrist_3_link_energy8 = p_0 * shoulder_link_rest19;
-        let wrist_3_link_energy9 = wrist_3_link_energy7 + wrist_3_link_energy8;
-        let wrist_3_link_energy10 = 0.5 * wrist_3_link_energy9;
-        // shoulder_link: gravity and wrenches
-        let shoulder_link_load0 = forearm_link_inertia7 - 1.5151591301;
-        // ground: energy
-        let ground_energy0 = 9.81 * shoulder_link_load0;
-        let kinetic = wrist_3_link_energy10;
-        let potential = -ground_energy0;
-        [kinetic, potential]
+        let mut result = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
+        result
+    }
+
+    #[inline(always)]
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 2];
+        for l in 0..LANES {
+            let p_0 = p.get(0, l);
+            let p_1 = p.get(1, l);
+            let p_2 = p.get(2, l);
+            let p_3 = p.get(3, l);
+            let p_4 = p.get(4, l);
+            let p_5 = p.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_sin0;
+            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
+            let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
+            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            // wrist_3_link: inertia carried to the parent, M* (4.48)
+            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
+            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
+            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
+            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
+            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
+            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
+            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
+            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
+            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
+            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
+            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
+            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
+            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
+            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
+            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
+            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
+            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
+            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
+            let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
+            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
+            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
+            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
+            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
+            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            // forearm_link: inertia carried to the parent, M* (4.48)
+            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
+            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
+            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
+            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
+            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
+            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
+            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
+            let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia16;
+            let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
+            let forearm_link_inertia9 = upper_arm_link_pose3 + wrist_1_link_inertia19;
+            let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
+            // upper_arm_link: inertia carried to the parent, M* (4.48)
+            let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
+            let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
+            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
+            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
+            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
+            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
+            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
+            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
+            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
+            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
+            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
+            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
+            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
+            let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
+            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
+            let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
+            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
+            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
+            let ground_pivot16 = 1.0 / ground_pivot3;
+            let ground_pivot17 = ground_pivot6 * ground_pivot16;
+            let ground_pivot18 = ground_pivot6 * ground_pivot17;
+            let ground_pivot19 = ground_pivot11 - ground_pivot18;
+            let ground_pivot20 = ground_pivot9 * ground_pivot16;
+            let ground_pivot21 = ground_pivot6 * ground_pivot20;
+            let ground_pivot22 = ground_pivot13 - ground_pivot21;
+            let ground_pivot23 = ground_pivot9 * ground_pivot20;
+            let ground_pivot24 = ground_pivot15 - ground_pivot23;
+            let ground_pivot25 = 1.0 / ground_pivot19;
+            let ground_pivot26 = ground_pivot22 * ground_pivot25;
+            let ground_pivot27 = ground_pivot22 * ground_pivot26;
+            let ground_pivot28 = ground_pivot24 - ground_pivot27;
+            let ground_pivot29 = 1.0 / ground_pivot28;
+            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
+            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
+            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
+            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
+            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
+            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
+            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
+            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
+            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
+            let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
+            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
+            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
+            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
+            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
+            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
+            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
+            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
+            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
+            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
+            let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
+            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
+            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
+            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
+            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
+            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
+            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
+            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
+            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
+            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
+            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
+            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
+            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            // ground: velocity and joint rate (4.40)
+            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
+            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
+            let ground_vel2 = ground_pivot17 * ground_vel1;
+            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
+            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
+            let ground_vel5 = ground_vel3 - ground_vel4;
+            let ground_vel6 = ground_pivot1 * ground_vel5;
+            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
+            let ground_vel8 = ground_pivot4 * ground_vel1;
+            let ground_vel9 = ground_vel7 - ground_vel8;
+            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
+            let ground_vel11 = ground_vel9 - ground_vel10;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = ground_vel1 + ground_vel5;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
+            let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
+            let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
+            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
+            let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
+            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
+            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
+            let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
+            // wrist_2_link: energy
+            let wrist_2_link_energy0 = p_4 * wrist_2_link_vel4;
+            // wrist_3_link: energy
+            let wrist_3_link_energy0 = p_5 * wrist_3_link_vel0;
+            let wrist_3_link_energy1 = wrist_2_link_energy0 + wrist_3_link_energy0;
+            let wrist_3_link_energy2 = p_3 * ground_vel11;
+            let wrist_3_link_energy3 = wrist_3_link_energy1 + wrist_3_link_energy2;
+            let wrist_3_link_energy4 = p_2 * ground_vel5;
+            let wrist_3_link_energy5 = wrist_3_link_energy3 + wrist_3_link_energy4;
+            let wrist_3_link_energy6 = p_1 * ground_vel1;
+            let wrist_3_link_energy7 = wrist_3_link_energy5 + wrist_3_link_energy6;
+            let wrist_3_link_energy8 = p_0 * shoulder_link_rest19;
+            let wrist_3_link_energy9 = wrist_3_link_energy7 + wrist_3_link_energy8;
+            let wrist_3_link_energy10 = 0.5 * wrist_3_link_energy9;
+            // shoulder_link: gravity and wrenches
+            let shoulder_link_load0 = forearm_link_inertia7 - 1.5151591301;
+            // ground: energy
+            let ground_energy0 = 9.81 * shoulder_link_load0;
+            results[0][l] = wrist_3_link_energy10;
+            results[1][l] = -ground_energy0;
+        }
+        result.give(0, &results[0]);
+        result.give(1, &results[1]);
     }
 
     /// Accelerations: `(q, v) → v̇`.
     /// 342 operations: 149 additions, 188 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let tau_0 = self.tau[0];
-        let tau_1 = self.tau[1];
-        let tau_2 = self.tau[2];
-        let tau_3 = self.tau[3];
-        let tau_4 = self.tau[4];
-        let tau_5 = self.tau[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-        let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-        let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-        let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-        let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-        let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-        let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-        let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
-        // wrist_3_link: inertia carried to the parent, M* (4.48)
-        let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-        let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-        let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-        let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-        let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-        let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-        let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-        let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-        let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
-        // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-        let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-        let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-        let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-        let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-        let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-        let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
-        // wrist_2_link: inertia carried to the parent, M* (4.48)
-        let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-        let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-        let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-        let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-        let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-        let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-        let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
-        // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-        let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-        let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-        let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-        let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-        let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-        let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
-        // wrist_1_link: inertia carried to the parent, M* (4.48)
-        let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-        let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-        let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-        let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-        let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-        let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-        let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-        let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-        let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
-        let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
-        // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-        let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-        let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-        let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-        let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
-        // forearm_link: inertia carried to the parent, M* (4.48)
-        let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-        let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-        let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-        let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-        let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-        let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-        let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-        let forearm_link_inertia7 = upper_arm_link_pose2 + forearm_link_inertia5;
-        let forearm_link_inertia8 = upper_arm_link_pose5 + wrist_1_link_inertia19;
-        let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
-        // upper_arm_link: inertia carried to the parent, M* (4.48)
-        let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
-        let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
-        let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
-        // ground: U, Mj, k and the reduced inertia M' (4.44)
-        let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-        let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-        let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-        let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-        let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-        let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-        let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-        let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-        let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-        let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-        let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-        let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
-        let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-        let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
-        let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-        let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-        let ground_pivot16 = 1.0 / ground_pivot3;
-        let ground_pivot17 = ground_pivot6 * ground_pivot16;
-        let ground_pivot18 = ground_pivot6 * ground_pivot17;
-        let ground_pivot19 = ground_pivot11 - ground_pivot18;
-        let ground_pivot20 = ground_pivot9 * ground_pivot16;
-        let ground_pivot21 = ground_pivot6 * ground_pivot20;
-        let ground_pivot22 = ground_pivot13 - ground_pivot21;
-        let ground_pivot23 = ground_pivot9 * ground_pivot20;
-        let ground_pivot24 = ground_pivot15 - ground_pivot23;
-        let ground_pivot25 = 1.0 / ground_pivot19;
-        let ground_pivot26 = ground_pivot22 * ground_pivot25;
-        let ground_pivot27 = ground_pivot22 * ground_pivot26;
-        let ground_pivot28 = ground_pivot24 - ground_pivot27;
-        let ground_pivot29 = 1.0 / ground_pivot28;
-        // upper_arm_link: acceleration
-        let upper_arm_link_acc0 = v_0 * v_1;
-        let upper_arm_link_acc1 = v_0 * v_0;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = v_1 * v_1;
-        let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-        let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
-        let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
-        let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
-        let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
-        let forearm_link_vel6 = forearm_link_vel5 + 9.81;
-        let forearm_link_vel7 = v_1 + v_2;
-        // forearm_link: acceleration
-        let forearm_link_acc0 = v_0 * v_2;
-        let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-        let forearm_link_acc2 = v_0 * forearm_link_vel7;
-        let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
-        let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-        let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
-        let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
-        let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
-        let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
-        let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
-        let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
-        let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
-        let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
-        let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
-        let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
-        let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
-        let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
-        let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
-        let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
-        let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
-        // wrist_1_link: acceleration
-        let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
-        let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
-        let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
-        let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
-        let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
-        let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
-        let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
-        let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
-        let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
-        let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
-        let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
-        let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
-        let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
-        let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-        let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
-        let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
-        // wrist_2_link: acceleration
-        let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-        let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-        let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
-        let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
-        let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
-        let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-        let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
-        let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-        let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
-        let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-        let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-        let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-        let wrist_3_link_vel7 = v_5 + wrist_2_link_vel5;
-        // wrist_3_link: acceleration
-        let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-        let wrist_3_link_acc1 = wrist_3_link_vel6 - wrist_3_link_acc0;
-        let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel7;
-        let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel7;
-        // upper_arm_link: gravity and wrenches
-        let upper_arm_link_load0 = upper_arm_link_pose3 * forearm_link_vel3;
-        let upper_arm_link_load1 = upper_arm_link_pose4 * forearm_link_vel0;
-        let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
-        let upper_arm_link_load3 = upper_arm_link_pose3 * upper_arm_link_acc1;
-        let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
-        let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
-        // forearm_link: gravity and wrenches
-        let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-        let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
-        let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
-        let forearm_link_load3 = forearm_link_pose7 * wrist_1_link_vel4;
-        let forearm_link_load4 = forearm_link_pose8 * wrist_1_link_vel0;
-        let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-        let forearm_link_load6 = forearm_link_pose8 * forearm_link_acc3;
-        let forearm_link_load7 = forearm_link_pose7 * upper_arm_link_acc1;
-        let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
-        let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
-        let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
-        let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
-        let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
-        let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
-        let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
-        let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
-        let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
-        let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
-        let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
-        let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-        let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-        let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
-        let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
-        let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
-        let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
-        let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
-        let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
-        let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
-        let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
-        let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
-        // wrist_2_link: gravity and wrenches
-        let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-        let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-        let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
-        let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-        let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
-        let wrist_2_link_load5 = 0.033822000000000005 * wrist_2_link_load0;
-        // wrist_3_link: gravity and wrenches
-        let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-        let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-        let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
-        let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-        let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
-        let wrist_3_link_load5 = 0.016685526854599998 * wrist_3_link_load0;
-        // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_3_link_rest0 = wrist_3_link_cos0 * wrist_3_link_load3;
-        let wrist_3_link_rest1 = wrist_3_link_sin0 * wrist_3_link_load4;
-        let wrist_3_link_rest2 = wrist_3_link_rest0 - wrist_3_link_rest1;
-        let wrist_3_link_rest3 = wrist_3_link_sin0 * wrist_3_link_load3;
-        let wrist_3_link_rest4 = wrist_3_link_cos0 * wrist_3_link_load4;
-        let wrist_3_link_rest5 = wrist_3_link_rest3 + wrist_3_link_rest4;
-        let wrist_3_link_rest6 = tau_5 + wrist_3_link_load5;
-        let wrist_3_link_rest7 = 58.355064750790525 * wrist_3_link_rest6;
-        let wrist_3_link_rest8 = wrist_2_link_load3 - wrist_3_link_rest2;
-        let wrist_3_link_rest9 = tau_5 - wrist_2_link_load4;
-        let wrist_3_link_rest10 = wrist_2_link_load5 - wrist_3_link_rest5;
-        // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_2_link_rest0 = wrist_2_link_cos0 * wrist_3_link_rest8;
-        let wrist_2_link_rest1 = wrist_2_link_sin0 * wrist_3_link_rest9;
-        let wrist_2_link_rest2 = wrist_2_link_rest0 - wrist_2_link_rest1;
-        let wrist_2_link_rest3 = wrist_2_link_sin0 * wrist_3_link_rest8;
-        let wrist_2_link_rest4 = wrist_2_link_cos0 * wrist_3_link_rest9;
-        let wrist_2_link_rest5 = wrist_2_link_rest3 + wrist_2_link_rest4;
-        let wrist_2_link_rest6 = tau_4 + wrist_3_link_rest10;
-        let wrist_2_link_rest7 = wrist_2_link_pivot0 * wrist_2_link_rest6;
-        let wrist_2_link_rest8 = wrist_2_link_inertia4 * wrist_2_link_rest7;
-        let wrist_2_link_rest9 = wrist_2_link_rest2 - wrist_2_link_rest8;
-        let wrist_2_link_rest10 = wrist_2_link_inertia5 * wrist_2_link_rest7;
-        let wrist_2_link_rest11 = wrist_2_link_rest5 - wrist_2_link_rest10;
-        let wrist_2_link_rest12 = wrist_1_link_load14 + wrist_2_link_rest9;
-        let wrist_2_link_rest13 = tau_4 + wrist_1_link_load10;
-        let wrist_2_link_rest14 = wrist_1_link_load15 - wrist_2_link_rest11;
-        // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-        let wrist_1_link_rest0 = wrist_1_link_cos0 * wrist_1_link_load4;
-        let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_1_link_load5;
-        let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-        let wrist_1_link_rest3 = wrist_1_link_sin0 * wrist_1_link_load4;
-        let wrist_1_link_rest4 = wrist_1_link_cos0 * wrist_1_link_load5;
-        let wrist_1_link_rest5 = wrist_1_link_rest3 - wrist_1_link_rest4;
-        let wrist_1_link_rest6 = wrist_1_link_sin0 * wrist_2_link_rest12;
-        let wrist_1_link_rest7 = wrist_1_link_cos0 * wrist_2_link_rest13;
-        let wrist_1_link_rest8 = wrist_1_link_rest6 - wrist_1_link_rest7;
-        let wrist_1_link_rest9 = 0.10915 * wrist_1_link_rest2;
-        let wrist_1_link_rest10 = wrist_1_link_rest8 - wrist_1_link_rest9;
-        let wrist_1_link_rest11 = wrist_1_link_pose2 * wrist_1_link_rest2;
-        let wrist_1_link_rest12 = wrist_2_link_rest14 + wrist_1_link_rest11;
-        let wrist_1_link_rest13 = wrist_1_link_pose1 * wrist_1_link_load6;
-        let wrist_1_link_rest14 = wrist_1_link_rest10 - wrist_1_link_rest13;
-        let wrist_1_link_rest15 = wrist_1_link_pose1 * wrist_1_link_rest5;
-        let wrist_1_link_rest16 = wrist_1_link_rest12 - wrist_1_link_rest15;
-        let wrist_1_link_rest17 = forearm_link_load0 - wrist_1_link_rest2;
-        let wrist_1_link_rest18 = forearm_link_load1 - wrist_1_link_rest5;
-        let wrist_1_link_rest19 = forearm_link_load2 + wrist_1_link_load6;
-        let wrist_1_link_rest20 = forearm_link_load13 - wrist_1_link_rest14;
-        let wrist_1_link_rest21 = forearm_link_load14 - wrist_1_link_rest16;
-        // forearm_link: momentum remainder D, D' (4.45, 4.49)
-        let forearm_link_rest0 = forearm_link_pose2 * wrist_1_link_rest17;
-        let forearm_link_rest1 = wrist_1_link_rest21 + forearm_link_rest0;
-        let forearm_link_rest2 = forearm_link_pose1 * wrist_1_link_rest19;
-        let forearm_link_rest3 = wrist_1_link_rest20 + forearm_link_rest2;
-        let forearm_link_rest4 = forearm_link_pose1 * wrist_1_link_rest18;
-        let forearm_link_rest5 = forearm_link_rest1 - forearm_link_rest4;
-        let forearm_link_rest6 = upper_arm_link_load2 + forearm_link_rest3;
-        let forearm_link_rest7 = upper_arm_link_load5 + forearm_link_rest5;
-        // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-        let shoulder_link_rest0 = tau_3 + wrist_2_link_rest14;
-        let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-        let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-        let shoulder_link_rest3 = wrist_1_link_rest21 + shoulder_link_rest2;
-        let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-        let shoulder_link_rest5 = forearm_link_rest7 + shoulder_link_rest4;
-        let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-        let shoulder_link_rest7 = forearm_link_rest6 - shoulder_link_rest6;
-        let shoulder_link_rest8 = tau_2 - shoulder_link_rest3;
-        let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-        let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-        let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-        let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-        let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-        let shoulder_link_rest14 = tau_1 - shoulder_link_rest11;
-        let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-        let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-        let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-        let shoulder_link_rest18 = tau_0 + shoulder_link_rest17;
-        let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
-        // ground: acceleration
-        let ground_acc0 = ground_pivot26 * shoulder_link_rest19;
-        let ground_acc1 = shoulder_link_rest15 - ground_acc0;
-        let ground_acc2 = ground_pivot17 * ground_acc1;
-        let ground_acc3 = shoulder_link_rest9 - ground_acc2;
-        let ground_acc4 = ground_pivot20 * shoulder_link_rest19;
-        let ground_acc5 = ground_acc3 - ground_acc4;
-        let ground_acc6 = ground_pivot1 * ground_acc5;
-        let ground_acc7 = shoulder_link_rest1 - ground_acc6;
-        let ground_acc8 = ground_pivot4 * ground_acc1;
-        let ground_acc9 = ground_acc7 - ground_acc8;
-        let ground_acc10 = ground_pivot7 * shoulder_link_rest19;
-        let ground_acc11 = ground_acc9 - ground_acc10;
-        // forearm_link: acceleration
-        let forearm_link_acc4 = ground_acc1 + ground_acc5;
-        // wrist_1_link: acceleration
-        let wrist_1_link_acc14 = ground_acc11 + forearm_link_acc4;
-        let wrist_1_link_acc15 = wrist_1_link_sin0 * shoulder_link_rest19;
-        let wrist_1_link_acc16 = wrist_1_link_cos0 * shoulder_link_rest19;
-        // wrist_2_link: acceleration
-        let wrist_2_link_acc6 = wrist_2_link_pivot1 * wrist_1_link_acc15;
-        let wrist_2_link_acc7 = wrist_2_link_pivot2 * wrist_1_link_acc14;
-        let wrist_2_link_acc8 = wrist_2_link_acc6 + wrist_2_link_acc7;
-        let wrist_2_link_acc9 = wrist_2_link_rest7 - wrist_2_link_acc8;
-        let wrist_2_link_acc10 = wrist_1_link_acc16 - wrist_2_link_acc9;
-        let wrist_2_link_acc11 = wrist_2_link_cos0 * wrist_1_link_acc14;
-        let wrist_2_link_acc12 = wrist_2_link_sin0 * wrist_1_link_acc15;
-        let wrist_2_link_acc13 = wrist_2_link_acc11 - wrist_2_link_acc12;
-        // wrist_3_link: acceleration
-        let wrist_3_link_acc4 = wrist_3_link_rest7 - wrist_2_link_acc13;
-        // wrist_2_link: acceleration
-        let wrist_2_link_acc14 = wrist_2_link_acc10 - wrist_1_link_acc3;
-        // wrist_3_link: acceleration
-        let wrist_3_link_acc5 = wrist_2_link_acc3 + wrist_3_link_acc4;
-        a[0] = shoulder_link_rest19;
-        a[1] = ground_acc1;
-        a[2] = ground_acc5;
-        a[3] = ground_acc11;
-        a[4] = wrist_2_link_acc14;
-        a[5] = wrist_3_link_acc5;
+        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+    }
+
+    #[inline(always)]
+    fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let tau_0 = tau.get(0, l);
+            let tau_1 = tau.get(1, l);
+            let tau_2 = tau.get(2, l);
+            let tau_3 = tau.get(3, l);
+            let tau_4 = tau.get(4, l);
+            let tau_5 = tau.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
+            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
+            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
+            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
+            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
+            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
+            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
+            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            // wrist_3_link: inertia carried to the parent, M* (4.48)
+            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
+            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
+            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
+            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
+            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
+            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
+            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
+            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
+            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
+            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
+            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
+            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
+            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
+            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
+            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
+            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
+            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
+            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
+            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
+            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
+            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
+            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
+            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
+            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
+            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
+            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
+            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
+            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
+            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
+            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
+            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
+            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
+            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
+            let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
+            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
+            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
+            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
+            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
+            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            // forearm_link: inertia carried to the parent, M* (4.48)
+            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
+            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
+            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
+            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
+            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
+            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
+            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
+            let forearm_link_inertia7 = upper_arm_link_pose2 + forearm_link_inertia5;
+            let forearm_link_inertia8 = upper_arm_link_pose5 + wrist_1_link_inertia19;
+            let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
+            // upper_arm_link: inertia carried to the parent, M* (4.48)
+            let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
+            let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
+            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
+            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
+            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
+            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
+            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
+            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
+            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
+            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
+            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
+            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
+            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
+            let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
+            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
+            let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
+            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
+            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
+            let ground_pivot16 = 1.0 / ground_pivot3;
+            let ground_pivot17 = ground_pivot6 * ground_pivot16;
+            let ground_pivot18 = ground_pivot6 * ground_pivot17;
+            let ground_pivot19 = ground_pivot11 - ground_pivot18;
+            let ground_pivot20 = ground_pivot9 * ground_pivot16;
+            let ground_pivot21 = ground_pivot6 * ground_pivot20;
+            let ground_pivot22 = ground_pivot13 - ground_pivot21;
+            let ground_pivot23 = ground_pivot9 * ground_pivot20;
+            let ground_pivot24 = ground_pivot15 - ground_pivot23;
+            let ground_pivot25 = 1.0 / ground_pivot19;
+            let ground_pivot26 = ground_pivot22 * ground_pivot25;
+            let ground_pivot27 = ground_pivot22 * ground_pivot26;
+            let ground_pivot28 = ground_pivot24 - ground_pivot27;
+            let ground_pivot29 = 1.0 / ground_pivot28;
+            // upper_arm_link: acceleration
+            let upper_arm_link_acc0 = v_0 * v_1;
+            let upper_arm_link_acc1 = v_0 * v_0;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = v_1 * v_1;
+            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
+            let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
+            let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
+            let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
+            let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
+            let forearm_link_vel6 = forearm_link_vel5 + 9.81;
+            let forearm_link_vel7 = v_1 + v_2;
+            // forearm_link: acceleration
+            let forearm_link_acc0 = v_0 * v_2;
+            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
+            let forearm_link_acc2 = v_0 * forearm_link_vel7;
+            let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
+            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
+            let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
+            let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
+            let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
+            let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
+            let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
+            let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
+            let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
+            let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
+            let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
+            let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
+            let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
+            let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
+            let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
+            let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
+            let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
+            // wrist_1_link: acceleration
+            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
+            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
+            let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
+            let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
+            let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
+            let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
+            let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
+            let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
+            let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
+            let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
+            let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
+            let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
+            let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
+            let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
+            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
+            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
+            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
+            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
+            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
+            let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
+            // wrist_2_link: acceleration
+            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
+            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
+            let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
+            let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
+            let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
+            let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
+            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
+            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
+            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
+            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
+            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
+            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
+            let wrist_3_link_vel7 = v_5 + wrist_2_link_vel5;
+            // wrist_3_link: acceleration
+            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
+            let wrist_3_link_acc1 = wrist_3_link_vel6 - wrist_3_link_acc0;
+            let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel7;
+            let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel7;
+            // upper_arm_link: gravity and wrenches
+            let upper_arm_link_load0 = upper_arm_link_pose3 * forearm_link_vel3;
+            let upper_arm_link_load1 = upper_arm_link_pose4 * forearm_link_vel0;
+            let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
+            let upper_arm_link_load3 = upper_arm_link_pose3 * upper_arm_link_acc1;
+            let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
+            let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
+            // forearm_link: gravity and wrenches
+            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
+            let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
+            let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
+            let forearm_link_load3 = forearm_link_pose7 * wrist_1_link_vel4;
+            let forearm_link_load4 = forearm_link_pose8 * wrist_1_link_vel0;
+            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
+            let forearm_link_load6 = forearm_link_pose8 * forearm_link_acc3;
+            let forearm_link_load7 = forearm_link_pose7 * upper_arm_link_acc1;
+            let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
+            let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
+            let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
+            let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
+            let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
+            let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
+            let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
+            let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
+            let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
+            let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
+            let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
+            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
+            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
+            let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
+            let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
+            let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
+            let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
+            let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
+            let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
+            let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
+            let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
+            let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
+            // wrist_2_link: gravity and wrenches
+            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
+            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
+            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
+            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
+            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
+            let wrist_2_link_load5 = 0.033822000000000005 * wrist_2_link_load0;
+            // wrist_3_link: gravity and wrenches
+            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
+            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
+            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
+            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
+            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
+            let wrist_3_link_load5 = 0.016685526854599998 * wrist_3_link_load0;
+            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_3_link_rest0 = wrist_3_link_cos0 * wrist_3_link_load3;
+            let wrist_3_link_rest1 = wrist_3_link_sin0 * wrist_3_link_load4;
+            let wrist_3_link_rest2 = wrist_3_link_rest0 - wrist_3_link_rest1;
+            let wrist_3_link_rest3 = wrist_3_link_sin0 * wrist_3_link_load3;
+            let wrist_3_link_rest4 = wrist_3_link_cos0 * wrist_3_link_load4;
+            let wrist_3_link_rest5 = wrist_3_link_rest3 + wrist_3_link_rest4;
+            let wrist_3_link_rest6 = tau_5 + wrist_3_link_load5;
+            let wrist_3_link_rest7 = 58.355064750790525 * wrist_3_link_rest6;
+            let wrist_3_link_rest8 = wrist_2_link_load3 - wrist_3_link_rest2;
+            let wrist_3_link_rest9 = tau_5 - wrist_2_link_load4;
+            let wrist_3_link_rest10 = wrist_2_link_load5 - wrist_3_link_rest5;
+            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_2_link_rest0 = wrist_2_link_cos0 * wrist_3_link_rest8;
+            let wrist_2_link_rest1 = wrist_2_link_sin0 * wrist_3_link_rest9;
+            let wrist_2_link_rest2 = wrist_2_link_rest0 - wrist_2_link_rest1;
+            let wrist_2_link_rest3 = wrist_2_link_sin0 * wrist_3_link_rest8;
+            let wrist_2_link_rest4 = wrist_2_link_cos0 * wrist_3_link_rest9;
+            let wrist_2_link_rest5 = wrist_2_link_rest3 + wrist_2_link_rest4;
+            let wrist_2_link_rest6 = tau_4 + wrist_3_link_rest10;
+            let wrist_2_link_rest7 = wrist_2_link_pivot0 * wrist_2_link_rest6;
+            let wrist_2_link_rest8 = wrist_2_link_inertia4 * wrist_2_link_rest7;
+            let wrist_2_link_rest9 = wrist_2_link_rest2 - wrist_2_link_rest8;
+            let wrist_2_link_rest10 = wrist_2_link_inertia5 * wrist_2_link_rest7;
+            let wrist_2_link_rest11 = wrist_2_link_rest5 - wrist_2_link_rest10;
+            let wrist_2_link_rest12 = wrist_1_link_load14 + wrist_2_link_rest9;
+            let wrist_2_link_rest13 = tau_4 + wrist_1_link_load10;
+            let wrist_2_link_rest14 = wrist_1_link_load15 - wrist_2_link_rest11;
+            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
+            let wrist_1_link_rest0 = wrist_1_link_cos0 * wrist_1_link_load4;
+            let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_1_link_load5;
+            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
+            let wrist_1_link_rest3 = wrist_1_link_sin0 * wrist_1_link_load4;
+            let wrist_1_link_rest4 = wrist_1_link_cos0 * wrist_1_link_load5;
+            let wrist_1_link_rest5 = wrist_1_link_rest3 - wrist_1_link_rest4;
+            let wrist_1_link_rest6 = wrist_1_link_sin0 * wrist_2_link_rest12;
+            let wrist_1_link_rest7 = wrist_1_link_cos0 * wrist_2_link_rest13;
+            let wrist_1_link_rest8 = wrist_1_link_rest6 - wrist_1_link_rest7;
+            let wrist_1_link_rest9 = 0.10915 * wrist_1_link_rest2;
+            let wrist_1_link_rest10 = wrist_1_link_rest8 - wrist_1_link_rest9;
+            let wrist_1_link_rest11 = wrist_1_link_pose2 * wrist_1_link_rest2;
+            let wrist_1_link_rest12 = wrist_2_link_rest14 + wrist_1_link_rest11;
+            let wrist_1_link_rest13 = wrist_1_link_pose1 * wrist_1_link_load6;
+            let wrist_1_link_rest14 = wrist_1_link_rest10 - wrist_1_link_rest13;
+            let wrist_1_link_rest15 = wrist_1_link_pose1 * wrist_1_link_rest5;
+            let wrist_1_link_rest16 = wrist_1_link_rest12 - wrist_1_link_rest15;
+            let wrist_1_link_rest17 = forearm_link_load0 - wrist_1_link_rest2;
+            let wrist_1_link_rest18 = forearm_link_load1 - wrist_1_link_rest5;
+            let wrist_1_link_rest19 = forearm_link_load2 + wrist_1_link_load6;
+            let wrist_1_link_rest20 = forearm_link_load13 - wrist_1_link_rest14;
+            let wrist_1_link_rest21 = forearm_link_load14 - wrist_1_link_rest16;
+            // forearm_link: momentum remainder D, D' (4.45, 4.49)
+            let forearm_link_rest0 = forearm_link_pose2 * wrist_1_link_rest17;
+            let forearm_link_rest1 = wrist_1_link_rest21 + forearm_link_rest0;
+            let forearm_link_rest2 = forearm_link_pose1 * wrist_1_link_rest19;
+            let forearm_link_rest3 = wrist_1_link_rest20 + forearm_link_rest2;
+            let forearm_link_rest4 = forearm_link_pose1 * wrist_1_link_rest18;
+            let forearm_link_rest5 = forearm_link_rest1 - forearm_link_rest4;
+            let forearm_link_rest6 = upper_arm_link_load2 + forearm_link_rest3;
+            let forearm_link_rest7 = upper_arm_link_load5 + forearm_link_rest5;
+            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
+            let shoulder_link_rest0 = tau_3 + wrist_2_link_rest14;
+            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
+            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
+            let shoulder_link_rest3 = wrist_1_link_rest21 + shoulder_link_rest2;
+            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
+            let shoulder_link_rest5 = forearm_link_rest7 + shoulder_link_rest4;
+            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
+            let shoulder_link_rest7 = forearm_link_rest6 - shoulder_link_rest6;
+            let shoulder_link_rest8 = tau_2 - shoulder_link_rest3;
+            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
+            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
+            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
+            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
+            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
+            let shoulder_link_rest14 = tau_1 - shoulder_link_rest11;
+            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
+            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
+            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
+            let shoulder_link_rest18 = tau_0 + shoulder_link_rest17;
+            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            // ground: acceleration
+            let ground_acc0 = ground_pivot26 * shoulder_link_rest19;
+            let ground_acc1 = shoulder_link_rest15 - ground_acc0;
+            let ground_acc2 = ground_pivot17 * ground_acc1;
+            let ground_acc3 = shoulder_link_rest9 - ground_acc2;
+            let ground_acc4 = ground_pivot20 * shoulder_link_rest19;
+            let ground_acc5 = ground_acc3 - ground_acc4;
+            let ground_acc6 = ground_pivot1 * ground_acc5;
+            let ground_acc7 = shoulder_link_rest1 - ground_acc6;
+            let ground_acc8 = ground_pivot4 * ground_acc1;
+            let ground_acc9 = ground_acc7 - ground_acc8;
+            let ground_acc10 = ground_pivot7 * shoulder_link_rest19;
+            let ground_acc11 = ground_acc9 - ground_acc10;
+            // forearm_link: acceleration
+            let forearm_link_acc4 = ground_acc1 + ground_acc5;
+            // wrist_1_link: acceleration
+            let wrist_1_link_acc14 = ground_acc11 + forearm_link_acc4;
+            let wrist_1_link_acc15 = wrist_1_link_sin0 * shoulder_link_rest19;
+            let wrist_1_link_acc16 = wrist_1_link_cos0 * shoulder_link_rest19;
+            // wrist_2_link: acceleration
+            let wrist_2_link_acc6 = wrist_2_link_pivot1 * wrist_1_link_acc15;
+            let wrist_2_link_acc7 = wrist_2_link_pivot2 * wrist_1_link_acc14;
+            let wrist_2_link_acc8 = wrist_2_link_acc6 + wrist_2_link_acc7;
+            let wrist_2_link_acc9 = wrist_2_link_rest7 - wrist_2_link_acc8;
+            let wrist_2_link_acc10 = wrist_1_link_acc16 - wrist_2_link_acc9;
+            let wrist_2_link_acc11 = wrist_2_link_cos0 * wrist_1_link_acc14;
+            let wrist_2_link_acc12 = wrist_2_link_sin0 * wrist_1_link_acc15;
+            let wrist_2_link_acc13 = wrist_2_link_acc11 - wrist_2_link_acc12;
+            // wrist_3_link: acceleration
+            let wrist_3_link_acc4 = wrist_3_link_rest7 - wrist_2_link_acc13;
+            // wrist_2_link: acceleration
+            let wrist_2_link_acc14 = wrist_2_link_acc10 - wrist_1_link_acc3;
+            // wrist_3_link: acceleration
+            let wrist_3_link_acc5 = wrist_2_link_acc3 + wrist_3_link_acc4;
+            results[0][l] = shoulder_link_rest19;
+            results[1][l] = ground_acc1;
+            results[2][l] = ground_acc5;
+            results[3][l] = ground_acc11;
+            results[4][l] = wrist_2_link_acc14;
+            results[5][l] = wrist_3_link_acc5;
+        }
+        a.give(0, &results[0]);
+        a.give(1, &results[1]);
+        a.give(2, &results[2]);
+        a.give(3, &results[3]);
+        a.give(4, &results[4]);
+        a.give(5, &results[5]);
     }
 
     /// Mass matrix, by rows.
     /// 93 operations: 50 additions, 43 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn mass_matrix(&self, q: &[f64; 6], m: &mut [[f64; 6]; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-        let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // wrist_3_link: mass matrix by composite inertias
-        let wrist_3_link_mass0 = 0.0171364731454 * wrist_2_link_sin0;
-        let wrist_3_link_mass1 = 0.0171364731454 * wrist_2_link_cos0;
-        let wrist_3_link_mass2 = wrist_1_link_sin0 * wrist_3_link_mass0;
-        let wrist_3_link_mass3 = 0.016685526854599998 * wrist_3_link_sin0;
-        let wrist_3_link_mass4 = wrist_3_link_sin0 * wrist_3_link_mass3;
-        let wrist_3_link_mass5 = wrist_3_link_cos0 * wrist_3_link_mass3;
-        let wrist_3_link_mass6 = wrist_3_link_mass4 - 0.016685526854599998;
-        let wrist_3_link_mass7 = wrist_3_link_mass4 + 0.0171364731454;
-        let wrist_3_link_mass8 = wrist_3_link_mass4 - wrist_3_link_mass7;
-        let wrist_3_link_mass9 = wrist_3_link_mass7 - 0.0171364731454;
-        let wrist_3_link_mass10 = wrist_3_link_mass6 + 0.033822000000000005;
-        let wrist_3_link_mass11 = wrist_3_link_mass9 - 0.253242;
-        // wrist_2_link: mass matrix by composite inertias
-        let wrist_2_link_mass0 = wrist_2_link_cos0 * wrist_3_link_mass5;
-        let wrist_2_link_mass1 = wrist_2_link_sin0 * wrist_3_link_mass5;
-        let wrist_2_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass0;
-        let wrist_2_link_mass3 = wrist_1_link_cos0 * wrist_3_link_mass11;
-        let wrist_2_link_mass4 = wrist_2_link_mass2 + wrist_2_link_mass3;
-        let wrist_2_link_mass5 = wrist_3_link_mass8 + wrist_3_link_mass10;
-        let wrist_2_link_mass6 = wrist_2_link_sin0 * wrist_2_link_mass5;
-        let wrist_2_link_mass7 = wrist_2_link_sin0 * wrist_2_link_mass6;
-        let wrist_2_link_mass8 = wrist_2_link_cos0 * wrist_2_link_mass6;
-        let wrist_2_link_mass9 = wrist_3_link_mass10 - wrist_2_link_mass7;
-        let wrist_2_link_mass10 = wrist_3_link_mass8 - wrist_2_link_mass7;
-        let wrist_2_link_mass11 = wrist_3_link_mass11 - wrist_2_link_mass10;
-        let wrist_2_link_mass12 = wrist_2_link_mass10 + wrist_2_link_mass11;
-        let wrist_2_link_mass13 = wrist_3_link_mass11 - wrist_2_link_mass11;
-        let wrist_2_link_mass14 = wrist_2_link_mass9 + 0.004608836229749974;
-        let wrist_2_link_mass15 = wrist_2_link_mass13 - 0.22402883622975;
-        // wrist_1_link: mass matrix by composite inertias
-        let wrist_1_link_mass0 = 0.01778473500000001 * wrist_1_link_cos0;
-        let wrist_1_link_mass1 = 0.01778473500000001 * wrist_1_link_sin0;
-        let wrist_1_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass8;
-        let wrist_1_link_mass3 = wrist_1_link_cos0 * wrist_2_link_mass1;
-        let wrist_1_link_mass4 = wrist_1_link_mass2 - wrist_1_link_mass3;
-        let wrist_1_link_mass5 = 0.10915 * wrist_1_link_mass0;
-        let wrist_1_link_mass6 = wrist_1_link_mass4 + wrist_1_link_mass5;
-        let wrist_1_link_mass7 = wrist_1_link_pose2 * wrist_1_link_mass0;
-        let wrist_1_link_mass8 = wrist_2_link_mass15 - wrist_1_link_mass7;
-        let wrist_1_link_mass9 = wrist_1_link_pose1 * wrist_1_link_mass1;
-        let wrist_1_link_mass10 = wrist_1_link_mass8 + wrist_1_link_mass9;
-        let wrist_1_link_mass11 = forearm_link_pose2 * wrist_1_link_mass0;
-        let wrist_1_link_mass12 = wrist_1_link_mass10 - wrist_1_link_mass11;
-        let wrist_1_link_mass13 = forearm_link_pose1 * wrist_1_link_mass1;
-        let wrist_1_link_mass14 = wrist_1_link_mass12 + wrist_1_link_mass13;
-        let wrist_1_link_mass15 = wrist_1_link_cos0 + wrist_1_link_cos0;
-        let wrist_1_link_mass16 = wrist_2_link_mass12 + wrist_2_link_mass14;
-        let wrist_1_link_mass17 = wrist_1_link_sin0 * wrist_1_link_mass16;
-        let wrist_1_link_mass18 = wrist_2_link_mass0 * wrist_1_link_mass15;
-        let wrist_1_link_mass19 = wrist_1_link_mass17 - wrist_1_link_mass18;
-        let wrist_1_link_mass20 = wrist_1_link_sin0 * wrist_1_link_mass19;
-        let wrist_1_link_mass21 = wrist_2_link_mass12 - wrist_1_link_mass20;
-        let wrist_1_link_mass22 = wrist_1_link_mass0 + wrist_1_link_mass0;
-        let wrist_1_link_mass23 = wrist_1_link_pose2 * wrist_1_link_mass22;
-        let wrist_1_link_mass24 = wrist_2_link_mass15 - wrist_1_link_mass23;
-        let wrist_1_link_mass25 = wrist_1_link_mass1 + wrist_1_link_mass1;
-        let wrist_1_link_mass26 = wrist_1_link_pose1 * wrist_1_link_mass25;
-        let wrist_1_link_mass27 = wrist_1_link_mass21 + wrist_1_link_mass26;
-        let wrist_1_link_mass28 = wrist_1_link_mass24 + wrist_1_link_mass26;
-        let wrist_1_link_mass29 = forearm_link_pose3 + wrist_1_link_mass0;
-        let wrist_1_link_mass30 = forearm_link_pose4 - wrist_1_link_mass1;
-        let wrist_1_link_mass31 = forearm_link_pose6 + wrist_1_link_mass27;
-        let wrist_1_link_mass32 = forearm_link_pose7 + wrist_1_link_mass6;
-        let wrist_1_link_mass33 = wrist_1_link_mass28 - 0.59565195167475;
-        // forearm_link: mass matrix by composite inertias
-        let forearm_link_mass0 = forearm_link_pose2 * wrist_1_link_mass29;
-        let forearm_link_mass1 = wrist_1_link_mass33 - forearm_link_mass0;
-        let forearm_link_mass2 = forearm_link_pose1 * wrist_1_link_mass30;
-        let forearm_link_mass3 = forearm_link_mass2 - forearm_link_mass1;
-        let forearm_link_mass4 = wrist_1_link_mass29 + wrist_1_link_mass29;
-        let forearm_link_mass5 = forearm_link_pose2 * forearm_link_mass4;
-        let forearm_link_mass6 = wrist_1_link_mass33 - forearm_link_mass5;
-        let forearm_link_mass7 = wrist_1_link_mass30 + wrist_1_link_mass30;
-        let forearm_link_mass8 = forearm_link_pose1 * forearm_link_mass7;
-        let forearm_link_mass9 = wrist_1_link_mass31 - forearm_link_mass8;
-        let forearm_link_mass10 = forearm_link_mass6 - forearm_link_mass8;
-        let forearm_link_mass11 = upper_arm_link_pose1 + forearm_link_mass9;
-        let forearm_link_mass12 = upper_arm_link_pose2 + wrist_1_link_mass32;
-        let forearm_link_mass13 = forearm_link_mass10 - 1.7701269384099998;
-        // upper_arm_link: mass matrix by composite inertias
-        let upper_arm_link_mass0 = forearm_link_mass11 - forearm_link_mass13;
-        let upper_arm_link_mass1 = forearm_link_mass13 + upper_arm_link_mass0;
-        let upper_arm_link_mass2 = 2.7644263025275 - upper_arm_link_mass1;
-        m[0][0] = upper_arm_link_mass2;
-        m[0][1] = forearm_link_mass12;
-        m[0][2] = wrist_1_link_mass32;
-        m[0][3] = wrist_1_link_mass6;
-        m[0][4] = wrist_2_link_mass4;
-        m[0][5] = -wrist_3_link_mass2;
-        m[1][0] = forearm_link_mass12;
-        m[1][1] = -forearm_link_mass13;
-        m[1][2] = forearm_link_mass3;
-        m[1][3] = -wrist_1_link_mass14;
-        m[1][4] = wrist_2_link_mass1;
-        m[1][5] = wrist_3_link_mass1;
-        m[2][0] = wrist_1_link_mass32;
-        m[2][1] = forearm_link_mass3;
-        m[2][2] = -wrist_1_link_mass33;
-        m[2][3] = -wrist_1_link_mass10;
-        m[2][4] = wrist_2_link_mass1;
-        m[2][5] = wrist_3_link_mass1;
-        m[3][0] = wrist_1_link_mass6;
-        m[3][1] = -wrist_1_link_mass14;
-        m[3][2] = -wrist_1_link_mass10;
-        m[3][3] = -wrist_2_link_mass15;
-        m[3][4] = wrist_2_link_mass1;
-        m[3][5] = wrist_3_link_mass1;
-        m[4][0] = wrist_2_link_mass4;
-        m[4][1] = wrist_2_link_mass1;
-        m[4][2] = wrist_2_link_mass1;
-        m[4][3] = wrist_2_link_mass1;
-        m[4][4] = -wrist_3_link_mass11;
-        m[4][5] = 0.0;
-        m[5][0] = -wrist_3_link_mass2;
-        m[5][1] = wrist_3_link_mass1;
-        m[5][2] = wrist_3_link_mass1;
-        m[5][3] = wrist_3_link_mass1;
-        m[5][4] = 0.0;
-        m[5][5] = 0.0171364731454;
+        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+    }
+
+    #[inline(always)]
+    fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 36];
+        for l in 0..LANES {
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
+            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // wrist_3_link: mass matrix by composite inertias
+            let wrist_3_link_mass0 = 0.0171364731454 * wrist_2_link_sin0;
+            let wrist_3_link_mass1 = 0.0171364731454 * wrist_2_link_cos0;
+            let wrist_3_link_mass2 = wrist_1_link_sin0 * wrist_3_link_mass0;
+            let wrist_3_link_mass3 = 0.016685526854599998 * wrist_3_link_sin0;
+            let wrist_3_link_mass4 = wrist_3_link_sin0 * wrist_3_link_mass3;
+            let wrist_3_link_mass5 = wrist_3_link_cos0 * wrist_3_link_mass3;
+            let wrist_3_link_mass6 = wrist_3_link_mass4 - 0.016685526854599998;
+            let wrist_3_link_mass7 = wrist_3_link_mass4 + 0.0171364731454;
+            let wrist_3_link_mass8 = wrist_3_link_mass4 - wrist_3_link_mass7;
+            let wrist_3_link_mass9 = wrist_3_link_mass7 - 0.0171364731454;
+            let wrist_3_link_mass10 = wrist_3_link_mass6 + 0.033822000000000005;
+            let wrist_3_link_mass11 = wrist_3_link_mass9 - 0.253242;
+            // wrist_2_link: mass matrix by composite inertias
+            let wrist_2_link_mass0 = wrist_2_link_cos0 * wrist_3_link_mass5;
+            let wrist_2_link_mass1 = wrist_2_link_sin0 * wrist_3_link_mass5;
+            let wrist_2_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass0;
+            let wrist_2_link_mass3 = wrist_1_link_cos0 * wrist_3_link_mass11;
+            let wrist_2_link_mass4 = wrist_2_link_mass2 + wrist_2_link_mass3;
+            let wrist_2_link_mass5 = wrist_3_link_mass8 + wrist_3_link_mass10;
+            let wrist_2_link_mass6 = wrist_2_link_sin0 * wrist_2_link_mass5;
+            let wrist_2_link_mass7 = wrist_2_link_sin0 * wrist_2_link_mass6;
+            let wrist_2_link_mass8 = wrist_2_link_cos0 * wrist_2_link_mass6;
+            let wrist_2_link_mass9 = wrist_3_link_mass10 - wrist_2_link_mass7;
+            let wrist_2_link_mass10 = wrist_3_link_mass8 - wrist_2_link_mass7;
+            let wrist_2_link_mass11 = wrist_3_link_mass11 - wrist_2_link_mass10;
+            let wrist_2_link_mass12 = wrist_2_link_mass10 + wrist_2_link_mass11;
+            let wrist_2_link_mass13 = wrist_3_link_mass11 - wrist_2_link_mass11;
+            let wrist_2_link_mass14 = wrist_2_link_mass9 + 0.004608836229749974;
+            let wrist_2_link_mass15 = wrist_2_link_mass13 - 0.22402883622975;
+            // wrist_1_link: mass matrix by composite inertias
+            let wrist_1_link_mass0 = 0.01778473500000001 * wrist_1_link_cos0;
+            let wrist_1_link_mass1 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass8;
+            let wrist_1_link_mass3 = wrist_1_link_cos0 * wrist_2_link_mass1;
+            let wrist_1_link_mass4 = wrist_1_link_mass2 - wrist_1_link_mass3;
+            let wrist_1_link_mass5 = 0.10915 * wrist_1_link_mass0;
+            let wrist_1_link_mass6 = wrist_1_link_mass4 + wrist_1_link_mass5;
+            let wrist_1_link_mass7 = wrist_1_link_pose2 * wrist_1_link_mass0;
+            let wrist_1_link_mass8 = wrist_2_link_mass15 - wrist_1_link_mass7;
+            let wrist_1_link_mass9 = wrist_1_link_pose1 * wrist_1_link_mass1;
+            let wrist_1_link_mass10 = wrist_1_link_mass8 + wrist_1_link_mass9;
+            let wrist_1_link_mass11 = forearm_link_pose2 * wrist_1_link_mass0;
+            let wrist_1_link_mass12 = wrist_1_link_mass10 - wrist_1_link_mass11;
+            let wrist_1_link_mass13 = forearm_link_pose1 * wrist_1_link_mass1;
+            let wrist_1_link_mass14 = wrist_1_link_mass12 + wrist_1_link_mass13;
+            let wrist_1_link_mass15 = wrist_1_link_cos0 + wrist_1_link_cos0;
+            let wrist_1_link_mass16 = wrist_2_link_mass12 + wrist_2_link_mass14;
+            let wrist_1_link_mass17 = wrist_1_link_sin0 * wrist_1_link_mass16;
+            let wrist_1_link_mass18 = wrist_2_link_mass0 * wrist_1_link_mass15;
+            let wrist_1_link_mass19 = wrist_1_link_mass17 - wrist_1_link_mass18;
+            let wrist_1_link_mass20 = wrist_1_link_sin0 * wrist_1_link_mass19;
+            let wrist_1_link_mass21 = wrist_2_link_mass12 - wrist_1_link_mass20;
+            let wrist_1_link_mass22 = wrist_1_link_mass0 + wrist_1_link_mass0;
+            let wrist_1_link_mass23 = wrist_1_link_pose2 * wrist_1_link_mass22;
+            let wrist_1_link_mass24 = wrist_2_link_mass15 - wrist_1_link_mass23;
+            let wrist_1_link_mass25 = wrist_1_link_mass1 + wrist_1_link_mass1;
+            let wrist_1_link_mass26 = wrist_1_link_pose1 * wrist_1_link_mass25;
+            let wrist_1_link_mass27 = wrist_1_link_mass21 + wrist_1_link_mass26;
+            let wrist_1_link_mass28 = wrist_1_link_mass24 + wrist_1_link_mass26;
+            let wrist_1_link_mass29 = forearm_link_pose3 + wrist_1_link_mass0;
+            let wrist_1_link_mass30 = forearm_link_pose4 - wrist_1_link_mass1;
+            let wrist_1_link_mass31 = forearm_link_pose6 + wrist_1_link_mass27;
+            let wrist_1_link_mass32 = forearm_link_pose7 + wrist_1_link_mass6;
+            let wrist_1_link_mass33 = wrist_1_link_mass28 - 0.59565195167475;
+            // forearm_link: mass matrix by composite inertias
+            let forearm_link_mass0 = forearm_link_pose2 * wrist_1_link_mass29;
+            let forearm_link_mass1 = wrist_1_link_mass33 - forearm_link_mass0;
+            let forearm_link_mass2 = forearm_link_pose1 * wrist_1_link_mass30;
+            let forearm_link_mass3 = forearm_link_mass2 - forearm_link_mass1;
+            let forearm_link_mass4 = wrist_1_link_mass29 + wrist_1_link_mass29;
+            let forearm_link_mass5 = forearm_link_pose2 * forearm_link_mass4;
+            let forearm_link_mass6 = wrist_1_link_mass33 - forearm_link_mass5;
+            let forearm_link_mass7 = wrist_1_link_mass30 + wrist_1_link_mass30;
+            let forearm_link_mass8 = forearm_link_pose1 * forearm_link_mass7;
+            let forearm_link_mass9 = wrist_1_link_mass31 - forearm_link_mass8;
+            let forearm_link_mass10 = forearm_link_mass6 - forearm_link_mass8;
+            let forearm_link_mass11 = upper_arm_link_pose1 + forearm_link_mass9;
+            let forearm_link_mass12 = upper_arm_link_pose2 + wrist_1_link_mass32;
+            let forearm_link_mass13 = forearm_link_mass10 - 1.7701269384099998;
+            // upper_arm_link: mass matrix by composite inertias
+            let upper_arm_link_mass0 = forearm_link_mass11 - forearm_link_mass13;
+            let upper_arm_link_mass1 = forearm_link_mass13 + upper_arm_link_mass0;
+            let upper_arm_link_mass2 = 2.7644263025275 - upper_arm_link_mass1;
+            results[0][l] = upper_arm_link_mass2;
+            results[1][l] = forearm_link_mass12;
+            results[2][l] = wrist_1_link_mass32;
+            results[3][l] = wrist_1_link_mass6;
+            results[4][l] = wrist_2_link_mass4;
+            results[5][l] = -wrist_3_link_mass2;
+            results[6][l] = forearm_link_mass12;
+            results[7][l] = -forearm_link_mass13;
+            results[8][l] = forearm_link_mass3;
+            results[9][l] = -wrist_1_link_mass14;
+            results[10][l] = wrist_2_link_mass1;
+            results[11][l] = wrist_3_link_mass1;
+            results[12][l] = wrist_1_link_mass32;
+            results[13][l] = forearm_link_mass3;
+            results[14][l] = -wrist_1_link_mass33;
+            results[15][l] = -wrist_1_link_mass10;
+            results[16][l] = wrist_2_link_mass1;
+            results[17][l] = wrist_3_link_mass1;
+            results[18][l] = wrist_1_link_mass6;
+            results[19][l] = -wrist_1_link_mass14;
+            results[20][l] = -wrist_1_link_mass10;
+            results[21][l] = -wrist_2_link_mass15;
+            results[22][l] = wrist_2_link_mass1;
+            results[23][l] = wrist_3_link_mass1;
+            results[24][l] = wrist_2_link_mass4;
+            results[25][l] = wrist_2_link_mass1;
+            results[26][l] = wrist_2_link_mass1;
+            results[27][l] = wrist_2_link_mass1;
+            results[28][l] = -wrist_3_link_mass11;
+            results[29][l] = 0.0;
+            results[30][l] = -wrist_3_link_mass2;
+            results[31][l] = wrist_3_link_mass1;
+            results[32][l] = wrist_3_link_mass1;
+            results[33][l] = wrist_3_link_mass1;
+            results[34][l] = 0.0;
+            results[35][l] = 0.0171364731454;
+        }
+        m.give(0, &results[0]);
+        m.give(1, &results[1]);
+        m.give(2, &results[2]);
+        m.give(3, &results[3]);
+        m.give(4, &results[4]);
+        m.give(5, &results[5]);
+        m.give(6, &results[6]);
+        m.give(7, &results[7]);
+        m.give(8, &results[8]);
+        m.give(9, &results[9]);
+        m.give(10, &results[10]);
+        m.give(11, &results[11]);
+        m.give(12, &results[12]);
+        m.give(13, &results[13]);
+        m.give(14, &results[14]);
+        m.give(15, &results[15]);
+        m.give(16, &results[16]);
+        m.give(17, &results[17]);
+        m.give(18, &results[18]);
+        m.give(19, &results[19]);
+        m.give(20, &results[20]);
+        m.give(21, &results[21]);
+        m.give(22, &results[22]);
+        m.give(23, &results[23]);
+        m.give(24, &results[24]);
+        m.give(25, &results[25]);
+        m.give(26, &results[26]);
+        m.give(27, &results[27]);
+        m.give(28, &results[28]);
+        m.give(29, &results[29]);
+        m.give(30, &results[30]);
+        m.give(31, &results[31]);
+        m.give(32, &results[32]);
+        m.give(33, &results[33]);
+        m.give(34, &results[34]);
+        m.give(35, &results[35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
     /// 245 operations: 102 additions, 143 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 6], v: &[f64; 6], a: &[f64; 6], tau: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        let a_0 = a[0];
-        let a_1 = a[1];
-        let a_2 = a[2];
-        let a_3 = a[3];
-        let a_4 = a[4];
-        let a_5 = a[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-        let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-        let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-        let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-        let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-        let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-        let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-        let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // upper_arm_link: acceleration
-        let upper_arm_link_acc0 = v_0 * v_1;
-        let upper_arm_link_acc1 = v_0 * v_0;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = v_1 * v_1;
-        let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-        let forearm_link_vel2 = a_1 * forearm_link_pose1;
-        let forearm_link_vel3 = forearm_link_vel2 - 9.81;
-        let forearm_link_vel4 = a_0 * forearm_link_pose1;
-        let forearm_link_vel5 = forearm_link_pose1 * forearm_link_vel1;
-        let forearm_link_vel6 = upper_arm_link_acc0 + upper_arm_link_acc0;
-        let forearm_link_vel7 = forearm_link_pose2 * forearm_link_vel6;
-        let forearm_link_vel8 = forearm_link_vel4 - forearm_link_vel7;
-        let forearm_link_vel9 = a_1 * forearm_link_pose2;
-        let forearm_link_vel10 = forearm_link_vel5 + forearm_link_vel9;
-        let forearm_link_vel11 = forearm_link_pose2 * forearm_link_vel0;
-        let forearm_link_vel12 = forearm_link_vel3 - forearm_link_vel11;
-        let forearm_link_vel13 = v_1 + v_2;
-        // forearm_link: acceleration
-        let forearm_link_acc0 = v_0 * v_2;
-        let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-        let forearm_link_acc2 = a_1 + a_2;
-        let forearm_link_acc3 = v_0 * forearm_link_vel13;
-        let forearm_link_acc4 = forearm_link_acc1 - forearm_link_acc3;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = forearm_link_vel13 * forearm_link_vel13;
-        let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-        let wrist_1_link_vel2 = wrist_1_link_pose1 * forearm_link_acc2;
-        let wrist_1_link_vel3 = forearm_link_vel12 + wrist_1_link_vel2;
-        let wrist_1_link_vel4 = a_0 * wrist_1_link_pose1;
-        let wrist_1_link_vel5 = forearm_link_vel8 + wrist_1_link_vel4;
-        let wrist_1_link_vel6 = wrist_1_link_pose1 * wrist_1_link_vel1;
-        let wrist_1_link_vel7 = forearm_link_vel10 + wrist_1_link_vel6;
-        let wrist_1_link_vel8 = forearm_link_acc1 + forearm_link_acc3;
-        let wrist_1_link_vel9 = wrist_1_link_pose2 * wrist_1_link_vel8;
-        let wrist_1_link_vel10 = wrist_1_link_vel5 - wrist_1_link_vel9;
-        let wrist_1_link_vel11 = wrist_1_link_pose2 * forearm_link_acc2;
-        let wrist_1_link_vel12 = wrist_1_link_vel7 + wrist_1_link_vel11;
-        let wrist_1_link_vel13 = wrist_1_link_pose2 * wrist_1_link_vel0;
-        let wrist_1_link_vel14 = wrist_1_link_vel3 - wrist_1_link_vel13;
-        let wrist_1_link_vel15 = v_0 * wrist_1_link_sin0;
-        let wrist_1_link_vel16 = v_0 * wrist_1_link_cos0;
-        let wrist_1_link_vel17 = wrist_1_link_cos0 * forearm_link_acc1;
-        let wrist_1_link_vel18 = a_0 * wrist_1_link_sin0;
-        let wrist_1_link_vel19 = wrist_1_link_vel17 + wrist_1_link_vel18;
-        let wrist_1_link_vel20 = a_0 * wrist_1_link_cos0;
-        let wrist_1_link_vel21 = wrist_1_link_sin0 * forearm_link_acc1;
-        let wrist_1_link_vel22 = wrist_1_link_vel20 - wrist_1_link_vel21;
-        let wrist_1_link_vel23 = wrist_1_link_cos0 * wrist_1_link_vel12;
-        let wrist_1_link_vel24 = wrist_1_link_sin0 * wrist_1_link_vel14;
-        let wrist_1_link_vel25 = wrist_1_link_vel23 - wrist_1_link_vel24;
-        let wrist_1_link_vel26 = v_3 + forearm_link_vel13;
-        // wrist_1_link: acceleration
-        let wrist_1_link_acc0 = v_3 * wrist_1_link_vel16;
-        let wrist_1_link_acc1 = v_3 * wrist_1_link_vel15;
-        let wrist_1_link_acc2 = wrist_1_link_vel19 + wrist_1_link_acc0;
-        let wrist_1_link_acc3 = wrist_1_link_vel22 - wrist_1_link_acc1;
-        let wrist_1_link_acc4 = a_3 + forearm_link_acc2;
-        let wrist_1_link_acc5 = wrist_1_link_vel15 * wrist_1_link_vel26;
-        let wrist_1_link_acc6 = wrist_1_link_acc3 + wrist_1_link_acc5;
-        let wrist_1_link_acc7 = wrist_1_link_vel16 * wrist_1_link_vel26;
-        let wrist_1_link_acc8 = wrist_1_link_vel15 * wrist_1_link_vel15;
-        let wrist_1_link_acc9 = wrist_1_link_vel16 * wrist_1_link_vel16;
-        let wrist_1_link_acc10 = wrist_1_link_acc8 + wrist_1_link_acc9;
-        let wrist_1_link_acc11 = 0.10915 * wrist_1_link_acc6;
-        let wrist_1_link_acc12 = wrist_1_link_vel25 + wrist_1_link_acc11;
-        let wrist_1_link_acc13 = 0.10915 * wrist_1_link_acc10;
-        let wrist_1_link_acc14 = wrist_1_link_vel10 - wrist_1_link_acc13;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel15;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel26;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel26;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel15;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-        let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc4;
-        let wrist_2_link_vel8 = wrist_2_link_vel6 + wrist_2_link_vel7;
-        let wrist_2_link_vel9 = wrist_2_link_cos0 * wrist_1_link_acc4;
-        let wrist_2_link_vel10 = wrist_2_link_sin0 * wrist_1_link_acc2;
-        let wrist_2_link_vel11 = wrist_2_link_vel9 - wrist_2_link_vel10;
-        let wrist_2_link_vel12 = v_4 - wrist_1_link_vel16;
-        // wrist_2_link: acceleration
-        let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-        let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-        let wrist_2_link_acc2 = wrist_2_link_vel8 + wrist_2_link_acc0;
-        let wrist_2_link_acc3 = wrist_2_link_vel11 - wrist_2_link_acc1;
-        let wrist_2_link_acc4 = a_4 - wrist_1_link_acc3;
-        let wrist_2_link_acc5 = wrist_2_link_vel2 * wrist_2_link_vel12;
-        let wrist_2_link_acc6 = wrist_2_link_vel5 * wrist_2_link_vel12;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-        let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel12;
-        let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-        let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel12;
-        let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-        let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-        let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-        let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_2_link_acc4;
-        let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
-        let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
-        // wrist_3_link: acceleration
-        let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-        let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
-        let wrist_3_link_acc2 = a_5 + wrist_2_link_acc3;
-        let wrist_3_link_acc3 = wrist_3_link_vel2 * wrist_3_link_vel9;
-        let wrist_3_link_acc4 = wrist_3_link_vel5 * wrist_3_link_vel9;
-        // shoulder_link: gravity and wrenches
-        let shoulder_link_load0 = 2.7644263025275 * a_0;
-        // upper_arm_link: gravity and wrenches
-        let upper_arm_link_load0 = a_0 * upper_arm_link_pose2;
-        let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel6;
-        let upper_arm_link_load2 = upper_arm_link_load0 + upper_arm_link_load1;
-        let upper_arm_link_load3 = a_1 * upper_arm_link_pose5;
-        let upper_arm_link_load4 = upper_arm_link_load2 - upper_arm_link_load3;
-        let upper_arm_link_load5 = upper_arm_link_pose4 * forearm_link_vel0;
-        let upper_arm_link_load6 = upper_arm_link_load4 - upper_arm_link_load5;
-        let upper_arm_link_load7 = 1.7701269384099998 * a_1;
-        let upper_arm_link_load8 = a_0 * upper_arm_link_pose5;
-        let upper_arm_link_load9 = upper_arm_link_load7 + upper_arm_link_load8;
-        let upper_arm_link_load10 = upper_arm_link_pose3 * upper_arm_link_acc1;
-        let upper_arm_link_load11 = upper_arm_link_load9 + upper_arm_link_load10;
-        let upper_arm_link_load12 = 9.81 * upper_arm_link_pose0;
-        let upper_arm_link_load13 = upper_arm_link_load11 - upper_arm_link_load12;
-        // forearm_link: gravity and wrenches
-        let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-        let forearm_link_load1 = forearm_link_pose3 * forearm_link_acc2;
-        let forearm_link_load2 = forearm_link_load0 + forearm_link_load1;
-        let forearm_link_load3 = forearm_link_pose4 * forearm_link_acc2;
-        let forearm_link_load4 = forearm_link_pose3 * wrist_1_link_vel0;
-        let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-        let forearm_link_load6 = a_0 * forearm_link_pose4;
-        let forearm_link_load7 = forearm_link_pose3 * wrist_1_link_vel8;
-        let forearm_link_load8 = forearm_link_load6 - forearm_link_load7;
-        let forearm_link_load9 = a_0 * forearm_link_pose6;
-        let forearm_link_load10 = forearm_link_pose7 * wrist_1_link_vel8;
-        let forearm_link_load11 = forearm_link_load9 + forearm_link_load10;
-        let forearm_link_load12 = forearm_link_pose9 * forearm_link_acc2;
-        let forearm_link_load13 = forearm_link_load11 - forearm_link_load12;
-        let forearm_link_load14 = forearm_link_pose8 * wrist_1_link_vel0;
-        let forearm_link_load15 = forearm_link_load13 - forearm_link_load14;
-        let forearm_link_load16 = 0.59565195167475 * forearm_link_acc2;
-        let forearm_link_load17 = forearm_link_pose8 * forearm_link_acc4;
-        let forearm_link_load18 = forearm_link_load16 + forearm_link_load17;
-        let forearm_link_load19 = a_0 * forearm_link_pose9;
-        let forearm_link_load20 = forearm_link_load18 + forearm_link_load19;
-        let forearm_link_load21 = forearm_link_pose7 * upper_arm_link_acc1;
-        let forearm_link_load22 = forearm_link_load20 + forearm_link_load21;
-        let forearm_link_load23 = forearm_link_pose4 * forearm_link_vel8;
-        let forearm_link_load24 = forearm_link_pose4 * forearm_link_vel12;
-        let forearm_link_load25 = forearm_link_pose3 * forearm_link_vel10;
-        let forearm_link_load26 = forearm_link_load24 + forearm_link_load25;
-        let forearm_link_load27 = forearm_link_load15 - forearm_link_load23;
-        let forearm_link_load28 = forearm_link_load22 + forearm_link_load26;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load0 = wrist_1_link_vel26 * wrist_1_link_vel26;
-        let wrist_1_link_load1 = wrist_1_link_vel15 * wrist_1_link_vel16;
-        let wrist_1_link_load2 = wrist_1_link_acc4 - wrist_1_link_load1;
-        let wrist_1_link_load3 = wrist_1_link_acc8 + wrist_1_link_load0;
-        let wrist_1_link_load4 = wrist_1_link_acc2 + wrist_1_link_acc7;
-        let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-        let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-        let wrist_1_link_load7 = 0.01778473500000001 * wrist_1_link_load4;
-        let wrist_1_link_load8 = 0.004608836229749974 * wrist_1_link_acc2;
-        let wrist_1_link_load9 = 0.22402883622975 * wrist_1_link_acc7;
-        let wrist_1_link_load10 = wrist_1_link_load8 + wrist_1_link_load9;
-        let wrist_1_link_load11 = 0.21942000000000003 * wrist_1_link_acc5;
-        let wrist_1_link_load12 = 0.22402883622975 * wrist_1_link_acc4;
-        let wrist_1_link_load13 = 0.004608836229749974 * wrist_1_link_load1;
-        let wrist_1_link_load14 = wrist_1_link_load12 - wrist_1_link_load13;
-        let wrist_1_link_load15 = 0.01778473500000001 * wrist_1_link_acc14;
-        let wrist_1_link_load16 = 0.01778473500000001 * wrist_1_link_acc12;
-        let wrist_1_link_load17 = wrist_1_link_load10 - wrist_1_link_load15;
-        let wrist_1_link_load18 = wrist_1_link_load14 + wrist_1_link_load16;
-        // wrist_2_link: gravity and wrenches
-        let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-        let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-        let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc6;
-        let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-        let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc5;
-        let wrist_2_link_load5 = 0.253242 * wrist_2_link_acc4;
-        let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
-        let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
-        // wrist_3_link: gravity and wrenches
-        let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-        let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-        let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc4;
-        let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-        let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc3;
-        let wrist_3_link_load5 = 0.0171364731454 * wrist_3_link_acc2;
-        let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
-        let wrist_3_link_load7 = wrist_3_link_load5 - wrist_3_link_load6;
-        let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
-        let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
-        let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
-        let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
-        let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
-        let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
-        let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
-        let wrist_3_link_load15 = wrist_2_link_load4 - wrist_3_link_load7;
-        let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
-        // wrist_2_link: gravity and wrenches
-        let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
-        let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
-        let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
-        let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
-        let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
-        let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
-        let wrist_2_link_load14 = wrist_1_link_load17 + wrist_2_link_load10;
-        let wrist_2_link_load15 = wrist_1_link_load11 + wrist_3_link_load16;
-        let wrist_2_link_load16 = wrist_1_link_load18 + wrist_2_link_load13;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load19 = wrist_1_link_cos0 * wrist_1_link_load5;
-        let wrist_1_link_load20 = wrist_1_link_sin0 * wrist_1_link_load6;
-        let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
-        let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_1_link_load5;
-        let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_1_link_load6;
-        let wrist_1_link_load24 = wrist_1_link_load22 + wrist_1_link_load23;
-        let wrist_1_link_load25 = wrist_1_link_sin0 * wrist_2_link_load14;
-        let wrist_1_link_load26 = wrist_1_link_cos0 * wrist_2_link_load15;
-        let wrist_1_link_load27 = wrist_1_link_load25 - wrist_1_link_load26;
-        let wrist_1_link_load28 = 0.10915 * wrist_1_link_load21;
-        let wrist_1_link_load29 = wrist_1_link_load27 + wrist_1_link_load28;
-        let wrist_1_link_load30 = wrist_1_link_pose2 * wrist_1_link_load21;
-        let wrist_1_link_load31 = wrist_2_link_load16 + wrist_1_link_load30;
-        let wrist_1_link_load32 = wrist_1_link_pose1 * wrist_1_link_load7;
-        let wrist_1_link_load33 = wrist_1_link_load29 - wrist_1_link_load32;
-        let wrist_1_link_load34 = wrist_1_link_pose1 * wrist_1_link_load24;
-        let wrist_1_link_load35 = wrist_1_link_load31 - wrist_1_link_load34;
-        let wrist_1_link_load36 = forearm_link_load2 + wrist_1_link_load21;
-        let wrist_1_link_load37 = forearm_link_load5 - wrist_1_link_load24;
-        let wrist_1_link_load38 = forearm_link_load8 - wrist_1_link_load7;
-        let wrist_1_link_load39 = forearm_link_load27 - wrist_1_link_load33;
-        let wrist_1_link_load40 = forearm_link_load28 + wrist_1_link_load35;
-        // forearm_link: gravity and wrenches
-        let forearm_link_load29 = forearm_link_pose2 * wrist_1_link_load36;
-        let forearm_link_load30 = wrist_1_link_load40 + forearm_link_load29;
-        let forearm_link_load31 = forearm_link_pose1 * wrist_1_link_load38;
-        let forearm_link_load32 = wrist_1_link_load39 - forearm_link_load31;
-        let forearm_link_load33 = forearm_link_pose1 * wrist_1_link_load37;
-        let forearm_link_load34 = forearm_link_load30 + forearm_link_load33;
-        let forearm_link_load35 = upper_arm_link_load6 + forearm_link_load32;
-        let forearm_link_load36 = upper_arm_link_load13 + forearm_link_load34;
-        // upper_arm_link: gravity and wrenches
-        let upper_arm_link_load14 = shoulder_link_load0 - forearm_link_load35;
-        tau[0] = upper_arm_link_load14;
-        tau[1] = forearm_link_load36;
-        tau[2] = wrist_1_link_load40;
-        tau[3] = wrist_2_link_load16;
-        tau[4] = wrist_3_link_load16;
-        tau[5] = wrist_3_link_load7;
+        Self::inverse_dynamics_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, a, tau);
+    }
+
+    #[inline(always)]
+    fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            let a_0 = a.get(0, l);
+            let a_1 = a.get(1, l);
+            let a_2 = a.get(2, l);
+            let a_3 = a.get(3, l);
+            let a_4 = a.get(4, l);
+            let a_5 = a.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
+            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
+            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
+            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
+            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
+            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
+            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
+            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // upper_arm_link: acceleration
+            let upper_arm_link_acc0 = v_0 * v_1;
+            let upper_arm_link_acc1 = v_0 * v_0;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = v_1 * v_1;
+            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
+            let forearm_link_vel2 = a_1 * forearm_link_pose1;
+            let forearm_link_vel3 = forearm_link_vel2 - 9.81;
+            let forearm_link_vel4 = a_0 * forearm_link_pose1;
+            let forearm_link_vel5 = forearm_link_pose1 * forearm_link_vel1;
+            let forearm_link_vel6 = upper_arm_link_acc0 + upper_arm_link_acc0;
+            let forearm_link_vel7 = forearm_link_pose2 * forearm_link_vel6;
+            let forearm_link_vel8 = forearm_link_vel4 - forearm_link_vel7;
+            let forearm_link_vel9 = a_1 * forearm_link_pose2;
+            let forearm_link_vel10 = forearm_link_vel5 + forearm_link_vel9;
+            let forearm_link_vel11 = forearm_link_pose2 * forearm_link_vel0;
+            let forearm_link_vel12 = forearm_link_vel3 - forearm_link_vel11;
+            let forearm_link_vel13 = v_1 + v_2;
+            // forearm_link: acceleration
+            let forearm_link_acc0 = v_0 * v_2;
+            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
+            let forearm_link_acc2 = a_1 + a_2;
+            let forearm_link_acc3 = v_0 * forearm_link_vel13;
+            let forearm_link_acc4 = forearm_link_acc1 - forearm_link_acc3;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = forearm_link_vel13 * forearm_link_vel13;
+            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
+            let wrist_1_link_vel2 = wrist_1_link_pose1 * forearm_link_acc2;
+            let wrist_1_link_vel3 = forearm_link_vel12 + wrist_1_link_vel2;
+            let wrist_1_link_vel4 = a_0 * wrist_1_link_pose1;
+            let wrist_1_link_vel5 = forearm_link_vel8 + wrist_1_link_vel4;
+            let wrist_1_link_vel6 = wrist_1_link_pose1 * wrist_1_link_vel1;
+            let wrist_1_link_vel7 = forearm_link_vel10 + wrist_1_link_vel6;
+            let wrist_1_link_vel8 = forearm_link_acc1 + forearm_link_acc3;
+            let wrist_1_link_vel9 = wrist_1_link_pose2 * wrist_1_link_vel8;
+            let wrist_1_link_vel10 = wrist_1_link_vel5 - wrist_1_link_vel9;
+            let wrist_1_link_vel11 = wrist_1_link_pose2 * forearm_link_acc2;
+            let wrist_1_link_vel12 = wrist_1_link_vel7 + wrist_1_link_vel11;
+            let wrist_1_link_vel13 = wrist_1_link_pose2 * wrist_1_link_vel0;
+            let wrist_1_link_vel14 = wrist_1_link_vel3 - wrist_1_link_vel13;
+            let wrist_1_link_vel15 = v_0 * wrist_1_link_sin0;
+            let wrist_1_link_vel16 = v_0 * wrist_1_link_cos0;
+            let wrist_1_link_vel17 = wrist_1_link_cos0 * forearm_link_acc1;
+            let wrist_1_link_vel18 = a_0 * wrist_1_link_sin0;
+            let wrist_1_link_vel19 = wrist_1_link_vel17 + wrist_1_link_vel18;
+            let wrist_1_link_vel20 = a_0 * wrist_1_link_cos0;
+            let wrist_1_link_vel21 = wrist_1_link_sin0 * forearm_link_acc1;
+            let wrist_1_link_vel22 = wrist_1_link_vel20 - wrist_1_link_vel21;
+            let wrist_1_link_vel23 = wrist_1_link_cos0 * wrist_1_link_vel12;
+            let wrist_1_link_vel24 = wrist_1_link_sin0 * wrist_1_link_vel14;
+            let wrist_1_link_vel25 = wrist_1_link_vel23 - wrist_1_link_vel24;
+            let wrist_1_link_vel26 = v_3 + forearm_link_vel13;
+            // wrist_1_link: acceleration
+            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel16;
+            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel15;
+            let wrist_1_link_acc2 = wrist_1_link_vel19 + wrist_1_link_acc0;
+            let wrist_1_link_acc3 = wrist_1_link_vel22 - wrist_1_link_acc1;
+            let wrist_1_link_acc4 = a_3 + forearm_link_acc2;
+            let wrist_1_link_acc5 = wrist_1_link_vel15 * wrist_1_link_vel26;
+            let wrist_1_link_acc6 = wrist_1_link_acc3 + wrist_1_link_acc5;
+            let wrist_1_link_acc7 = wrist_1_link_vel16 * wrist_1_link_vel26;
+            let wrist_1_link_acc8 = wrist_1_link_vel15 * wrist_1_link_vel15;
+            let wrist_1_link_acc9 = wrist_1_link_vel16 * wrist_1_link_vel16;
+            let wrist_1_link_acc10 = wrist_1_link_acc8 + wrist_1_link_acc9;
+            let wrist_1_link_acc11 = 0.10915 * wrist_1_link_acc6;
+            let wrist_1_link_acc12 = wrist_1_link_vel25 + wrist_1_link_acc11;
+            let wrist_1_link_acc13 = 0.10915 * wrist_1_link_acc10;
+            let wrist_1_link_acc14 = wrist_1_link_vel10 - wrist_1_link_acc13;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel15;
+            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel26;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel26;
+            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel15;
+            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
+            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
+            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc4;
+            let wrist_2_link_vel8 = wrist_2_link_vel6 + wrist_2_link_vel7;
+            let wrist_2_link_vel9 = wrist_2_link_cos0 * wrist_1_link_acc4;
+            let wrist_2_link_vel10 = wrist_2_link_sin0 * wrist_1_link_acc2;
+            let wrist_2_link_vel11 = wrist_2_link_vel9 - wrist_2_link_vel10;
+            let wrist_2_link_vel12 = v_4 - wrist_1_link_vel16;
+            // wrist_2_link: acceleration
+            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
+            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
+            let wrist_2_link_acc2 = wrist_2_link_vel8 + wrist_2_link_acc0;
+            let wrist_2_link_acc3 = wrist_2_link_vel11 - wrist_2_link_acc1;
+            let wrist_2_link_acc4 = a_4 - wrist_1_link_acc3;
+            let wrist_2_link_acc5 = wrist_2_link_vel2 * wrist_2_link_vel12;
+            let wrist_2_link_acc6 = wrist_2_link_vel5 * wrist_2_link_vel12;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
+            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel12;
+            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
+            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel12;
+            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
+            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
+            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
+            let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_2_link_acc4;
+            let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
+            let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
+            // wrist_3_link: acceleration
+            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
+            let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
+            let wrist_3_link_acc2 = a_5 + wrist_2_link_acc3;
+            let wrist_3_link_acc3 = wrist_3_link_vel2 * wrist_3_link_vel9;
+            let wrist_3_link_acc4 = wrist_3_link_vel5 * wrist_3_link_vel9;
+            // shoulder_link: gravity and wrenches
+            let shoulder_link_load0 = 2.7644263025275 * a_0;
+            // upper_arm_link: gravity and wrenches
+            let upper_arm_link_load0 = a_0 * upper_arm_link_pose2;
+            let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel6;
+            let upper_arm_link_load2 = upper_arm_link_load0 + upper_arm_link_load1;
+            let upper_arm_link_load3 = a_1 * upper_arm_link_pose5;
+            let upper_arm_link_load4 = upper_arm_link_load2 - upper_arm_link_load3;
+            let upper_arm_link_load5 = upper_arm_link_pose4 * forearm_link_vel0;
+            let upper_arm_link_load6 = upper_arm_link_load4 - upper_arm_link_load5;
+            let upper_arm_link_load7 = 1.7701269384099998 * a_1;
+            let upper_arm_link_load8 = a_0 * upper_arm_link_pose5;
+            let upper_arm_link_load9 = upper_arm_link_load7 + upper_arm_link_load8;
+            let upper_arm_link_load10 = upper_arm_link_pose3 * upper_arm_link_acc1;
+            let upper_arm_link_load11 = upper_arm_link_load9 + upper_arm_link_load10;
+            let upper_arm_link_load12 = 9.81 * upper_arm_link_pose0;
+            let upper_arm_link_load13 = upper_arm_link_load11 - upper_arm_link_load12;
+            // forearm_link: gravity and wrenches
+            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
+            let forearm_link_load1 = forearm_link_pose3 * forearm_link_acc2;
+            let forearm_link_load2 = forearm_link_load0 + forearm_link_load1;
+            let forearm_link_load3 = forearm_link_pose4 * forearm_link_acc2;
+            let forearm_link_load4 = forearm_link_pose3 * wrist_1_link_vel0;
+            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
+            let forearm_link_load6 = a_0 * forearm_link_pose4;
+            let forearm_link_load7 = forearm_link_pose3 * wrist_1_link_vel8;
+            let forearm_link_load8 = forearm_link_load6 - forearm_link_load7;
+            let forearm_link_load9 = a_0 * forearm_link_pose6;
+            let forearm_link_load10 = forearm_link_pose7 * wrist_1_link_vel8;
+            let forearm_link_load11 = forearm_link_load9 + forearm_link_load10;
+            let forearm_link_load12 = forearm_link_pose9 * forearm_link_acc2;
+            let forearm_link_load13 = forearm_link_load11 - forearm_link_load12;
+            let forearm_link_load14 = forearm_link_pose8 * wrist_1_link_vel0;
+            let forearm_link_load15 = forearm_link_load13 - forearm_link_load14;
+            let forearm_link_load16 = 0.59565195167475 * forearm_link_acc2;
+            let forearm_link_load17 = forearm_link_pose8 * forearm_link_acc4;
+            let forearm_link_load18 = forearm_link_load16 + forearm_link_load17;
+            let forearm_link_load19 = a_0 * forearm_link_pose9;
+            let forearm_link_load20 = forearm_link_load18 + forearm_link_load19;
+            let forearm_link_load21 = forearm_link_pose7 * upper_arm_link_acc1;
+            let forearm_link_load22 = forearm_link_load20 + forearm_link_load21;
+            let forearm_link_load23 = forearm_link_pose4 * forearm_link_vel8;
+            let forearm_link_load24 = forearm_link_pose4 * forearm_link_vel12;
+            let forearm_link_load25 = forearm_link_pose3 * forearm_link_vel10;
+            let forearm_link_load26 = forearm_link_load24 + forearm_link_load25;
+            let forearm_link_load27 = forearm_link_load15 - forearm_link_load23;
+            let forearm_link_load28 = forearm_link_load22 + forearm_link_load26;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load0 = wrist_1_link_vel26 * wrist_1_link_vel26;
+            let wrist_1_link_load1 = wrist_1_link_vel15 * wrist_1_link_vel16;
+            let wrist_1_link_load2 = wrist_1_link_acc4 - wrist_1_link_load1;
+            let wrist_1_link_load3 = wrist_1_link_acc8 + wrist_1_link_load0;
+            let wrist_1_link_load4 = wrist_1_link_acc2 + wrist_1_link_acc7;
+            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
+            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
+            let wrist_1_link_load7 = 0.01778473500000001 * wrist_1_link_load4;
+            let wrist_1_link_load8 = 0.004608836229749974 * wrist_1_link_acc2;
+            let wrist_1_link_load9 = 0.22402883622975 * wrist_1_link_acc7;
+            let wrist_1_link_load10 = wrist_1_link_load8 + wrist_1_link_load9;
+            let wrist_1_link_load11 = 0.21942000000000003 * wrist_1_link_acc5;
+            let wrist_1_link_load12 = 0.22402883622975 * wrist_1_link_acc4;
+            let wrist_1_link_load13 = 0.004608836229749974 * wrist_1_link_load1;
+            let wrist_1_link_load14 = wrist_1_link_load12 - wrist_1_link_load13;
+            let wrist_1_link_load15 = 0.01778473500000001 * wrist_1_link_acc14;
+            let wrist_1_link_load16 = 0.01778473500000001 * wrist_1_link_acc12;
+            let wrist_1_link_load17 = wrist_1_link_load10 - wrist_1_link_load15;
+            let wrist_1_link_load18 = wrist_1_link_load14 + wrist_1_link_load16;
+            // wrist_2_link: gravity and wrenches
+            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
+            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
+            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc6;
+            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
+            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc5;
+            let wrist_2_link_load5 = 0.253242 * wrist_2_link_acc4;
+            let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
+            let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
+            // wrist_3_link: gravity and wrenches
+            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
+            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
+            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc4;
+            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
+            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc3;
+            let wrist_3_link_load5 = 0.0171364731454 * wrist_3_link_acc2;
+            let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
+            let wrist_3_link_load7 = wrist_3_link_load5 - wrist_3_link_load6;
+            let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
+            let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
+            let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
+            let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
+            let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
+            let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
+            let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
+            let wrist_3_link_load15 = wrist_2_link_load4 - wrist_3_link_load7;
+            let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
+            // wrist_2_link: gravity and wrenches
+            let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
+            let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
+            let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
+            let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
+            let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
+            let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
+            let wrist_2_link_load14 = wrist_1_link_load17 + wrist_2_link_load10;
+            let wrist_2_link_load15 = wrist_1_link_load11 + wrist_3_link_load16;
+            let wrist_2_link_load16 = wrist_1_link_load18 + wrist_2_link_load13;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load19 = wrist_1_link_cos0 * wrist_1_link_load5;
+            let wrist_1_link_load20 = wrist_1_link_sin0 * wrist_1_link_load6;
+            let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
+            let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_1_link_load5;
+            let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_1_link_load6;
+            let wrist_1_link_load24 = wrist_1_link_load22 + wrist_1_link_load23;
+            let wrist_1_link_load25 = wrist_1_link_sin0 * wrist_2_link_load14;
+            let wrist_1_link_load26 = wrist_1_link_cos0 * wrist_2_link_load15;
+            let wrist_1_link_load27 = wrist_1_link_load25 - wrist_1_link_load26;
+            let wrist_1_link_load28 = 0.10915 * wrist_1_link_load21;
+            let wrist_1_link_load29 = wrist_1_link_load27 + wrist_1_link_load28;
+            let wrist_1_link_load30 = wrist_1_link_pose2 * wrist_1_link_load21;
+            let wrist_1_link_load31 = wrist_2_link_load16 + wrist_1_link_load30;
+            let wrist_1_link_load32 = wrist_1_link_pose1 * wrist_1_link_load7;
+            let wrist_1_link_load33 = wrist_1_link_load29 - wrist_1_link_load32;
+            let wrist_1_link_load34 = wrist_1_link_pose1 * wrist_1_link_load24;
+            let wrist_1_link_load35 = wrist_1_link_load31 - wrist_1_link_load34;
+            let wrist_1_link_load36 = forearm_link_load2 + wrist_1_link_load21;
+            let wrist_1_link_load37 = forearm_link_load5 - wrist_1_link_load24;
+            let wrist_1_link_load38 = forearm_link_load8 - wrist_1_link_load7;
+            let wrist_1_link_load39 = forearm_link_load27 - wrist_1_link_load33;
+            let wrist_1_link_load40 = forearm_link_load28 + wrist_1_link_load35;
+            // forearm_link: gravity and wrenches
+            let forearm_link_load29 = forearm_link_pose2 * wrist_1_link_load36;
+            let forearm_link_load30 = wrist_1_link_load40 + forearm_link_load29;
+            let forearm_link_load31 = forearm_link_pose1 * wrist_1_link_load38;
+            let forearm_link_load32 = wrist_1_link_load39 - forearm_link_load31;
+            let forearm_link_load33 = forearm_link_pose1 * wrist_1_link_load37;
+            let forearm_link_load34 = forearm_link_load30 + forearm_link_load33;
+            let forearm_link_load35 = upper_arm_link_load6 + forearm_link_load32;
+            let forearm_link_load36 = upper_arm_link_load13 + forearm_link_load34;
+            // upper_arm_link: gravity and wrenches
+            let upper_arm_link_load14 = shoulder_link_load0 - forearm_link_load35;
+            results[0][l] = upper_arm_link_load14;
+            results[1][l] = forearm_link_load36;
+            results[2][l] = wrist_1_link_load40;
+            results[3][l] = wrist_2_link_load16;
+            results[4][l] = wrist_3_link_load16;
+            results[5][l] = wrist_3_link_load7;
+        }
+        tau.give(0, &results[0]);
+        tau.give(1, &results[1]);
+        tau.give(2, &results[2]);
+        tau.give(3, &results[3]);
+        tau.give(4, &results[4]);
+        tau.give(5, &results[5]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
     /// 190 operations: 74 additions, 116 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 6], v: &[f64; 6], h: &mut [f64; 6]) {
-        let q_1 = q[1];
-        let q_2 = q[2];
-        let q_3 = q[3];
-        let q_4 = q[4];
-        let q_5 = q[5];
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        // upper_arm_link: sine and cosine, rotation
-        let (upper_arm_link_sin0, upper_arm_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_1);
-        let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-        let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-        let upper_arm_link_pose2 = upper_arm_link_cos0 * upper_arm_link_pose1;
-        let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_cos0;
-        // forearm_link: sine and cosine, rotation
-        let forearm_link_pose0 = q_1 + q_2;
-        let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-        let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-        let (forearm_link_sin0, forearm_link_cos0) = ::multibody::runtime::trig::sincos_f64(forearm_link_pose0);
-        let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-        let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-        let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-        let forearm_link_pose6 = forearm_link_cos0 * forearm_link_pose5;
-        let forearm_link_pose7 = 0.07714261911624999 * forearm_link_cos0;
-        // wrist_1_link: sine and cosine, rotation
-        let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
-        let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-        let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-        let (wrist_1_link_sin0, wrist_1_link_cos0) = ::multibody::runtime::trig::sincos_f64(wrist_1_link_pose0);
-        // wrist_2_link: sine and cosine, rotation
-        let (wrist_2_link_sin0, wrist_2_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_4);
-        // wrist_3_link: sine and cosine, rotation
-        let (wrist_3_link_sin0, wrist_3_link_cos0) = ::multibody::runtime::trig::sincos_f64(q_5);
-        // upper_arm_link: acceleration
-        let upper_arm_link_acc0 = v_0 * v_1;
-        let upper_arm_link_acc1 = v_0 * v_0;
-        // forearm_link: velocity and joint rate (4.40)
-        let forearm_link_vel0 = v_1 * v_1;
-        let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-        let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
-        let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
-        let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
-        let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
-        let forearm_link_vel6 = forearm_link_vel5 + 9.81;
-        let forearm_link_vel7 = v_1 + v_2;
-        // forearm_link: acceleration
-        let forearm_link_acc0 = v_0 * v_2;
-        let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-        let forearm_link_acc2 = v_0 * forearm_link_vel7;
-        let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
-        // wrist_1_link: velocity and joint rate (4.40)
-        let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
-        let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-        let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
-        let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
-        let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
-        let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
-        let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
-        let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
-        let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
-        let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
-        let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
-        let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
-        let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
-        let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
-        let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
-        let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
-        let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
-        // wrist_1_link: acceleration
-        let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
-        let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
-        let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
-        let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
-        let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
-        let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
-        let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
-        let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
-        let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
-        let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
-        let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
-        let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
-        let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
-        let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
-        // wrist_2_link: velocity and joint rate (4.40)
-        let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
-        let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
-        let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-        let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
-        let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
-        let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-        let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-        let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
-        let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
-        // wrist_2_link: acceleration
-        let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-        let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-        let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
-        let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
-        let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
-        let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
-        // wrist_3_link: velocity and joint rate (4.40)
-        let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-        let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
-        let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-        let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
-        let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-        let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-        let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-        let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_1_link_acc3;
-        let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
-        let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
-        // wrist_3_link: acceleration
-        let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-        let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
-        let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel9;
-        let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel9;
-        // upper_arm_link: gravity and wrenches
-        let upper_arm_link_load0 = upper_arm_link_pose2 * forearm_link_vel3;
-        let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel0;
-        let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
-        let upper_arm_link_load3 = upper_arm_link_pose2 * upper_arm_link_acc1;
-        let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
-        let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
-        // forearm_link: gravity and wrenches
-        let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-        let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
-        let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
-        let forearm_link_load3 = forearm_link_pose6 * wrist_1_link_vel4;
-        let forearm_link_load4 = forearm_link_pose7 * wrist_1_link_vel0;
-        let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-        let forearm_link_load6 = forearm_link_pose7 * forearm_link_acc3;
-        let forearm_link_load7 = forearm_link_pose6 * upper_arm_link_acc1;
-        let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
-        let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
-        let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
-        let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
-        let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
-        let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
-        let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
-        let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
-        let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
-        let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
-        let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
-        let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-        let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-        let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
-        let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
-        let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
-        let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
-        let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
-        let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
-        let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
-        let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
-        let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
-        // wrist_2_link: gravity and wrenches
-        let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-        let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-        let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
-        let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-        let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
-        let wrist_2_link_load5 = 0.253242 * wrist_1_link_acc3;
-        let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
-        let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
-        // wrist_3_link: gravity and wrenches
-        let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-        let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-        let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
-        let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-        let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
-        let wrist_3_link_load5 = 0.0171364731454 * wrist_2_link_acc3;
-        let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
-        let wrist_3_link_load7 = wrist_3_link_load5 + wrist_3_link_load6;
-        let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
-        let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
-        let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
-        let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
-        let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
-        let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
-        let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
-        let wrist_3_link_load15 = wrist_2_link_load4 + wrist_3_link_load7;
-        let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
-        // wrist_2_link: gravity and wrenches
-        let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
-        let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
-        let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
-        let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
-        let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
-        let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
-        let wrist_2_link_load14 = wrist_1_link_load14 + wrist_2_link_load10;
-        let wrist_2_link_load15 = wrist_1_link_load10 + wrist_3_link_load16;
-        let wrist_2_link_load16 = wrist_1_link_load15 - wrist_2_link_load13;
-        // wrist_1_link: gravity and wrenches
-        let wrist_1_link_load16 = wrist_1_link_cos0 * wrist_1_link_load4;
-        let wrist_1_link_load17 = wrist_1_link_sin0 * wrist_1_link_load5;
-        let wrist_1_link_load18 = wrist_1_link_load16 + wrist_1_link_load17;
-        let wrist_1_link_load19 = wrist_1_link_sin0 * wrist_1_link_load4;
-        let wrist_1_link_load20 = wrist_1_link_cos0 * wrist_1_link_load5;
-        let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
-        let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_2_link_load14;
-        let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_2_link_load15;
-        let wrist_1_link_load24 = wrist_1_link_load22 - wrist_1_link_load23;
-        let wrist_1_link_load25 = 0.10915 * wrist_1_link_load18;
-        let wrist_1_link_load26 = wrist_1_link_load24 - wrist_1_link_load25;
-        let wrist_1_link_load27 = wrist_1_link_pose2 * wrist_1_link_load18;
-        let wrist_1_link_load28 = wrist_2_link_load16 + wrist_1_link_load27;
-        let wrist_1_link_load29 = wrist_1_link_pose1 * wrist_1_link_load6;
-        let wrist_1_link_load30 = wrist_1_link_load26 - wrist_1_link_load29;
-        let wrist_1_link_load31 = wrist_1_link_pose1 * wrist_1_link_load21;
-        let wrist_1_link_load32 = wrist_1_link_load28 - wrist_1_link_load31;
-        let wrist_1_link_load33 = forearm_link_load0 - wrist_1_link_load18;
-        let wrist_1_link_load34 = forearm_link_load1 - wrist_1_link_load21;
-        let wrist_1_link_load35 = forearm_link_load2 + wrist_1_link_load6;
-        let wrist_1_link_load36 = forearm_link_load13 - wrist_1_link_load30;
-        let wrist_1_link_load37 = forearm_link_load14 - wrist_1_link_load32;
-        // forearm_link: gravity and wrenches
-        let forearm_link_load15 = forearm_link_pose2 * wrist_1_link_load33;
-        let forearm_link_load16 = wrist_1_link_load37 + forearm_link_load15;
-        let forearm_link_load17 = forearm_link_pose1 * wrist_1_link_load35;
-        let forearm_link_load18 = wrist_1_link_load36 + forearm_link_load17;
-        let forearm_link_load19 = forearm_link_pose1 * wrist_1_link_load34;
-        let forearm_link_load20 = forearm_link_load16 - forearm_link_load19;
-        let forearm_link_load21 = upper_arm_link_load2 + forearm_link_load18;
-        let forearm_link_load22 = upper_arm_link_load5 + forearm_link_load20;
-        h[0] = -forearm_link_load21;
-        h[1] = forearm_link_load22;
-        h[2] = wrist_1_link_load37;
-        h[3] = -wrist_2_link_load16;
-        h[4] = wrist_3_link_load16;
-        h[5] = -wrist_3_link_load7;
+        Self::bias_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, h);
+    }
+
+    #[inline(always)]
+    fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut angles = [[0.0; LANES]; 5];
+        for l in 0..LANES {
+            let q_1 = q.get(1, l);
+            let q_2 = q.get(2, l);
+            let q_3 = q.get(3, l);
+            let q_4 = q.get(4, l);
+            let q_5 = q.get(5, l);
+            let forearm_link_pose0 = q_1 + q_2;
+            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            angles[0][l] = q_1;
+            angles[1][l] = q_4;
+            angles[2][l] = q_5;
+            angles[3][l] = forearm_link_pose0;
+            angles[4][l] = wrist_1_link_pose0;
+        }
+        let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            // upper_arm_link: sine and cosine, rotation
+            let upper_arm_link_sin0 = sines[0][l];
+            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
+            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
+            let upper_arm_link_pose2 = upper_arm_link_cos0 * upper_arm_link_pose1;
+            let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_cos0;
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
+            let forearm_link_sin0 = sines[3][l];
+            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_pose6 = forearm_link_cos0 * forearm_link_pose5;
+            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_cos0;
+            // wrist_1_link: sine and cosine, rotation
+            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
+            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_cos0 = cosines[4][l];
+            // wrist_2_link: sine and cosine, rotation
+            let wrist_2_link_sin0 = sines[1][l];
+            let wrist_2_link_cos0 = cosines[1][l];
+            // wrist_3_link: sine and cosine, rotation
+            let wrist_3_link_sin0 = sines[2][l];
+            let wrist_3_link_cos0 = cosines[2][l];
+            // upper_arm_link: acceleration
+            let upper_arm_link_acc0 = v_0 * v_1;
+            let upper_arm_link_acc1 = v_0 * v_0;
+            // forearm_link: velocity and joint rate (4.40)
+            let forearm_link_vel0 = v_1 * v_1;
+            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
+            let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
+            let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
+            let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
+            let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
+            let forearm_link_vel6 = forearm_link_vel5 + 9.81;
+            let forearm_link_vel7 = v_1 + v_2;
+            // forearm_link: acceleration
+            let forearm_link_acc0 = v_0 * v_2;
+            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
+            let forearm_link_acc2 = v_0 * forearm_link_vel7;
+            let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
+            // wrist_1_link: velocity and joint rate (4.40)
+            let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
+            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
+            let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
+            let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
+            let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
+            let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
+            let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
+            let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
+            let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
+            let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
+            let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
+            let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
+            let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
+            let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
+            let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
+            let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
+            let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
+            // wrist_1_link: acceleration
+            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
+            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
+            let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
+            let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
+            let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
+            let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
+            let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
+            let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
+            let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
+            let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
+            let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
+            let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
+            let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
+            let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
+            // wrist_2_link: velocity and joint rate (4.40)
+            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
+            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
+            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
+            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
+            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
+            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
+            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
+            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
+            let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
+            // wrist_2_link: acceleration
+            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
+            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
+            let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
+            let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
+            let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
+            let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
+            // wrist_3_link: velocity and joint rate (4.40)
+            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
+            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
+            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
+            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
+            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
+            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
+            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
+            let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_1_link_acc3;
+            let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
+            let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
+            // wrist_3_link: acceleration
+            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
+            let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
+            let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel9;
+            let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel9;
+            // upper_arm_link: gravity and wrenches
+            let upper_arm_link_load0 = upper_arm_link_pose2 * forearm_link_vel3;
+            let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel0;
+            let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
+            let upper_arm_link_load3 = upper_arm_link_pose2 * upper_arm_link_acc1;
+            let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
+            let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
+            // forearm_link: gravity and wrenches
+            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
+            let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
+            let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
+            let forearm_link_load3 = forearm_link_pose6 * wrist_1_link_vel4;
+            let forearm_link_load4 = forearm_link_pose7 * wrist_1_link_vel0;
+            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
+            let forearm_link_load6 = forearm_link_pose7 * forearm_link_acc3;
+            let forearm_link_load7 = forearm_link_pose6 * upper_arm_link_acc1;
+            let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
+            let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
+            let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
+            let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
+            let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
+            let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
+            let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
+            let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
+            let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
+            let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
+            let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
+            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
+            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
+            let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
+            let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
+            let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
+            let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
+            let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
+            let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
+            let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
+            let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
+            let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
+            // wrist_2_link: gravity and wrenches
+            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
+            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
+            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
+            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
+            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
+            let wrist_2_link_load5 = 0.253242 * wrist_1_link_acc3;
+            let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
+            let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
+            // wrist_3_link: gravity and wrenches
+            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
+            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
+            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
+            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
+            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
+            let wrist_3_link_load5 = 0.0171364731454 * wrist_2_link_acc3;
+            let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
+            let wrist_3_link_load7 = wrist_3_link_load5 + wrist_3_link_load6;
+            let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
+            let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
+            let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
+            let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
+            let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
+            let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
+            let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
+            let wrist_3_link_load15 = wrist_2_link_load4 + wrist_3_link_load7;
+            let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
+            // wrist_2_link: gravity and wrenches
+            let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
+            let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
+            let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
+            let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
+            let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
+            let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
+            let wrist_2_link_load14 = wrist_1_link_load14 + wrist_2_link_load10;
+            let wrist_2_link_load15 = wrist_1_link_load10 + wrist_3_link_load16;
+            let wrist_2_link_load16 = wrist_1_link_load15 - wrist_2_link_load13;
+            // wrist_1_link: gravity and wrenches
+            let wrist_1_link_load16 = wrist_1_link_cos0 * wrist_1_link_load4;
+            let wrist_1_link_load17 = wrist_1_link_sin0 * wrist_1_link_load5;
+            let wrist_1_link_load18 = wrist_1_link_load16 + wrist_1_link_load17;
+            let wrist_1_link_load19 = wrist_1_link_sin0 * wrist_1_link_load4;
+            let wrist_1_link_load20 = wrist_1_link_cos0 * wrist_1_link_load5;
+            let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
+            let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_2_link_load14;
+            let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_2_link_load15;
+            let wrist_1_link_load24 = wrist_1_link_load22 - wrist_1_link_load23;
+            let wrist_1_link_load25 = 0.10915 * wrist_1_link_load18;
+            let wrist_1_link_load26 = wrist_1_link_load24 - wrist_1_link_load25;
+            let wrist_1_link_load27 = wrist_1_link_pose2 * wrist_1_link_load18;
+            let wrist_1_link_load28 = wrist_2_link_load16 + wrist_1_link_load27;
+            let wrist_1_link_load29 = wrist_1_link_pose1 * wrist_1_link_load6;
+            let wrist_1_link_load30 = wrist_1_link_load26 - wrist_1_link_load29;
+            let wrist_1_link_load31 = wrist_1_link_pose1 * wrist_1_link_load21;
+            let wrist_1_link_load32 = wrist_1_link_load28 - wrist_1_link_load31;
+            let wrist_1_link_load33 = forearm_link_load0 - wrist_1_link_load18;
+            let wrist_1_link_load34 = forearm_link_load1 - wrist_1_link_load21;
+            let wrist_1_link_load35 = forearm_link_load2 + wrist_1_link_load6;
+            let wrist_1_link_load36 = forearm_link_load13 - wrist_1_link_load30;
+            let wrist_1_link_load37 = forearm_link_load14 - wrist_1_link_load32;
+            // forearm_link: gravity and wrenches
+            let forearm_link_load15 = forearm_link_pose2 * wrist_1_link_load33;
+            let forearm_link_load16 = wrist_1_link_load37 + forearm_link_load15;
+            let forearm_link_load17 = forearm_link_pose1 * wrist_1_link_load35;
+            let forearm_link_load18 = wrist_1_link_load36 + forearm_link_load17;
+            let forearm_link_load19 = forearm_link_pose1 * wrist_1_link_load34;
+            let forearm_link_load20 = forearm_link_load16 - forearm_link_load19;
+            let forearm_link_load21 = upper_arm_link_load2 + forearm_link_load18;
+            let forearm_link_load22 = upper_arm_link_load5 + forearm_link_load20;
+            results[0][l] = -forearm_link_load21;
+            results[1][l] = forearm_link_load22;
+            results[2][l] = wrist_1_link_load37;
+            results[3][l] = -wrist_2_link_load16;
+            results[4][l] = wrist_3_link_load16;
+            results[5][l] = -wrist_3_link_load7;
+        }
+        h.give(0, &results[0]);
+        h.give(1, &results[1]);
+        h.give(2, &results[2]);
+        h.give(3, &results[3]);
+        h.give(4, &results[4]);
+        h.give(5, &results[5]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
     #[inline]
     pub fn coordinate_rates(&self, q: &[f64; 6], v: &[f64; 6], qd: &mut [f64; 6]) {
-        let v_0 = v[0];
-        let v_1 = v[1];
-        let v_2 = v[2];
-        let v_3 = v[3];
-        let v_4 = v[4];
-        let v_5 = v[5];
-        qd[0] = v_0;
-        qd[1] = v_1;
-        qd[2] = v_2;
-        qd[3] = v_3;
-        qd[4] = v_4;
-        qd[5] = v_5;
+        Self::coordinate_rates_kernel::<::multibody::runtime::kernel::Plain, 1>(v, qd);
+    }
+
+    #[inline(always)]
+    fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut results = [[0.0; LANES]; 6];
+        for l in 0..LANES {
+            let v_0 = v.get(0, l);
+            let v_1 = v.get(1, l);
+            let v_2 = v.get(2, l);
+            let v_3 = v.get(3, l);
+            let v_4 = v.get(4, l);
+            let v_5 = v.get(5, l);
+            results[0][l] = v_0;
+            results[1][l] = v_1;
+            results[2][l] = v_2;
+            results[3][l] = v_3;
+            results[4][l] = v_4;
+            results[5][l] = v_5;
+        }
+        qd.give(0, &results[0]);
+        qd.give(1, &results[1]);
+        qd.give(2, &results[2]);
+        qd.give(3, &results[3]);
+        qd.give(4, &results[4]);
+        qd.give(5, &results[5]);
+    }
+
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> Ur5Lanes<LANES> {
+        Ur5Lanes { tau: self.tau.map(|x| [x; LANES]) }
+    }
+
+    /// Rates of any number of states, given as columns: `q[k][s]` is coordinate `k` of state `s`. Joint forces are a column each; the fields of
+    /// `self` are the same for all states. 8 states are computed at a time.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    pub fn rates_batch(&self, q: [&[f64]; 6], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 6], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        ::multibody::runtime::batch::run::<f64, 8, 6, 6, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
+            ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
+        })
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<0, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, tau, qd, pd,): (&'a P0, &'a P1, &'a P2, &'a mut P3, &'a mut P4,)) {
+        Self::rates_kernel::<A, LANES>(q, p, tau, qd, pd);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<1, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, v,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::velocities_kernel::<A, LANES>(q, p, v);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<2, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, p,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::momenta_kernel::<A, LANES>(q, v, p);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, result);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<4, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, tau, a,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::accelerations_kernel::<A, LANES>(q, v, tau, a);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<5, LANES, (&'a P0, &'a mut P1,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, m,): (&'a P0, &'a mut P1,)) {
+        Self::mass_matrix_kernel::<A, LANES>(q, m);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<6, LANES, (&'a P0, &'a P1, &'a P2, &'a mut P3,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, a, tau,): (&'a P0, &'a P1, &'a P2, &'a mut P3,)) {
+        Self::inverse_dynamics_kernel::<A, LANES>(q, v, a, tau);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<7, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, h,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_kernel::<A, LANES>(q, v, h);
+    }
+}
+
+#[rustfmt::skip]
+impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<8, LANES, (&'a P0, &'a mut P1,)> for Ur5 {
+    #[inline(always)]
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((v, qd,): (&'a P0, &'a mut P1,)) {
+        Self::coordinate_rates_kernel::<A, LANES>(v, qd);
+    }
+}
+
+/// `LANES` states of [`Ur5`] at once, side by side in vector registers. In every array the last index is the lane:
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+#[derive(Clone, Debug, PartialEq)]
+#[rustfmt::skip]
+pub struct Ur5Lanes<const LANES: usize> {
+    /// Joint forces, N m or N, one for each velocity.
+    pub tau: [[f64; LANES]; 6],
+}
+
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
+#[rustfmt::skip]
+impl<const LANES: usize> Ur5Lanes<LANES> {
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {
+        Ur5::new().lanes()
+    }
+
+    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    #[inline]
+    pub fn rates(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6], qd: &mut [[f64; LANES]; 6], pd: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+    }
+
+    /// Velocities from momenta: `(q, p) → v`.
+    #[inline]
+    pub fn velocities(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6], v: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 1, LANES, f64, _>((q, p, v,));
+    }
+
+    /// Momenta from velocities: `p = M(q) v`.
+    #[inline]
+    pub fn momenta(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], p: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 2, LANES, f64, _>((q, v, p,));
+    }
+
+    /// Kinetic and potential energy, J.
+    #[inline]
+    pub fn energy(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6]) -> [[f64; LANES]; 2] {
+        let mut result = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 3, LANES, f64, _>((q, p, &mut result,));
+        result
+    }
+
+    /// Accelerations: `(q, v) → v̇`.
+    #[inline]
+    pub fn accelerations(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], a: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 4, LANES, f64, _>((q, v, &self.tau, a,));
+    }
+
+    /// Mass matrix, by rows.
+    #[inline]
+    pub fn mass_matrix(&self, q: &[[f64; LANES]; 6], m: &mut [[[f64; LANES]; 6]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 5, LANES, f64, _>((q, m.as_flattened_mut(),));
+    }
+
+    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    #[inline]
+    pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], a: &[[f64; LANES]; 6], tau: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 6, LANES, f64, _>((q, v, a, tau,));
+    }
+
+    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    #[inline]
+    pub fn bias(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], h: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 7, LANES, f64, _>((q, v, h,));
+    }
+
+    /// Coordinate rates of given velocities: `q̇ = N(q) v`.
+    #[inline]
+    pub fn coordinate_rates(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], qd: &mut [[f64; LANES]; 6]) {
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 8, LANES, f64, _>((v, qd,));
+    }
+}
+
+#[rustfmt::skip]
+impl<const LANES: usize> ::core::default::Default for Ur5Lanes<LANES> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -2206,5 +2646,13 @@ impl ::multibody::runtime::System for Ur5 {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 6], v: &[f64; 6], qd: &mut [f64; 6]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::batch::RatesBatch<f64, 6, 6, 6> for Ur5 {
+    fn rates_batch(&self, q: [&[f64]; 6], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 6], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+        let _ = tau;
+        Self::rates_batch(self, q, p, tau, qd, pd)
     }
 }

@@ -9,10 +9,10 @@ use multibody::runtime::{Interpreter, System};
 /// Types as a user's public module has them.
 pub mod made {
     // Several in one module, and nothing imported.
-    multibody::mbd_model! { path = "models/double_pendulum.toml", name = DoublePendulum }
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = DoublePendulum, arithmetic = exact }
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = Again, outputs = [velocities], efforts = false }
-    multibody::mbd_model! { path = "models/ur5.urdf", name = pub(crate) Ur5 }
-    multibody::mbd_model! { path = "models/solo12.urdf", name = Solo12, base = floating }
+    multibody::mbd_model! { path = "models/ur5.urdf", name = pub(crate) Ur5, arithmetic = exact }
+    multibody::mbd_model! { path = "models/solo12.urdf", name = Solo12, base = floating, arithmetic = exact }
     multibody::mbd_model! {
         path = r"models/double_pendulum.toml",
         name = #[doc = "With a fine copy."] #[derive(Copy)] pub Single,

@@ -24,6 +24,14 @@ pub fn source(options: &Options) -> String {
         .collect();
     let declared: String = fields.iter().map(|(f, ty, _)| format!("#[doc = \"\"] pub {f}: {ty},")).collect();
     let values: String = fields.iter().map(|(f, _, value)| format!("{f}: {value},")).collect();
+    let lane_fields: String = fields
+        .iter()
+        .map(|(f, ty, _)| {
+            format!("#[doc = \"\"] pub {f}: {},", ty.replacen(&format!("{t};"), &format!("[{t}; LANES];"), 1))
+        })
+        .collect();
+    let lane_values: String =
+        fields.iter().map(|(f, _, value)| format!("{f}: {},", value.replacen("0.0;", "[0.0; LANES];", 1))).collect();
     let functions: String = [
         ("rates", "q p qd pd"),
         ("coordinate_rates", "q v qd"),
@@ -62,6 +70,19 @@ pub fn source(options: &Options) -> String {
             #[doc = \"\"] pub const fn new() -> Self {{ {name} {{ {values} }} }}
             {functions}
             #[doc = \"\"] pub fn energy<A0, A1>(&self, _q: A0, _p: A1) -> [{t}; 2] {{ [0.0; 2] }}
+            #[doc = \"\"] pub fn rates_batch<A0, A1, A2, A3, A4>(&self, _q: A0, _p: A1, _tau: A2, _qd: A3, _pd: A4) -> ::core::result::Result<(), {rt}::batch::Lengths> {{
+                ::core::result::Result::Ok(())
+            }}
+            #[doc = \"\"] pub fn lanes<const LANES: usize>(&self) -> {name}Lanes<LANES> {{ {name}Lanes {{ {lane_values} }} }}
+        }}
+        /// Stands in for several states of a model with errors.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct {name}Lanes<const LANES: usize> {{ {lane_fields} }}
+        #[allow(clippy::all, clippy::pedantic, dead_code)]
+        impl<const LANES: usize> {name}Lanes<LANES> {{
+            #[doc = \"\"] pub fn new() -> Self {{ {name}Lanes {{ {lane_values} }} }}
+            {functions}
+            #[doc = \"\"] pub fn energy<A0, A1>(&self, _q: A0, _p: A1) -> [[{t}; LANES]; 2] {{ [[0.0; LANES]; 2] }}
         }}
         impl ::core::default::Default for {name} {{ fn default() -> Self {{ Self::new() }} }}
         impl {rt}::System for {name} {{

@@ -1,16 +1,21 @@
 //! Sweeps, interpreter and integrators of the multibody project.
 //!
-//! `no_std`, no allocation on the hot path. Generated code needs [`System`], [`integrate`] and [`trig`] only; the tree,
-//! its workspace and the interpreter (feature `alloc`) live in vectors that are sized once.
+//! `no_std` unless asked, no allocation on the hot path. Generated code needs [`System`], [`integrate`], [`kernel`],
+//! [`batch`] and [`trig`] only; the tree, its workspace and the interpreter (feature `alloc`) live in vectors that are
+//! sized once. Feature `std` lets generated code use what the processor turns out to have.
 #![no_std]
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
+#[cfg(feature = "std")]
+extern crate std;
 
+pub mod batch;
 mod dual;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;
+pub mod kernel;
 #[cfg(feature = "alloc")]
 pub mod layout;
 pub mod notation;

@@ -35,6 +35,10 @@ impl Scalar for f64 {
     }
     #[inline]
     fn sqrt(self) -> Self {
+        // Both are rounded correctly: the same bits.
+        #[cfg(feature = "std")]
+        return f64::sqrt(self);
+        #[cfg(not(feature = "std"))]
         libm::sqrt(self)
     }
 }
@@ -50,6 +54,10 @@ impl Scalar for f32 {
     }
     #[inline]
     fn sqrt(self) -> Self {
+        // Both are rounded correctly: the same bits.
+        #[cfg(feature = "std")]
+        return f32::sqrt(self);
+        #[cfg(not(feature = "std"))]
         libm::sqrtf(self)
     }
 }

@@ -1,14 +1,19 @@
 //! Sine and cosine together, in plain additions and multiplications: the same bits on every target.
 //!
 //! `core` has no trigonometry, and the usual stand-in computes its single-precision versions in double precision, which a
-//! Cortex-M4F has to emulate. Here `f32` stays in `f32`. No fused multiply-add, no table and no branch on the main path
-//! (so a loop over lanes vectorises); one branch sends large, infinite and NaN arguments to an exact integer reduction.
+//! Cortex-M4F has to emulate. Here `f32` stays in `f32`. No table and no branch on the main path, so a loop over lanes
+//! vectorises; one branch sends large, infinite and NaN arguments to an exact integer reduction.
+//!
+//! Written over an [`Arithmetic`]: plain for single calls, the same bits everywhere; in kernels with fused
+//! multiply-adds where the processor has them. Generated code has all its angles at the start, and computes their sines
+//! and cosines side by side in vector registers ([`pairs_f64`], [`pairs_f32`]).
 //!
 //! Main path (|x| <= 10^6 for `f64`, <= 1600 for `f32`):
 //! 1. `n = round(x · 2/π)` by adding and subtracting 1.5 · 2^(mantissa bits); the low bits of the sum are the quadrant.
 //! 2. `y0 + y1 = x − n·π/2` with π/2 in four parts (Cody and Waite). The first three have so few bits that their
 //!    products with `n` are exact; what the two subtractions round away is recovered exactly and goes into `y1`. So the
-//!    reduced argument is good to well below an ulp even next to a multiple of π/2.
+//!    reduced argument is good to well below an ulp even next to a multiple of π/2. Fused, the first part is a whole
+//!    float and three parts do: `x − n·p1` is a multiple of the last place of `p1` or `x` below 1, so it is exact.
 //! 3. Polynomials for both functions on |y| <= π/4; for `f64` those of fdlibm, in both cases with fdlibm's use of `y1`.
 //! 4. Quadrant: exchange by a select, signs by their bit.
 //!
@@ -18,6 +23,8 @@
 //! arguments; `f32` 0.79 over every one of its 2^32 arguments.
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
 #![allow(clippy::excessive_precision, clippy::approx_constant)]
+
+use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
 
 /// 2/π as a binary fraction behind 64 zero bits: enough for the largest `f64`.
 const TWO_OVER_PI: [u32; 40] = [
@@ -49,36 +56,122 @@ macro_rules! sincos {
         limit $limit:literal;
         two_over_pi $inv:literal, magic $magic:literal;
         pi_half $p1:literal, $p2:literal, $p3:literal, $p4:literal, integer $pi_int:literal;
-        sin($zs:ident) $s1:literal, $sin_tail:expr;
-        cos($zc:ident) $cos_tail:expr;
+        fused $f1:literal, $f2:literal, $f3:literal;
+        fma $fma:ident, width $width:literal;
+        sin($zs:ident, $fs:ident) $s1:literal, $sin_tail:expr;
+        cos($zc:ident, $fc:ident) $cos_tail:expr;
         $(#[$doc:meta])* scalar $name:ident;
         $(#[$lanes_doc:meta])* lanes $lanes:ident;
-        parts $fast:ident, $kernel:ident, $slow:ident, $large:ident
+        $(#[$slice_doc:meta])* slice $slice:ident, $kernel_type:ident;
+        $(#[$pair_doc:meta])* pair $pair:ident;
+        $(#[$pairs_doc:meta])* pairs $pairs:ident;
+        parts $fast:ident, $kernel:ident, $slow:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
     ) => {
         $(#[$doc])*
         #[inline]
         pub fn $name(x: $float) -> ($float, $float) {
-            if $large(x) {
-                $slow(x)
-            } else {
-                $fast(x)
-            }
+            $pair::<Plain>(x)
         }
 
         $(#[$lanes_doc])*
         #[inline]
         pub fn $lanes<const N: usize>(x: [$float; N]) -> ([$float; N], [$float; N]) {
-            let (mut sin, mut cos, mut any) = ([0.0; N], [0.0; N], false);
-            for ((x, s), c) in x.iter().zip(&mut sin).zip(&mut cos) {
-                (*s, *c) = $fast(*x);
-                any |= $large(*x);
-            }
-            if any {
-                for ((x, s), c) in x.iter().zip(&mut sin).zip(&mut cos) {
-                    (*s, *c) = $name(*x);
-                }
+            let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
+            if $flat::<Plain>(&x, &mut sin, &mut cos) {
+                $repair(&x, &mut sin, &mut cos);
             }
             (sin, cos)
+        }
+
+        $(#[$slice_doc])*
+        pub fn $slice(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
+            call_lanes::<$kernel_type, 0, $width, $float, _>((x, sin, cos));
+        }
+
+        struct $kernel_type;
+        impl Kernel<0, $width, (&[$float], &mut [$float], &mut [$float])> for $kernel_type {
+            #[inline(always)]
+            fn run<A: Arithmetic>((x, sin, cos): (&[$float], &mut [$float], &mut [$float])) {
+                if $flat::<A>(x, sin, cos) {
+                    $repair(x, sin, cos);
+                }
+            }
+        }
+
+        $(#[$pair_doc])*
+        #[inline(always)]
+        pub fn $pair<A: Arithmetic>(x: $float) -> ($float, $float) {
+            if $large(x) {
+                $slow(x)
+            } else {
+                $fast::<A>(x)
+            }
+        }
+
+        $(#[$pairs_doc])*
+        #[inline(always)]
+        pub fn $pairs<A: Arithmetic, const L: usize, const N: usize>(
+            x: &[[$float; L]; N],
+        ) -> ([[$float; L]; N], [[$float; L]; N]) {
+            let (mut sin, mut cos) = ([[0.0; L]; N], [[0.0; L]; N]);
+            if $flat::<A>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut()) {
+                // Copies are lent, so that the arrays of the main path can stay in registers.
+                let (x, mut s, mut c) = (*x, sin, cos);
+                $repair(x.as_flattened(), s.as_flattened_mut(), c.as_flattened_mut());
+                (sin, cos) = (s, c);
+            }
+            (sin, cos)
+        }
+
+        /// The main path in blocks as wide as the widest vectors, the rest in narrower ones; whether there is an angle
+        /// beyond it.
+        #[inline(always)]
+        fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
+            let mut large = false;
+            let (mut xs, mut ss, mut cs) =
+                (x.chunks_exact($width), sin.chunks_exact_mut($width), cos.chunks_exact_mut($width));
+            for ((x, s), c) in (&mut xs).zip(&mut ss).zip(&mut cs) {
+                large |= $block::<A, $width>(x, s, c);
+            }
+            let (x_rest, s, c) = (xs.remainder(), ss.into_remainder(), cs.into_remainder());
+            let rest = match x_rest.len() {
+                0 => false,
+                1 => $block::<A, 1>(x_rest, s, c),
+                2..=4 => $block::<A, 4>(x_rest, s, c),
+                5..=8 => $block::<A, 8>(x_rest, s, c),
+                _ => $block::<A, $width>(x_rest, s, c),
+            };
+            large | rest
+        }
+
+        /// Up to `W` angles on the main path; whether there is one beyond it.
+        #[inline(always)]
+        fn $block<A: Arithmetic, const W: usize>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
+            let (mut angles, mut s, mut c, mut beyond) = ([0.0; W], [0.0; W], [0.0; W], [false; W]);
+            for (angle, x) in angles.iter_mut().zip(x) {
+                *angle = *x;
+            }
+            for w in 0..W {
+                (s[w], c[w]) = $fast::<A>(angles[w]);
+            }
+            for w in 0..W {
+                beyond[w] = $large(angles[w]);
+            }
+            for ((sin, cos), (s, c)) in sin.iter_mut().zip(cos).zip(s.iter().zip(&c)) {
+                (*sin, *cos) = (*s, *c);
+            }
+            beyond.iter().fold(false, |any, x| any | x)
+        }
+
+        /// Computes anew what the main path cannot.
+        #[cold]
+        #[inline(never)]
+        fn $repair(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
+            for ((x, s), c) in x.iter().zip(sin).zip(cos) {
+                if $large(*x) {
+                    (*s, *c) = $slow(*x);
+                }
+            }
         }
 
         /// Whether `x` is beyond the main path: large, infinite or NaN.
@@ -89,10 +182,19 @@ macro_rules! sincos {
         }
 
         /// The main path. Nonsense (but no panic) beyond its range.
-        #[inline]
-        fn $fast(x: $float) -> ($float, $float) {
-            let shifted = x * $inv + $magic;
+        #[inline(always)]
+        fn $fast<A: Arithmetic>(x: $float) -> ($float, $float) {
+            let shifted = A::$fma(x, $inv, $magic);
             let n = shifted - $magic;
+            if A::FUSED {
+                // Exact: see above.
+                let a = A::$fma(-n, $f1, x);
+                // An exact product, and as below an exact remainder.
+                let w = n * $f2;
+                let b = a - w;
+                let lost = (a - b) - w;
+                return $kernel::<A>(b, A::$fma(-n, $f3, lost), shifted.to_bits());
+            }
             // Exact: the product, and the difference by Sterbenz's lemma.
             let a = x - n * $p1;
             // Exact products; `a` and `b` are multiples of the last place of `w` and `v`, so both remainders are exact.
@@ -102,26 +204,25 @@ macro_rules! sincos {
             let v = n * $p3;
             let c = b - v;
             let lost_c = (b - c) - v;
-            let tail = n * $p4 - (lost_b + lost_c);
-            let y0 = c - tail;
-            let y1 = (c - y0) - tail;
-            $kernel(y0, y1, shifted.to_bits())
+            $kernel::<A>(c, (lost_b + lost_c) - n * $p4, shifted.to_bits())
         }
 
-        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| <= π/4 and a little more, |y1| below an ulp of y0.
-        #[inline]
-        fn $kernel(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
+        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| <= π/4 and a little more. `y1` is some ulps of `y0` at
+        /// most; where both are tiny it may be more.
+        #[inline(always)]
+        fn $kernel<A: Arithmetic>(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
             let z = y0 * y0;
             let sin = {
-                let $zs = z;
-                let cube = z * y0;
-                y0 - ((z * (0.5 * y1 - cube * $sin_tail) - y1) - cube * $s1)
+                let ($zs, $fs) = (z, A::$fma);
+                // Subtracted, so that the sine of -0 is -0.
+                let bend = A::$fma(0.5 * z, y1, -y1);
+                y0 - A::$fma(-(z * y0), A::$fma(z, $sin_tail, $s1), bend)
             };
             let cos = {
-                let $zc = z;
+                let ($zc, $fc) = (z, A::$fma);
                 let half = 0.5 * z;
                 let w = 1.0 - half;
-                w + (((1.0 - w) - half) + (z * $cos_tail - y0 * y1))
+                w + (((1.0 - w) - half) + A::$fma(z, $cos_tail, -(y0 * y1)))
             };
             let odd = quadrant & 1 != 0;
             let (s, c) = (if odd { cos } else { sin }, if odd { sin } else { cos });
@@ -172,7 +273,7 @@ macro_rules! sincos {
             let quadrant = quadrant.wrapping_add($uint::from(negative));
             // The angle's sign, then that of x: the sine is odd, the cosine even.
             let (y0, y1) = if negative { (-y0, -y1) } else { (y0, y1) };
-            let (sin, cos) = $kernel(y0, y1, quadrant);
+            let (sin, cos) = $kernel::<Plain>(y0, y1, quadrant);
             (if x < 0.0 { -sin } else { sin }, cos)
         }
     };
@@ -184,18 +285,26 @@ sincos! {
     two_over_pi 0.6366197723675814, magic 6755399441055744.0;
     pi_half 1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32,
         integer 0xc90fdaa22168c235;
-    sin(z) -1.66666666666666324348e-01,
-        (8.33333333332248946124e-03
-            + z * (-1.98412698298579493134e-04 + z * 2.75573137070700676789e-06)
-            + z * (z * z) * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10));
-    cos(z) (z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * 2.48015872894767294178e-05))
-            + (z * z) * (z * z)
-                * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)));
+    fused 1.5707963267948966, 6.12323399538461e-17, 3.5215598651832e-27;
+    fma fma_f64, width 8;
+    sin(z, fma) -1.66666666666666324348e-01,
+        fma(z * (z * z), fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08),
+            fma(z, fma(z, 2.75573137070700676789e-06, -1.98412698298579493134e-04), 8.33333333332248946124e-03));
+    cos(z, fma) fma((z * z) * (z * z),
+            fma(z, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09), -2.75573143513906633035e-07),
+            z * fma(z, fma(z, 2.48015872894767294178e-05, -1.38888888888741095749e-03), 4.16666666666666019037e-02));
     /// `(sin x, cos x)`, `x` in radians, each within one unit in the last place for every finite `x`; NaN otherwise.
     scalar sincos_f64;
     /// [`sincos_f64`] of each lane, with the same bits.
     lanes sincos_lanes_f64;
-    parts fast_f64, kernel_f64, slow_f64, large_f64
+    /// Sines and cosines of as many angles, radians, as the shortest of the slices has, each within one unit in the last
+    /// place; with what the processor has, so the bits depend on it.
+    slice sincos_slice_f64, SliceF64;
+    /// [`sincos_f64`] for kernels.
+    pair pair_f64;
+    /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
+    pairs pairs_f64;
+    parts fast_f64, kernel_f64, slow_f64, large_f64, repair_f64, block_f64, flat_f64
 }
 
 sincos! {
@@ -203,14 +312,23 @@ sincos! {
     limit 1600.0;
     two_over_pi 0.63661975, magic 12582912.0;
     pi_half 1.5706787, 0.000117614865, 9.91804e-10, 2.8960740e-13, integer 0xc90fdaa2;
-    sin(z) -0.16666655, (0.008332202 + z * -0.00019521112);
-    cos(z) (z * (0.041666646 + z * (-0.0013887309 + z * 2.4432287e-05)));
+    fused 1.57079637, -4.37139533e-8, 2.56334407e-12;
+    fma fma_f32, width 16;
+    sin(z, fma) -0.16666655, fma(z, -0.00019521112, 0.008332202);
+    cos(z, fma) z * fma(z, fma(z, 2.4432287e-05, -0.0013887309), 0.041666646);
     /// `(sin x, cos x)`, `x` in radians, each within one unit in the last place for every finite `x`; NaN otherwise.
     /// No double-precision operation is used.
     scalar sincos_f32;
     /// [`sincos_f32`] of each lane, with the same bits.
     lanes sincos_lanes_f32;
-    parts fast_f32, kernel_f32, slow_f32, large_f32
+    /// Sines and cosines of as many angles, radians, as the shortest of the slices has, each within one unit in the last
+    /// place; with what the processor has, so the bits depend on it.
+    slice sincos_slice_f32, SliceF32;
+    /// [`sincos_f32`] for kernels.
+    pair pair_f32;
+    /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
+    pairs pairs_f32;
+    parts fast_f32, kernel_f32, slow_f32, large_f32, repair_f32, block_f32, flat_f32
 }
 
 #[cfg(test)]

@@ -24,7 +24,6 @@ pub fn tree(k: u64) -> (Model, Options) {
         outputs: Group::ALL.to_vec(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
         efforts: rng.chance(0.8),
-        chunk: rng.pick(&[50, 300, 1000]),
         ..Options::default()
     };
     (random_model(seed, &Knobs::everything(seed, 2 + k as usize % 4)), options)

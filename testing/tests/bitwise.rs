@@ -7,7 +7,7 @@ mod common;
 
 use std::collections::HashMap;
 
-use common::{Array, Emitted};
+use common::Emitted;
 use mbd_codegen::generate::{generate, Arithmetic, Group, Options};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
@@ -36,8 +36,6 @@ impl Case {
             arithmetic: Arithmetic::Exact,
             outputs: Group::ALL.into_iter().filter(|g| derivatives || *g < Group::Derivatives).collect(),
             efforts: rng.chance(0.8),
-            // Small parts make long sources.
-            chunk: if size < 4 { rng.pick(&[7, 1000]) } else { rng.pick(&[60, 200, 1000]) },
             ..Options::default()
         };
         let plan = Plan::new(&model, options.plan);
@@ -45,26 +43,25 @@ impl Case {
         Case { seed, plan, efforts: options.efforts, derivatives, emitted: Emitted::parse(&source) }
     }
 
-    fn inputs(&self, s: &State, p: &[f64]) -> HashMap<String, Array> {
-        let wrenches = Array { dims: vec![s.wrenches.len(), 6], data: s.wrenches.concat() };
+    fn inputs(&self, s: &State, p: &[f64]) -> HashMap<String, Vec<f64>> {
         let fields = [
-            ("q", Array::flat(&s.q)),
-            ("p", Array::flat(p)),
-            ("v", Array::flat(&s.v)),
-            ("self.tau", Array::flat(&s.tau)),
-            ("self.drive_q", Array::flat(&s.drive[0])),
-            ("self.drive_v", Array::flat(&s.drive[1])),
-            ("self.drive_a", Array::flat(&s.drive[2])),
-            ("self.wrenches", wrenches),
-            ("self.params", Array::flat(&s.params)),
-            ("self.gravity", Array::flat(&s.gravity)),
+            ("q", s.q.clone()),
+            ("p", p.to_vec()),
+            ("v", s.v.clone()),
+            ("tau", s.tau.clone()),
+            ("drive_q", s.drive[0].clone()),
+            ("drive_v", s.drive[1].clone()),
+            ("drive_a", s.drive[2].clone()),
+            ("wrenches", s.wrenches.concat()),
+            ("params", s.params.clone()),
+            ("gravity", s.gravity.to_vec()),
         ];
         fields.into_iter().map(|(name, a)| (name.to_string(), a)).collect()
     }
 
-    fn compare(&self, what: &str, emitted: &Array, interpreted: &[f64]) {
-        assert_eq!(emitted.data.len(), interpreted.len(), "seed {}: {what}", self.seed);
-        for (k, (a, b)) in emitted.data.iter().zip(interpreted).enumerate() {
+    fn compare(&self, what: &str, emitted: &[f64], interpreted: &[f64]) {
+        assert_eq!(emitted.len(), interpreted.len(), "seed {}: {what}", self.seed);
+        for (k, (a, b)) in emitted.iter().zip(interpreted).enumerate() {
             let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
             let text = || to_toml(&self.plan.model);
             assert!(a.is_finite() && b.is_finite(), "seed {}: {what}[{k}] is {a} and {b}\n{}", self.seed, text());
@@ -125,7 +122,7 @@ impl Case {
         i.velocities(&s.q, &p, &mut v);
         self.compare("velocities", &run(Group::Velocities)["v"], &v);
         let (kinetic, potential) = i.energy(&s.q, &p);
-        self.compare("energy", &run(Group::Energy)["return"], &[kinetic, potential]);
+        self.compare("energy", &run(Group::Energy)["result"], &[kinetic, potential]);
         let mut a = vec![0.0; nv];
         i.accelerations(&s.q, &s.v, &mut a);
         self.compare("accelerations", &run(Group::Accelerations)["a"], &a);
@@ -139,7 +136,7 @@ impl Case {
         let (mut tau, mut h) = (vec![0.0; nv], vec![0.0; nv]);
         i.inverse_dynamics(&s.q, &s.v, &a, &mut tau);
         let mut given = inputs.clone();
-        given.insert("a".to_string(), Array::flat(&a));
+        given.insert("a".to_string(), a.clone());
         let emitted = self.emitted.run(Group::InverseDynamics.name(), &given);
         self.compare("inverse dynamics", &emitted["tau"], &tau);
         i.bias(&s.q, &s.v, &mut h);

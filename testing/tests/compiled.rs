@@ -2,6 +2,7 @@
 
 #[allow(dead_code)]
 mod batch {
+    use mbd_runtime::batch::RatesBatch;
     use mbd_testing::state::State;
 
     /// Results by name, in a fixed order.
@@ -32,6 +33,23 @@ mod batch {
     fn numbers<T: Number>(x: &[T]) -> Vec<f64> {
         x.iter().map(|x| (*x).into()).collect()
     }
+
+    /// A batch of whatever lengths the tree has, with joint forces where it takes them.
+    trait Batch<T, const NQ: usize, const NV: usize, const NT: usize>: RatesBatch<T, NQ, NV, NT> {
+        fn batch<const S: usize>(
+            &self,
+            q: &[[T; S]; NQ],
+            p: &[[T; S]; NV],
+            tau: &[[T; S]; NV],
+            qd: [&mut [T]; NQ],
+            pd: [&mut [T]; NV],
+        ) {
+            let (q, p) = (q.each_ref().map(|c| &c[..]), p.each_ref().map(|c| &c[..]));
+            let tau = std::array::from_fn(|k| &tau[k][..]);
+            self.rates_batch(q, p, tau, qd, pd).unwrap();
+        }
+    }
+    impl<T, S: RatesBatch<T, NQ, NV, NT>, const NQ: usize, const NV: usize, const NT: usize> Batch<T, NQ, NV, NT> for S {}
 
     macro_rules! runner {
         ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], $frames:literal, $joints:literal, $params:literal) => {
@@ -93,6 +111,37 @@ mod batch {
                 results.push(("jacobians", numbers(&jacobian.concat().concat())));
                 tree.drifts(&q, &v, &mut drift);
                 results.push(("drifts", numbers(&drift.concat())));
+                // Lanes and batches have the bits of single states. Neighbouring states differ.
+                const STATES: usize = 21;
+                let state = |s: usize| {
+                    let shift = <$t>::of(0.01 * s as f64);
+                    let (q, p) = (q.map(|x| x + shift), p.map(|x| x - shift));
+                    let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
+                    tree.rates(&q, &p, &mut qd, &mut pd);
+                    (q, p, qd, pd)
+                };
+                let states: [_; STATES] = std::array::from_fn(state);
+                let lanes = tree.lanes::<STATES>();
+                let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
+                let column = |get: &dyn Fn(usize) -> $t| -> [$t; STATES] { std::array::from_fn(get) };
+                let q: [_; NQ] = std::array::from_fn(|k| column(&|s| states[s].0[k]));
+                let p: [_; NV] = std::array::from_fn(|k| column(&|s| states[s].1[k]));
+                let expected = (
+                    std::array::from_fn(|k| column(&|s| states[s].2[k])),
+                    std::array::from_fn(|k| column(&|s| states[s].3[k])),
+                );
+                lanes.rates(&q, &p, &mut qd, &mut pd);
+                assert_eq!((qd, pd), expected, "lanes");
+                let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
+                let tau: [[$t; STATES]; NV] = std::array::from_fn(|k| [<$t>::of(s.tau[k]); STATES]);
+                let (mut qds, mut pds) = (qd.iter_mut(), pd.iter_mut());
+                tree.batch(&q, &p, &tau, std::array::from_fn(|_| &mut qds.next().unwrap()[..]), std::array::from_fn(|_| &mut pds.next().unwrap()[..]));
+                assert_eq!((qd, pd), expected, "batch");
+                let (mut m, mut a) = ([[[0.0; STATES]; NV]; NV], [[0.0; NV]; NV]);
+                lanes.mass_matrix(&q, &mut m);
+                tree.mass_matrix(&states[7].0, &mut a);
+                assert_eq!(m.map(|row| row.map(|x| x[7])), a, "mass matrix of a lane");
+                assert_eq!(lanes.energy(&q, &p).map(|x| x[20]), tree.energy(&states[20].0, &states[20].1));
                 results
             }
         };

@@ -12,6 +12,8 @@ use crate::symbolic::Counts;
 use crate::trace::{chosen_frames, GroupProgram};
 
 /// Shape of one generated function.
+// Some of it is for code in loop form alone.
+#[allow(dead_code)]
 pub struct Function {
     /// Doc comment.
     pub doc: String,
@@ -138,8 +140,8 @@ pub fn header(out: &mut String, plan: &Plan, options: &Options, groups: &[GroupP
     out.push('\n');
 }
 
-/// Fields of the type: name, element type with length, value of the constructor, doc.
-fn fields(plan: &Plan, options: &Options) -> Vec<(&'static str, String, String, &'static str)> {
+/// Fields of the type: name, array type, value of the constructor, doc.
+pub fn fields(plan: &Plan, options: &Options) -> Vec<(&'static str, String, String, &'static str)> {
     let t = options.precision.name();
     let d = plan.dims;
     let mut fields = Vec::new();

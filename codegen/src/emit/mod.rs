@@ -1,7 +1,9 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
+mod lanes;
 mod layout;
 pub(crate) mod names;
+mod ports;
 mod statements;
 
 use std::fmt::Write;
@@ -17,7 +19,7 @@ pub use names::{identifier, quantity};
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
 pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {
     let mut out = String::new();
-    let rates = groups.iter().any(|g| g.group == Group::Rates);
+    let [rates, derivatives] = [Group::Rates, Group::Derivatives].map(|x| groups.iter().any(|g| g.group == x));
     layout::header(&mut out, plan, options, groups);
     layout::type_definition(&mut out, plan, options, groups);
     let name = &options.type_name;
@@ -27,36 +29,33 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     );
     layout::constants(&mut out, plan, options);
     layout::constructor(&mut out, plan, options);
-    for group in groups {
-        function(&mut out, plan, options, group, group.group.name(), &layout::signature(plan, options, group.group));
+    let map_signature = rates.then(|| (map, "coordinate_rates", layout::coordinate_rates_signature(plan, options)));
+    let groups = groups.iter().map(|g| (g, g.group.name(), layout::signature(plan, options, g.group)));
+    let functions: Vec<_> = groups.chain(map_signature).collect();
+    let mut kernels = Vec::new();
+    for (id, (group, name, signature)) in functions.iter().enumerate() {
+        let _ = writeln!(out, "\n{}", signature.doc);
+        if let Some(counts) = layout::count_line(&group.program.counts()) {
+            let _ = writeln!(out, "    /// {counts}");
+        }
+        let body = Body::new(plan, options, group, signature);
+        body.write(&mut out, name, id, signature);
+        kernels.push(lanes::Kernel { id, name, signature, ports: body.ports().to_vec() });
     }
+    lanes::broadcast(&mut out, plan, options);
     if rates {
-        function(&mut out, plan, options, map, "coordinate_rates", &layout::coordinate_rates_signature(plan, options));
+        lanes::batch(&mut out, plan, options, &kernels);
     }
     let _ = writeln!(out, "}}");
+    lanes::kernels(&mut out, options, &kernels);
+    lanes::lanes_type(&mut out, plan, options, &kernels);
     layout::default(&mut out, options);
     if rates {
         layout::system(&mut out, plan, options);
-        if groups.iter().any(|g| g.group == Group::Derivatives) {
+        if derivatives {
             layout::differentiable(&mut out, plan, options);
         }
+        lanes::batch_trait(&mut out, plan, options);
     }
     out
-}
-
-/// One function, split into parts if it is long.
-fn function(
-    out: &mut String,
-    plan: &Plan,
-    options: &Options,
-    group: &GroupProgram,
-    name: &str,
-    signature: &layout::Function,
-) {
-    let body = Body::new(plan, options, group, &signature.results);
-    let _ = writeln!(out, "\n{}", signature.doc);
-    if let Some(counts) = layout::count_line(&group.program.counts()) {
-        let _ = writeln!(out, "    /// {counts}");
-    }
-    body.write(out, name, signature);
 }

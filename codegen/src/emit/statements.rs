@@ -1,13 +1,19 @@
-//! Straight-line bodies: one statement for each operation, split into parts where there are many.
+//! Straight-line bodies: one statement for each operation, in a loop over lanes.
+//!
+//! One text serves one state and many: the compiler drops a loop of one turn, and makes vector instructions of a longer
+//! one. For that the body has no calls that it cannot inline: angles come first, and their sines and cosines are computed
+//! together, before the loop. Nothing is split: compile time grows in proportion to the number of statements, and parts
+//! would hand their values over in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use super::layout::Function;
 use super::names::{identifier, quantity};
-use crate::options::{Options, Precision};
+use super::ports::{self, Port};
+use crate::options::{Arithmetic, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Label, Op, Operand, Output};
+use crate::symbolic::{Fma, Op, Operand, Output};
 use crate::trace::{GroupProgram, InputArray};
 
 /// A program with names for its values and places for its results.
@@ -16,20 +22,64 @@ pub struct Body<'a> {
     options: &'a Options,
     group: &'a GroupProgram,
     names: BTreeMap<u32, String>,
-    results: &'a [String],
+    ports: Vec<Port>,
+    angles: Angles,
 }
 
-/// One statement: nodes it defines, and its text.
-struct Statement {
-    defines: Vec<u32>,
-    uses: Vec<u32>,
-    label: Label,
-    text: String,
+/// Sines and cosines of a program.
+#[derive(Default)]
+struct Angles {
+    /// Angles that follow from inputs by sums and products, with the nodes of sine and cosine.
+    early: BTreeMap<u32, [Option<u32>; 2]>,
+    /// The others.
+    late: BTreeMap<u32, [Option<u32>; 2]>,
+    /// Nodes that early angles need.
+    before: BTreeSet<u32>,
+    /// Nodes that the rest needs.
+    after: BTreeSet<u32>,
+}
+
+impl Angles {
+    fn new(group: &GroupProgram) -> Angles {
+        let mut angles = Angles::default();
+        let mut all: BTreeMap<u32, [Option<u32>; 2]> = BTreeMap::new();
+        // Nodes that do not follow from inputs by sums and products.
+        let mut involved = BTreeSet::new();
+        for (id, op, _) in &group.program.steps {
+            match op {
+                Op::Sin(a) => all.entry(*a).or_default()[0] = Some(*id),
+                Op::Cos(a) => all.entry(*a).or_default()[1] = Some(*id),
+                _ => {}
+            }
+            let inner = |o| matches!(o, Operand::Node(k) if involved.contains(&k));
+            if matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..)) || op.operands().any(inner) {
+                involved.insert(*id);
+            }
+        }
+        (angles.late, angles.early) = all.into_iter().partition(|(a, _)| involved.contains(a));
+        angles.before.extend(angles.early.keys());
+        for output in &group.program.outputs {
+            if let Output::Node(id, _) = output {
+                angles.after.insert(*id);
+            }
+        }
+        for (id, op, _) in group.program.steps.iter().rev() {
+            let nodes = || op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None });
+            if angles.before.contains(id) {
+                angles.before.extend(nodes());
+            }
+            let early = matches!(op, Op::Sin(a) | Op::Cos(a) if angles.early.contains_key(a));
+            if angles.after.contains(id) && !early {
+                angles.after.extend(nodes());
+            }
+        }
+        angles
+    }
 }
 
 impl<'a> Body<'a> {
     /// Names every value after its body and quantity, numbered in order.
-    pub fn new(plan: &'a Plan, options: &'a Options, group: &'a GroupProgram, results: &'a [String]) -> Self {
+    pub fn new(plan: &'a Plan, options: &'a Options, group: &'a GroupProgram, function: &Function) -> Self {
         let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
         let mut next: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         let mut names = BTreeMap::new();
@@ -48,121 +98,121 @@ impl<'a> Body<'a> {
             names.insert(*id, format!("{body}_{short}{number}"));
             *number += 1;
         }
-        Body { plan, options, group, names, results }
+        Body { plan, options, group, names, ports: ports::ports(group, function), angles: Angles::new(group) }
     }
 
-    /// Writes the function, and its parts before it if there are any.
-    pub fn write(&self, out: &mut String, name: &str, function: &Function) {
-        let statements = self.statements();
-        let number = self.options.precision.name();
-        if statements.len() <= self.options.chunk {
-            let _ = writeln!(
-                out,
-                "{}    pub fn {name}(&self, {}){} {{",
-                function.inline(statements.len()),
-                function.arguments,
-                function.returns
-            );
-            self.write_statements(out, &statements);
-            self.write_results(out, &self.names);
-            let _ = writeln!(out, "{}    }}", function.tail);
+    /// What the kernel reads and writes.
+    pub fn ports(&self) -> &[Port] {
+        &self.ports
+    }
+
+    /// Whether the kernel computes what the target computes best; otherwise the same everywhere.
+    fn chooses(&self) -> bool {
+        self.options.arithmetic == Arithmetic::Fast
+    }
+
+    /// Writes the function and its kernel, number `id` of the type.
+    pub fn write(&self, out: &mut String, name: &str, id: usize, function: &Function) {
+        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+        let statements = self.group.program.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
+        let _ = writeln!(
+            out,
+            "{}    pub fn {name}(&self, {}){} {{",
+            function.inline(statements),
+            function.arguments,
+            function.returns
+        );
+        let arguments: Vec<&str> = self.ports.iter().map(|p| p.argument.as_str()).collect();
+        let call = match self.chooses() {
+            true => format!(
+                "{rt}::kernel::call::<Self, {id}, _>(({}))",
+                arguments.iter().map(|a| format!("{a}, ")).collect::<String>().trim_end()
+            ),
+            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
+        };
+        match self.ports.iter().find(|p| p.returned) {
+            Some(port) => {
+                let (place, dims) = (&port.name, &port.dims);
+                let _ = writeln!(out, "        let mut {place} = {};", ports::nested(dims, "0.0"));
+                let _ = writeln!(out, "        {call};\n        {place}\n    }}");
+            }
+            None => {
+                let _ = writeln!(out, "        {call};\n    }}");
+            }
+        }
+        let _ = writeln!(out, "\n    #[inline(always)]");
+        let _ = writeln!(
+            out,
+            "    fn {name}_kernel<A: {rt}::kernel::Arithmetic, const LANES: usize>({}) {{",
+            self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
+        );
+        self.write_sines(out);
+        let n = self.group.program.outputs.len();
+        if n > 0 {
+            let _ = writeln!(out, "        let mut results = [[0.0; LANES]; {n}];");
+        }
+        let _ = writeln!(out, "        for l in 0..LANES {{");
+        self.write_steps(out, &self.angles.after, true);
+        self.write_results(out);
+        let _ = writeln!(out, "    }}");
+    }
+
+    /// Sines and cosines of all angles that are known from the start.
+    fn write_sines(&self, out: &mut String) {
+        let n = self.angles.early.len();
+        if n == 0 {
             return;
         }
-        let parts: Vec<&[Statement]> = statements.chunks(self.options.chunk).collect();
-        let slots = self.slots(&parts);
-        let len = slots.values().max().map_or(0, |m| m + 1);
-        let inputs: String = function.inputs.iter().map(|i| format!("{i}, ")).collect();
-        let _ = writeln!(out, "    pub fn {name}(&self, {}){} {{", function.arguments, function.returns);
-        let _ = writeln!(out, "        let mut kept = [0.0; {len}];");
-        for k in 0..parts.len() {
-            let _ = writeln!(out, "        self.{name}_part{}({inputs}&mut kept);", k + 1);
+        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+        let _ = writeln!(out, "        let mut angles = [[0.0; LANES]; {n}];\n        for l in 0..LANES {{");
+        self.write_steps(out, &self.angles.before, false);
+        for (k, angle) in self.angles.early.keys().enumerate() {
+            let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
         }
-        let kept = slots.iter().map(|(id, slot)| (*id, format!("kept[{slot}]"))).collect();
-        self.write_results(out, &kept);
-        let _ = writeln!(out, "{}    }}", function.tail);
-        for (k, part) in parts.iter().enumerate() {
-            let _ = writeln!(
-                out,
-                "\n    #[inline(never)]\n    fn {name}_part{}(&self, {}kept: &mut [{number}; {len}]) {{",
-                k + 1,
-                function.input_arguments
-            );
-            let defined: BTreeSet<u32> = part.iter().flat_map(|s| s.defines.iter().copied()).collect();
-            let used: BTreeSet<u32> = part.iter().flat_map(|s| s.uses.iter().copied()).collect();
-            for id in used.difference(&defined) {
-                let _ = writeln!(out, "        let {} = kept[{}];", self.names[id], slots[id]);
-            }
-            self.write_statements(out, part);
-            for id in defined.iter().filter(|id| slots.contains_key(id)) {
-                let _ = writeln!(out, "        kept[{}] = {};", slots[id], self.names[id]);
-            }
-            let _ = writeln!(out, "    }}");
+        let _ = writeln!(out, "        }}");
+        let arithmetic = self.arithmetic();
+        let call = format!("{rt}::trig::pairs_{number}::<{arithmetic}, LANES, {n}>(&angles)");
+        let _ = writeln!(out, "        let (sines, cosines) = {call};");
+    }
+
+    /// Arithmetic of sines and cosines.
+    fn arithmetic(&self) -> String {
+        match self.chooses() {
+            true => "A".to_string(),
+            false => format!("{}::kernel::Plain", self.options.runtime),
         }
     }
 
-    /// Places for the values that outlive the part that computes them, each used again once its value is dead.
-    fn slots(&self, parts: &[&[Statement]]) -> BTreeMap<u32, usize> {
-        let mut last: BTreeMap<u32, usize> = BTreeMap::new();
-        for (k, part) in parts.iter().enumerate() {
-            for id in part.iter().flat_map(|s| &s.uses) {
-                last.insert(*id, k);
+    /// Those of the program's steps that are in a set, in order.
+    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, comments: bool) {
+        let mut last = None;
+        let mut late = self.angles.late.clone();
+        for (id, op, label) in self.group.program.steps.iter().filter(|(id, _, _)| set.contains(id)) {
+            let Some(text) = self.statement(*id, op, &mut late) else { continue };
+            if comments && last != Some(*label) && !matches!(op, Op::Input(_)) {
+                let body = label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
+                let _ = writeln!(out, "            // {body}: {}", quantity(label.1).1);
+                last = Some(*label);
             }
+            let _ = writeln!(out, "            {text}");
         }
-        for output in &self.group.program.outputs {
-            if let Output::Node(id, _) = output {
-                last.insert(*id, parts.len());
-            }
-        }
-        let mut slots = BTreeMap::new();
-        let mut free: Vec<usize> = Vec::new();
-        let mut count = 0;
-        for (k, part) in parts.iter().enumerate() {
-            for id in part.iter().flat_map(|s| &s.defines) {
-                if last.get(id).is_some_and(|&end| end > k) {
-                    let slot = free.pop().unwrap_or_else(|| {
-                        count += 1;
-                        count - 1
-                    });
-                    slots.insert(*id, slot);
-                }
-            }
-            // Values read for the last time by the next part may be overwritten only after it.
-            free.extend(slots.iter().filter(|(id, _)| last[*id] == k).map(|(_, slot)| *slot));
-        }
-        slots
     }
 
-    fn statements(&self) -> Vec<Statement> {
-        let steps = &self.group.program.steps;
-        let mut pairs: BTreeMap<u32, (Option<u32>, Option<u32>)> = BTreeMap::new();
-        for (id, op, _) in steps {
-            match op {
-                Op::Sin(a) => pairs.entry(*a).or_default().0 = Some(*id),
-                Op::Cos(a) => pairs.entry(*a).or_default().1 = Some(*id),
-                _ => {}
-            }
+    fn statement(&self, id: u32, op: &Op, late: &mut BTreeMap<u32, [Option<u32>; 2]>) -> Option<String> {
+        let name = &self.names[&id];
+        let (angle, row) = match op {
+            Op::Sin(a) => (a, "sines"),
+            Op::Cos(a) => (a, "cosines"),
+            op => return Some(format!("let {name} = {};", self.expression(op))),
+        };
+        if let Some(k) = self.angles.early.keys().position(|a| a == angle) {
+            return Some(format!("let {name} = {row}[{k}][l];"));
         }
-        let mut statements = Vec::new();
-        for (id, op, label) in steps {
-            let uses = op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None }).collect();
-            let (defines, text) = match op {
-                Op::Sin(a) | Op::Cos(a) => {
-                    // The first of a pair to be met stands for both.
-                    let Some((s, c)) = pairs.remove(a) else { continue };
-                    let name = |id: Option<u32>| id.map_or("_".to_string(), |id| self.names[&id].clone());
-                    let call = format!(
-                        "{}::trig::sincos_{}({})",
-                        self.options.runtime,
-                        self.options.precision.name(),
-                        self.names[a]
-                    );
-                    (s.into_iter().chain(c).collect(), format!("let ({}, {}) = {call};", name(s), name(c)))
-                }
-                op => (vec![*id], format!("let {} = {};", self.names[id], self.expression(op))),
-            };
-            statements.push(Statement { defines, uses, label: *label, text });
-        }
-        statements
+        // The first of a pair to be met stands for both.
+        let pair = late.remove(angle)?;
+        let [s, c] = pair.map(|id| id.map_or("_", |id| self.names[&id].as_str()));
+        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
+        Some(format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", self.names[angle]))
     }
 
     fn expression(&self, op: &Op) -> String {
@@ -171,43 +221,43 @@ impl<'a> Body<'a> {
             Operand::Node(id) => self.names[id].clone(),
         };
         match op {
-            Op::Input(k) => input_place(&self.group.inputs, *k as usize),
+            Op::Input(k) => {
+                let (array, k) = locate(&self.group.inputs, *k as usize);
+                format!("{}.get({k}, l)", ports::local(&array.name))
+            }
             Op::Add(a, b) => format!("{} + {}", text(a), text(b)),
             Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
             Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
             Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
-            Op::Fma(f) => {
-                let (p, s) = (if f.minus_product { "-" } else { "" }, if f.minus_addend { "-" } else { "+" });
-                format!("{p}({} * {}) {s} {}", text(&f.a), text(&f.b), text(&f.c))
+            Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
+                let minus = |yes: &bool| if *yes { "-" } else { "" };
+                let (a, b, c) = (text(a), text(b), text(c));
+                let number = self.options.precision.name();
+                format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(minus_product), minus(minus_addend))
             }
             Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, self.names[a]),
             Op::Sin(_) | Op::Cos(_) => unreachable!("written as pairs"),
         }
     }
 
-    fn write_statements(&self, out: &mut String, statements: &[Statement]) {
-        let mut last = None;
-        for s in statements {
-            let is_input = s.uses.is_empty();
-            if last != Some(s.label) && !is_input {
-                let body = s.label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
-                let _ = writeln!(out, "        // {body}: {}", quantity(s.label.1).1);
-                last = Some(s.label);
-            }
-            let _ = writeln!(out, "        {}", s.text);
-        }
-    }
-
-    fn write_results(&self, out: &mut String, names: &BTreeMap<u32, String>) {
-        for (place, output) in self.results.iter().zip(&self.group.program.outputs) {
+    /// Results are gathered first: the loop over lanes writes nowhere else, so that the compiler need not ask at run time
+    /// whether what it writes is also read.
+    fn write_results(&self, out: &mut String) {
+        for (k, output) in self.group.program.outputs.iter().enumerate() {
             let value = match output {
                 Output::Const(x) => {
                     let sign = if *x < 0.0 { "-" } else { "" };
                     format!("{sign}{}", literal(x.abs(), self.options.precision))
                 }
-                Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, names[id]),
+                Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, self.names[id]),
             };
-            let _ = writeln!(out, "        {place} = {value};");
+            let _ = writeln!(out, "            results[{k}][l] = {value};");
+        }
+        let _ = writeln!(out, "        }}");
+        let places = self.ports.iter().filter(|p| p.mutable);
+        let places = places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (&p.name, k)));
+        for (result, (name, k)) in places.enumerate() {
+            let _ = writeln!(out, "        {name}.give({k}, &results[{result}]);");
         }
     }
 }
@@ -230,15 +280,7 @@ fn locate(inputs: &[InputArray], mut k: usize) -> (&InputArray, usize) {
     unreachable!("inputs are numbered through their arrays")
 }
 
-fn input_place(inputs: &[InputArray], k: usize) -> String {
-    let (array, k) = locate(inputs, k);
-    match array.sixes {
-        true => format!("{}[{}][{}]", array.name, k / 6, k % 6),
-        false => format!("{}[{k}]", array.name),
-    }
-}
-
 fn input_name(inputs: &[InputArray], k: usize) -> String {
     let (array, k) = locate(inputs, k);
-    format!("{}_{k}", array.name.trim_start_matches("self."))
+    format!("{}_{k}", ports::local(&array.name))
 }

@@ -2,7 +2,7 @@
 //! constants nor method with the code under test.
 //!
 //! The claim is one ulp. The bound here is tighter: half an ulp for the final rounding; about 0.3 for the operations
-//! before it (at |y| near π/4 the correction y³/6 is a tenth of y, and four of its roundings count), and in `f32` up to
+//! before it (at |y| near π/4 the correction y³/6 is a tenth of y, and five of its roundings count), and in `f32` up to
 //! 0.1 of that for a polynomial of relative error 2^-27.3.
 extern crate std;
 
@@ -11,7 +11,21 @@ use astro_float_num::{BigFloat, Consts, RoundingMode};
 use std::{eprintln, vec, vec::Vec};
 
 /// Largest error allowed anywhere, in ulp.
-const BOUND: f64 = 0.80;
+const BOUND: f64 = 0.85;
+
+/// As kernels compute where products are added without being rounded. (The crate's own type needs feature `std`.)
+#[derive(Clone, Copy)]
+struct Fused;
+
+impl Arithmetic for Fused {
+    const FUSED: bool = true;
+    fn fma_f64(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+    fn fma_f32(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
+}
 
 /// High-precision sine and cosine, as a fraction of 128 bits and a binary exponent.
 struct Reference {
@@ -49,28 +63,39 @@ fn error_in_ulp(got: f64, exact: &BigFloat, mantissa: i32) -> f64 {
     got - whole - part
 }
 
+/// The two ways of adding a product.
+const WAYS: [&str; 2] = ["plain", "fused"];
+
 fn check_f64(points: impl IntoIterator<Item = f64>, what: &str) {
-    let (mut reference, mut worst) = (Reference::new(), (0.0, 0.0));
+    let (mut reference, mut worst) = (Reference::new(), [(0.0, 0.0); 2]);
     for x in points {
-        let ((s, c), (es, ec)) = (sincos_f64(x), reference.sincos(x));
-        for error in [error_in_ulp(s, &es, 53).abs(), error_in_ulp(c, &ec, 53).abs()] {
-            assert!(error <= BOUND, "x = {x:e} ({:#x}): {error} ulp, sin {s:e} cos {c:e}", x.to_bits());
-            worst = if error > worst.0 { (error, x) } else { worst };
+        let (es, ec) = reference.sincos(x);
+        for (k, (s, c)) in [pair_f64::<Plain>(x), pair_f64::<Fused>(x)].into_iter().enumerate() {
+            for error in [error_in_ulp(s, &es, 53).abs(), error_in_ulp(c, &ec, 53).abs()] {
+                assert!(error <= BOUND, "{}, x = {x:e}: {error} ulp, sin {s:e} cos {c:e}", WAYS[k]);
+                worst[k] = if error > worst[k].0 { (error, x) } else { worst[k] };
+            }
         }
     }
-    eprintln!("f64 {what}: at most {:.4} ulp, at {:e}", worst.0, worst.1);
+    for (way, (error, x)) in WAYS.iter().zip(worst) {
+        eprintln!("f64 {way}, {what}: at most {error:.4} ulp, at {x:e}");
+    }
 }
 
 fn check_f32(points: impl IntoIterator<Item = f32>, what: &str) {
-    let (mut reference, mut worst) = (Reference::new(), (0.0, 0.0));
+    let (mut reference, mut worst) = (Reference::new(), [(0.0, 0.0); 2]);
     for x in points {
-        let ((s, c), (es, ec)) = (sincos_f32(x), reference.sincos(x.into()));
-        for error in [error_in_ulp(s.into(), &es, 24).abs(), error_in_ulp(c.into(), &ec, 24).abs()] {
-            assert!(error <= BOUND, "x = {x:e} ({:#x}): {error} ulp, sin {s:e} cos {c:e}", x.to_bits());
-            worst = if error > worst.0 { (error, x) } else { worst };
+        let (es, ec) = reference.sincos(x.into());
+        for (k, (s, c)) in [pair_f32::<Plain>(x), pair_f32::<Fused>(x)].into_iter().enumerate() {
+            for error in [error_in_ulp(s.into(), &es, 24).abs(), error_in_ulp(c.into(), &ec, 24).abs()] {
+                assert!(error <= BOUND, "{}, x = {x:e}: {error} ulp, sin {s:e} cos {c:e}", WAYS[k]);
+                worst[k] = if error > worst[k].0 { (error, x) } else { worst[k] };
+            }
         }
     }
-    eprintln!("f32 {what}: at most {:.4} ulp, at {:e}", worst.0, worst.1);
+    for (way, (error, x)) in WAYS.iter().zip(worst) {
+        eprintln!("f32 {way}, {what}: at most {error:.4} ulp, at {x:e}");
+    }
 }
 
 /// SplitMix64.
@@ -257,13 +282,19 @@ fn paths_and_lanes_agree() {
     for _ in 0..50_000 {
         let x = random.within(1.0e6);
         if x.abs() >= 1024.0 {
-            let ((a, b), (c, d)) = (fast_f64(x), slow_f64(x));
+            let ((a, b), (c, d)) = (fast_f64::<Plain>(x), slow_f64(x));
             assert!((a - c).abs() <= 2e-16 && (b - d).abs() <= 2e-16, "at {x:e}");
         }
         let x: [f64; 4] = core::array::from_fn(|i| random.within([1.0, 1.0e3, 9.0e5, 1.0e6 + 10.0][i]));
         let (s, c) = sincos_lanes_f64(x);
         for i in 0..4 {
             assert_eq!((s[i], c[i]), sincos_f64(x[i]));
+        }
+        let (mut s, mut c) = ([0.0; 4], [0.0; 4]);
+        sincos_slice_f64(&x, &mut s, &mut c);
+        for i in 0..4 {
+            let fused = (s[i], c[i]) == pair_f64::<Fused>(x[i]);
+            assert!(fused || (s[i], c[i]) == sincos_f64(x[i]), "{:e}", x[i]);
         }
         let x = x.map(|x| x as f32);
         let (s, c) = sincos_lanes_f32(x);
@@ -281,8 +312,8 @@ fn every_single() {
     let worst = |from: u32| {
         let mut worst = (0.0, 0.0);
         for x in (from..end).step_by(2).map(f32::from_bits) {
-            let ((s, c), (es, ec)) = (sincos_f32(x), f64::from(x).sin_cos());
-            for (got, exact) in [(s, es), (c, ec)] {
+            let ((s, c), (sf, cf), (es, ec)) = (sincos_f32(x), pair_f32::<Fused>(x), f64::from(x).sin_cos());
+            for (got, exact) in [(s, es), (c, ec), (sf, es), (cf, ec)] {
                 // Ulp of the binade of `exact`, not less than the smallest subnormal.
                 let binade = f64::from_bits(exact.to_bits() & (0x7ff << 52)).max(f64::from(f32::MIN_POSITIVE));
                 let error = (f64::from(got) - exact).abs() / (binade * 0.5f64.powi(23));
@@ -322,11 +353,21 @@ fn throughput() {
         let sums = doubles.chunks_exact(8).map(|x| sincos_lanes_f64::<8>(x.try_into().unwrap()));
         sums.map(|(s, c)| s.iter().zip(c).map(|(s, c)| s + c).sum::<f64>()).sum()
     });
+    time("f64 here, slices", &|| {
+        let (mut s, mut c) = ([0.0; 4096], [0.0; 4096]);
+        sincos_slice_f64(&doubles, &mut s, &mut c);
+        s[1] + c[2]
+    });
     time("f64 C library", &|| doubles.iter().map(|x| x.sin_cos()).map(|(s, c)| s + c).sum());
     time("f32 here", &|| singles.iter().map(|x| sincos_f32(*x)).map(|(s, c)| s + c).sum::<f32>().into());
     time("f32 here, lanes of 8", &|| {
         let sums = singles.chunks_exact(8).map(|x| sincos_lanes_f32::<8>(x.try_into().unwrap()));
         sums.map(|(s, c)| s.iter().zip(c).map(|(s, c)| s + c).sum::<f32>()).sum::<f32>().into()
+    });
+    time("f32 here, slices", &|| {
+        let (mut s, mut c) = ([0.0; 4096], [0.0; 4096]);
+        sincos_slice_f32(&singles, &mut s, &mut c);
+        (s[1] + c[2]).into()
     });
     time("f32 C library", &|| singles.iter().map(|x| x.sin_cos()).map(|(s, c)| s + c).sum::<f32>().into());
 }

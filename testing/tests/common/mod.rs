@@ -1,46 +1,21 @@
 //! Runs emitted Rust without compiling it: the source text is parsed with `syn`, lowered, and run.
 //!
-//! The emitted language is tiny, and everything outside it is refused with a panic: `let` of a number or a pair, sums,
-//! products, quotients, signs, sine-cosine pairs, roots, reads and writes of arrays at constant places, calls of parts.
-//! A name that is defined twice in a function is refused too, although Rust would allow it.
+//! What is run are the kernels, for one lane; `compiled.rs` has what stands around them, and lanes. The emitted language is
+//! tiny, and everything outside it is refused with a panic: `let` of a number or a pair, sums, products, quotients, signs,
+//! sine-cosine pairs one by one or all at once, roots, reads and writes of arrays at constant places, loops over lanes. A
+//! name that is defined twice in a block is refused too, although Rust would allow it.
 
 use std::collections::HashMap;
 
 use mbd_runtime::trig::sincos_f64;
 use syn::{Expr, FnArg, ImplItem, Item, Lit, Pat, Stmt, Type, UnOp};
 
-/// An array of any depth, flattened.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Array {
-    pub dims: Vec<usize>,
-    pub data: Vec<f64>,
-}
-
-impl Array {
-    pub fn flat(data: &[f64]) -> Array {
-        Array { dims: vec![data.len()], data: data.to_vec() }
-    }
-
-    /// Not zero: what is read before it is written must show.
-    fn unset(dims: Vec<usize>) -> Array {
-        let n = dims.iter().product();
-        Array { dims, data: vec![f64::NAN; n] }
-    }
-
-    fn place(&self, at: &[usize]) -> usize {
-        assert_eq!(at.len(), self.dims.len(), "depth of an array");
-        at.iter().zip(&self.dims).fold(0, |sum, (k, n)| {
-            assert!(k < n, "{at:?} is out of bounds {:?}", self.dims);
-            sum * n + k
-        })
-    }
-}
-
 /// A number: locals and arrays by their indices in the function.
 enum Number {
     Literal(f64),
     Local(usize),
-    Item(usize, Vec<usize>),
+    /// Number of an array.
+    Item(usize, usize),
     Negative(Box<Number>),
     Sum(Box<[Number; 2]>),
     Difference(Box<[Number; 2]>),
@@ -53,19 +28,19 @@ enum Step {
     Let(usize, Number),
     SinCos([Option<usize>; 2], Number),
     NewArray(usize, usize),
-    Set(usize, Vec<usize>, Number),
-    /// Name of the part and the arrays it is given.
-    Part(String, Vec<usize>),
-    Return(Vec<Number>),
+    Set(usize, usize, Number),
+    /// Arrays of sines and cosines of an array of angles.
+    AllSines([usize; 2], usize),
 }
 
-/// A lowered function.
+/// A lowered kernel.
 struct Function {
-    /// Name, dimensions and mutability of every argument but `self`.
-    arguments: Vec<(String, Vec<usize>, bool)>,
-    /// Arguments first, then fields of `self` and own arrays.
+    /// Name and mutability of every argument.
+    arguments: Vec<(String, bool)>,
+    /// Arguments first, then own arrays.
     arrays: Vec<String>,
-    locals: HashMap<String, usize>,
+    locals: Vec<HashMap<String, usize>>,
+    count: usize,
     steps: Vec<Step>,
 }
 
@@ -87,49 +62,25 @@ impl Emitted {
             for item in block.items {
                 let ImplItem::Fn(f) = item else { continue };
                 let name = f.sig.ident.to_string();
-                if name == "new" {
-                    continue;
-                }
-                assert!(functions.insert(name.clone(), Function::lower(&f)).is_none(), "{name} is emitted twice");
+                let Some(name) = name.strip_suffix("_kernel") else { continue };
+                assert!(functions.insert(name.to_string(), Function::lower(&f)).is_none(), "{name} is emitted twice");
             }
         }
         Emitted { functions }
     }
 
-    /// Runs a function: arrays in by the names of arguments and fields (`q`, `self.tau`), arrays out by the names of the
-    /// `&mut` arguments; a returned array is called `return`.
-    pub fn run(&self, name: &str, inputs: &HashMap<String, Array>) -> HashMap<String, Array> {
+    /// Runs a kernel: arrays in by the names of arguments (`q`, `tau`), flat; arrays out by the names of the `&mut`
+    /// arguments; a returned array is called `result`.
+    pub fn run(&self, name: &str, inputs: &HashMap<String, Vec<f64>>) -> HashMap<String, Vec<f64>> {
         let f = &self.functions[name];
-        let given = f.arguments.iter().map(|(arg, dims, mutable)| {
-            if *mutable {
-                Array::unset(dims.clone())
-            } else {
-                inputs.get(arg).unwrap_or_else(|| panic!("{name} reads {arg}")).clone()
+        // Not zero: what is read before it is written must show.
+        let mut arrays: Vec<Vec<f64>> = vec![Vec::new(); f.arrays.len()];
+        for (array, (arg, mutable)) in arrays.iter_mut().zip(&f.arguments) {
+            if !mutable {
+                *array = inputs.get(arg).unwrap_or_else(|| panic!("{name} reads {arg}")).clone();
             }
-        });
-        let (returned, arrays) = self.call(f, given.collect(), inputs);
-        let results = f.arguments.iter().zip(arrays).filter(|((_, _, mutable), _)| *mutable);
-        let results = results.map(|((arg, _, _), array)| (arg.clone(), array));
-        results.chain(returned.map(|values| ("return".to_string(), Array::flat(&values)))).collect()
-    }
-
-    /// Runs a function on its arguments and gives them back.
-    fn call(
-        &self,
-        f: &Function,
-        mut arrays: Vec<Array>,
-        fields: &HashMap<String, Array>,
-    ) -> (Option<Vec<f64>>, Vec<Array>) {
-        for ((name, dims, _), array) in f.arguments.iter().zip(&arrays) {
-            assert_eq!(*dims, array.dims, "{name}");
         }
-        for name in &f.arrays[arrays.len()..] {
-            arrays.push(match name.starts_with("self.") {
-                true => fields.get(name).unwrap_or_else(|| panic!("no field {name}")).clone(),
-                false => Array::unset(Vec::new()),
-            });
-        }
-        let mut locals = vec![f64::NAN; f.locals.len()];
+        let mut locals = vec![f64::NAN; f.count];
         for step in &f.steps {
             match step {
                 Step::Let(to, x) => locals[*to] = x.value(&locals, &arrays),
@@ -139,36 +90,36 @@ impl Emitted {
                         to.iter().for_each(|to| locals[*to] = x);
                     }
                 }
-                Step::NewArray(to, n) => arrays[*to] = Array::unset(vec![*n]),
-                Step::Set(to, at, x) => {
+                Step::NewArray(to, n) => arrays[*to] = vec![f64::NAN; *n],
+                Step::Set(to, k, x) => {
                     let x = x.value(&locals, &arrays);
-                    let place = arrays[*to].place(at);
-                    arrays[*to].data[place] = x;
-                }
-                Step::Part(name, given) => {
-                    let part = &self.functions[name];
-                    assert_eq!(given.len(), part.arguments.len(), "arguments of {name}");
-                    let lent = given.iter().map(|k| std::mem::replace(&mut arrays[*k], Array::flat(&[])));
-                    let (returned, back) = self.call(part, lent.collect(), fields);
-                    assert!(returned.is_none());
-                    for (k, array) in given.iter().zip(back) {
-                        arrays[*k] = array;
+                    let array = &mut arrays[*to];
+                    // Results are written in order; the lengths of their arrays are not in the text.
+                    if *k == array.len() {
+                        array.push(x);
+                    } else {
+                        array[*k] = x;
                     }
                 }
-                Step::Return(list) => return (Some(list.iter().map(|x| x.value(&locals, &arrays)).collect()), arrays),
+                Step::AllSines(to, from) => {
+                    let pairs: Vec<(f64, f64)> = arrays[*from].iter().map(|x| sincos_f64(*x)).collect();
+                    arrays[to[0]] = pairs.iter().map(|p| p.0).collect();
+                    arrays[to[1]] = pairs.iter().map(|p| p.1).collect();
+                }
             }
         }
-        (None, arrays)
+        let results = f.arguments.iter().zip(arrays).filter(|((_, mutable), _)| *mutable);
+        results.map(|((arg, _), array)| (arg.clone(), array)).collect()
     }
 }
 
 impl Number {
-    fn value(&self, locals: &[f64], arrays: &[Array]) -> f64 {
+    fn value(&self, locals: &[f64], arrays: &[Vec<f64>]) -> f64 {
         let of = |x: &Number| x.value(locals, arrays);
         match self {
             Number::Literal(x) => *x,
             Number::Local(k) => locals[*k],
-            Number::Item(k, at) => arrays[*k].data[arrays[*k].place(at)],
+            Number::Item(array, k) => arrays[*array][*k],
             Number::Negative(x) => -of(x),
             Number::Sum(x) => of(&x[0]) + of(&x[1]),
             Number::Difference(x) => of(&x[0]) - of(&x[1]),
@@ -182,32 +133,45 @@ impl Number {
 impl Function {
     fn lower(f: &syn::ImplItemFn) -> Function {
         let arguments = arguments(f);
-        let arrays = arguments.iter().map(|(name, _, _)| name.clone()).collect();
-        let mut out = Function { arguments, arrays, locals: HashMap::new(), steps: Vec::new() };
-        for stmt in &f.block.stmts {
-            let step = match stmt {
-                Stmt::Local(local) => out.binding(local),
-                Stmt::Expr(Expr::Assign(a), Some(_)) => {
-                    let (array, at) = out.place(&a.left);
-                    Step::Set(array, at, out.number(&a.right))
-                }
-                // self.rates_part1(q, p, &mut kept);
-                Stmt::Expr(Expr::MethodCall(call), Some(_)) => {
-                    let given = call.args.iter().map(|a| match a {
-                        Expr::Reference(r) => out.array(path(&r.expr)),
-                        a => out.array(path(a)),
-                    });
-                    Step::Part(call.method.to_string(), given.collect())
-                }
-                Stmt::Expr(Expr::Array(list), None) => Step::Return(list.elems.iter().map(|e| out.number(e)).collect()),
-                other => panic!("unexpected statement {other:?}"),
-            };
-            out.steps.push(step);
-        }
+        let arrays = arguments.iter().map(|(name, _)| name.clone()).collect();
+        let mut out = Function { arguments, arrays, locals: vec![HashMap::new()], count: 0, steps: Vec::new() };
+        out.block(&f.block.stmts);
         out
     }
 
-    /// `let x = ..;`, `let (s, c) = ..sincos_f64(x);`, `let mut kept = [0.0; n];`
+    fn block(&mut self, statements: &[Stmt]) {
+        for stmt in statements {
+            let step = match stmt {
+                Stmt::Local(local) => self.binding(local),
+                // angles[0][l] = q_1;
+                Stmt::Expr(Expr::Assign(a), Some(_)) => {
+                    let (array, k) = self.place(&a.left);
+                    Step::Set(array, k, self.number(&a.right))
+                }
+                // qd.give(0, &results[4]);
+                Stmt::Expr(Expr::MethodCall(call), Some(_)) if call.method == "give" => {
+                    let Expr::Reference(result) = &call.args[1] else { panic!("results are lent") };
+                    let Expr::Index(result) = &*result.expr else { panic!("a result") };
+                    let result = Number::Item(self.array(path(&result.expr)), literal(&result.index) as usize);
+                    Step::Set(self.array(path(&call.receiver)), literal(&call.args[0]) as usize, result)
+                }
+                // for l in 0..LANES { .. }
+                Stmt::Expr(Expr::ForLoop(all), None) => {
+                    let Expr::Range(range) = &*all.expr else { panic!("a loop over lanes") };
+                    assert_eq!(range.end.as_deref().map(path).as_deref(), Some("LANES"));
+                    self.locals.push(HashMap::new());
+                    self.block(&all.body.stmts);
+                    self.locals.pop();
+                    continue;
+                }
+                other => panic!("unexpected statement {other:?}"),
+            };
+            self.steps.push(step);
+        }
+    }
+
+    /// `let x = ..;`, `let (s, c) = ..pair_f64::<..>(x);`, `let mut angles = [[0.0; LANES]; n];`,
+    /// `let (sines, cosines) = ..pairs_f64::<..>(&angles);`
     fn binding(&mut self, local: &syn::Local) -> Step {
         let value = &local.init.as_ref().expect("every binding has a value").expr;
         match (&local.pat, &**value) {
@@ -220,24 +184,30 @@ impl Function {
                 Step::Let(self.define(name.ident.to_string()), x)
             }
             (Pat::Tuple(pair), Expr::Call(call)) => {
-                assert!(path(&call.func).ends_with("::trig::sincos_f64"), "{}", path(&call.func));
-                let x = self.number(&call.args[0]);
                 assert_eq!(pair.elems.len(), 2);
-                let to = [&pair.elems[0], &pair.elems[1]].map(|pat| match pat {
-                    Pat::Ident(name) => Some(self.define(name.ident.to_string())),
+                let names = [&pair.elems[0], &pair.elems[1]].map(|pat| match pat {
+                    Pat::Ident(name) => Some(name.ident.to_string()),
                     Pat::Wild(_) => None,
                     other => panic!("unexpected pattern {other:?}"),
                 });
-                Step::SinCos(to, x)
+                if path(&call.func).ends_with("::trig::pairs_f64") {
+                    let Expr::Reference(angles) = &call.args[0] else { panic!("angles are lent") };
+                    let angles = self.array(path(&angles.expr));
+                    return Step::AllSines(names.map(|name| self.array(name.expect("a name"))), angles);
+                }
+                assert!(path(&call.func).ends_with("::trig::pair_f64"), "{}", path(&call.func));
+                let x = self.number(&call.args[0]);
+                Step::SinCos(names.map(|name| name.map(|name| self.define(name))), x)
             }
             other => panic!("unexpected binding {other:?}"),
         }
     }
 
     fn define(&mut self, name: String) -> usize {
-        let k = self.locals.len();
-        assert!(self.locals.insert(name.clone(), k).is_none(), "{name} is defined twice");
-        k
+        let scope = self.locals.last_mut().expect("a block");
+        assert!(scope.insert(name.clone(), self.count).is_none(), "{name} is defined twice");
+        self.count += 1;
+        self.count - 1
     }
 
     fn array(&mut self, name: String) -> usize {
@@ -247,16 +217,12 @@ impl Function {
         })
     }
 
-    /// An array and the indices of an element.
-    fn place(&mut self, e: &Expr) -> (usize, Vec<usize>) {
-        match e {
-            Expr::Index(i) => {
-                let (array, mut at) = self.place(&i.expr);
-                at.push(literal(&i.index) as usize);
-                (array, at)
-            }
-            e => (self.array(path(e)), Vec::new()),
-        }
+    /// `angles[0][l]`: array and place.
+    fn place(&mut self, e: &Expr) -> (usize, usize) {
+        let Expr::Index(lane) = e else { panic!("unexpected place {e:?}") };
+        assert_eq!(path(&lane.index), "l");
+        let Expr::Index(item) = &*lane.expr else { panic!("unexpected place {e:?}") };
+        (self.array(path(&item.expr)), literal(&item.index) as usize)
     }
 
     fn number(&mut self, e: &Expr) -> Number {
@@ -265,11 +231,18 @@ impl Function {
             Expr::Paren(p) => self.number(&p.expr),
             Expr::Path(_) => {
                 let name = path(e);
-                Number::Local(*self.locals.get(&name).unwrap_or_else(|| panic!("{name} is not defined")))
+                Number::Local(
+                    *self.locals.last().and_then(|l| l.get(&name)).unwrap_or_else(|| panic!("{name} is not defined")),
+                )
             }
             Expr::Index(_) => {
-                let (array, at) = self.place(e);
-                Number::Item(array, at)
+                let (array, k) = self.place(e);
+                Number::Item(array, k)
+            }
+            // q.get(1, l)
+            Expr::MethodCall(call) if call.method == "get" => {
+                assert_eq!(path(&call.args[1]), "l");
+                Number::Item(self.array(path(&call.receiver)), literal(&call.args[0]) as usize)
             }
             Expr::Unary(u) if matches!(u.op, UnOp::Neg(_)) => Number::Negative(Box::new(self.number(&u.expr))),
             Expr::Binary(b) => {
@@ -290,37 +263,24 @@ impl Function {
     }
 }
 
-/// Name, dimensions and mutability of every argument but `self`.
-fn arguments(f: &syn::ImplItemFn) -> Vec<(String, Vec<usize>, bool)> {
-    let typed = f.sig.inputs.iter().filter_map(|a| match a {
-        FnArg::Typed(t) => Some(t),
-        FnArg::Receiver(_) => None,
-    });
-    let one = |t: &syn::PatType| {
+/// Name and mutability of every argument.
+fn arguments(f: &syn::ImplItemFn) -> Vec<(String, bool)> {
+    let one = |argument: &FnArg| {
+        let FnArg::Typed(t) = argument else { panic!("a kernel has no self") };
         let Pat::Ident(name) = &*t.pat else { panic!("unexpected argument") };
         let Type::Reference(reference) = &*t.ty else { panic!("arguments are references") };
-        let mut dims = Vec::new();
-        let mut ty = &*reference.elem;
-        while let Type::Array(array) = ty {
-            dims.push(literal(&array.len) as usize);
-            ty = &array.elem;
-        }
-        (name.ident.to_string(), dims, reference.mutability.is_some())
+        (name.ident.to_string(), reference.mutability.is_some())
     };
-    typed.map(one).collect()
+    f.sig.inputs.iter().map(one).collect()
 }
 
-/// `q`, `self.tau`, `::mbd_runtime::trig::sincos_f64`.
+/// `q`, `::mbd_runtime::trig::pair_f64`.
 fn path(e: &Expr) -> String {
     match e {
         Expr::Path(p) => {
             let parts: Vec<String> = p.path.segments.iter().map(|s| s.ident.to_string()).collect();
             parts.join("::")
         }
-        Expr::Field(f) => match &f.member {
-            syn::Member::Named(name) => format!("{}.{name}", path(&f.base)),
-            syn::Member::Unnamed(_) => panic!("a field without name"),
-        },
         other => panic!("unexpected path {other:?}"),
     }
 }

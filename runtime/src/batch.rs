@@ -1,0 +1,158 @@
+//! Rates of many states: columns in, columns out.
+//!
+//! A column holds one coordinate of every state, `q[k][s]` that of coordinate `k` in state `s`: so neighbouring states
+//! are computed side by side in vector registers, and nothing is turned around on the way. Generated types have a method
+//! `rates_batch`; with feature `rayon`, [`rates_parallel`] gives the states to several threads.
+
+use crate::Scalar;
+
+/// Columns of different lengths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lengths {
+    /// That of the first column.
+    pub expected: usize,
+    /// One that differs.
+    pub found: usize,
+}
+
+impl core::fmt::Display for Lengths {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "a column has {} numbers, the first has {}", self.found, self.expected)
+    }
+}
+
+impl core::error::Error for Lengths {}
+
+/// A system whose rates can be computed for many states in one call. `NT` is `NV`, or 0 without joint forces.
+pub trait RatesBatch<T, const NQ: usize, const NV: usize, const NT: usize> {
+    /// Rates of any number of states; the columns are those of `q` (rad, m), `p`, `tau` (N m, N), `q̇` and `ṗ`.
+    ///
+    /// # Errors
+    /// Columns of different lengths; nothing is written then.
+    fn rates_batch(
+        &self,
+        q: [&[T]; NQ],
+        p: [&[T]; NV],
+        tau: [&[T]; NT],
+        qd: [&mut [T]; NQ],
+        pd: [&mut [T]; NV],
+    ) -> Result<(), Lengths>;
+}
+
+/// Length of all columns.
+fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, Lengths> {
+    let mut lengths = lengths.into_iter();
+    let expected = lengths.next().unwrap_or(0);
+    match lengths.find(|n| *n != expected) {
+        Some(found) => Err(Lengths { expected, found }),
+        None => Ok(expected),
+    }
+}
+
+/// States `at..at + L` of some columns. Behind the last state stands the last one again: a state that exists.
+#[inline(always)]
+fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usize, block: &mut [[T; L]; N]) {
+    for (column, lanes) in columns.iter().zip(block) {
+        let rest = column.get(at..).unwrap_or(&[]);
+        if let Some(full) = rest.first_chunk::<L>() {
+            *lanes = *full;
+        } else if let Some(last) = rest.last() {
+            *lanes = [*last; L];
+            lanes.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+        }
+    }
+}
+
+/// The way back.
+#[inline(always)]
+fn store<T: Scalar, const L: usize, const N: usize>(block: &[[T; L]; N], at: usize, columns: &mut [&mut [T]; N]) {
+    for (lanes, column) in block.iter().zip(columns) {
+        let rest = column.get_mut(at..).unwrap_or(&mut []);
+        if let Some(full) = rest.first_chunk_mut::<L>() {
+            *full = *lanes;
+        } else {
+            rest.iter_mut().zip(lanes).for_each(|(to, from)| *to = *from);
+        }
+    }
+}
+
+/// Cuts columns into blocks of `L` states and runs a kernel on each; for generated code.
+///
+/// # Errors
+/// Columns of different lengths.
+#[inline]
+pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT: usize>(
+    q: [&[T]; NQ],
+    p: [&[T]; NV],
+    tau: [&[T]; NT],
+    mut qd: [&mut [T]; NQ],
+    mut pd: [&mut [T]; NV],
+    mut kernel: impl FnMut(&[[T; L]; NQ], &[[T; L]; NV], &[[T; L]; NT], &mut [[T; L]; NQ], &mut [[T; L]; NV]),
+) -> Result<(), Lengths> {
+    let inputs = q.iter().chain(&p).chain(&tau).map(|c| c.len());
+    let n = length(inputs.chain(qd.iter().chain(&pd).map(|c| c.len())))?;
+    let zero = [T::zero(); L];
+    let (mut q_block, mut p_block, mut tau_block) = ([zero; NQ], [zero; NV], [zero; NT]);
+    let (mut qd_block, mut pd_block) = ([zero; NQ], [zero; NV]);
+    for at in (0..n).step_by(L.max(1)) {
+        load(&q, at, &mut q_block);
+        load(&p, at, &mut p_block);
+        load(&tau, at, &mut tau_block);
+        kernel(&q_block, &p_block, &tau_block, &mut qd_block, &mut pd_block);
+        store(&qd_block, at, &mut qd);
+        store(&pd_block, at, &mut pd);
+    }
+    Ok(())
+}
+
+/// [`RatesBatch::rates_batch`] on the threads of rayon's pool. Every state's numbers are those of one thread alone.
+///
+/// # Errors
+/// Columns of different lengths; nothing is written then.
+#[cfg(feature = "rayon")]
+pub fn rates_parallel<S, T, const NQ: usize, const NV: usize, const NT: usize>(
+    system: &S,
+    q: [&[T]; NQ],
+    p: [&[T]; NV],
+    tau: [&[T]; NT],
+    qd: [&mut [T]; NQ],
+    pd: [&mut [T]; NV],
+) -> Result<(), Lengths>
+where
+    S: RatesBatch<T, NQ, NV, NT> + Sync,
+    T: Scalar + Send + Sync,
+{
+    /// Fewer states are not worth a thread; a multiple of all block sizes.
+    const GRAIN: usize = 256;
+    let inputs = q.iter().chain(&p).chain(&tau).map(|c| c.len());
+    let n = length(inputs.chain(qd.iter().chain(&pd).map(|c| c.len())))?;
+    if n < 2 * GRAIN {
+        return system.rates_batch(q, p, tau, qd, pd);
+    }
+    let at = n / 2 / GRAIN * GRAIN;
+    let ((q, q_rest), (p, p_rest), (tau, tau_rest)) = (halves(q, at), halves(p, at), halves(tau, at));
+    let ((qd, qd_rest), (pd, pd_rest)) = (halves_mut(qd, at), halves_mut(pd, at));
+    let (first, second) = rayon::join(
+        || rates_parallel(system, q, p, tau, qd, pd),
+        || rates_parallel(system, q_rest, p_rest, tau_rest, qd_rest, pd_rest),
+    );
+    first.and(second)
+}
+
+#[cfg(feature = "rayon")]
+fn halves<T, const N: usize>(columns: [&[T]; N], at: usize) -> ([&[T]; N], [&[T]; N]) {
+    (columns.map(|c| c.split_at(at).0), columns.map(|c| c.split_at(at).1))
+}
+
+#[cfg(feature = "rayon")]
+fn halves_mut<T, const N: usize>(columns: [&mut [T]; N], at: usize) -> ([&mut [T]; N], [&mut [T]; N]) {
+    let mut rest: [&mut [T]; N] = core::array::from_fn(|_| <&mut [T]>::default());
+    let mut k = 0;
+    let first = columns.map(|c| {
+        let (a, b) = c.split_at_mut(at);
+        rest[k] = b;
+        k += 1;
+        a
+    });
+    (first, rest)
+}

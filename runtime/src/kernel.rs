@@ -1,0 +1,263 @@
+//! How generated code meets the processor: one source text, compiled for what the machine has.
+//!
+//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it
+//! compiled for the best the processor offers. With feature `std` that is found out at run time, once, so that a plain
+//! `cargo build --release` is fast everywhere; without it, kernels are plain code of the target.
+//!
+//! | arithmetic | `a · b + c` | where |
+//! | --- | --- | --- |
+//! | [`Plain`] | two roundings | everywhere; the only one without `std` |
+//! | `Fused` | one rounding | x86-64 with AVX2 and FMA, and aarch64; with `std` |
+//!
+//! Vectors come from the compiler: a kernel is a loop over lanes whose body is straight-line code, and the loop is
+//! compiled into vector instructions. Where AVX-512 is there and the compiler is 1.89 or later, lanes that fill its
+//! registers use it.
+//!
+//! The only `unsafe` code of the project stands at the end of this file. It calls functions that are compiled for more
+//! than the baseline of the target, which is sound where the processor has been asked; [`level`] is asked each time.
+
+/// What a kernel computes with. The numbers are ordinary ones; what differs is how a product is added.
+pub trait Arithmetic: Copy {
+    /// Whether `a · b + c` is rounded once.
+    const FUSED: bool;
+    /// `a · b + c` in double precision.
+    fn fma_f64(a: f64, b: f64, c: f64) -> f64;
+    /// `a · b + c` in single precision.
+    fn fma_f32(a: f32, b: f32, c: f32) -> f32;
+}
+
+/// Products are rounded before they are added: the same bits on every machine.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+impl Arithmetic for Plain {
+    const FUSED: bool = false;
+    #[inline(always)]
+    fn fma_f64(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+    #[inline(always)]
+    fn fma_f32(a: f32, b: f32, c: f32) -> f32 {
+        a * b + c
+    }
+}
+
+/// Products are added without being rounded. Quick only where the processor can do it, right everywhere.
+#[cfg(feature = "std")]
+#[derive(Clone, Copy, Debug)]
+pub struct Fused;
+
+#[cfg(feature = "std")]
+impl Arithmetic for Fused {
+    const FUSED: bool = true;
+    #[inline(always)]
+    fn fma_f64(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+    #[inline(always)]
+    fn fma_f32(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
+}
+
+/// Body number `ID` of a generated type, for `L` lanes. `run` must be `#[inline(always)]`: so it is compiled as part of its caller, for
+/// the caller's processor.
+pub trait Kernel<const ID: usize, const L: usize, Arguments> {
+    /// Runs it.
+    fn run<A: Arithmetic>(arguments: Arguments);
+}
+
+/// Numbers that a kernel reads: number `k` of lane `l`.
+///
+/// An array of numbers is the same in every lane; an array of arrays has one number for each lane.
+pub trait Read<T> {
+    /// Number `k` of lane `l`.
+    fn get(&self, k: usize, l: usize) -> T;
+}
+
+/// Numbers that a kernel writes: number `k` of lane `l`.
+pub trait Write<T> {
+    /// Sets number `k` of lane `l`.
+    fn set(&mut self, k: usize, l: usize, x: T);
+    /// Sets number `k` of all lanes.
+    #[inline(always)]
+    fn give<const L: usize>(&mut self, k: usize, x: &[T; L])
+    where
+        T: Copy,
+    {
+        for l in 0..L {
+            self.set(k, l, x[l]);
+        }
+    }
+}
+
+macro_rules! places {
+    ($float:ident) => {
+        places!(@one $float, [const N: usize], [$float; N]);
+        places!(@one $float, [], [$float]);
+        places!(@lanes $float, [const L: usize, const N: usize], [[$float; L]; N]);
+        places!(@lanes $float, [const L: usize], [[$float; L]]);
+    };
+    (@one $float:ident, [$($parameters:tt)*], $array:ty) => {
+        impl<$($parameters)*> Read<$float> for $array {
+            #[inline(always)]
+            fn get(&self, k: usize, _: usize) -> $float {
+                self[k]
+            }
+        }
+        impl<$($parameters)*> Write<$float> for $array {
+            #[inline(always)]
+            fn set(&mut self, k: usize, _: usize, x: $float) {
+                self[k] = x;
+            }
+        }
+    };
+    (@lanes $float:ident, [$($parameters:tt)*], $array:ty) => {
+        impl<$($parameters)*> Read<$float> for $array {
+            #[inline(always)]
+            fn get(&self, k: usize, l: usize) -> $float {
+                self[k][l]
+            }
+        }
+        impl<$($parameters)*> Write<$float> for $array {
+            #[inline(always)]
+            fn set(&mut self, k: usize, l: usize, x: $float) {
+                self[k][l] = x;
+            }
+        }
+    };
+}
+
+places!(f64);
+places!(f32);
+
+/// What the processor offers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Nothing beyond the baseline of the target.
+    Plain,
+    /// Fused multiplication and addition; on x86-64 with vectors of 32 bytes (AVX2).
+    Fused,
+    /// The same with vectors of 64 bytes (AVX-512).
+    Wide,
+}
+
+/// What the processor offers, as far as kernels make use of it.
+#[inline]
+pub fn level() -> Level {
+    processor::level()
+}
+
+/// Runs a kernel for one state.
+#[inline(always)]
+pub fn call<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
+    processor::call::<K, ID, 1, X, false>(arguments);
+}
+
+/// Runs a kernel for `L` states of numbers of type `T`.
+#[inline(always)]
+pub fn call_lanes<K: Kernel<ID, L, X>, const ID: usize, const L: usize, T, X>(arguments: X) {
+    // Vectors of 64 bytes only where the lanes fill them.
+    if const { L * size_of::<T>() >= 64 } {
+        processor::call::<K, ID, L, X, true>(arguments);
+    } else {
+        processor::call::<K, ID, L, X, false>(arguments);
+    }
+}
+
+/// Found out at run time.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+#[allow(unsafe_code)]
+mod processor {
+    use core::sync::atomic::{AtomicU8, Ordering};
+
+    use super::{Fused, Kernel, Level, Plain};
+
+    /// 0: not asked yet; else one more than the level.
+    static LEVEL: AtomicU8 = AtomicU8::new(0);
+
+    #[inline]
+    pub fn level() -> Level {
+        match LEVEL.load(Ordering::Relaxed) {
+            3 => Level::Wide,
+            2 => Level::Fused,
+            1 => Level::Plain,
+            _ => ask(),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn ask() -> Level {
+        use std::is_x86_feature_detected as has;
+        let wide = cfg!(avx512) && has!("avx512f") && has!("avx512dq") && has!("avx512vl");
+        let found = match has!("avx2") && has!("fma") {
+            true if wide => Level::Wide,
+            true => Level::Fused,
+            false => Level::Plain,
+        };
+        LEVEL.store(found as u8 + 1, Ordering::Relaxed);
+        found
+    }
+
+    #[inline(always)]
+    pub fn call<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X, const WIDE: bool>(arguments: X) {
+        #[cfg(all(target_feature = "avx2", target_feature = "fma"))]
+        if !WIDE {
+            // The whole program is compiled for such a processor: nothing to ask, and the kernel can be inlined.
+            return K::run::<Fused>(arguments);
+        }
+        match level() {
+            // SAFETY: `level` says that the processor has AVX2, FMA and these three parts of AVX-512.
+            #[cfg(avx512)]
+            Level::Wide if WIDE => unsafe { wide::<K, ID, L, X>(arguments) },
+            // SAFETY: `level` says that the processor has AVX2 and FMA.
+            Level::Wide | Level::Fused => unsafe { fused::<K, ID, L, X>(arguments) },
+            Level::Plain => plain::<K, ID, L, X>(arguments),
+        }
+    }
+
+    #[inline(never)]
+    fn plain<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X>(arguments: X) {
+        K::run::<Plain>(arguments);
+    }
+
+    /// # Safety
+    /// The processor has AVX2 and FMA.
+    #[target_feature(enable = "avx2,fma")]
+    unsafe fn fused<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X>(arguments: X) {
+        K::run::<Fused>(arguments);
+    }
+
+    /// # Safety
+    /// The processor has AVX2, FMA, and of AVX-512 F, DQ and VL.
+    #[cfg(avx512)]
+    #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
+    unsafe fn wide<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X>(arguments: X) {
+        K::run::<Fused>(arguments);
+    }
+}
+
+/// Known when the program is compiled.
+#[cfg(not(all(feature = "std", target_arch = "x86_64")))]
+mod processor {
+    use super::{Kernel, Level};
+
+    #[cfg(all(feature = "std", target_arch = "aarch64"))]
+    type Best = super::Fused;
+    #[cfg(not(all(feature = "std", target_arch = "aarch64")))]
+    type Best = super::Plain;
+
+    #[inline]
+    pub fn level() -> Level {
+        match cfg!(all(feature = "std", target_arch = "aarch64")) {
+            true => Level::Fused,
+            false => Level::Plain,
+        }
+    }
+
+    #[inline(always)]
+    pub fn call<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X, const WIDE: bool>(arguments: X) {
+        K::run::<Best>(arguments);
+    }
+}

@@ -1,0 +1,116 @@
+//! Lanes are vector instructions: emitted code is compiled, and its assembly looked at.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use mbd_codegen::import::{load, ImportOptions};
+use mbd_codegen::{generate, Group, Options, Precision};
+
+/// Runs the compiler that built this test, or the first on the path.
+fn rustc(arguments: &[&str], source: &Path, folder: &Path) {
+    let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let mut command = Command::new(compiler);
+    command.args([
+        "--edition",
+        "2021",
+        "--crate-type",
+        "rlib",
+        "-C",
+        "opt-level=3",
+        "-C",
+        "symbol-mangling-version=v0",
+    ]);
+    command.args(["--cap-lints", "allow", "--out-dir"]).arg(folder).args(arguments).arg(source);
+    let output = command.output().expect("rustc runs");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+fn source(model: &str, name: &str, precision: Precision) -> String {
+    let file = format!("{}/../models/{model}", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(&file).expect("the model");
+    let (model, findings) = load(&file, &text, &ImportOptions::default());
+    let options = Options {
+        type_name: "Arm".to_string(),
+        runtime: "mbd_runtime".to_string(),
+        outputs: vec![Group::Rates],
+        precision,
+        ..Options::default()
+    };
+    let code = generate(&model.unwrap_or_else(|| panic!("{findings}")), &options).expect("code");
+    let (t, lanes) = match precision {
+        Precision::F64 => ("f64", 8),
+        Precision::F32 => ("f32", 16),
+    };
+    format!(
+        "mod {name} {{ {}
+            pub fn use_lanes(arm: &ArmLanes<{lanes}>, q: &[[{t}; {lanes}]; Arm::NQ], p: &[[{t}; {lanes}]; Arm::NV],
+                qd: &mut [[{t}; {lanes}]; Arm::NQ], pd: &mut [[{t}; {lanes}]; Arm::NV]) {{ arm.rates(q, p, qd, pd); }}
+        }}
+        pub use {name}::use_lanes as {name}_lanes;\n",
+        code.source.replace("//!", "//")
+    )
+}
+
+/// Bodies of the functions whose symbol contains all of some words.
+fn functions<'a>(assembly: &'a str, words: &[&str]) -> Vec<Vec<&'a str>> {
+    let mut found = Vec::new();
+    let mut body: Option<Vec<&str>> = None;
+    for line in assembly.lines() {
+        match line.strip_suffix(':') {
+            Some(label) if !label.starts_with(['.', ' ', '\t']) => {
+                found.extend(body.take());
+                body = words.iter().all(|w| label.contains(w)).then(Vec::new);
+            }
+            _ if line.contains(".cfi_endproc") => found.extend(body.take()),
+            _ => body.iter_mut().for_each(|b| b.push(line.trim())),
+        }
+    }
+    found
+}
+
+/// Instructions of arithmetic: (of whole vectors of 32 bytes, of single numbers).
+fn arithmetic(body: &[&str], packed: &str, single: &str) -> (usize, usize) {
+    let is = |word: &str, suffix: &str| {
+        let name = word.strip_suffix(suffix).and_then(|n| n.strip_prefix('v')).unwrap_or("");
+        ["add", "sub", "mul", "div", "fmadd", "fmsub", "fnmadd", "fnmsub"]
+            .iter()
+            .any(|k| name.strip_prefix(k).is_some_and(|rest| rest.chars().all(|c| c.is_ascii_digit())))
+    };
+    let count = |suffix: &str, register: &str| {
+        let all = body.iter().filter(|l| l.split_whitespace().next().is_some_and(|word| is(word, suffix)));
+        all.filter(|l| l.contains(register)).count()
+    };
+    (count(packed, "ymm"), count(single, "xmm"))
+}
+
+#[test]
+fn lanes_are_vectors() {
+    if !cfg!(target_arch = "x86_64") {
+        eprintln!("not looked at: the assembly of {}", std::env::consts::ARCH);
+        return;
+    }
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("assembly");
+    std::fs::create_dir_all(&folder).expect("room for the assembly");
+    let runtime = Path::new(env!("CARGO_MANIFEST_DIR")).join("../runtime/src/lib.rs");
+    // Without the switch for AVX-512: every compiler has AVX2. Without the interpreter: nothing else to link.
+    let features = ["--cfg", "feature=\"std\"", "--crate-name", "mbd_runtime"];
+    rustc(&features, &runtime, &folder);
+    let text = source("ur5.urdf", "double", Precision::F64) + &source("ur5.urdf", "single", Precision::F32);
+    let file = folder.join("arms.rs");
+    std::fs::write(&file, text).expect("the source");
+    let library = format!("mbd_runtime={}", folder.join("libmbd_runtime.rlib").display());
+    rustc(&["--emit", "asm", "-C", "codegen-units=1", "--extern", &library, "--crate-name", "arms"], &file, &folder);
+    let assembly = std::fs::read_to_string(folder.join("arms.s")).expect("the assembly");
+    for (word, packed, single) in [("6double", "pd", "sd"), ("6single", "ps", "ss")] {
+        let bodies = functions(&assembly, &["9processor5fused", word]);
+        let largest = bodies.iter().max_by_key(|b| b.len()).unwrap_or_else(|| panic!("no function of `{word}`"));
+        let (vectors, numbers) = arithmetic(largest, packed, single);
+        let fused = largest.iter().filter(|l| l.starts_with("vf") && l.contains("ymm")).count();
+        eprintln!(
+            "{word}: {vectors} instructions on whole vectors, {fused} of them fused; {numbers} on single numbers"
+        );
+        // The arm has some three hundred operations, sines and cosines a hundred more.
+        assert!(vectors > 250 && fused > 80, "{word}: {vectors} on vectors, {fused} fused");
+        assert_eq!(numbers, 0, "{word}: on single numbers");
+    }
+}
