@@ -23,10 +23,14 @@ const ROUNDS: usize = 4;
 /// Registers that a schedule fills: of the 32 of AVX-512, or of 16 with some in memory, which costs little.
 const LIMITS: Limits = Limits { registers: 24, search: 64 };
 
-/// Programs whose pipes are busy this many times as long as their longest path takes keep the order of the sweeps: there is
-/// always something to do, and values that are used where they are made stay in registers. (Derivatives of Panda and
-/// Solo12, at 2.4 and 8 times, take a fifth less time with fused operations than in the order of a schedule.)
+/// Long programs whose pipes are busy this many times as long as their longest path takes keep the order of the sweeps:
+/// there is always something to do, and values that are used where they are made stay in registers. (Derivatives of a
+/// general chain, Panda and Solo12 then take less time, the last two a fifth with fused operations; iiwa's, with fewer
+/// instructions, take more.)
 const WIDE: f64 = 2.0;
+
+/// Instructions of a long program.
+const LONG: usize = 1400;
 
 /// The program as it is to be emitted.
 pub fn run(program: Program, arithmetic: Arithmetic) -> Program {
@@ -34,9 +38,10 @@ pub fn run(program: Program, arithmetic: Arithmetic) -> Program {
         Arithmetic::Exact => program,
         Arithmetic::Fast => {
             let program = shorten::regroup_short(&constants::gather(&fewer(program)));
-            match program.throughput() < WIDE * f64::from(program.critical_path()) {
-                true => schedule::schedule(&program, LIMITS),
-                false => program,
+            let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
+            match wide && program.instructions() >= LONG {
+                true => program,
+                false => schedule::schedule(&program, LIMITS),
             }
         }
     }
