@@ -81,12 +81,17 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
+        for l in 0..LANES { given[2][l] = tau.get(0, l); }
+        for l in 0..LANES { given[3][l] = tau.get(1, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
+            let tau_0 = given[2][l];
+            let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -160,10 +165,13 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
             // lower: sine and cosine, rotation
             let lower_cos0 = cosines[0][l];
             // lower: inertia carried to the parent, M* (4.48)
@@ -207,10 +215,13 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
             // lower: sine and cosine, rotation
             let lower_cos0 = cosines[0][l];
             // lower: velocity and joint rate (4.40)
@@ -252,10 +263,13 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -319,12 +333,17 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = tau.get(0, l); }
+        for l in 0..LANES { given[3][l] = tau.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let tau_0 = given[2][l];
+            let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -395,12 +414,17 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = tau.get(0, l); }
+        for l in 0..LANES { given[3][l] = tau.get(1, l); }
         let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let tau_0 = given[2][l];
+            let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -561,10 +585,13 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
         let mut results = [[0.0; LANES]; 54];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -713,12 +740,17 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = a.get(0, l); }
+        for l in 0..LANES { given[3][l] = a.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let a_0 = a.get(0, l);
-            let a_1 = a.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let a_0 = given[2][l];
+            let a_1 = given[3][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -778,10 +810,13 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
             // upper: sine and cosine, rotation
             let upper_sin0 = sines[0][l];
             let upper_cos0 = cosines[0][l];
@@ -933,10 +968,13 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
         let mut results = [[0.0; LANES]; 18];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
             // lower: sine and cosine, rotation
             let lower_sin0 = sines[0][l];
             let lower_cos0 = cosines[0][l];
@@ -995,10 +1033,13 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut given = [[0.0; LANES]; 2];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
             results[0][l] = v_0;
             results[1][l] = v_1;
         }

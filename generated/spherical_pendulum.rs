@@ -78,20 +78,33 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = p.get(0, l); }
+        for l in 0..LANES { given[5][l] = p.get(1, l); }
+        for l in 0..LANES { given[6][l] = p.get(2, l); }
+        for l in 0..LANES { given[7][l] = p.get(3, l); }
+        for l in 0..LANES { given[8][l] = tau.get(0, l); }
+        for l in 0..LANES { given[9][l] = tau.get(1, l); }
+        for l in 0..LANES { given[10][l] = tau.get(2, l); }
+        for l in 0..LANES { given[11][l] = tau.get(3, l); }
         let mut results = [[0.0; LANES]; 9];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
-            let tau_2 = tau.get(2, l);
-            let tau_3 = tau.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let p_0 = given[4][l];
+            let p_1 = given[5][l];
+            let p_2 = given[6][l];
+            let p_3 = given[7][l];
+            let tau_0 = given[8][l];
+            let tau_1 = given[9][l];
+            let tau_2 = given[10][l];
+            let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -277,12 +290,17 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
+        for l in 0..LANES { given[2][l] = p.get(2, l); }
+        for l in 0..LANES { given[3][l] = p.get(3, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
+            let p_2 = given[2][l];
+            let p_3 = given[3][l];
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
             let tail_cos0 = cosines[0][l];
@@ -365,12 +383,17 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
             let tail_cos0 = cosines[0][l];
@@ -444,16 +467,25 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 8];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = p.get(0, l); }
+        for l in 0..LANES { given[5][l] = p.get(1, l); }
+        for l in 0..LANES { given[6][l] = p.get(2, l); }
+        for l in 0..LANES { given[7][l] = p.get(3, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let p_0 = given[4][l];
+            let p_1 = given[5][l];
+            let p_2 = given[6][l];
+            let p_3 = given[7][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -561,20 +593,33 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
+        for l in 0..LANES { given[8][l] = tau.get(0, l); }
+        for l in 0..LANES { given[9][l] = tau.get(1, l); }
+        for l in 0..LANES { given[10][l] = tau.get(2, l); }
+        for l in 0..LANES { given[11][l] = tau.get(3, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
-            let tau_2 = tau.get(2, l);
-            let tau_3 = tau.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
+            let tau_0 = given[8][l];
+            let tau_1 = given[9][l];
+            let tau_2 = given[10][l];
+            let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -756,20 +801,33 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
+        for l in 0..LANES { given[8][l] = tau.get(0, l); }
+        for l in 0..LANES { given[9][l] = tau.get(1, l); }
+        for l in 0..LANES { given[10][l] = tau.get(2, l); }
+        for l in 0..LANES { given[11][l] = tau.get(3, l); }
         let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
-            let tau_2 = tau.get(2, l);
-            let tau_3 = tau.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
+            let tau_0 = given[8][l];
+            let tau_1 = given[9][l];
+            let tau_2 = given[10][l];
+            let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -1157,16 +1215,25 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 8];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
         let mut results = [[0.0; LANES]; 36];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -1351,20 +1418,33 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
+        for l in 0..LANES { given[8][l] = a.get(0, l); }
+        for l in 0..LANES { given[9][l] = a.get(1, l); }
+        for l in 0..LANES { given[10][l] = a.get(2, l); }
+        for l in 0..LANES { given[11][l] = a.get(3, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let a_0 = a.get(0, l);
-            let a_1 = a.get(1, l);
-            let a_2 = a.get(2, l);
-            let a_3 = a.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
+            let a_0 = given[8][l];
+            let a_1 = given[9][l];
+            let a_2 = given[10][l];
+            let a_3 = given[11][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -1512,16 +1592,25 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 8];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
         let mut results = [[0.0; LANES]; 4];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
             // bob: sine and cosine, rotation
             let bob_pose0 = q_0 + q_0;
             let bob_pose1 = q_1 + q_1;
@@ -1779,12 +1868,17 @@ impl SphericalPendulum {
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
+        let mut given = [[0.0; LANES]; 4];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
         let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
             let tail_cos0 = cosines[0][l];
@@ -1860,16 +1954,25 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut given = [[0.0; LANES]; 8];
+        for l in 0..LANES { given[0][l] = q.get(0, l); }
+        for l in 0..LANES { given[1][l] = q.get(1, l); }
+        for l in 0..LANES { given[2][l] = q.get(2, l); }
+        for l in 0..LANES { given[3][l] = q.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(0, l); }
+        for l in 0..LANES { given[5][l] = v.get(1, l); }
+        for l in 0..LANES { given[6][l] = v.get(2, l); }
+        for l in 0..LANES { given[7][l] = v.get(3, l); }
         let mut results = [[0.0; LANES]; 5];
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
-            let q_2 = q.get(2, l);
-            let q_3 = q.get(3, l);
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
+            let q_0 = given[0][l];
+            let q_1 = given[1][l];
+            let q_2 = given[2][l];
+            let q_3 = given[3][l];
+            let v_0 = given[4][l];
+            let v_1 = given[5][l];
+            let v_2 = given[6][l];
+            let v_3 = given[7][l];
             // bob: coordinate rates
             let bob_rate0 = q_1 * v_2;
             let bob_rate1 = q_2 * v_1;

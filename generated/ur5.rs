@@ -95,20 +95,33 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
+        for l in 0..LANES { given[2][l] = p.get(2, l); }
+        for l in 0..LANES { given[3][l] = p.get(3, l); }
+        for l in 0..LANES { given[4][l] = p.get(4, l); }
+        for l in 0..LANES { given[5][l] = p.get(5, l); }
+        for l in 0..LANES { given[6][l] = tau.get(0, l); }
+        for l in 0..LANES { given[7][l] = tau.get(1, l); }
+        for l in 0..LANES { given[8][l] = tau.get(2, l); }
+        for l in 0..LANES { given[9][l] = tau.get(3, l); }
+        for l in 0..LANES { given[10][l] = tau.get(4, l); }
+        for l in 0..LANES { given[11][l] = tau.get(5, l); }
         let mut results = [[0.0; LANES]; 12];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
-            let p_4 = p.get(4, l);
-            let p_5 = p.get(5, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
-            let tau_2 = tau.get(2, l);
-            let tau_3 = tau.get(3, l);
-            let tau_4 = tau.get(4, l);
-            let tau_5 = tau.get(5, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
+            let p_2 = given[2][l];
+            let p_3 = given[3][l];
+            let p_4 = given[4][l];
+            let p_5 = given[5][l];
+            let tau_0 = given[6][l];
+            let tau_1 = given[7][l];
+            let tau_2 = given[8][l];
+            let tau_3 = given[9][l];
+            let tau_4 = given[10][l];
+            let tau_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -472,14 +485,21 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 6];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
+        for l in 0..LANES { given[2][l] = p.get(2, l); }
+        for l in 0..LANES { given[3][l] = p.get(3, l); }
+        for l in 0..LANES { given[4][l] = p.get(4, l); }
+        for l in 0..LANES { given[5][l] = p.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
-            let p_4 = p.get(4, l);
-            let p_5 = p.get(5, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
+            let p_2 = given[2][l];
+            let p_3 = given[3][l];
+            let p_4 = given[4][l];
+            let p_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -723,14 +743,21 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 6];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(4, l); }
+        for l in 0..LANES { given[5][l] = v.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let v_4 = v.get(4, l);
-            let v_5 = v.get(5, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
+            let v_4 = given[4][l];
+            let v_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -916,14 +943,21 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 6];
+        for l in 0..LANES { given[0][l] = p.get(0, l); }
+        for l in 0..LANES { given[1][l] = p.get(1, l); }
+        for l in 0..LANES { given[2][l] = p.get(2, l); }
+        for l in 0..LANES { given[3][l] = p.get(3, l); }
+        for l in 0..LANES { given[4][l] = p.get(4, l); }
+        for l in 0..LANES { given[5][l] = p.get(5, l); }
         let mut results = [[0.0; LANES]; 2];
         for l in 0..LANES {
-            let p_0 = p.get(0, l);
-            let p_1 = p.get(1, l);
-            let p_2 = p.get(2, l);
-            let p_3 = p.get(3, l);
-            let p_4 = p.get(4, l);
-            let p_5 = p.get(5, l);
+            let p_0 = given[0][l];
+            let p_1 = given[1][l];
+            let p_2 = given[2][l];
+            let p_3 = given[3][l];
+            let p_4 = given[4][l];
+            let p_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -1178,20 +1212,33 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(4, l); }
+        for l in 0..LANES { given[5][l] = v.get(5, l); }
+        for l in 0..LANES { given[6][l] = tau.get(0, l); }
+        for l in 0..LANES { given[7][l] = tau.get(1, l); }
+        for l in 0..LANES { given[8][l] = tau.get(2, l); }
+        for l in 0..LANES { given[9][l] = tau.get(3, l); }
+        for l in 0..LANES { given[10][l] = tau.get(4, l); }
+        for l in 0..LANES { given[11][l] = tau.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let v_4 = v.get(4, l);
-            let v_5 = v.get(5, l);
-            let tau_0 = tau.get(0, l);
-            let tau_1 = tau.get(1, l);
-            let tau_2 = tau.get(2, l);
-            let tau_3 = tau.get(3, l);
-            let tau_4 = tau.get(4, l);
-            let tau_5 = tau.get(5, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
+            let v_4 = given[4][l];
+            let v_5 = given[5][l];
+            let tau_0 = given[6][l];
+            let tau_1 = given[7][l];
+            let tau_2 = given[8][l];
+            let tau_3 = given[9][l];
+            let tau_4 = given[10][l];
+            let tau_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -1838,20 +1885,33 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 12];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(4, l); }
+        for l in 0..LANES { given[5][l] = v.get(5, l); }
+        for l in 0..LANES { given[6][l] = a.get(0, l); }
+        for l in 0..LANES { given[7][l] = a.get(1, l); }
+        for l in 0..LANES { given[8][l] = a.get(2, l); }
+        for l in 0..LANES { given[9][l] = a.get(3, l); }
+        for l in 0..LANES { given[10][l] = a.get(4, l); }
+        for l in 0..LANES { given[11][l] = a.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let v_4 = v.get(4, l);
-            let v_5 = v.get(5, l);
-            let a_0 = a.get(0, l);
-            let a_1 = a.get(1, l);
-            let a_2 = a.get(2, l);
-            let a_3 = a.get(3, l);
-            let a_4 = a.get(4, l);
-            let a_5 = a.get(5, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
+            let v_4 = given[4][l];
+            let v_5 = given[5][l];
+            let a_0 = given[6][l];
+            let a_1 = given[7][l];
+            let a_2 = given[8][l];
+            let a_3 = given[9][l];
+            let a_4 = given[10][l];
+            let a_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -2169,14 +2229,21 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
+        let mut given = [[0.0; LANES]; 6];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(4, l); }
+        for l in 0..LANES { given[5][l] = v.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let v_4 = v.get(4, l);
-            let v_5 = v.get(5, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
+            let v_4 = given[4][l];
+            let v_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
             let upper_arm_link_cos0 = cosines[0][l];
@@ -2420,14 +2487,21 @@ impl Ur5 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+        let mut given = [[0.0; LANES]; 6];
+        for l in 0..LANES { given[0][l] = v.get(0, l); }
+        for l in 0..LANES { given[1][l] = v.get(1, l); }
+        for l in 0..LANES { given[2][l] = v.get(2, l); }
+        for l in 0..LANES { given[3][l] = v.get(3, l); }
+        for l in 0..LANES { given[4][l] = v.get(4, l); }
+        for l in 0..LANES { given[5][l] = v.get(5, l); }
         let mut results = [[0.0; LANES]; 6];
         for l in 0..LANES {
-            let v_0 = v.get(0, l);
-            let v_1 = v.get(1, l);
-            let v_2 = v.get(2, l);
-            let v_3 = v.get(3, l);
-            let v_4 = v.get(4, l);
-            let v_5 = v.get(5, l);
+            let v_0 = given[0][l];
+            let v_1 = given[1][l];
+            let v_2 = given[2][l];
+            let v_3 = given[3][l];
+            let v_4 = given[4][l];
+            let v_5 = given[5][l];
             results[0][l] = v_0;
             results[1][l] = v_1;
             results[2][l] = v_2;

@@ -147,6 +147,7 @@ impl<'a> Body<'a> {
             self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
         );
         self.write_sines(out);
+        self.write_given(out);
         let n = self.group.program.outputs.len();
         if n > 0 {
             let _ = writeln!(out, "        let mut results = [[0.0; LANES]; {n}];");
@@ -184,12 +185,17 @@ impl<'a> Body<'a> {
     }
 
     /// Those of the program's steps that are in a set, in order.
-    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, comments: bool) {
+    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
         let mut last = None;
         let mut late = self.angles.late.clone();
+        // Only the loop over lanes has its inputs copied.
+        let given = match lanes {
+            true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
+            false => BTreeMap::new(),
+        };
         for (id, op, label) in self.group.program.steps.iter().filter(|(id, _, _)| set.contains(id)) {
-            let Some(text) = self.statement(*id, op, &mut late) else { continue };
-            if comments && last != Some(*label) && !matches!(op, Op::Input(_)) {
+            let Some(text) = self.statement(*id, op, &given, &mut late) else { continue };
+            if lanes && last != Some(*label) && !matches!(op, Op::Input(_)) {
                 let body = label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
                 let _ = writeln!(out, "            // {body}: {}", quantity(label.1).1);
                 last = Some(*label);
@@ -198,8 +204,17 @@ impl<'a> Body<'a> {
         }
     }
 
-    fn statement(&self, id: u32, op: &Op, late: &mut BTreeMap<u32, [Option<u32>; 2]>) -> Option<String> {
+    fn statement(
+        &self,
+        id: u32,
+        op: &Op,
+        given: &BTreeMap<u32, usize>,
+        late: &mut BTreeMap<u32, [Option<u32>; 2]>,
+    ) -> Option<String> {
         let name = &self.names[&id];
+        if let Some(k) = given.get(&id) {
+            return Some(format!("let {name} = given[{k}][l];"));
+        }
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
             Op::Cos(a) => (a, "cosines"),
@@ -240,8 +255,29 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Results are gathered first: the loop over lanes writes nowhere else, so that the compiler need not ask at run time
-    /// whether what it writes is also read.
+    /// Inputs of the loop over lanes.
+    fn given(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.group.program.steps.iter().filter_map(|(id, op, _)| match op {
+            Op::Input(k) if self.angles.after.contains(id) => Some((*id, *k)),
+            _ => None,
+        })
+    }
+
+    /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
+    /// point to, and the compiler makes vector instructions of it without asking at run time what overlaps.
+    fn write_given(&self, out: &mut String) {
+        let n = self.given().count();
+        if n > 0 {
+            let _ = writeln!(out, "        let mut given = [[0.0; LANES]; {n}];");
+        }
+        for (to, (_, k)) in self.given().enumerate() {
+            let (array, k) = locate(&self.group.inputs, k as usize);
+            let from = ports::local(&array.name);
+            let _ = writeln!(out, "        for l in 0..LANES {{ given[{to}][l] = {from}.get({k}, l); }}");
+        }
+    }
+
+    /// Results are gathered in an array before they are handed over.
     fn write_results(&self, out: &mut String) {
         for (k, output) in self.group.program.outputs.iter().enumerate() {
             let value = match output {
