@@ -53,9 +53,12 @@ if [ -z "${REUSE:-}" ]; then
     fi
 
     echo "ours"
-    # As users build it: which instructions to use is found out at run time.
-    RIVALS_ROBOTS=$models/robots.txt cargo build --release --quiet --manifest-path "$here/ours/Cargo.toml" --target-dir "$work/ours"
-    cp "$work/ours/release/librivals_ours.so" "$build/ours.so"
+    # As users build it: which instructions to use is found out at run time. A library for each.
+    while read -r robot rest; do
+        echo "$robot $rest" >"$models/$robot.txt"
+        RIVALS_ROBOTS=$models/$robot.txt cargo build --release --quiet --manifest-path "$here/ours/Cargo.toml" --target-dir "$work/ours"
+        cp "$work/ours/release/librivals_ours.so" "$build/ours_$robot.so"
+    done <"$models/robots.txt"
 
     echo "C of the rivals"
     for robot in $robots; do

@@ -178,7 +178,7 @@ static std::vector<Contestant> contestants(const std::string & robot, const pino
     std::vector<int> same_q(nq), same_v(nv), ours_q(nq), ours_v(nv);
     std::iota(same_q.begin(), same_q.end(), 0), std::iota(same_v.begin(), same_v.end(), 0);
     int operations[2] = {};
-    auto about = reinterpret_cast<About>(libraries.find("ours.so", robot + "_about"));
+    auto about = reinterpret_cast<About>(libraries.find("ours_" + robot + ".so", robot + "_about"));
     if (!about) throw std::runtime_error(std::string("no generated code for ") + robot + ": " + dlerror());
     about(ours_q.data(), ours_v.data(), operations);
 
@@ -215,7 +215,7 @@ static std::vector<Contestant> contestants(const std::string & robot, const pino
     for (const auto & [door, lanes] : doors)
         for (const bool rates : {true, false}) {
             const std::string what = rates ? "_rates" : "_accelerations";
-            add("ours" + door + what, "ours.so", robot + what + door, lanes, true, rates, operations[rates ? 0 : 1]);
+            add("ours" + door + what, "ours_" + robot + ".so", robot + what + door, lanes, true, rates, operations[rates ? 0 : 1]);
         }
     return all;
 }
