@@ -9,7 +9,7 @@ import sys
 NAMES = {
     "double_pendulum": "double pendulum", "chain10_planar": "planar chain, 10", "ur5": "UR5", "panda_arm": "Panda",
     "iiwa14": "iiwa 14", "chain6": "general chain, 6", "chain20": "general chain, 20", "solo12": "Solo 12",
-    "g1": "Unitree G1",
+    "g1": "Unitree G1", "talos": "Talos", "chain100": "general chain, 100", "planar100": "planar chain, 100",
 }
 
 
@@ -35,8 +35,8 @@ class Robot:
         return self.rows[key]["ns_median"] if key in self.rows else None
 
     def best(self, keys):
-        """The fastest of some contestants."""
-        return min((k for k in keys if k in self.rows), key=self.ns)
+        """The fastest of some contestants, if one of them ran."""
+        return min((k for k in keys if k in self.rows), key=self.ns, default=None)
 
     @property
     def aba(self):
@@ -60,81 +60,91 @@ def lines(header, rows):
     return out + ["| " + " | ".join(row) + " |" for row in rows]
 
 
-def table(robots, about):
-    """Markdown: one call at a time, then eight lanes, then what each contestant needs."""
-    text = ["# Times of one run", "", *about, "", "## One state a call", "",
-            "ns for each state, medians over the rounds. In brackets: the best generated rival's time divided by ours.", ""]
-    rows = []
-    for r in robots:
-        rival = r.ns(r.rival)
-        ours = lambda key: f"{number(r.ns(key))} ({rival / r.ns(key):.2f})"
-        rows.append([
-            f"{NAMES[r.name]} ({r.nv})", number(r.ns(r.aba)), f"{number(rival)} ({r.rival})",
-            ours("ours_native_accelerations"), ours("ours_plain_accelerations"), ours("ours_native_rates"), ours("ours_plain_rates"),
-            f"{r.ns(r.aba) / r.ns('ours_native_accelerations'):.1f}", f"{r.ns(r.aba) / r.ns('ours_native_rates'):.1f}",
-        ])
-    text += lines(["robot (nv)", "Pinocchio ABA", "best generated rival", "ours, q̈, native", "ours, q̈, plain", "ours, (q̇, ṗ), native",
-                   "ours, (q̇, ṗ), plain", "ABA / ours q̈", "ABA / ours (q̇, ṗ)"], rows)
-    text += ["", "## The same C compiler for all", "",
-             "Our statements as C, with the rivals' compiler, flags and C library: one state a call, then eight lanes (ns for each state).", ""]
-    rows = []
-    for r in robots:
-        keys = [r.rival, "ours_clang_accelerations", "ours_clang_rates", r.rival_lanes, "ours_clang_lanes_accelerations", "ours_clang_lanes_rates"]
-        cells = []
-        for k, key in enumerate(keys):
-            reference = r.ns(keys[0 if k < 3 else 3])
-            cells.append(number(r.ns(key)) + (f" ({reference / r.ns(key):.2f})" if k % 3 else f" ({key.split('_')[0]})"))
-        rows.append([NAMES[r.name], *cells])
-    text += lines(["robot", "rival", "q̈", "(q̇, ṗ)", "rival, lanes", "q̈, lanes", "(q̇, ṗ), lanes"], rows)
+def table(robots, about, late):
+    """Markdown: one call at a time, then eight lanes, then operations and agreement."""
+    short = {"casadi": "CasADi", "cppadcg": "CppADCodeGen", "casadi_lanes": "CasADi", "cppadcg_lanes": "CppADCodeGen"}
+    ns = lambda r, key: number(r.ns(key)) if r.ns(key) else "–"
+    ratio = lambda r, key, other: f"{r.ns(key) / r.ns(other):.2f}" if r.ns(key) and other else "–"
+    text = ["# Times of one run", "", *about, *late, "", "## One state a call", "",
+            "ns, medians over the rounds. Ratios are our time divided by theirs: *rival* is the faster of CasADi and CppADCodeGen.", ""]
+    header = ["robot (nv)", "Pinocchio ABA", "CasADi", "CppADCodeGen", "ours, q̈", "ours, (q̇, ṗ)", "q̈ / rival", "(q̇, ṗ) / rival", "q̈ / ABA", "(q̇, ṗ) / ABA"]
+    keys = ["casadi", "cppadcg", "ours_accelerations", "ours_rates"]
+    text += lines(header, [
+        [f"{NAMES[r.name]} ({r.nv})", ns(r, r.aba), *(ns(r, k) for k in keys)]
+        + [ratio(r, "ours" + k, other) for other in (r.rival, r.aba) for k in ("_accelerations", "_rates")] for r in robots])
+    text += ["", "## Eight states a call", "",
+             "ns for each state. The rivals' C with eight doubles to a number and the C library's vector sine and cosine; our lanes; our batches of 256 states.", ""]
+    header = ["robot (nv)", "CasADi", "CppADCodeGen", "ours, q̈", "ours, (q̇, ṗ)", "ours, batch of (q̇, ṗ)", "q̈ / rival", "(q̇, ṗ) / rival"]
+    keys = ["casadi_lanes", "cppadcg_lanes", "ours_lanes_accelerations", "ours_lanes_rates", "ours_batch_rates"]
+    text += lines(header, [
+        [f"{NAMES[r.name]} ({r.nv})", *(ns(r, k) for k in keys), ratio(r, keys[2], r.rival_lanes), ratio(r, keys[3], r.rival_lanes)] for r in robots])
     text += ["", "## Operations and agreement", "",
-             "Additions, multiplications, divisions of the generated code; sines, cosines, roots apart. Largest difference from Pinocchio, relative.", ""]
+             "Additions, multiplications, divisions of the generated code; sines, cosines, roots apart. Largest difference of any contestant from Pinocchio, relative.", ""]
     rows = []
     for r in robots:
-        keys = ["casadi", "cppadcg", "ours_native_accelerations", "ours_native_rates"]
+        keys = ["casadi", "cppadcg", "ours_accelerations", "ours_rates"]
         error = max(row["error"] for row in r.rows.values())
-        rows.append([NAMES[r.name], *(str(r.rows[k]["operations"]) for k in keys), f"{error:.0e}"])
+        rows.append([NAMES[r.name], *(str(r.rows[k]["operations"]) if k in r.rows else "–" for k in keys), f"{error:.0e}"])
     text += lines(["robot", "CasADi, q̈", "CppADCodeGen, q̈", "ours, q̈", "ours, (q̇, ṗ)", "difference"], rows)
     return "\n".join(text) + "\n"
 
 
-SERIES = [
-    ("Pinocchio ABA", "#9aa3ad", lambda r: r.aba),
-    ("best code generated from Pinocchio (CasADi, CppADCodeGen; clang -O3 -march=native -ffast-math)", "#5b8db8", lambda r: r.rival),
-    ("this project: (q, v, τ) → q̈", "#e0a03c", lambda r: "ours_native_accelerations"),
-    ("this project: (q, p, τ) → (q̇, ṗ)", "#c8502d", lambda r: "ours_native_rates"),
+GREY, BLUE, ORANGE, RED = "#9aa3ad", "#5b8db8", "#e0a03c", "#c8502d"
+LEGEND = [
+    (GREY, "Pinocchio’s articulated-body algorithm, C++"),
+    (BLUE, "best code generated from it (CasADi or CppADCodeGen; clang -O3 -march=native -ffast-math)"),
+    (ORANGE, "this project, (q, v, τ) → q̈"),
+    (RED, "this project, (q, p, τ) → (q̇, ṗ)"),
+]
+PANELS = [
+    ("one state a call", [(GREY, lambda r: r.aba), (BLUE, lambda r: r.rival), (ORANGE, lambda r: "ours_accelerations"), (RED, lambda r: "ours_rates")]),
+    ("eight states a call", [(BLUE, lambda r: r.rival_lanes), (ORANGE, lambda r: "ours_lanes_accelerations"), (RED, lambda r: "ours_lanes_rates")]),
 ]
 
 
-def chart(robots, about):
-    """Bars: how many times as fast as Pinocchio's forward dynamics, with the time at the end of each bar."""
-    left, top, bar, gap, width = 150, 108, 13, 14, 560
+def panel(robots, title, series, left, top, width, room):
+    """Bars of one panel: how many times as fast as Pinocchio."""
+    bar, gap = 13, 14
     speed = lambda r, key: r.ns(r.aba) / r.ns(key)
-    most = max(speed(r, pick(r)) for r in robots for _, _, pick in SERIES)
-    step = next(s for s in (1, 2, 5, 10, 20) if most / s <= 12)
+    present = lambda r, pick: pick(r) if pick(r) in r.rows else None
+    most = max(speed(r, present(r, pick)) for r in robots for _, pick in series if present(r, pick))
+    step = next(s for s in (1, 2, 5, 10, 20, 50) if most / s <= 8)
     scale = width / most
-    height = top + len(robots) * (len(SERIES) * bar + gap) + 44
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + width + 90} {height}" font-family="Helvetica, Arial, sans-serif" font-size="12">',
-           f'<rect width="100%" height="100%" fill="#ffffff"/>',
-           '<text x="12" y="22" font-size="15" font-weight="bold" fill="#222">Forward dynamics: speed relative to Pinocchio’s articulated-body algorithm</text>']
-    for k, (label, colour, _) in enumerate(SERIES):
-        y = 40 + 15 * k
-        out.append(f'<rect x="14" y="{y - 9}" width="10" height="10" fill="{colour}"/><text x="30" y="{y}" fill="#333">{label}</text>')
-    bottom = height - 40
+    block = 4 * bar + gap
+    bottom = top + len(robots) * block - gap + 4
+    out = [f'<text x="{left}" y="{top - 14}" font-weight="bold" fill="#222">{title}</text>']
     for tick in range(0, int(most / step) + 1):
         x = left + tick * step * scale
         out.append(f'<line x1="{x:.1f}" y1="{top - 6}" x2="{x:.1f}" y2="{bottom}" stroke="#e3e6e9"/>'
                    f'<text x="{x:.1f}" y="{bottom + 14}" text-anchor="middle" fill="#555">{tick * step}×</text>')
-    y = top
-    for r in robots:
-        out.append(f'<text x="{left - 8}" y="{y + 2 * bar + 4}" text-anchor="end" fill="#222">{NAMES[r.name]}</text>')
-        for _, colour, pick in SERIES:
-            key = pick(r)
-            length = speed(r, key) * scale
-            out.append(f'<rect x="{left}" y="{y}" width="{length:.1f}" height="{bar - 2}" fill="{colour}"/>'
-                       f'<text x="{left + length + 4:.1f}" y="{y + bar - 3}" font-size="10" fill="#333">{number(r.ns(key))} ns</text>')
+    for k, r in enumerate(robots):
+        y = top + k * block + (4 - len(series)) * bar / 2
+        for colour, pick in series:
+            key = present(r, pick)
+            if key:
+                length = speed(r, key) * scale
+                out.append(f'<rect x="{left}" y="{y:.1f}" width="{length:.1f}" height="{bar - 2}" fill="{colour}"/>'
+                           f'<text x="{left + length + 4:.1f}" y="{y + bar - 3:.1f}" font-size="10" fill="#333">{number(r.ns(key))} ns</text>')
             y += bar
-        y += gap
-    out.append(f'<text x="12" y="{height - 8}" font-size="9" fill="#777">{about}</text></svg>')
+    return out
+
+
+def chart(robots, about):
+    """Two panels of bars beside one another."""
+    left, top, width, room = 130, 132, 330, 62
+    height = top + len(robots) * 66 + 34
+    total = left + 2 * (width + room) + 10
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {total} {height}" font-family="Helvetica, Arial, sans-serif" font-size="12">',
+           '<rect width="100%" height="100%" fill="#ffffff"/>',
+           '<text x="12" y="22" font-size="15" font-weight="bold" fill="#222">Forward dynamics: speed relative to Pinocchio, time of each state</text>']
+    for k, (colour, label) in enumerate(LEGEND):
+        y = 42 + 16 * k
+        out.append(f'<rect x="14" y="{y - 9}" width="10" height="10" fill="{colour}"/><text x="30" y="{y}" fill="#333">{label}</text>')
+    for k, r in enumerate(robots):
+        out.append(f'<text x="{left - 8}" y="{top + k * 66 + 30}" text-anchor="end" fill="#222">{NAMES[r.name]}</text>')
+    for k, (title, series) in enumerate(PANELS):
+        out += panel(robots, title, series, left + k * (width + room), top, width, room)
+    out.append(f'<text x="12" y="{height - 6}" font-size="9" fill="#777">{about}</text></svg>')
     return "\n".join(out) + "\n"
 
 
@@ -145,8 +155,11 @@ def main(folder, clang, rustc, packages, rounds):
     date = datetime.date.today().isoformat()
     about = [f"- Machine: {machine()}.", f"- {clang}; {rustc}; {packages.strip()}.",
              f"- {date}; `benches/rivals/run.sh VENV WORK {rounds}`: 256 random states, {rounds} rounds in changing order."]
-    (folder / "table.md").write_text(table(robots, about))
-    (folder / "chart.svg").write_text(chart(robots, f"{machine()}; {clang.split(' (')[0]}; {rustc.split(' (')[0]}; {packages.strip()}; {date}. Medians of one run."))
+    late = folder / "late.txt"
+    late = [f"- {line}." for line in late.read_text().splitlines()] if late.exists() else []
+    (folder / "table.md").write_text(table(robots, about, late))
+    versions = f"{clang.split(' (')[0]}; {rustc.split(' (')[0]}; {packages.strip()}; {date}. Medians of one run."
+    (folder / "chart.svg").write_text(chart(robots, f"{machine()}; {versions}"))
 
 
 if __name__ == "__main__":

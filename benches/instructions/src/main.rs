@@ -31,6 +31,16 @@ macro_rules! models {
                     }
                     Ok(a[0])
                 })*
+                $((stringify!($name), "rates_lanes") => {
+                    let system = $name::RobotLanes::<8>::new();
+                    let (q, p) = (state().map(|x| [x; 8]), state().map(|x| [x; 8]));
+                    let (mut qd, mut pd) = ([[0.0; 8]; $name::$type::NQ], [[0.0; 8]; $name::$type::NV]);
+                    for _ in 0..calls {
+                        black_box(&system).rates(black_box(&q), black_box(&p), &mut qd, &mut pd);
+                        black_box((&mut qd, &mut pd));
+                    }
+                    Ok(qd[0][0] + pd[0][0])
+                })*
                 _ => Err(format!("{model} {function}: no such model or function")),
             }
         }

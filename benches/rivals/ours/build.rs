@@ -2,15 +2,12 @@
 
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::layout::pinocchio;
-use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_codegen::plan::{Forms, Plan, PlanOptions};
 use mbd_codegen::{generate, Group, Options};
 use std::fmt::Write as _;
-use std::io::{Read as _, Write as _};
-use std::process::{Command, Stdio};
 
 fn main() {
     println!("cargo:rerun-if-env-changed=RIVALS_ROBOTS");
-    println!("cargo:rerun-if-env-changed=RIVALS_CHUNK");
     let list = std::env::var("RIVALS_ROBOTS").expect("RIVALS_ROBOTS names the list of robots");
     println!("cargo:rerun-if-changed={list}");
     let mut lib = String::new();
@@ -26,21 +23,6 @@ fn write(file: &str, text: &str) {
     std::fs::write(format!("{out}/{file}"), text).expect("written");
 }
 
-/// The code as the command in `RIVALS_FILTER` leaves it, for experiments.
-fn filtered(source: String) -> String {
-    println!("cargo:rerun-if-env-changed=RIVALS_FILTER");
-    let Ok(command) = std::env::var("RIVALS_FILTER") else { return source };
-    let mut child = Command::new("sh").arg("-c").arg(&command).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
-    let child = child.as_mut().expect("a command");
-    let mut input = child.stdin.take().expect("piped");
-    let writer = std::thread::spawn(move || input.write_all(source.as_bytes()));
-    let mut out = String::new();
-    child.stdout.take().expect("piped").read_to_string(&mut out).expect("text");
-    writer.join().expect("no panic").expect("read by the command");
-    assert!(child.wait().expect("ended").success(), "{command}");
-    out
-}
-
 fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     println!("cargo:rerun-if-changed={path}");
     let text = std::fs::read_to_string(path).expect("the model");
@@ -51,17 +33,16 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     for joint in &mut model.joints {
         joint.damping.fill(mbd_codegen::model::Value::Const(0.0));
     }
-    let chunk = std::env::var("RIVALS_CHUNK").ok().map(|c| c.parse().expect("RIVALS_CHUNK is a number"));
     let options = Options {
         type_name: "Kernel".to_string(),
         outputs: vec![Group::Rates, Group::Accelerations],
-        chunk: chunk.unwrap_or(Options::default().chunk),
         source: name.to_string(),
         ..Options::default()
     };
     let generated = generate(&model, &options).expect("code");
-    write(&format!("{name}.rs"), &filtered(generated.source));
-    let plan = Plan::new(&model, PlanOptions::default());
+    write(&format!("{name}.rs"), &generated.source);
+    // For the order of coordinates, which no form changes.
+    let plan = Plan::new(&model, PlanOptions { forms: Forms::Single, ..PlanOptions::default() });
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();
@@ -94,6 +75,30 @@ pub mod {name} {{
     #[no_mangle]
     pub unsafe extern \"C\" fn {name}_accelerations(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64) {{
         (*tau.cast::<Kernel>()).accelerations(&*q.cast(), &*v.cast(), &mut *out.cast());
+    }}
+
+    const _: () = assert!(core::mem::size_of::<KernelLanes<8>>() == {nv} * 64);
+
+    /// # Safety
+    /// Pointers to 8 times {nq}, {nv}, {nv} and {nq} + {nv} numbers, the lanes of each side by side.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_rates_lanes(q: *const f64, p: *const f64, tau: *const f64, out: *mut f64) {{
+        (*tau.cast::<KernelLanes<8>>()).rates(&*q.cast(), &*p.cast(), &mut *out.cast(), &mut *out.add(8 * {nq}).cast());
+    }}
+
+    /// # Safety
+    /// Pointers to 8 times {nq}, {nv}, {nv} and {nv} numbers, the lanes of each side by side.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_accelerations_lanes(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64) {{
+        (*tau.cast::<KernelLanes<8>>()).accelerations(&*q.cast(), &*v.cast(), &mut *out.cast());
+    }}
+
+    /// # Safety
+    /// Pointers to [`crate::STATES`] times {nq}, {nv}, {nv} and {nq} + {nv} numbers, the states of each side by side.
+    #[no_mangle]
+    pub unsafe extern \"C\" fn {name}_rates_batch(q: *const f64, p: *const f64, tau: *const f64, out: *mut f64) {{
+        use crate::{{columns, columns_mut}};
+        let _ = Kernel::new().rates_batch(columns(q), columns(p), columns(tau), columns_mut(out), columns_mut(out.add(crate::STATES * {nq})));
     }}
 
     /// Where our coordinates and velocities stand in Pinocchio's state; operations of rates and accelerations.
