@@ -22,7 +22,7 @@ crate() {
     cp "$root/Cargo.lock" "$work/$1/Cargo.lock"
 }
 facade="multibody = { path = \"$root\", default-features = false }"
-crate file "mbd-runtime = { path = \"$root/runtime\" }"
+crate file "mbd-runtime = { path = \"$root/runtime\", features = [\"std\"] }"
 crate macro "$facade"
 crate quick "$facade" $'[profile.dev.build-override]\nopt-level = 3\n[profile.release.build-override]\nopt-level = 3'
 
