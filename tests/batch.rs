@@ -45,24 +45,13 @@ fn every_length() {
         let arm = Single::new();
         let (q, p) = (columns::<2>(n, 0.0), columns::<2>(n, 0.3));
         let (q, p) = [q, p].map(|c| c.map(|c| c.iter().map(|x| *x as f32).collect::<Vec<_>>())).into();
-        let (tau, mut qd, mut pd) = ([0.0; 2], [0.0; 2], [0.0; 2]).map_each(|x| vec![x; n]);
+        let [tau, mut qd, mut pd] = [(); 3].map(|()| [0.0_f32; 2].map(|x| vec![x; n]));
         arm.rates_batch(slices(&q), slices(&p), slices(&tau), slices_mut(&mut qd), slices_mut(&mut pd)).unwrap();
         for s in 0..n {
             let (mut qd1, mut pd1) = ([0.0; 2], [0.0; 2]);
             arm.rates(&state(&q, s), &state(&p, s), &mut qd1, &mut pd1);
             assert_eq!((state(&qd, s), state(&pd, s)), (qd1, pd1), "state {s} of {n}, f32");
         }
-    }
-}
-
-/// Three arrays of columns alike.
-trait MapEach<const N: usize> {
-    fn map_each(self, f: impl Fn(f32) -> Vec<f32>) -> ([Vec<f32>; N], [Vec<f32>; N], [Vec<f32>; N]);
-}
-
-impl<const N: usize> MapEach<N> for ([f32; N], [f32; N], [f32; N]) {
-    fn map_each(self, f: impl Fn(f32) -> Vec<f32>) -> ([Vec<f32>; N], [Vec<f32>; N], [Vec<f32>; N]) {
-        (self.0.map(&f), self.1.map(&f), self.2.map(&f))
     }
 }
 

@@ -26,6 +26,9 @@
 
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
 
+/// Whether blocks of angles pay: without vectors, lanes that only fill a block cost as much as the others.
+const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
+
 /// 2/π as a binary fraction behind 64 zero bits: enough for the largest `f64`.
 const TWO_OVER_PI: [u32; 40] = [
     0x00000000, 0x00000000, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab,
@@ -127,6 +130,12 @@ macro_rules! sincos {
         /// beyond it.
         #[inline(always)]
         fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
+            if !VECTORS {
+                for ((x, s), c) in x.iter().zip(sin).zip(cos) {
+                    (*s, *c) = $pair::<A>(*x);
+                }
+                return false;
+            }
             let mut large = false;
             let (mut xs, mut ss, mut cs) =
                 (x.chunks_exact($width), sin.chunks_exact_mut($width), cos.chunks_exact_mut($width));
