@@ -6,7 +6,7 @@ use super::passes::terms::Opened;
 use super::{Op, Operand, Output, Program};
 
 /// Bytes of code for each instruction, spills included: from 9.3 in short programs to 12 in long ones.
-const BYTES: f64 = 11.0;
+pub const BYTES: f64 = 11.0;
 
 /// Code beyond this is fetched from the second-level cache.
 const CACHE: f64 = 32768.0;
