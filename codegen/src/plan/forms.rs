@@ -178,7 +178,9 @@ impl Here {
             search.consider(form);
         }
         while search.neighbours(from_ground) {}
-        looped.iter().for_each(|form| drop(search.consider(form.clone())));
+        if let Some(form) = &looped {
+            search.consider(form.clone());
+        }
         let Search { chosen, tried, mut seen, .. } = search;
         let mut second = None;
         if options.accelerations {
@@ -190,7 +192,9 @@ impl Here {
                 search.consider(form);
             }
             while search.neighbours(from_ground) {}
-            looped.iter().for_each(|form| drop(search.consider(form.clone())));
+            if let Some(form) = &looped {
+                search.consider(form.clone());
+            }
             second = search.chosen;
         }
         Known { forms: [chosen, second], tried, letters: self.letters }
@@ -514,7 +518,7 @@ fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
 fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
     for (&i, &turned) in chain.iter().zip(&form.turned) {
         plan.nodes[i].parent_side = turned;
-        plan.nodes[i].looped = form.looped;
+        plan.nodes[i].looped |= form.looped;
         plan.nodes[i].unturned &= !form.looped;
     }
     for &i in &chain[..form.gather] {
