@@ -13,6 +13,17 @@ pub const TREES: u64 = 44;
 /// From this one on, trees are chains, and code takes loops wherever links repeat.
 pub const FIRST_CHAIN: u64 = 40;
 
+/// What long chains compute in loops.
+const LOOPED: [Group; 7] = [
+    Group::Rates,
+    Group::Velocities,
+    Group::Momenta,
+    Group::Energy,
+    Group::Accelerations,
+    Group::InverseDynamics,
+    Group::Bias,
+];
+
 /// Every fourth tree is generated in single precision.
 pub fn is_single(k: u64) -> bool {
     k % 4 == 3
@@ -35,7 +46,8 @@ pub fn tree(k: u64) -> (Model, Options) {
         ..Options::default()
     };
     if k >= FIRST_CHAIN {
-        return (random_model(seed, &chain(k - FIRST_CHAIN)), options);
+        let outputs = LOOPED.to_vec();
+        return (random_model(seed, &chain(k - FIRST_CHAIN)), Options { outputs, ..options });
     }
     (random_model(seed, &Knobs::everything(seed, 2 + k as usize % 4)), options)
 }
