@@ -15,6 +15,9 @@ pub mod chain6;
 /// From models/chain10_planar.toml.
 pub mod chain10_planar;
 
+/// From models/chain100.toml.
+pub mod chain100;
+
 /// From models/ur5.urdf.
 pub mod ur5;
 

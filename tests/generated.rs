@@ -249,6 +249,14 @@ check!(
     outputs: [rates, velocities, momenta, energy, accelerations, mass_matrix, inverse_dynamics, bias]
 );
 check!(
+    chain100,
+    generated::chain100::Chain100,
+    "models/chain100.toml",
+    Base::Fixed,
+    inputs: [tau],
+    outputs: [rates, velocities, momenta, energy]
+);
+check!(
     ur5,
     generated::ur5::Ur5,
     "models/ur5.urdf",

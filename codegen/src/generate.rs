@@ -2,8 +2,9 @@
 //! through here.
 
 use crate::emit;
+use crate::loops::looped;
 use crate::model::Model;
-pub use crate::options::{Arithmetic, Group, Options, Precision};
+pub use crate::options::{Arithmetic, Group, Loops, Options, Precision};
 use crate::plan::Plan;
 use crate::symbolic::{Counts, Operand, Output};
 use crate::trace::coordinate_map;
@@ -27,10 +28,13 @@ pub struct Generated {
 /// checks cannot see where parameters are involved), as a message.
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
     let plan = Plan::new(model, options.searches());
-    let groups = options.outputs.iter().map(|&g| trace(&plan, g, options));
+    let groups = options.outputs.iter().map(|&g| match looped(&plan, g, options) {
+        Some(program) => Ok(GroupProgram::looped(program)),
+        None => trace(&plan, g, options),
+    });
     let groups = groups.collect::<Result<Vec<_>, String>>()?;
     groups.iter().try_for_each(|g| finite(&plan, g, options.precision))?;
-    let counts = groups.iter().map(|g| (g.group, g.program.counts())).collect();
+    let counts = groups.iter().map(|g| (g.group, g.counts())).collect();
     let map = coordinate_map(&plan);
     let source = emit::source(&plan, options, &groups, &map);
     Ok(Generated { source, counts, notices: plan.notices.clone() })
@@ -43,6 +47,9 @@ fn finite(plan: &Plan, group: &GroupProgram, precision: Precision) -> Result<(),
         Precision::F32 => (x as f32).is_finite(),
     };
     let name = group.group.name();
+    if group.loops.as_ref().is_some_and(|l| !l.all_constants(fits)) {
+        return Err(format!("`{name}` contains an infinite number: is there a freedom without inertia?"));
+    }
     for (_, op, (node, _)) in &group.program.steps {
         if op.operands().any(|o| matches!(o, Operand::Const(bits) if !fits(f64::from_bits(bits)))) {
             let body = node.map_or("ground", |i| plan.nodes[i].name.as_str());

@@ -6,10 +6,11 @@ pub mod emit;
 pub mod generate;
 pub mod import;
 pub mod layout;
+pub mod loops;
 pub mod model;
 pub mod options;
 pub mod plan;
 pub mod symbolic;
 pub mod trace;
 
-pub use generate::{generate, Arithmetic, Generated, Group, Options, Precision};
+pub use generate::{generate, Arithmetic, Generated, Group, Loops, Options, Precision};

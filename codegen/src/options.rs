@@ -41,6 +41,32 @@ impl Arithmetic {
     }
 }
 
+/// Where generated code takes loops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Loops {
+    /// Over runs of like links that are long enough to gain by it, branch by branch.
+    #[default]
+    Auto,
+    /// Wherever links repeat.
+    Always,
+    /// Nowhere: straight-line code.
+    Never,
+}
+
+impl Loops {
+    /// All of them.
+    pub const ALL: [Loops; 3] = [Loops::Auto, Loops::Always, Loops::Never];
+
+    /// Its name in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            Loops::Auto => "auto",
+            Loops::Always => "always",
+            Loops::Never => "never",
+        }
+    }
+}
+
 /// What generated code can compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {

@@ -6,10 +6,11 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
+use crate::loops::LoopProgram;
 use crate::model::Gravity;
 use crate::options::{Group, Options};
 use crate::plan::Plan;
-use crate::symbolic::{passes, Expr, Graph, Program};
+use crate::symbolic::{passes, Counts, Expr, Graph, Program};
 
 /// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,15 +30,98 @@ pub struct GroupProgram {
     pub group: Group,
     /// Input arrays, numbered through.
     pub inputs: Vec<InputArray>,
-    /// The program.
+    /// The program; empty where the group is in loop form.
     pub program: Program,
+    /// The group in loop form.
+    pub loops: Option<LoopProgram>,
+}
+
+impl GroupProgram {
+    /// A group in loop form.
+    pub fn looped(loops: LoopProgram) -> GroupProgram {
+        GroupProgram {
+            group: loops.group,
+            inputs: loops.inputs.clone(),
+            program: Program::default(),
+            loops: Some(loops),
+        }
+    }
+
+    /// Operations that are executed.
+    pub fn counts(&self) -> Counts {
+        self.loops.as_ref().map_or_else(|| self.program.counts(), LoopProgram::counts)
+    }
 }
 
 /// Symbolic inputs of one function.
-struct Symbols<'g> {
+pub(crate) struct Symbols<'g> {
     graph: &'g Graph,
     arrays: Vec<InputArray>,
     next: usize,
+}
+
+/// What a group is given, as symbols.
+pub(crate) struct Given<'g> {
+    /// Input arrays, numbered through.
+    pub arrays: Vec<InputArray>,
+    /// Coordinates.
+    pub q: Vec<Expr<'g>>,
+    /// Momenta or velocities, whichever the group takes.
+    pub second: Vec<Expr<'g>>,
+    /// Accelerations, where the group takes them.
+    pub third: Vec<Expr<'g>>,
+    /// Joint forces.
+    pub tau: Vec<Expr<'g>>,
+    /// Prescribed positions, rates, accelerations.
+    pub drive: [Vec<Expr<'g>>; 3],
+    /// External wrenches.
+    pub wrenches: Vec<[Expr<'g>; 6]>,
+    /// Run-time parameters.
+    pub params: Vec<Expr<'g>>,
+    /// Gravity in ground axes.
+    pub gravity: [Expr<'g>; 3],
+}
+
+impl<'g> Given<'g> {
+    /// Symbols for the inputs of a group.
+    pub fn new(graph: &'g Graph, plan: &Plan, group: Group, options: &Options) -> Given<'g> {
+        let mut symbols = Symbols { graph, arrays: Vec::new(), next: 0 };
+        let dims = plan.dims;
+        let q = symbols.array("q", dims.nq);
+        let second = match group {
+            Group::Rates | Group::Velocities | Group::Energy | Group::Derivatives | Group::ParameterDerivatives => {
+                symbols.array("p", dims.nv)
+            }
+            Group::MassMatrix | Group::Jacobians => Vec::new(),
+            _ => symbols.array("v", dims.nv),
+        };
+        let third = if group == Group::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
+        let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
+        let drive_q = symbols.array("self.drive_q", dims.drive_q);
+        let drive_v = symbols.array("self.drive_v", dims.drive_v);
+        let drive_a = symbols.array("self.drive_a", dims.drive_v);
+        let flat = symbols.array("self.wrenches", 6 * dims.wrenches);
+        let wrenches = flat.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
+        let params = symbols.array("self.params", plan.model.params.len());
+        let gravity = match plan.model.gravity {
+            Gravity::Constant(g) => g.map(|v| match v {
+                crate::model::Value::Const(x) => Expr::Const(x),
+                crate::model::Value::Param(k) => params[k],
+            }),
+            Gravity::Input => {
+                let g = symbols.array("self.gravity", 3);
+                std::array::from_fn(|k| g[k])
+            }
+        };
+        let drive = [drive_q, drive_v, drive_a];
+        Given { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
+    }
+
+    /// As the sweeps take it.
+    pub fn inputs(&self) -> Inputs<'_, Expr<'g>> {
+        let [drive_q, drive_v, drive_a] = &self.drive;
+        Inputs { tau: &self.tau, drive_q, drive_v, drive_a, wrenches: &self.wrenches, gravity: self.gravity }
+    }
 }
 
 impl<'g> Symbols<'g> {
@@ -65,45 +149,19 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Strin
 /// An unknown frame name in the options, as a message.
 pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgram, String> {
     let graph = Graph::default();
-    let mut symbols = Symbols { graph: &graph, arrays: Vec::new(), next: 0 };
-    let dims = plan.dims;
-    let q = symbols.array("q", dims.nq);
-    let second = match group {
-        Group::Rates | Group::Velocities | Group::Energy | Group::Derivatives | Group::ParameterDerivatives => {
-            symbols.array("p", dims.nv)
-        }
-        Group::MassMatrix | Group::Jacobians => Vec::new(),
-        _ => symbols.array("v", dims.nv),
-    };
-    let third = if group == Group::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
-    let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
-    let drive_q = symbols.array("self.drive_q", dims.drive_q);
-    let drive_v = symbols.array("self.drive_v", dims.drive_v);
-    let drive_a = symbols.array("self.drive_a", dims.drive_v);
-    let flat = symbols.array("self.wrenches", 6 * dims.wrenches);
-    let wrenches: Vec<[Expr; 6]> = flat.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
-    let params = symbols.array("self.params", plan.model.params.len());
-    let gravity: [Expr; 3] = match plan.model.gravity {
-        Gravity::Constant(g) => g.map(|v| match v {
-            crate::model::Value::Const(x) => Expr::Const(x),
-            crate::model::Value::Param(k) => params[k],
-        }),
-        Gravity::Input => {
-            let g = symbols.array("self.gravity", 3);
-            std::array::from_fn(|k| g[k])
-        }
-    };
-    let inputs =
-        Inputs { tau: &tau, drive_q: &drive_q, drive_v: &drive_v, drive_a: &drive_a, wrenches: &wrenches, gravity };
-    let physical: Tree<Expr> = plan.tree(&params);
+    let given = Given::new(&graph, plan, group, options);
+    let physical: Tree<Expr> = plan.tree(&given.params);
     let tree = physical.regrouped();
     let frames = chosen_frames(plan, options)?;
+    let state = [given.q.as_slice(), &given.second, &given.third];
     let outputs = match group {
-        Group::ParameterDerivatives => parameter_derivatives(&graph, plan, &tree, &q, &second, &params, &inputs),
-        _ => run(&graph, [&tree, &physical], group, [&q, &second, &third], &inputs, &frames),
+        Group::ParameterDerivatives => {
+            parameter_derivatives(&graph, plan, &tree, &given.q, &given.second, &given.params, &given.inputs())
+        }
+        _ => run(&graph, [&tree, &physical], group, state, &given.inputs(), &frames),
     };
     let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);
-    Ok(GroupProgram { group, inputs: symbols.arrays, program })
+    Ok(GroupProgram { group, inputs: given.arrays, program, loops: None })
 }
 
 fn run<'g>(
@@ -242,5 +300,5 @@ pub(crate) fn coordinate_map(plan: &Plan) -> GroupProgram {
     let tree: Tree<Expr> = plan.tree(&params);
     let mut qd = vec![Expr::zero(); plan.dims.nq];
     Sweeps { tree: &tree, trace: &graph }.coordinate_rates(&q, &v, &mut qd);
-    GroupProgram { group: Group::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd) }
+    GroupProgram { group: Group::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd), loops: None }
 }

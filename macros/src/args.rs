@@ -3,7 +3,7 @@
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Forms;
-use mbd_codegen::{Arithmetic, Group, Options, Precision};
+use mbd_codegen::{Arithmetic, Group, Loops, Options, Precision};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
 use crate::literal;
@@ -50,13 +50,14 @@ pub struct Args {
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 14] = [
+const KEYS: [&str; 15] = [
     "path",
     "name",
     "outputs",
     "scalar",
     "arithmetic",
     "forms",
+    "loops",
     "base",
     "gravity",
     "efforts",
@@ -159,6 +160,10 @@ impl Args {
             "forms" => {
                 let choices = Forms::ALL.map(|f| (f.name(), f));
                 self.options.plan.forms = choice("forms", value, &choices)?;
+            }
+            "loops" => {
+                let choices = Loops::ALL.map(|l| (l.name(), l));
+                self.options.plan.loops = choice("loops", value, &choices)?;
             }
             "base" => {
                 let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];

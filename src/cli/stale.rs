@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{self, Arithmetic, Group, Options, Precision};
+use multibody::codegen::{self, Arithmetic, Group, Loops, Options, Precision};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
@@ -38,6 +38,7 @@ struct Entry {
     scalar: Option<String>,
     arithmetic: Option<String>,
     forms: Option<String>,
+    loops: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -90,7 +91,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 
 const KEYS: &str =
     "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
-                    `gravity`, `scalar`, `arithmetic`, `forms`, `efforts`, `frames`, `snap`, `chunk`";
+                    `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// What a file should hold.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -125,6 +126,13 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
             *Forms::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
         }
     };
+    let loops = match entry.loops.as_deref() {
+        None => Loops::default(),
+        Some(name) => {
+            let found = Loops::ALL.iter().find(|l| l.name() == name);
+            *found.ok_or_else(|| wrong(format!("`loops` is auto, always or never, not `{name}`")))?
+        }
+    };
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
@@ -132,7 +140,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         arithmetic,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
-        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms, ..PlanOptions::default() },
+        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms, loops, ..PlanOptions::default() },
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),

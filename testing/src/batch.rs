@@ -2,12 +2,16 @@
 
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
-use mbd_codegen::Group;
+use mbd_codegen::plan::PlanOptions;
+use mbd_codegen::{Group, Loops};
 
 use crate::random::{random_model, Knobs, Rng};
 
 /// Number of trees: as many as compile in well under a minute.
-pub const TREES: u64 = 40;
+pub const TREES: u64 = 44;
+
+/// From this one on, trees are chains, and code takes loops wherever links repeat.
+pub const FIRST_CHAIN: u64 = 40;
 
 /// Every fourth tree is generated in single precision.
 pub fn is_single(k: u64) -> bool {
@@ -24,7 +28,26 @@ pub fn tree(k: u64) -> (Model, Options) {
         outputs: Group::ALL.to_vec(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
         efforts: rng.chance(0.8),
+        plan: PlanOptions {
+            loops: if k < FIRST_CHAIN { Loops::Auto } else { Loops::Always },
+            ..PlanOptions::default()
+        },
         ..Options::default()
     };
+    if k >= FIRST_CHAIN {
+        return (random_model(seed, &chain(k - FIRST_CHAIN)), options);
+    }
     (random_model(seed, &Knobs::everything(seed, 2 + k as usize % 4)), options)
+}
+
+/// Chains of pins, of pins in right angles with springs and dampers, of ball joints, and of pins again.
+fn chain(k: u64) -> Knobs {
+    let n = 7 - k as usize;
+    let mut kinds = [0.0; 9];
+    kinds[if k == 2 { 6 } else { 0 }] = 1.0;
+    let plain = Knobs { bodies: (n, n), taper: 1.0, kinds, ..Knobs::default() };
+    match k {
+        1 => Knobs { skew: 0.0, damping: 1.0, springs: 1.0, armature: 1.0, gravity: [0.0, 0.0, 1.0], ..plain },
+        _ => plain,
+    }
 }

@@ -124,7 +124,7 @@ pub fn header(out: &mut String, plan: &Plan, options: &Options, groups: &[GroupP
         "//\n// Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):"
     );
     for group in groups {
-        let c = group.program.counts();
+        let c = group.counts();
         let _ = writeln!(
             out,
             "//   {}: {} + {} + {} = {}; {}, {}",

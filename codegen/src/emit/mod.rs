@@ -2,6 +2,7 @@
 
 mod lanes;
 mod layout;
+mod loops;
 pub(crate) mod names;
 mod ports;
 mod statements;
@@ -11,7 +12,7 @@ use std::fmt::Write;
 use crate::options::{Group, Options};
 use crate::plan::Plan;
 use crate::trace::GroupProgram;
-use statements::Body;
+use statements::{Body, Head};
 
 pub use layout::joint_word;
 pub use names::{identifier, quantity};
@@ -35,12 +36,16 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     let mut kernels = Vec::new();
     for (id, (group, name, signature)) in functions.iter().enumerate() {
         let _ = writeln!(out, "\n{}", signature.doc);
-        if let Some(counts) = layout::count_line(&group.program.counts()) {
+        if let Some(counts) = layout::count_line(&group.counts()) {
             let _ = writeln!(out, "    /// {counts}");
         }
-        let body = Body::new(plan, options, group, signature);
-        body.write(&mut out, name, id, signature);
-        kernels.push(lanes::Kernel { id, name, signature, ports: body.ports().to_vec() });
+        let ports = ports::ports(group, signature);
+        let head = Head { options, name, id, function: signature, ports: &ports };
+        match &group.loops {
+            Some(program) => loops::Loops::new(plan, program, head).write(&mut out),
+            None => Body::new(plan, group, head).write(&mut out),
+        }
+        kernels.push(lanes::Kernel { id, name, signature, ports });
     }
     lanes::broadcast(&mut out, plan, options);
     if rates {

@@ -71,11 +71,20 @@ pub fn declared(function: &Function) -> Vec<Port> {
     declarations.map(port).collect()
 }
 
+/// Numbers of the inputs that are used.
+fn used(group: &GroupProgram) -> BTreeSet<usize> {
+    match &group.loops {
+        Some(program) => program.used_inputs(),
+        None => {
+            let steps = group.program.steps.iter();
+            steps.filter_map(|(_, op, _)| if let Op::Input(k) = op { Some(*k as usize) } else { None }).collect()
+        }
+    }
+}
+
 /// Inputs that are used, then outputs, in the order of the function's results.
 pub fn ports(group: &GroupProgram, function: &Function) -> Vec<Port> {
-    let steps = &group.program.steps;
-    let used: BTreeSet<usize> =
-        steps.iter().filter_map(|(_, op, _)| if let Op::Input(k) = op { Some(*k as usize) } else { None }).collect();
+    let used = used(group);
     let mut ports = Vec::new();
     let mut at = 0;
     for array in &group.inputs {

@@ -16,13 +16,132 @@ use crate::plan::Plan;
 use crate::symbolic::{Fma, Op, Operand, Output};
 use crate::trace::{GroupProgram, InputArray};
 
+/// What every function begins with.
+pub struct Head<'a> {
+    /// How code is generated.
+    pub options: &'a Options,
+    /// Name of the function.
+    pub name: &'a str,
+    /// Number of its kernel.
+    pub id: usize,
+    /// Its signature.
+    pub function: &'a Function,
+    /// What the kernel reads and writes.
+    pub ports: &'a [Port],
+}
+
+impl Head<'_> {
+    /// Whether the kernel computes what the target computes best; otherwise the same everywhere.
+    fn chooses(&self) -> bool {
+        self.options.arithmetic == Arithmetic::Fast
+    }
+
+    /// Arithmetic of sines and cosines.
+    pub fn arithmetic(&self) -> String {
+        match self.chooses() {
+            true => "A".to_string(),
+            false => format!("{}::kernel::Plain", self.options.runtime),
+        }
+    }
+
+    /// Writes the function, and the first line of its kernel.
+    pub fn write(&self, out: &mut String, statements: usize) {
+        let rt = &self.options.runtime;
+        let (name, id, function) = (self.name, self.id, self.function);
+        let _ = writeln!(
+            out,
+            "{}    pub fn {name}(&self, {}){} {{",
+            function.inline(statements),
+            function.arguments,
+            function.returns
+        );
+        let arguments: Vec<&str> = self.ports.iter().map(|p| p.argument.as_str()).collect();
+        let call = match self.chooses() {
+            true => format!(
+                "{rt}::kernel::call::<Self, {id}, _>(({}))",
+                arguments.iter().map(|a| format!("{a}, ")).collect::<String>().trim_end()
+            ),
+            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
+        };
+        match self.ports.iter().find(|p| p.returned) {
+            Some(port) => {
+                let (place, dims) = (&port.name, &port.dims);
+                let _ = writeln!(out, "        let mut {place} = {};", ports::nested(dims, "0.0"));
+                let _ = writeln!(out, "        {call};\n        {place}\n    }}");
+            }
+            None => {
+                let _ = writeln!(out, "        {call};\n    }}");
+            }
+        }
+        let _ = writeln!(out, "\n    #[inline(always)]");
+        let _ = writeln!(
+            out,
+            "    fn {name}_kernel<A: {rt}::kernel::Arithmetic, const LANES: usize>({}) {{",
+            self.parameters()
+        );
+    }
+
+    /// Parameters of the kernel.
+    pub fn parameters(&self) -> String {
+        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+        self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Places of the results in order: port and number in it.
+    pub fn places(&self) -> Vec<(&str, usize)> {
+        let places = self.ports.iter().filter(|p| p.mutable);
+        places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (p.name.as_str(), k))).collect()
+    }
+
+    /// Right-hand side of an operation; inputs, sines and cosines are written by the caller.
+    pub fn expression(&self, op: &Op, names: &BTreeMap<u32, String>) -> String {
+        let text = |o: &Operand| match o {
+            Operand::Const(bits) => literal(f64::from_bits(*bits), self.options.precision),
+            Operand::Node(id) => names[id].clone(),
+        };
+        match op {
+            Op::Add(a, b) => format!("{} + {}", text(a), text(b)),
+            Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
+            Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
+            Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
+            Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
+                let minus = |yes: &bool| if *yes { "-" } else { "" };
+                let (a, b, c) = (text(a), text(b), text(c));
+                let number = self.options.precision.name();
+                format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(minus_product), minus(minus_addend))
+            }
+            Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, names[a]),
+            Op::Input(_) | Op::Sin(_) | Op::Cos(_) => unreachable!("written by the caller"),
+        }
+    }
+
+    /// An output of a program as it is written.
+    pub fn value(&self, output: &Output, names: &BTreeMap<u32, String>) -> String {
+        match output {
+            Output::Const(x) => self.constant(*x),
+            Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, names[id]),
+        }
+    }
+
+    /// A constant with its sign; zeros have none.
+    pub fn constant(&self, x: f64) -> String {
+        let sign = if x < 0.0 { "-" } else { "" };
+        format!("{sign}{}", literal(x.abs(), self.options.precision))
+    }
+}
+
+/// An input of a function as a kernel reads it, in lane `lane`; the number may be a term to be added.
+pub fn input(inputs: &[InputArray], k: usize, more: &str, lane: &str) -> String {
+    let (array, k) = locate(inputs, k);
+    format!("{}.get({k}{more}, {lane})", ports::local(&array.name))
+}
+
 /// A program with names for its values and places for its results.
 pub struct Body<'a> {
     plan: &'a Plan,
-    options: &'a Options,
+    head: Head<'a>,
     group: &'a GroupProgram,
     names: BTreeMap<u32, String>,
-    ports: Vec<Port>,
     angles: Angles,
 }
 
@@ -79,7 +198,7 @@ impl Angles {
 
 impl<'a> Body<'a> {
     /// Names every value after its body and quantity, numbered in order.
-    pub fn new(plan: &'a Plan, options: &'a Options, group: &'a GroupProgram, function: &Function) -> Self {
+    pub fn new(plan: &'a Plan, group: &'a GroupProgram, head: Head<'a>) -> Self {
         let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
         let mut next: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         let mut names = BTreeMap::new();
@@ -98,54 +217,13 @@ impl<'a> Body<'a> {
             names.insert(*id, format!("{body}_{short}{number}"));
             *number += 1;
         }
-        Body { plan, options, group, names, ports: ports::ports(group, function), angles: Angles::new(group) }
+        Body { plan, head, group, names, angles: Angles::new(group) }
     }
 
-    /// What the kernel reads and writes.
-    pub fn ports(&self) -> &[Port] {
-        &self.ports
-    }
-
-    /// Whether the kernel computes what the target computes best; otherwise the same everywhere.
-    fn chooses(&self) -> bool {
-        self.options.arithmetic == Arithmetic::Fast
-    }
-
-    /// Writes the function and its kernel, number `id` of the type.
-    pub fn write(&self, out: &mut String, name: &str, id: usize, function: &Function) {
-        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+    /// Writes the function and its kernel.
+    pub fn write(&self, out: &mut String) {
         let statements = self.group.program.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
-        let _ = writeln!(
-            out,
-            "{}    pub fn {name}(&self, {}){} {{",
-            function.inline(statements),
-            function.arguments,
-            function.returns
-        );
-        let arguments: Vec<&str> = self.ports.iter().map(|p| p.argument.as_str()).collect();
-        let call = match self.chooses() {
-            true => format!(
-                "{rt}::kernel::call::<Self, {id}, _>(({}))",
-                arguments.iter().map(|a| format!("{a}, ")).collect::<String>().trim_end()
-            ),
-            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
-        };
-        match self.ports.iter().find(|p| p.returned) {
-            Some(port) => {
-                let (place, dims) = (&port.name, &port.dims);
-                let _ = writeln!(out, "        let mut {place} = {};", ports::nested(dims, "0.0"));
-                let _ = writeln!(out, "        {call};\n        {place}\n    }}");
-            }
-            None => {
-                let _ = writeln!(out, "        {call};\n    }}");
-            }
-        }
-        let _ = writeln!(out, "\n    #[inline(always)]");
-        let _ = writeln!(
-            out,
-            "    fn {name}_kernel<A: {rt}::kernel::Arithmetic, const LANES: usize>({}) {{",
-            self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
-        );
+        self.head.write(out, statements);
         self.write_sines(out);
         self.write_given(out);
         let n = self.group.program.outputs.len();
@@ -164,24 +242,16 @@ impl<'a> Body<'a> {
         if n == 0 {
             return;
         }
-        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+        let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
         let _ = writeln!(out, "        let mut angles = [[0.0; LANES]; {n}];\n        for l in 0..LANES {{");
         self.write_steps(out, &self.angles.before, false);
         for (k, angle) in self.angles.early.keys().enumerate() {
             let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
         }
         let _ = writeln!(out, "        }}");
-        let arithmetic = self.arithmetic();
+        let arithmetic = self.head.arithmetic();
         let call = format!("{rt}::trig::pairs_{number}::<{arithmetic}, LANES, {n}>(&angles)");
         let _ = writeln!(out, "        let (sines, cosines) = {call};");
-    }
-
-    /// Arithmetic of sines and cosines.
-    fn arithmetic(&self) -> String {
-        match self.chooses() {
-            true => "A".to_string(),
-            false => format!("{}::kernel::Plain", self.options.runtime),
-        }
     }
 
     /// Those of the program's steps that are in a set, in order.
@@ -226,32 +296,15 @@ impl<'a> Body<'a> {
         // The first of a pair to be met stands for both.
         let pair = late.remove(angle)?;
         let [s, c] = pair.map(|id| id.map_or("_", |id| self.names[&id].as_str()));
-        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
+        let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
+        let arithmetic = self.head.arithmetic();
         Some(format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", self.names[angle]))
     }
 
     fn expression(&self, op: &Op) -> String {
-        let text = |o: &Operand| match o {
-            Operand::Const(bits) => literal(f64::from_bits(*bits), self.options.precision),
-            Operand::Node(id) => self.names[id].clone(),
-        };
         match op {
-            Op::Input(k) => {
-                let (array, k) = locate(&self.group.inputs, *k as usize);
-                format!("{}.get({k}, l)", ports::local(&array.name))
-            }
-            Op::Add(a, b) => format!("{} + {}", text(a), text(b)),
-            Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
-            Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
-            Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
-            Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
-                let minus = |yes: &bool| if *yes { "-" } else { "" };
-                let (a, b, c) = (text(a), text(b), text(c));
-                let number = self.options.precision.name();
-                format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(minus_product), minus(minus_addend))
-            }
-            Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, self.names[a]),
-            Op::Sin(_) | Op::Cos(_) => unreachable!("written as pairs"),
+            Op::Input(k) => input(&self.group.inputs, *k as usize, "", "l"),
+            op => self.head.expression(op, &self.names),
         }
     }
 
@@ -280,26 +333,18 @@ impl<'a> Body<'a> {
     /// Results are gathered in an array before they are handed over.
     fn write_results(&self, out: &mut String) {
         for (k, output) in self.group.program.outputs.iter().enumerate() {
-            let value = match output {
-                Output::Const(x) => {
-                    let sign = if *x < 0.0 { "-" } else { "" };
-                    format!("{sign}{}", literal(x.abs(), self.options.precision))
-                }
-                Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, self.names[id]),
-            };
+            let value = self.head.value(output, &self.names);
             let _ = writeln!(out, "            results[{k}][l] = {value};");
         }
         let _ = writeln!(out, "        }}");
-        let places = self.ports.iter().filter(|p| p.mutable);
-        let places = places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (&p.name, k)));
-        for (result, (name, k)) in places.enumerate() {
+        for (result, (name, k)) in self.head.places().into_iter().enumerate() {
             let _ = writeln!(out, "        {name}.give({k}, &results[{result}]);");
         }
     }
 }
 
 /// A constant as it is written: the shortest decimal that reads back as the same number.
-fn literal(x: f64, precision: Precision) -> String {
+pub(super) fn literal(x: f64, precision: Precision) -> String {
     match precision {
         Precision::F64 => format!("{x:?}"),
         Precision::F32 => format!("{:?}", x as f32),

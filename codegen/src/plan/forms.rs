@@ -12,13 +12,23 @@ use mbd_runtime::sweep::Quantity;
 use mbd_runtime::tree::Source;
 
 use super::accuracy::{Judge, LIMIT};
-use super::{NodeKind, Plan, PlanOptions, PoseStep};
-use crate::options::{Arithmetic, Group, Options};
+use super::{NodeKind, Plan, PlanNode, PlanOptions, PoseStep};
+use crate::loops;
+use crate::options::{Arithmetic, Group, Loops, Options};
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;
 
 /// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
 const LONGEST: usize = 10;
+
+/// The shortest chain that is tried as a loop.
+const TRIED_AS_LOOP: usize = 8;
+
+/// Chains from this length on are loops without a search: straight-line code is far behind.
+const LOOP: usize = 24;
+
+/// The same where chains are not laid out for loops.
+const LOOP_OTHERWISE: usize = 16;
 
 /// Trees beyond this are not searched: counting a candidate means to generate it.
 const LARGEST: usize = 150;
@@ -79,6 +89,8 @@ struct Form {
     turned: Vec<bool>,
     /// Joints before this one get their momentum rates from accumulated momenta.
     gather: usize,
+    /// Whether the joints are the turns of a loop.
+    looped: bool,
 }
 
 /// Chooses a form for every chain that ends at a tip. Each is searched with what carries it alone.
@@ -86,19 +98,27 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
     if plan.nodes.len() > LARGEST {
         return;
     }
-    let runs = parallel_runs(plan);
+    let mut runs = parallel_runs(plan);
+    let mut chains = tip_chains(plan);
+    if options.forms == Forms::Fastest {
+        chains.retain(|chain| !chain.iter().any(|&i| plan.nodes[i].looped));
+        runs.retain(|run| !touches_loop(plan, run));
+    }
+    if chains.is_empty() && runs.is_empty() {
+        return;
+    }
     let goals = [Group::Rates, Group::Accelerations].map(|group| Goal { forms: options.forms, group });
     let single = plan.clone();
     toggle_unturned(plan, &single, &runs, goals[0]);
     let mut other = options.accelerations.then(|| plan.clone());
     let mut known: Vec<Known> = Vec::new();
-    for chain in tip_chains(plan) {
+    for chain in chains {
         let (branch, numbers) = plan.branch(chain[0]);
         let inside: Vec<usize> = chain.iter().filter_map(|&i| numbers[i]).collect();
         let here = Here { letters: branch.letters(), plan: branch, chain: inside, goals };
         let like = known.iter().position(|k| k.letters == here.letters && k.is_accurate(&here));
         let like = like.unwrap_or_else(|| {
-            known.push(here.search(other.is_some()));
+            known.push(here.search(options));
             known.len() - 1
         });
         let Known { forms: [first, second], tried, .. } = &known[like];
@@ -148,17 +168,22 @@ impl Known {
 }
 
 impl Here {
-    fn search(self, accelerations: bool) -> Known {
+    fn search(self, options: PlanOptions) -> Known {
         let (plan, chain) = (&self.plan, &self.chain[..]);
+        let as_loop = (options.forms, options.loops) == (Forms::Fastest, Loops::Auto);
+        let looped = Form::looped(chain.len()).filter(|_| as_loop);
         let from_ground = plan.nodes[chain[0]].parent.is_none();
         let mut search = Search::new(plan, chain, self.goals[0]);
         for form in first_forms(chain.len(), from_ground) {
             search.consider(form);
         }
         while search.neighbours(from_ground) {}
+        if let Some(form) = &looped {
+            search.consider(form.clone());
+        }
         let Search { chosen, tried, mut seen, .. } = search;
         let mut second = None;
-        if accelerations {
+        if options.accelerations {
             // From those forms that lead to velocities with the fewest operations: what the rates need beside them
             // differs from form to form, what the accelerations need does hardly.
             seen.sort_by_key(|(operations, _)| *operations);
@@ -167,6 +192,9 @@ impl Here {
                 search.consider(form);
             }
             while search.neighbours(from_ground) {}
+            if let Some(form) = &looped {
+                search.consider(form.clone());
+            }
             second = search.chosen;
         }
         Known { forms: [chosen, second], tried, letters: self.letters }
@@ -201,6 +229,9 @@ fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 /// one.
 fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Goal) {
     for run in runs {
+        if goal.forms == Forms::Fastest && touches_loop(plan, run) {
+            continue;
+        }
         let (mut branch, numbers) = plan.branch(run[0]);
         let score = goal.score(&branch);
         run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].unturned ^= true);
@@ -269,8 +300,18 @@ struct Search<'a> {
 }
 
 impl Form {
+    /// A chain as the turns of a loop, whose time is that of the shortest way through a link: one joint at a time, on the
+    /// parent's side.
+    fn looped(len: usize) -> Option<Form> {
+        let form = Form { split: 0, base: len - 1, turned: vec![true; len], gather: 0, looped: true };
+        (len >= TRIED_AS_LOOP).then_some(form)
+    }
+
     /// In words.
     fn words(&self, len: usize) -> String {
+        if self.looped {
+            return "a loop".to_string();
+        }
         let mut words = Vec::new();
         let met = self.split == self.base && self.split > 0;
         match (met, len - self.base) {
@@ -323,10 +364,15 @@ impl<'a> Search<'a> {
     fn consider(&mut self, form: Form) -> bool {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
-        let Some(look) = self.goal.look(&candidate) else { return false };
+        let Some(mut look) = self.goal.look(&candidate) else { return false };
+        if form.looped {
+            let options = Options { arithmetic: Arithmetic::Fast, ..options(self.goal.group) };
+            let Some(cost) = loops::cost(&candidate, self.goal.group, &options) else { return false };
+            look.cost = cost;
+        }
         // Momenta are the rates' alone.
         let seen = (look.velocities(), Form { gather: 0, ..form.clone() });
-        if !self.seen.contains(&seen) {
+        if !form.looped && !self.seen.contains(&seen) {
             self.seen.push(seen);
         }
         let score = self.goal.forms.score(&look.cost);
@@ -378,7 +424,7 @@ impl<'a> Search<'a> {
 fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     let mut forms = Vec::new();
     let mut add = |split: usize, base: usize, from: usize, gather: usize| {
-        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), gather };
+        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), gather, looped: false };
         if !forms.contains(&form) {
             forms.push(form);
         }
@@ -399,19 +445,69 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     forms
 }
 
+/// A joint of one freedom that is solved by itself.
+fn eligible(node: &PlanNode) -> bool {
+    let single = matches!(node.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
+    let plain = node.shared.is_none() && node.solve_before.is_empty() && node.open.is_empty();
+    single && plain && matches!(node.source, Source::State { .. })
+}
+
+/// Number of children of every node.
+fn children(plan: &Plan) -> Vec<usize> {
+    let mut children = vec![0; plan.nodes.len()];
+    for parent in plan.nodes.iter().filter_map(|n| n.parent) {
+        children[parent] += 1;
+    }
+    children
+}
+
+/// Whether a loop has one of these nodes, or starts behind one: a frame that does not turn leaves its children to it, too.
+fn touches_loop(plan: &Plan, nodes: &[usize]) -> bool {
+    let touches = |k: usize, i: usize| k == i || plan.nodes[k].parent == Some(i);
+    (0..plan.nodes.len()).any(|k| plan.nodes[k].looped && nodes.iter().any(|&i| touches(k, i)))
+}
+
+/// Marks what may become loops: all that repeats, or what is long enough to gain by it for sure. The search adds to it.
+pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
+    let fastest = options.forms == Forms::Fastest;
+    let least = match (options.loops, fastest) {
+        (Loops::Never, _) => return,
+        (Loops::Always, true) => 3,
+        (Loops::Always, false) => 1,
+        (Loops::Auto, true) => LOOP,
+        (Loops::Auto, false) => LOOP_OTHERWISE,
+    };
+    for i in paths(plan, least).concat() {
+        plan.nodes[i].looped = true;
+        plan.nodes[i].parent_side = fastest && eligible(&plan.nodes[i]);
+    }
+}
+
+/// Joints one behind the other, without branches, at least so many.
+fn paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
+    let children = children(plan);
+    let own = |node: &PlanNode| node.shared.is_none() && matches!(node.source, Source::State { .. });
+    let mut paths: Vec<Vec<usize>> = Vec::new();
+    for (i, node) in plan.nodes.iter().enumerate().filter(|(_, n)| own(n)) {
+        match paths.last_mut() {
+            Some(path) if path.last().copied() == node.parent && node.parent.is_some_and(|p| children[p] == 1) => {
+                path.push(i)
+            }
+            _ => paths.push(vec![i]),
+        }
+    }
+    paths.retain(|path| path.len() >= least);
+    paths
+}
+
 /// Runs of single-freedom joints that end at a tip, inner joint first.
 fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
-    let children = |i: usize| plan.nodes.iter().filter(|n| n.parent == Some(i)).count();
-    let eligible = |i: usize| {
-        let node = &plan.nodes[i];
-        let single = matches!(node.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
-        let plain = node.shared.is_none() && node.solve_before.is_empty() && node.open.is_empty();
-        single && plain && matches!(node.source, Source::State { .. })
-    };
-    let tips = (0..plan.nodes.len()).filter(|&i| children(i) == 0 && eligible(i));
+    let children = children(plan);
+    let eligible = |i: usize| eligible(&plan.nodes[i]);
+    let tips = (0..plan.nodes.len()).filter(|&i| children[i] == 0 && eligible(i));
     tips.map(|tip| {
         let up =
-            std::iter::successors(Some(tip), |&i| plan.nodes[i].parent.filter(|&p| children(p) == 1 && eligible(p)));
+            std::iter::successors(Some(tip), |&i| plan.nodes[i].parent.filter(|&p| children[p] == 1 && eligible(p)));
         let mut chain: Vec<usize> = up.collect();
         chain.reverse();
         chain
@@ -422,6 +518,8 @@ fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
 fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
     for (&i, &turned) in chain.iter().zip(&form.turned) {
         plan.nodes[i].parent_side = turned;
+        plan.nodes[i].looped |= form.looped;
+        plan.nodes[i].unturned &= !form.looped;
     }
     for &i in &chain[..form.gather] {
         plan.nodes[i].gather = true;

@@ -221,6 +221,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
         shared: None,
         deferred: false,
         parent_side: false,
+        looped: false,
         unturned: false,
         gather: false,
         ends: Vec::new(),

@@ -16,6 +16,7 @@ use mbd_runtime::spatial::{Axis, Mat3};
 use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use crate::model::{Gravity, JointKind, Model, Motion, Param, Value};
+use crate::options::Loops;
 
 pub use forms::{Candidate, Forms};
 pub use rigid::Rigid;
@@ -36,11 +37,14 @@ pub struct PlanOptions {
     pub accelerations: bool,
     /// Whether the mass matrix gets one.
     pub mass_matrix: bool,
+    /// Loops over runs of like links: long chains are laid out for them.
+    pub loops: Loops,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        PlanOptions { snap: DEFAULT_SNAP, forms: Forms::default(), accelerations: true, mass_matrix: true }
+        let (forms, loops) = (Forms::default(), Loops::default());
+        PlanOptions { snap: DEFAULT_SNAP, forms, accelerations: true, mass_matrix: true, loops }
     }
 }
 
@@ -128,6 +132,8 @@ pub struct PlanNode {
     pub unturned: bool,
     /// See [`mbd_runtime::tree::Node`].
     pub gather: bool,
+    /// Whether the generator may make it part of a loop.
+    pub looped: bool,
     /// See [`mbd_runtime::tree::Node`].
     pub ends: Vec<usize>,
     /// See [`mbd_runtime::tree::Node`].
@@ -226,6 +232,7 @@ impl Plan {
             })
             .collect();
         shared::share(&mut plan);
+        forms::lay_out(&mut plan, options);
         if options.forms != Forms::Single {
             forms::choose(&mut plan, options);
         }

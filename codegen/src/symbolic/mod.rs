@@ -11,6 +11,6 @@ pub mod machine;
 pub mod passes;
 mod program;
 
-pub use cost::{cost, Cost};
+pub use cost::{cost, Cost, BYTES};
 pub use expr::{Expr, Fma, Graph, Label, Op, Operand};
 pub use program::{Counts, Output, Program};

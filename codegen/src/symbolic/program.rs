@@ -64,7 +64,7 @@ impl Counts {
 }
 
 /// A straight-line program: what the outputs need, nothing else, operands before their use.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Program {
     /// Live nodes in order: node id, operation, origin.
     pub steps: Vec<(u32, Op, Label)>,
@@ -133,7 +133,7 @@ impl Program {
     }
 
     /// `−(a − b)` that is only ever an output becomes `b − a`.
-    fn turn_negated_differences(&mut self) {
+    pub(crate) fn turn_negated_differences(&mut self) {
         let mut inner = std::collections::BTreeSet::new();
         for (_, op, _) in &self.steps {
             inner.extend(op.operands());

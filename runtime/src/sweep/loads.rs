@@ -87,15 +87,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// `V = −g · s` and the springs.
     pub(super) fn potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
+        (0..self.tree.nodes.len()).fold(self.weight_potential(u, w), |sum, i| self.spring_node(i, w, sum))
+    }
+
+    /// `−g · s`.
+    pub fn weight_potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
         self.trace.at(None, Quantity::Energy);
-        let mut potential = -dot3(u.gravity, w.loads.ground_moment);
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Energy);
-            for k in 0..node.kind.springs() {
-                let passive = &node.passive[k];
-                let stretch = w.poses.coordinate(i, k) - passive.rest;
-                potential = potential + S::constant(0.5) * passive.stiffness * stretch * stretch;
-            }
+        -dot3(u.gravity, w.loads.ground_moment)
+    }
+
+    /// A potential with that of the springs of node `i` added.
+    pub fn spring_node(&self, i: usize, w: &Workspace<S>, mut potential: S) -> S {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Energy);
+        for k in 0..node.kind.springs() {
+            let passive = &node.passive[k];
+            let stretch = w.poses.coordinate(i, k) - passive.rest;
+            potential = potential + S::constant(0.5) * passive.stiffness * stretch * stretch;
         }
         potential
     }

@@ -5,6 +5,9 @@
 //!
 //! A coordinate shared by several joints (a mimic) keeps its column `F = M* E` open while the sweep goes on inward, and
 //! is eliminated where all its joints have met: exact, and still one pass.
+//!
+//! The step of every sweep for one node is a function of its own (`factor_node`, `motion_node` ...): the generator runs one
+//! link of a long chain by itself.
 
 mod acceleration;
 mod articulate;

@@ -46,6 +46,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for i in 0..self.tree.nodes.len() {
             twice = self.kinetic_node(i, p, w, twice);
         }
+        self.kinetic_end(p, w, twice)
+    }
+
+    /// Kinetic energy from twice the sum of all nodes: shared coordinates, and the half.
+    pub fn kinetic_end(&self, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
         for (g, &v) in self.tree.shared.iter().enumerate() {
             twice = twice + p[v] * w.velocity.shared_rate[g];
         }

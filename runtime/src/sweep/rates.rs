@@ -21,7 +21,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
     /// node's own axis is known: `EᵀP* = p − armature · rate`.
-    pub(super) fn gather_momenta(&self, p: &[S], w: &mut Workspace<S>) {
+    pub fn gather_momenta(&self, p: &[S], w: &mut Workspace<S>) {
         for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].gather) {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);

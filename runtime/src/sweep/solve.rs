@@ -271,7 +271,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Rates of the state's velocities out of the nodes.
-    pub(super) fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
+    pub fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
             if let (Source::State { v: at, .. }, None) = (node.source, node.shared) {
                 let nv = node.kind.nv();

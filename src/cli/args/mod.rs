@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{Arithmetic, Group, Options, Precision};
+use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
 use values::{camel_case, finite, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
@@ -138,6 +138,9 @@ pub struct CodeArgs {
     /// one by one. `mbd count` shows the candidates
     #[arg(long, value_enum, default_value_t = FormsArg::Fastest)]
     pub forms: FormsArg,
+    /// Loops over runs of like links, or straight-line code
+    #[arg(long, value_enum, default_value_t = LoopsArg::Auto)]
+    pub loops: LoopsArg,
     /// No joint forces: they are zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -184,7 +187,12 @@ impl CodeArgs {
             precision: self.scalar.precision(),
             efforts: !self.no_efforts,
             frames: self.frames.clone(),
-            plan: PlanOptions { snap: self.snap, forms: self.forms.forms(), ..PlanOptions::default() },
+            plan: PlanOptions {
+                snap: self.snap,
+                forms: self.forms.forms(),
+                loops: self.loops.loops(),
+                ..PlanOptions::default()
+            },
             chunk: self.chunk as usize,
             arithmetic: self.arithmetic.arithmetic(),
             ..Options::default()
@@ -234,6 +242,27 @@ impl ArithmeticArg {
         match self {
             ArithmeticArg::Exact => Arithmetic::Exact,
             ArithmeticArg::Fast => Arithmetic::Fast,
+        }
+    }
+}
+
+/// Loops in generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LoopsArg {
+    /// Where a run of like links is long enough to gain by it
+    Auto,
+    /// Wherever links repeat
+    Always,
+    /// Straight-line code throughout
+    Never,
+}
+
+impl LoopsArg {
+    fn loops(self) -> Loops {
+        match self {
+            LoopsArg::Auto => Loops::Auto,
+            LoopsArg::Always => Loops::Always,
+            LoopsArg::Never => Loops::Never,
         }
     }
 }

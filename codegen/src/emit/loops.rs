@@ -1,0 +1,282 @@
+//! Programs in loop form: numbers between blocks in `kept`, what a run keeps from pass to pass in one row for each turn, its
+//! constants in a table. Every block is a loop over lanes, as in straight-line code.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::names::{identifier, quantity};
+use super::statements::{input, Head};
+use crate::loops::{Block, Loop, LoopProgram, Place, Repeat, Start, Target, Way};
+use crate::options::Precision;
+use crate::plan::Plan;
+use crate::symbolic::{Op, Output};
+
+/// Bytes that the rows of eight lanes may take on the stack; beyond, lanes are computed one after the other.
+const ROWS: usize = 1 << 19;
+
+/// Writes the function of a group in loop form.
+pub struct Loops<'a> {
+    plan: &'a Plan,
+    program: &'a LoopProgram,
+    head: Head<'a>,
+    /// Whether lanes are computed one after the other.
+    one_by_one: bool,
+}
+
+impl<'a> Loops<'a> {
+    /// Of one group.
+    pub fn new(plan: &'a Plan, program: &'a LoopProgram, head: Head<'a>) -> Self {
+        let bytes = match head.options.precision {
+            Precision::F64 => 64,
+            Precision::F32 => 32,
+        };
+        let rows: usize = program.loops.iter().map(|l| l.row * l.table.len()).sum();
+        Loops { plan, program, head, one_by_one: rows * bytes > ROWS }
+    }
+
+    /// Lane in inputs and results.
+    fn lane(&self) -> &'static str {
+        if self.one_by_one {
+            "lane"
+        } else {
+            "l"
+        }
+    }
+
+    /// Function, kernel and tables.
+    pub fn write(&self, out: &mut String) {
+        let (name, rt) = (self.head.name, &self.head.options.runtime);
+        self.head.write(out, usize::MAX);
+        if self.one_by_one {
+            let ports: String = self.head.ports.iter().map(|p| format!(", {}", p.name)).collect();
+            let _ = writeln!(out, "        for lane in 0..LANES {{\n            Self::{name}_lane::<A>(lane{ports});");
+            let _ =
+                writeln!(out, "        }}\n    }}\n\n    /// One lane: the rows of many would not fit on the stack.");
+            let _ = writeln!(
+                out,
+                "    #[inline(always)]\n    fn {name}_lane<A: {rt}::kernel::Arithmetic>(lane: usize, {}) {{",
+                self.head.parameters()
+            );
+            let _ = writeln!(out, "        const LANES: usize = 1;");
+        }
+        let _ = writeln!(out, "        let mut kept = [[0.0; LANES]; {}];", self.program.kept);
+        for (k, run) in self.program.loops.iter().enumerate() {
+            let _ = writeln!(out, "        let mut rows{k} = [[[0.0; LANES]; {}]; {}];", run.row, run.table.len());
+        }
+        for block in &self.program.blocks {
+            let _ = writeln!(out, "        {{");
+            match &block.repeat {
+                None => self.body(out, block, "            "),
+                Some(repeat) if repeat.way.is_none() => self.sines(out, block, repeat),
+                Some(repeat) => self.repeated(out, block, repeat),
+            }
+            let _ = writeln!(out, "        }}");
+        }
+        let _ = writeln!(out, "    }}");
+        for (k, run) in self.program.loops.iter().enumerate() {
+            self.table(out, k, run);
+        }
+    }
+
+    fn table(&self, out: &mut String, k: usize, run: &Loop) {
+        let (t, columns) = (self.head.options.precision.name(), run.table.first().map_or(0, Vec::len));
+        let bodies = (&self.plan.nodes[run.nodes.start].name, &self.plan.nodes[run.nodes.end - 1].name);
+        let _ =
+            writeln!(out, "\n    /// Constants from {} to {}, one row for each turn of the loop.", bodies.0, bodies.1);
+        let (name, turns) = (self.table_name(k), run.table.len());
+        let _ = writeln!(out, "    const {name}: &'static [[{t}; {columns}]; {turns}] = &[");
+        for row in &run.table {
+            let numbers: Vec<String> = row.iter().map(|x| self.head.constant(*x)).collect();
+            let _ = writeln!(out, "        [{}],", numbers.join(", "));
+        }
+        let _ = writeln!(out, "    ];");
+    }
+
+    fn table_name(&self, run: usize) -> String {
+        format!("{}_TABLE{run}", self.head.name.to_ascii_uppercase())
+    }
+
+    /// The row of the table, if it is read.
+    fn open_table(&self, out: &mut String, block: &Block, run: usize) {
+        if block.inputs.iter().any(|p| matches!(p, Place::Column(_))) {
+            let _ = writeln!(out, "                let table = &Self::{}[k];", self.table_name(run));
+        }
+    }
+
+    fn repeated(&self, out: &mut String, block: &Block, repeat: &Repeat) {
+        for (k, (start, _)) in repeat.carried.iter().enumerate() {
+            let minus = |neg: bool| if neg { "-" } else { "" };
+            let start = match *start {
+                Start::Const(x) => {
+                    let _ = writeln!(out, "            let mut carried{k} = [{}; LANES];", self.head.constant(x));
+                    continue;
+                }
+                Start::Kept(slot, neg) => format!("{}kept[{slot}][l]", minus(neg)),
+                Start::Given(k, neg) => {
+                    format!("{}{}", minus(neg), input(&self.program.inputs, k, "", self.lane()))
+                }
+            };
+            let _ = writeln!(out, "            let mut carried{k} = [0.0; LANES];");
+            let _ = writeln!(out, "            for l in 0..LANES {{ carried{k}[l] = {start}; }}");
+        }
+        let turns = self.program.loops[repeat.run].table.len();
+        let order = if repeat.way == Some(Way::Back) { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
+        let _ = writeln!(out, "            for k in {order} {{");
+        let _ = writeln!(out, "                let row = &mut rows{}[k];", repeat.run);
+        self.open_table(out, block, repeat.run);
+        self.body(out, block, "                ");
+        let _ = writeln!(out, "            }}");
+        for (k, (_, end)) in repeat.carried.iter().enumerate() {
+            if let Some(slot) = end {
+                let _ = writeln!(out, "            kept[{slot}] = carried{k};");
+            }
+        }
+    }
+
+    /// Sines and cosines of all turns together.
+    fn sines(&self, out: &mut String, block: &Block, repeat: &Repeat) {
+        let (run, turns) = (repeat.run, self.program.loops[repeat.run].table.len());
+        let names = self.names(block);
+        let angles = pairs(block);
+        for k in 0..angles.len() {
+            let _ = writeln!(out, "            let mut angles{k} = [[0.0; LANES]; {turns}];");
+        }
+        let _ = writeln!(out, "            for k in 0..{turns} {{");
+        self.open_table(out, block, run);
+        let _ = writeln!(out, "                for l in 0..LANES {{");
+        for (id, op, _) in &block.program.steps {
+            if !matches!(op, Op::Sin(_) | Op::Cos(_)) {
+                let _ = writeln!(out, "                    let {} = {};", names[id], self.value(block, op, &names));
+            }
+        }
+        for (k, angle) in angles.keys().enumerate() {
+            let _ = writeln!(out, "                    angles{k}[k][l] = {};", names[angle]);
+        }
+        let _ = writeln!(out, "                }}\n            }}");
+        let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
+        for k in 0..angles.len() {
+            let call = format!("{rt}::trig::pairs_{number}::<{}, LANES, {turns}>", self.head.arithmetic());
+            let _ = writeln!(out, "            let (sines{k}, cosines{k}) = {call}(&angles{k});");
+        }
+        let _ = writeln!(out, "            for k in 0..{turns} {{");
+        for (output, target) in block.program.outputs.iter().zip(&block.outputs) {
+            let (Output::Node(id, _), Target::Row(row)) = (output, target) else { continue };
+            let part = |(k, pair): (usize, &[Option<u32>; 2])| {
+                let name = ["sines", "cosines"].into_iter().zip(pair).find(|(_, node)| **node == Some(*id));
+                name.map(|(name, _)| format!("{name}{k}"))
+            };
+            if let Some(array) = angles.values().enumerate().find_map(part) {
+                let _ = writeln!(out, "                rows{run}[k][{row}] = {array}[k];");
+            }
+        }
+        let _ = writeln!(out, "            }}");
+    }
+
+    /// Statements and results, of one turn in a loop. Results are gathered first, as in straight-line code.
+    fn body(&self, out: &mut String, block: &Block, indent: &str) {
+        let names = self.names(block);
+        let n = block.outputs.len();
+        if n > 0 {
+            let _ = writeln!(out, "{indent}let mut results = [[0.0; LANES]; {n}];");
+        }
+        let _ = writeln!(out, "{indent}for l in 0..LANES {{");
+        let mut last = None;
+        let mut late = pairs(block);
+        for (id, op, label) in &block.program.steps {
+            let text = match op {
+                Op::Sin(a) | Op::Cos(a) => {
+                    // The first of a pair to be met stands for both.
+                    let Some(pair) = late.remove(a) else { continue };
+                    let [s, c] = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
+                    let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
+                    let arithmetic = self.head.arithmetic();
+                    format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", names[a])
+                }
+                op => format!("let {} = {};", names[id], self.value(block, op, &names)),
+            };
+            if block.repeat.is_none() && last != Some(*label) && !matches!(op, Op::Input(_)) {
+                let body = label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
+                let _ = writeln!(out, "{indent}    // {body}: {}", quantity(label.1).1);
+                last = Some(*label);
+            }
+            let _ = writeln!(out, "{indent}    {text}");
+        }
+        for (k, output) in block.program.outputs.iter().enumerate() {
+            let _ = writeln!(out, "{indent}    results[{k}][l] = {};", self.head.value(output, &names));
+        }
+        let _ = writeln!(out, "{indent}}}");
+        let places = self.head.places();
+        for (k, target) in block.outputs.iter().enumerate() {
+            let given = |result: usize, more: &str| match (places[result], self.one_by_one) {
+                ((port, at), true) => format!("{port}.set({at}{more}, lane, results[{k}][0]);"),
+                ((port, at), false) => format!("{port}.give({at}{more}, &results[{k}]);"),
+            };
+            let text = match *target {
+                Target::Result(result) => given(result, ""),
+                Target::ResultOfTurn { first, stride } => given(first, &of_turn(stride)),
+                Target::Kept(slot) => format!("kept[{slot}] = results[{k}];"),
+                Target::Row(row) => format!("row[{row}] = results[{k}];"),
+                Target::Carried(carried) => format!("carried{carried} = results[{k}];"),
+            };
+            let _ = writeln!(out, "{indent}{text}");
+        }
+    }
+
+    /// Names after body and quantity; in loops, after the place of the link in its turn.
+    fn names(&self, block: &Block) -> BTreeMap<u32, String> {
+        let mut next: BTreeMap<(String, &str), usize> = BTreeMap::new();
+        let mut names = BTreeMap::new();
+        for (id, op, (node, what)) in &block.program.steps {
+            let short = match op {
+                Op::Input(_) => "in",
+                Op::Sin(_) => "sin",
+                Op::Cos(_) => "cos",
+                _ => quantity(*what).0,
+            };
+            let body = match (node, &block.repeat) {
+                (None, _) => "ground".to_string(),
+                (Some(i), None) => identifier(&self.plan.nodes[*i].name),
+                (Some(0), Some(_)) => "inner".to_string(),
+                (Some(_), Some(r)) if self.program.loops[r.run].period == 1 => "link".to_string(),
+                (Some(i), Some(_)) => format!("link{i}"),
+            };
+            let number = next.entry((body.clone(), short)).or_default();
+            names.insert(*id, format!("{body}_{short}{number}"));
+            *number += 1;
+        }
+        names
+    }
+
+    fn value(&self, block: &Block, op: &Op, names: &BTreeMap<u32, String>) -> String {
+        let Op::Input(k) = op else { return self.head.expression(op, names) };
+        match block.inputs[*k as usize] {
+            Place::Given(k) => input(&self.program.inputs, k, "", self.lane()),
+            Place::GivenOfTurn { first, stride } => input(&self.program.inputs, first, &of_turn(stride), self.lane()),
+            Place::Kept(slot) => format!("kept[{slot}][l]"),
+            Place::Column(column) => format!("table[{column}]"),
+            Place::Row(row) => format!("row[{row}][l]"),
+            Place::Carried(k) => format!("carried{k}[l]"),
+        }
+    }
+}
+
+/// Angles with the nodes of their sines and cosines.
+fn pairs(block: &Block) -> BTreeMap<u32, [Option<u32>; 2]> {
+    let mut pairs: BTreeMap<u32, [Option<u32>; 2]> = BTreeMap::new();
+    for (id, op, _) in &block.program.steps {
+        match op {
+            Op::Sin(a) => pairs.entry(*a).or_default()[0] = Some(*id),
+            Op::Cos(a) => pairs.entry(*a).or_default()[1] = Some(*id),
+            _ => {}
+        }
+    }
+    pairs
+}
+
+/// What is added to a number at turn 0 to have that of turn `k`.
+fn of_turn(stride: usize) -> String {
+    match stride {
+        1 => " + k".to_string(),
+        _ => format!(" + {stride} * k"),
+    }
+}

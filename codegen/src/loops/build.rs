@@ -1,0 +1,357 @@
+//! From a plan to blocks: finds the runs, walks the passes, keeps what is needed, and cuts it into straight-line pieces and
+//! loops.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mbd_runtime::tree::{Source, Tree};
+
+use super::link::Link;
+use super::main_line::MainLine;
+use super::partition::{assemble, output, partition, Body, Wanted};
+use super::runs::{find, Run};
+use super::stage::{passes, Stage, Way};
+use super::{Block, Loop, LoopProgram, Place, Repeat, Start, Target};
+use crate::options::{Group, Options};
+use crate::plan::Plan;
+use crate::symbolic::{passes, Expr, Graph, Op, Operand, Output};
+use crate::trace::Given;
+
+/// Builds the loop form; `None` where no run is long enough.
+pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Option<LoopProgram> {
+    let ways = passes(group)?;
+    let graph = Graph::default();
+    let given = Given::new(&graph, plan, group, options);
+    let tree: Tree<Expr> = plan.tree(&given.params).regrouped();
+    let (plan_of_tree, tree) = match (group, &plan.accelerations) {
+        (Group::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
+        _ => (plan, tree),
+    };
+    let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.looped).collect();
+    let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
+    if runs.is_empty() {
+        return None;
+    }
+    let starts: Vec<(usize, usize)> = runs.iter().map(|run| state_of(&tree, run.nodes.start)).collect();
+    let graphs: Vec<Graph> = runs.iter().map(|_| Graph::default()).collect();
+    let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, options.efforts));
+    let mut links: Vec<Link> = links.collect();
+    let next_input = given.arrays.iter().map(|a| a.len).sum();
+    let stage = Stage::new(group, &graph, tree);
+    let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
+    for (pass, way) in ways.iter().enumerate() {
+        line.pass(pass, *way, &mut links);
+    }
+    let results = line.stage.finish(&line.given);
+    let own: Vec<Vec<(Expr, Target)>> =
+        links.iter_mut().zip(&starts).map(|(link, start)| results_of_turn(plan, group, link, *start)).collect();
+    let mut build = Build { group, line: &line, graphs: &graphs, links: &links, starts: &starts, own, ways, results };
+    Some(build.program(options))
+}
+
+/// First coordinate and velocity of a node.
+fn state_of(tree: &Tree<Expr>, i: usize) -> (usize, usize) {
+    match tree.nodes[i].source {
+        Source::State { q, v } | Source::Drive { q, v } => (q, v),
+    }
+}
+
+/// Whether coordinates move on by the same number from turn to turn.
+fn steady(tree: &Tree<Expr>, run: &Run) -> bool {
+    let sizes = |i: usize| (tree.nodes[i].kind.nq(), tree.nodes[i].kind.nv());
+    let mut at = state_of(tree, run.nodes.start);
+    run.nodes.clone().all(|i| {
+        let same = state_of(tree, i) == at;
+        at = (at.0 + sizes(i).0, at.1 + sizes(i).1);
+        same
+    })
+}
+
+/// Results of one turn and where they go.
+fn results_of_turn<'g>(
+    plan: &Plan,
+    group: Group,
+    link: &mut Link<'g>,
+    start: (usize, usize),
+) -> Vec<(Expr<'g>, Target)> {
+    let (nq, nv) = link.size;
+    let coordinates = (start.0, nq);
+    let velocities = (start.1, nv);
+    let lists = match group {
+        Group::Rates => vec![coordinates, (plan.dims.nq + start.1, nv)],
+        Group::Energy => Vec::new(),
+        _ => vec![velocities],
+    };
+    let targets = lists
+        .into_iter()
+        .flat_map(|(first, n)| (0..n).map(move |k| Target::ResultOfTurn { first: first + k, stride: n }));
+    link.finish().into_iter().zip(targets).collect()
+}
+
+struct Build<'b, 'm, 'g> {
+    group: Group,
+    line: &'b MainLine<'m, 'b>,
+    graphs: &'g [Graph],
+    links: &'b [Link<'g>],
+    starts: &'b [(usize, usize)],
+    own: Vec<Vec<(Expr<'g>, Target)>>,
+    ways: &'b [Way],
+    results: Vec<Expr<'m>>,
+}
+
+/// What is needed.
+struct Live {
+    main: Vec<bool>,
+    links: Vec<Vec<bool>>,
+    /// Places of what run and pass carry.
+    carried: Vec<Vec<Vec<bool>>>,
+}
+
+fn mark(graph: &Graph, live: &mut [bool], e: Expr) {
+    let Expr::Node { id, .. } = e else { return };
+    let mut open = vec![id];
+    while let Some(id) = open.pop() {
+        if !std::mem::replace(&mut live[id as usize], true) {
+            let operands = graph.get(id).0.operands();
+            open.extend(operands.filter_map(|o| if let Operand::Node(id) = o { Some(id) } else { None }));
+        }
+    }
+}
+
+impl<'m> Build<'_, 'm, '_> {
+    /// Results outside runs.
+    fn results(&self) -> impl Iterator<Item = (usize, Expr<'m>)> + '_ {
+        let mut owned = BTreeSet::new();
+        for (own, run) in self.own.iter().zip(self.line.runs) {
+            for (_, target) in own {
+                if let Target::ResultOfTurn { first, stride } = target {
+                    owned.extend((0..run.count()).map(|turn| first + turn * stride));
+                }
+            }
+        }
+        let results = self.results.iter().copied().enumerate();
+        results.filter(move |(k, _)| !owned.contains(k))
+    }
+
+    fn live(&self) -> Live {
+        let passes = |link: &Link| link.passes.iter().map(|p| vec![false; p.incoming.len()]).collect();
+        let mut live = Live {
+            main: vec![false; self.line.graph.len()],
+            links: self.graphs.iter().map(|g| vec![false; g.len()]).collect(),
+            carried: self.links.iter().map(passes).collect(),
+        };
+        self.results().for_each(|(_, e)| mark(self.line.graph, &mut live.main, e));
+        for (k, own) in self.own.iter().enumerate() {
+            own.iter().for_each(|(e, _)| mark(&self.graphs[k], &mut live.links[k], *e));
+        }
+        loop {
+            let mut settled = true;
+            for event in self.line.events.iter().rev() {
+                let (link, graph) = (&self.links[event.run], &self.graphs[event.run]);
+                let pass = &link.passes[event.pass];
+                for (k, (start, end)) in event.start.iter().zip(&event.end).enumerate() {
+                    let read = |e: Expr, live: &[bool]| matches!(e, Expr::Node { id, .. } if live[id as usize]);
+                    let wanted = read(*end, &live.main) || read(pass.incoming[k], &live.links[event.run]);
+                    if wanted && !std::mem::replace(&mut live.carried[event.run][event.pass][k], true) {
+                        mark(graph, &mut live.links[event.run], pass.outgoing[k]);
+                        mark(self.line.graph, &mut live.main, *start);
+                        settled = false;
+                    }
+                }
+            }
+            if settled {
+                return live;
+            }
+        }
+    }
+
+    fn program(&mut self, options: &Options) -> LoopProgram {
+        let live = self.live();
+        let mut loops = Vec::new();
+        let mut bodies: Vec<BTreeMap<Option<usize>, Body>> = Vec::new();
+        for (k, run) in self.line.runs.iter().enumerate() {
+            let inputs = &self.line.given.arrays;
+            let array = |name: &str| inputs.iter().take_while(|a| a.name != name).map(|a| a.len).sum::<usize>();
+            let (q, v) = self.starts[k];
+            let wanted = Wanted {
+                results: self.own[k].clone(),
+                carried: &live.carried[k],
+                first: [q, inputs[0].len + v, array("a") + v, array("self.tau") + v],
+            };
+            let code = partition(&self.graphs[k], &self.links[k], run, &live.links[k], &wanted);
+            loops.push(Loop { nodes: run.nodes.clone(), period: run.period, table: code.table, row: code.row });
+            bodies.push(code.bodies.into_iter().map(|b| (b.pass, b)).collect());
+        }
+        let units = self.units(&live);
+        let (kept, slots) = self.slots(&units, &live);
+        let mut blocks = Vec::new();
+        for (k, bodies) in bodies.iter_mut().enumerate() {
+            if let Some(b) = bodies.remove(&None) {
+                let repeat = Some(Repeat { run: k, way: None, carried: Vec::new() });
+                blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
+            }
+        }
+        for unit in &units {
+            match unit {
+                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, unit_is_last(unit, &units))),
+                Unit::Loop(event) => {
+                    let event = &self.line.events[*event];
+                    let Some(b) = bodies[event.run].remove(&Some(event.pass)) else { continue };
+                    let carried = self.carried(event, &live, &slots);
+                    let repeat = Some(Repeat { run: event.run, way: Some(self.ways[event.pass]), carried });
+                    blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
+                }
+            }
+        }
+        let inputs = self.line.given.arrays.clone();
+        for block in &mut blocks {
+            let program = std::mem::take(&mut block.program);
+            block.program = passes::run(program, options.arithmetic);
+        }
+        LoopProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
+    }
+
+    /// Live nodes of the main line between loops.
+    fn units(&self, live: &Live) -> Vec<Unit> {
+        let mut units = Vec::new();
+        let mut at = 0;
+        let ends = self.line.events.iter().map(|e| e.at).chain(Some(self.line.graph.len()));
+        for (k, end) in ends.enumerate() {
+            let is_op = |id: &u32| !matches!(self.line.graph.get(*id).0, Op::Input(_));
+            let own: BTreeSet<u32> =
+                (at as u32..end as u32).filter(|id| live.main[*id as usize]).filter(is_op).collect();
+            if !own.is_empty() {
+                units.push(Unit::Straight(own));
+            }
+            at = end;
+            if k < self.line.events.len() {
+                units.push(Unit::Loop(k));
+            }
+        }
+        // Constants and results of loops are handed over at the end.
+        if !matches!(units.last(), Some(Unit::Straight(_))) {
+            units.push(Unit::Straight(BTreeSet::new()));
+        }
+        units
+    }
+
+    /// Places for values that one unit computes and another needs, used again when they are free.
+    fn slots(&self, units: &[Unit], live: &Live) -> (usize, BTreeMap<u32, usize>) {
+        let mut born: BTreeMap<u32, usize> = BTreeMap::new();
+        let mut last: BTreeMap<u32, usize> = BTreeMap::new();
+        for (k, unit) in units.iter().enumerate() {
+            let mut read = |id: u32| {
+                last.insert(id, k);
+            };
+            match unit {
+                Unit::Straight(own) => {
+                    for id in own {
+                        let operands = self.line.graph.get(*id).0.operands();
+                        operands.for_each(|o| {
+                            if let Operand::Node(id) = o {
+                                read(id)
+                            }
+                        });
+                        born.insert(*id, k);
+                    }
+                }
+                Unit::Loop(event) => {
+                    let event = &self.line.events[*event];
+                    let needed = &live.carried[event.run][event.pass];
+                    for ((start, end), _) in event.start.iter().zip(&event.end).zip(needed).filter(|(_, n)| **n) {
+                        if let Expr::Node { id, .. } = *start {
+                            read(id);
+                        }
+                        if let Expr::Node { id, .. } = *end {
+                            born.insert(id, k);
+                        }
+                    }
+                }
+            }
+        }
+        // Results of loops are handed over by the last piece.
+        for (_, e) in self.results() {
+            if let Expr::Node { id, .. } = e {
+                if matches!(self.line.graph.get(id).0, Op::Input(_)) && born.contains_key(&id) {
+                    last.insert(id, units.len() - 1);
+                }
+            }
+        }
+        let mut slots = BTreeMap::new();
+        let (mut free, mut count) = (Vec::new(), 0);
+        for k in 0..units.len() {
+            for (id, _) in born.iter().filter(|(id, at)| **at == k && last.get(id).is_some_and(|l| *l > k)) {
+                let slot = free.pop().unwrap_or_else(|| {
+                    count += 1;
+                    count - 1
+                });
+                slots.insert(*id, slot);
+            }
+            free.extend(slots.iter().filter(|(id, _)| last[id] == k).map(|(_, slot)| *slot));
+        }
+        (count, slots)
+    }
+
+    fn straight(&self, own: &BTreeSet<u32>, slots: &BTreeMap<u32, usize>, is_last: bool) -> Option<Block> {
+        let mut outputs: Vec<(Output, Target)> = Vec::new();
+        for (k, e) in self.results() {
+            let here = match e {
+                Expr::Const(_) => is_last,
+                Expr::Node { id, .. } => {
+                    own.contains(&id) || (is_last && matches!(self.line.graph.get(id).0, Op::Input(_)))
+                }
+            };
+            if here {
+                outputs.push((output(e), Target::Result(k)));
+            }
+        }
+        for id in own {
+            if let Some(slot) = slots.get(id) {
+                outputs.push((Output::Node(*id, false), Target::Kept(*slot)));
+            }
+        }
+        let given = self.line.given.arrays.iter().map(|a| a.len).sum();
+        let place = |id: u32| match self.line.graph.get(id).0 {
+            Op::Input(k) if (k as usize) < given => Place::Given(k as usize),
+            _ => Place::Kept(slots[&id]),
+        };
+        if outputs.is_empty() {
+            return None;
+        }
+        let (program, inputs, outputs) = assemble(self.line.graph, own, place, &outputs);
+        Some(Block { program, inputs, outputs, repeat: None })
+    }
+
+    fn carried(
+        &self,
+        event: &super::main_line::Event<'_>,
+        live: &Live,
+        slots: &BTreeMap<u32, usize>,
+    ) -> Vec<(Start, Option<usize>)> {
+        let incoming = &self.links[event.run].passes[event.pass].incoming;
+        let needed = &live.carried[event.run][event.pass];
+        let places = event.start.iter().zip(&event.end).zip(incoming.iter().zip(needed));
+        places
+            .filter(|(_, (incoming, needed))| **needed && matches!(incoming, Expr::Node { .. }))
+            .map(|((start, end), _)| {
+                let start = match *start {
+                    Expr::Const(x) => Start::Const(x),
+                    Expr::Node { id, neg, .. } => match self.line.graph.get(id).0 {
+                        Op::Input(k) if !slots.contains_key(&id) => Start::Given(k as usize, neg),
+                        _ => Start::Kept(slots[&id], neg),
+                    },
+                };
+                let end = if let Expr::Node { id, .. } = *end { slots.get(&id).copied() } else { None };
+                (start, end)
+            })
+            .collect()
+    }
+}
+
+fn unit_is_last(unit: &Unit, units: &[Unit]) -> bool {
+    units.last().is_some_and(|last| std::ptr::eq(last, unit))
+}
+
+enum Unit {
+    Straight(BTreeSet<u32>),
+    Loop(usize),
+}

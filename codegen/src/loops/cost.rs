@@ -1,0 +1,55 @@
+//! What a loop form costs to run, in the terms of [`symbolic::cost`](crate::symbolic::cost()).
+
+use super::{looped, Block, LoopProgram, Place, Target};
+use crate::options::{Group, Options};
+use crate::plan::Plan;
+use crate::symbolic::machine::{latency, SINE, WIDTH};
+use crate::symbolic::{Cost, Operand, Output, BYTES};
+
+/// Cost of a group in loop form; `None` where it has none. Turns follow each other as fast as what they carry allows.
+/// Sines and cosines are left out, as everywhere.
+pub fn cost(plan: &Plan, group: Group, options: &Options) -> Option<Cost> {
+    looped(plan, group, options).map(|program| of_program(&program))
+}
+
+fn of_program(program: &LoopProgram) -> Cost {
+    let mut sum = Cost { operations: program.counts().total(), critical_path: SINE, ..Cost::default() };
+    for block in &program.blocks {
+        let instructions = block.program.instructions();
+        sum.bytes += BYTES * instructions as f64;
+        let (turns, path) = match &block.repeat {
+            None => (1, block.program.critical_path()),
+            Some(repeat) if repeat.way.is_none() => continue,
+            Some(repeat) => (program.loops[repeat.run].table.len(), carried_path(block)),
+        };
+        // Rows are written; what is read is an operand of instructions.
+        let rows = block.outputs.iter().filter(|t| matches!(t, Target::Row(_))).count();
+        let throughput = block.program.throughput().max((instructions + rows) as f64 / f64::from(WIDTH));
+        sum.instructions += turns * (instructions + rows);
+        sum.throughput += turns as f64 * throughput;
+        sum.critical_path += turns as u32 * path;
+    }
+    sum
+}
+
+/// Cycles from what a turn takes from the one before it to what it hands on.
+fn carried_path(block: &Block) -> u32 {
+    let mut ready = std::collections::BTreeMap::new();
+    for (id, op, _) in &block.program.steps {
+        let at = match op {
+            crate::symbolic::Op::Input(k) => matches!(block.inputs[*k as usize], Place::Carried(_)).then_some(0),
+            op => {
+                let operands =
+                    op.operands().filter_map(|o| if let Operand::Node(k) = o { ready.get(&k) } else { None });
+                operands.max().map(|at: &u32| at + latency(op))
+            }
+        };
+        at.map(|at| ready.insert(*id, at));
+    }
+    let outputs = block.program.outputs.iter().zip(&block.outputs);
+    let carried = outputs.filter_map(|(output, target)| match (output, target) {
+        (Output::Node(id, _), Target::Carried(_)) => ready.get(id).copied(),
+        _ => None,
+    });
+    carried.max().unwrap_or(0)
+}

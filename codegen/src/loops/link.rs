@@ -1,0 +1,212 @@
+//! One turn of a run by itself: a dummy node in the place of the rest of the tree, and the links of one period behind it,
+//! taken through the passes with symbols for what they carry in.
+
+use mbd_runtime::spatial::RigidInertia;
+use mbd_runtime::tree::{Dims, Kind, Node, Source, Tree};
+use mbd_runtime::Scalar;
+
+use super::runs::{map_node, Run, Slot};
+use super::stage::{Stage, Way};
+use crate::options::Group;
+use crate::symbolic::{Expr, Graph};
+use crate::trace::Given;
+
+/// What an input of a link's graph is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LinkInput {
+    /// Column of the table of constants.
+    Column(usize),
+    /// Coordinate of the turn.
+    Q(usize),
+    /// Momentum or velocity of the turn.
+    Second(usize),
+    /// Acceleration of the turn.
+    Third(usize),
+    /// Joint force of the turn.
+    Tau(usize),
+    /// What a pass carries in: pass and place.
+    Carried(usize, usize),
+}
+
+/// A pass through one turn.
+pub struct LinkPass<'g> {
+    /// Symbols carried in; constants where every turn takes in the same.
+    pub incoming: Vec<Expr<'g>>,
+    /// What is carried out.
+    pub outgoing: Vec<Expr<'g>>,
+    /// Where the negative is carried, because that is what a turn computes.
+    pub negative: Vec<bool>,
+}
+
+/// One turn of a run on its way through the passes.
+pub struct Link<'g> {
+    graph: &'g Graph,
+    stage: Stage<'g>,
+    given: Given<'g>,
+    nodes: usize,
+    /// What the graph's inputs are.
+    pub inputs: Vec<LinkInput>,
+    /// Passes done.
+    pub passes: Vec<LinkPass<'g>>,
+    /// Coordinates and velocities of one turn.
+    pub size: (usize, usize),
+}
+
+impl<'g> Link<'g> {
+    /// Nothing done yet.
+    pub fn new(graph: &'g Graph, group: Group, run: &Run, efforts: bool) -> Self {
+        let mut inputs = Vec::new();
+        let mut symbols = |of: &dyn Fn(usize) -> LinkInput, n: usize| -> Vec<Expr<'g>> {
+            let first = inputs.len();
+            inputs.extend((0..n).map(of));
+            (first..first + n).map(|k| graph.input(k)).collect()
+        };
+        let columns = symbols(&LinkInput::Column, run.table[0].len());
+        let (mut nq, mut nv) = (0, 0);
+        let mut nodes = vec![dummy()];
+        for (k, node) in run.template.iter().enumerate() {
+            let mut node = map_node(node, &mut |slot| match slot {
+                Slot::Const(x) => Expr::Const(x),
+                Slot::Column(c) => columns[c],
+            });
+            node.parent = Some(k);
+            node.source = Source::State { q: nq, v: nv };
+            (nq, nv) = (nq + node.kind.nq(), nv + node.kind.nv());
+            nodes.push(node);
+        }
+        let zero = Expr::zero();
+        let given = Given {
+            arrays: Vec::new(),
+            q: symbols(&LinkInput::Q, nq),
+            second: symbols(&LinkInput::Second, nv),
+            third: symbols(&LinkInput::Third, if group == Group::InverseDynamics { nv } else { 0 }),
+            tau: symbols(&LinkInput::Tau, if efforts { nv } else { 0 }),
+            // What the dummy is driven by; nothing reads it.
+            drive: [vec![zero; 3], vec![zero; 3], vec![zero; 3]],
+            wrenches: Vec::new(),
+            params: Vec::new(),
+            gravity: [zero; 3],
+        };
+        let dims = Dims { nq, nv, ..Dims::default() };
+        let tree = Tree {
+            nodes,
+            dims,
+            shared: Vec::new(),
+            solve_at_ground: Vec::new(),
+            ground_moment: [zero; 3],
+            wrenches: Vec::new(),
+            frames: Vec::new(),
+            joint_nodes: Vec::new(),
+            accelerations: None,
+            matrix_depth: 0,
+        };
+        let stage = Stage::new(group, graph, tree);
+        Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) }
+    }
+
+    /// The next pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
+    /// constant of the loop; the rest become symbols.
+    pub fn pass(&mut self, way: Way, first: &[Expr<'_>]) {
+        let pass = self.passes.len();
+        let mut known: Vec<Option<f64>> =
+            first.iter().map(|e| if let Expr::Const(x) = e { Some(*x) } else { None }).collect();
+        let symbols: Vec<Expr<'g>> = (0..first.len())
+            .map(|k| {
+                self.inputs.push(LinkInput::Carried(pass, k));
+                self.graph.input(self.inputs.len() - 1)
+            })
+            .collect();
+        let signed = |e: Expr<'g>, negative: bool| if negative { -e } else { e };
+        let mut negative = vec![false; first.len()];
+        // Signs are chosen once: choosing them again could go on for ever.
+        let mut choose = true;
+        loop {
+            let symbol = |k: usize| signed(symbols[k], negative[k]);
+            let incoming: Vec<Expr<'g>> =
+                known.iter().enumerate().map(|(k, known)| known.map_or(symbol(k), Expr::Const)).collect();
+            let mut stage = self.stage.clone();
+            let outgoing = self.turn(&mut stage, pass, way, &incoming);
+            let mut settled = true;
+            for (known, out) in known.iter_mut().zip(&outgoing) {
+                if known.is_some_and(|x| !matches!(out, Expr::Const(y) if *y == x)) {
+                    *known = None;
+                    settled = false;
+                }
+            }
+            if settled && std::mem::take(&mut choose) {
+                for ((negative, out), known) in negative.iter_mut().zip(&outgoing).zip(&known) {
+                    *negative = known.is_none() && matches!(out, Expr::Node { neg: true, .. });
+                }
+                settled = !negative.contains(&true);
+            }
+            if settled {
+                self.stage = stage;
+                let outgoing = outgoing.into_iter().zip(&negative).map(|(e, negative)| signed(e, *negative)).collect();
+                self.passes.push(LinkPass { incoming: symbols_of(&incoming), outgoing, negative });
+                return;
+            }
+        }
+    }
+
+    fn turn(&self, stage: &mut Stage<'g>, pass: usize, way: Way, incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
+        stage.begin(pass, &self.given);
+        let (inner, outer) = (0, self.nodes);
+        match way {
+            Way::Back => {
+                for (own, from) in stage.carried(pass, outer).into_iter().zip(incoming) {
+                    *own = *own + *from;
+                }
+                (1..=outer).rev().for_each(|i| stage.node(pass, i, &self.given));
+                stage.carried(pass, inner).into_iter().map(|e| *e).collect()
+            }
+            Way::Forth => {
+                for (own, from) in stage.carried(pass, inner).into_iter().zip(incoming) {
+                    *own = *from;
+                }
+                (1..=outer).for_each(|i| stage.node(pass, i, &self.given));
+                stage.carried(pass, outer).into_iter().map(|e| *e).collect()
+            }
+        }
+    }
+
+    /// Results of one turn, after the last pass.
+    pub fn finish(&mut self) -> Vec<Expr<'g>> {
+        self.stage.finish(&self.given)
+    }
+}
+
+/// The symbols without their signs.
+fn symbols_of<'g>(incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
+    let plain = incoming.iter().map(|e| match *e {
+        Expr::Node { graph, id, .. } => Expr::Node { graph, id, neg: false },
+        Expr::Const(x) => Expr::Const(x),
+    });
+    plain.collect()
+}
+
+/// Stands for whatever is inboard of a turn: has no inertia, and is never stepped.
+fn dummy<'g>() -> Node<Expr<'g>> {
+    Node {
+        parent: None,
+        place: Vec::new(),
+        kind: Kind::Planar,
+        source: Source::Drive { q: 0, v: 0 },
+        ratio: Expr::one(),
+        offset: Expr::zero(),
+        phase: Expr::zero(),
+        quarter: 0,
+        slide: Expr::zero(),
+        inertia: RigidInertia::zero(),
+        passive: Vec::new(),
+        shared: None,
+        deferred: false,
+        parent_side: false,
+        unturned: false,
+        gather: false,
+        ends: Vec::new(),
+        screws: Vec::new(),
+        open: Vec::new(),
+        solve_before: Vec::new(),
+        solve_after: Vec::new(),
+    }
+}

@@ -1,0 +1,197 @@
+//! Loop form: runs of like links as loops over tables of their constants, the rest of the tree as straight-line code.
+//!
+//! Straight-line code of a long chain outgrows the instruction cache and takes long to compile. Here every pass of a group
+//! (leaves to base, base to leaves) walks the tree once; where it meets a run, one turn is traced on symbols by the same
+//! steps of the sweeps, and becomes the body of a loop. What a later pass needs of an earlier one is kept in one row of
+//! numbers for each turn. The operations are those of the straight-line form, so the bits are the same.
+
+mod build;
+mod cost;
+mod evaluate;
+mod link;
+mod main_line;
+mod partition;
+mod runs;
+mod stage;
+
+use std::collections::BTreeSet;
+
+use crate::options::{Group, Loops, Options};
+use crate::plan::Plan;
+use crate::symbolic::{Counts, Output, Program};
+use crate::trace::InputArray;
+
+pub use cost::cost;
+pub use runs::{find, Run};
+pub use stage::Way;
+
+/// Nodes in the shortest run that becomes a loop where the plan allows one.
+const LEAST: usize = 6;
+
+/// The same where loops are asked for.
+const LEAST_ALWAYS: usize = 3;
+
+/// Where an input of a block comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// Input of the function, numbered through its arrays.
+    Given(usize),
+    /// The same, moving on with every turn.
+    GivenOfTurn {
+        /// At turn 0.
+        first: usize,
+        /// From turn to turn.
+        stride: usize,
+    },
+    /// Kept by an earlier block.
+    Kept(usize),
+    /// Column of the run's table.
+    Column(usize),
+    /// Number of the turn's row.
+    Row(usize),
+    /// Carried from turn to turn.
+    Carried(usize),
+}
+
+/// Where an output of a block goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// Result of the function, in the order of the straight-line program's outputs.
+    Result(usize),
+    /// The same, moving on with every turn.
+    ResultOfTurn {
+        /// At turn 0.
+        first: usize,
+        /// From turn to turn.
+        stride: usize,
+    },
+    /// Kept for later blocks.
+    Kept(usize),
+    /// Number of the turn's row.
+    Row(usize),
+    /// Carried to the next turn.
+    Carried(usize),
+}
+
+/// First value of something carried.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// A constant.
+    Const(f64),
+    /// Kept by an earlier block, perhaps with the other sign.
+    Kept(usize, bool),
+    /// Input of the function (gravity), perhaps with the other sign.
+    Given(usize, bool),
+}
+
+/// How a block repeats.
+#[derive(Clone, Debug)]
+pub struct Repeat {
+    /// Which run.
+    pub run: usize,
+    /// Order of the turns; `None`: any, the turns do not depend on each other.
+    pub way: Option<Way>,
+    /// First values of what is carried, and where the last ones are kept.
+    pub carried: Vec<(Start, Option<usize>)>,
+}
+
+/// Straight-line code, or the body of a loop.
+#[derive(Clone, Debug)]
+pub struct Block {
+    /// Its program; inputs are numbered through `inputs`.
+    pub program: Program,
+    /// Where the inputs come from.
+    pub inputs: Vec<Place>,
+    /// Where the outputs go.
+    pub outputs: Vec<Target>,
+    /// Set for loops.
+    pub repeat: Option<Repeat>,
+}
+
+/// One run in the code.
+#[derive(Clone, Debug)]
+pub struct Loop {
+    /// Nodes.
+    pub nodes: std::ops::Range<usize>,
+    /// Nodes in one turn.
+    pub period: usize,
+    /// One row of constants for each turn.
+    pub table: Vec<Vec<f64>>,
+    /// Numbers kept for each turn.
+    pub row: usize,
+}
+
+/// An output group in loop form.
+#[derive(Clone, Debug)]
+pub struct LoopProgram {
+    /// Which.
+    pub group: Group,
+    /// Input arrays, numbered through.
+    pub inputs: Vec<InputArray>,
+    /// Number of results.
+    pub results: usize,
+    /// Runs.
+    pub loops: Vec<Loop>,
+    /// Blocks, in order.
+    pub blocks: Vec<Block>,
+    /// Numbers kept between blocks.
+    pub kept: usize,
+}
+
+impl LoopProgram {
+    /// Operations that are executed.
+    pub fn counts(&self) -> Counts {
+        self.blocks.iter().fold(Counts::default(), |sum, block| {
+            let turns = block.repeat.as_ref().map_or(1, |r| self.loops[r.run].table.len());
+            let once = block.program.counts();
+            (0..turns).fold(sum, |sum, _| sum.plus(once))
+        })
+    }
+
+    /// Numbers of the inputs that are read.
+    pub fn used_inputs(&self) -> BTreeSet<usize> {
+        let mut used = BTreeSet::new();
+        for block in &self.blocks {
+            let turns = block.repeat.as_ref().map_or(1, |r| self.loops[r.run].table.len());
+            for place in &block.inputs {
+                match *place {
+                    Place::Given(k) => used.extend([k]),
+                    Place::GivenOfTurn { first, stride } => used.extend((0..turns).map(|turn| first + stride * turn)),
+                    _ => {}
+                }
+            }
+            let starts = block.repeat.iter().flat_map(|r| &r.carried);
+            used.extend(starts.filter_map(|(start, _)| if let Start::Given(k, _) = start { Some(*k) } else { None }));
+        }
+        used
+    }
+
+    /// Whether all numbers in the code satisfy a condition.
+    pub fn all_constants(&self, mut fits: impl FnMut(f64) -> bool) -> bool {
+        let tables = self.loops.iter().all(|l| l.table.iter().flatten().all(|x| fits(*x)));
+        tables
+            && self.blocks.iter().all(|block| {
+                let steps = block.program.steps.iter().flat_map(|(_, op, _)| op.operands());
+                let mut operands = steps.filter_map(|o| match o {
+                    crate::symbolic::Operand::Const(bits) => Some(f64::from_bits(bits)),
+                    crate::symbolic::Operand::Node(_) => None,
+                });
+                let outputs_fit = block.program.outputs.iter().all(|o| match o {
+                    Output::Const(x) => fits(*x),
+                    Output::Node(..) => true,
+                });
+                outputs_fit && operands.all(&mut fits)
+            })
+    }
+}
+
+/// The loop form of a group; `None` where there is none, or straight-line code is better.
+pub fn looped(plan: &Plan, group: Group, options: &Options) -> Option<LoopProgram> {
+    let least = match options.plan.loops {
+        Loops::Never => return None,
+        Loops::Auto => LEAST,
+        Loops::Always => LEAST_ALWAYS,
+    };
+    stage::passes(group)?;
+    build::build(plan, group, options, least)
+}

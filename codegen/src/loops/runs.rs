@@ -1,0 +1,312 @@
+//! Runs of like links: where a branch repeats itself.
+//!
+//! Links are alike if their joints are of one kind and their placements, inertias and passive elements have zeros and
+//! ones in the same places; a run may repeat two to four different links in turn. Where a branch is not strictly regular,
+//! links are also taken for alike after identity steps and zeros have been let in, if that costs little.
+
+use std::ops::Range;
+
+use mbd_runtime::spatial::Step;
+use mbd_runtime::tree::{Kind, Node, Source, Tree};
+
+use crate::symbolic::Expr;
+
+/// Links that repeat: `count` times `period` nodes.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Nodes, inner first; each hangs on the one before it.
+    pub nodes: Range<usize>,
+    /// Nodes in one turn of the loop.
+    pub period: usize,
+    /// One node of the period each: constants common to all turns, and the others as columns of the table.
+    pub(super) template: Vec<Node<Slot>>,
+    /// One row for each turn of the loop, columns as the template numbers them.
+    pub table: Vec<Vec<f64>>,
+}
+
+/// A constant of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Slot {
+    /// The same in all links.
+    Const(f64),
+    /// Column of the table.
+    Column(usize),
+}
+
+impl Run {
+    /// Turns of the loop.
+    pub fn count(&self) -> usize {
+        self.table.len()
+    }
+
+    /// First node of a turn.
+    pub fn first(&self, turn: usize) -> usize {
+        self.nodes.start + turn * self.period
+    }
+
+    /// Outermost node.
+    pub fn last(&self) -> usize {
+        self.nodes.end - 1
+    }
+}
+
+/// The longest period that is looked for.
+const LONGEST_PERIOD: usize = 4;
+
+/// Runs of at least `least` nodes among those that are allowed, inner nodes first.
+pub fn find(tree: &Tree<Expr>, allowed: &[bool], least: usize) -> Vec<Run> {
+    if !tree.wrenches.is_empty() {
+        return Vec::new();
+    }
+    let links: Vec<Option<Node<f64>>> =
+        (0..tree.nodes.len()).map(|i| constant_link(tree, i).filter(|_| allowed[i])).collect();
+    let mut children = vec![0; tree.nodes.len()];
+    for parent in tree.nodes.iter().filter_map(|n| n.parent) {
+        children[parent] += 1;
+    }
+    let mut runs = Vec::new();
+    let mut at = 0;
+    while at < tree.nodes.len() {
+        let path = path_from(&links, &children, at);
+        in_path(&links, path.clone(), least, &mut runs);
+        at = path.end.max(at + 1);
+    }
+    runs
+}
+
+/// Consecutive nodes from `start` on that may be in one run: each the only child of the one before it.
+fn path_from(links: &[Option<Node<f64>>], children: &[usize], start: usize) -> Range<usize> {
+    // What the innermost link hands inward needs a place, so it hangs on a node; the outermost takes in from one child.
+    let fits =
+        |i: usize| links.get(i).is_some_and(|l| l.as_ref().is_some_and(|l| l.parent.is_some())) && children[i] <= 1;
+    if !fits(start) {
+        return start..start;
+    }
+    let mut end = start + 1;
+    while fits(end) && links[end].as_ref().is_some_and(|l| l.parent == Some(end - 1)) {
+        end += 1;
+    }
+    start..end
+}
+
+/// Node `i` with numbers for constants, if it can be in a loop.
+fn constant_link(tree: &Tree<Expr>, i: usize) -> Option<Node<f64>> {
+    let node = &tree.nodes[i];
+    let plain = node.shared.is_none()
+        && !node.deferred
+        && !node.gather
+        && !node.unturned
+        && !node.parent.is_some_and(|p| tree.nodes[p].gather || tree.nodes[p].unturned)
+        && node.open.is_empty()
+        && node.ends.is_empty()
+        && node.screws.is_empty()
+        && node.solve_before.is_empty()
+        && node.solve_after.is_empty()
+        && matches!(node.source, Source::State { .. });
+    let mut constant = true;
+    let link = map_node(node, &mut |x| match x {
+        Expr::Const(x) => x,
+        Expr::Node { .. } => {
+            constant = false;
+            0.0
+        }
+    });
+    (plain && constant).then_some(link)
+}
+
+/// Runs in a path: strictly alike where that covers most of it, otherwise as alike as possible.
+fn in_path(links: &[Option<Node<f64>>], path: Range<usize>, least: usize, runs: &mut Vec<Run>) {
+    let link = |i: usize| links[i].as_ref();
+    let strict = cover(path.clone(), least, |a, b| matches!((link(a), link(b)), (Some(a), Some(b)) if alike(a, b)));
+    let covered: usize = strict.iter().map(|(nodes, _)| nodes.len()).sum();
+    let mut chosen = strict;
+    if covered + covered / 4 < path.len() {
+        let loose = cover(path, least, |a, b| matches!((link(a), link(b)), (Some(a), Some(b)) if compatible(a, b)));
+        if loose.iter().map(|(nodes, _)| nodes.len()).sum::<usize>() > covered {
+            chosen = loose;
+        }
+    }
+    for (nodes, period) in chosen {
+        let all: Option<Vec<Node<f64>>> = nodes.clone().map(|i| links[i].clone()).collect();
+        if let Some(run) = all.and_then(|all| tabulate(&all, nodes, period)) {
+            runs.push(run);
+        }
+    }
+}
+
+/// Greedy cover by runs with their periods: the longest from each start, with the shortest period that gives it.
+fn cover(path: Range<usize>, least: usize, same: impl Fn(usize, usize) -> bool) -> Vec<(Range<usize>, usize)> {
+    let mut runs = Vec::new();
+    let mut at = path.start;
+    while at < path.end {
+        let mut best = (0, 1);
+        for period in 1..=LONGEST_PERIOD {
+            let mut end = at + period;
+            while end < path.end && same(end - period, end) && same(at + (end - at) % period, end) {
+                end += 1;
+            }
+            let turns = (end.min(path.end) - at) / period;
+            let length = turns * period;
+            if turns >= 2 && length >= least && length > best.0 + best.0 / 8 {
+                best = (length, period);
+            }
+        }
+        let (length, period) = best;
+        if length == 0 {
+            at += 1;
+            continue;
+        }
+        runs.push((at..at + length, period));
+        at += length;
+    }
+    runs
+}
+
+/// 0, 1, −1 or anything else.
+fn class(x: f64) -> Option<i8> {
+    [0, 1, -1].into_iter().find(|&c| f64::from(c) == x)
+}
+
+fn constants(node: &Node<f64>) -> Vec<f64> {
+    let mut out = Vec::new();
+    map_node(node, &mut |x| out.push(x));
+    out
+}
+
+fn same_step(a: &Step<f64>, b: &Step<f64>) -> bool {
+    match (a, b) {
+        (Step::Turn { axis: a, .. }, Step::Turn { axis: b, .. }) => a == b,
+        (Step::Shift { axis: a, .. }, Step::Shift { axis: b, .. }) => a == b,
+        (Step::Rotate(_), Step::Rotate(_)) => true,
+        _ => false,
+    }
+}
+
+fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
+    std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
+        && a.quarter == b.quarter
+        && a.parent_side == b.parent_side
+}
+
+/// The same structure and zeros and ones in the same places.
+fn alike(a: &Node<f64>, b: &Node<f64>) -> bool {
+    same_joint(a, b)
+        && a.place.len() == b.place.len()
+        && a.place.iter().zip(&b.place).all(|(a, b)| same_step(a, b))
+        && constants(a).iter().zip(constants(b)).all(|(a, b)| class(*a) == class(b))
+}
+
+/// The same joint, and one placement is the other with shifts left out.
+fn compatible(a: &Node<f64>, b: &Node<f64>) -> bool {
+    same_joint(a, b) && merged(&a.place, &b.place).is_some()
+}
+
+/// The longer placement, if the other is the same but for shifts left out. A shift by zero is exact; a turn by zero rounds.
+fn merged(a: &[Step<f64>], b: &[Step<f64>]) -> Option<Vec<Step<f64>>> {
+    let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
+    let mut rest = short.iter().peekable();
+    for step in long {
+        if rest.peek().is_some_and(|s| same_step(s, step)) {
+            rest.next();
+        } else if !matches!(step, Step::Shift { .. }) {
+            return None;
+        }
+    }
+    rest.next().is_none().then(|| long.to_vec())
+}
+
+/// A placement written with the steps of a longer one, identity steps let in.
+fn padded(place: &[Step<f64>], steps: &[Step<f64>]) -> Option<Vec<Step<f64>>> {
+    let mut rest = place.iter().copied().peekable();
+    let mut out = Vec::new();
+    for step in steps {
+        match rest.peek() {
+            Some(s) if same_step(s, step) => out.extend(rest.next()),
+            _ => match *step {
+                Step::Shift { axis, .. } => out.push(Step::Shift { axis, r: 0.0 }),
+                Step::Turn { .. } | Step::Rotate(_) => return None,
+            },
+        }
+    }
+    rest.next().is_none().then_some(out)
+}
+
+/// Constants of a run: what is the same in all turns stays a constant, the rest goes into the table.
+fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<Run> {
+    let turns = links.len() / period;
+    let mut table = vec![Vec::new(); turns];
+    let mut template = Vec::new();
+    for k in 0..period {
+        let group = || links.iter().skip(k).step_by(period);
+        let steps = group().try_fold(links[k].place.clone(), |all, link| merged(&all, &link.place))?;
+        let like = group()
+            .map(|link| Some(Node { place: padded(&link.place, &steps)?, ..link.clone() }))
+            .collect::<Option<Vec<_>>>()?;
+        let rows: Vec<Vec<f64>> = like.iter().map(constants).collect();
+        let mut slots = (0..rows.first()?.len()).map(|c| {
+            let same = rows.iter().all(|row| row[c].to_bits() == rows[0][c].to_bits());
+            if same {
+                return Slot::Const(rows[0][c]);
+            }
+            let column = table[0].len();
+            for (row, from) in table.iter_mut().zip(&rows) {
+                row.push(from[c]);
+            }
+            Slot::Column(column)
+        });
+        template.push(map_node(&like[0], &mut |_| slots.next().unwrap_or(Slot::Const(0.0))));
+    }
+    Some(Run { nodes, period, template, table })
+}
+
+/// A node with every constant replaced, always in the same order.
+pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -> Node<B> {
+    let place = node.place.iter().map(|step| match *step {
+        Step::Turn { axis, c, s } => Step::Turn { axis, c: f(c), s: f(s) },
+        Step::Shift { axis, r } => Step::Shift { axis, r: f(r) },
+        Step::Rotate(m) => Step::Rotate(m.map(|row| row.map(&mut *f))),
+    });
+    let place = place.collect();
+    let kind = match node.kind {
+        Kind::Pin => Kind::Pin,
+        Kind::Slider => Kind::Slider,
+        Kind::Helical { pitch } => Kind::Helical { pitch: f(pitch) },
+        Kind::Planar => Kind::Planar,
+        Kind::Spherical => Kind::Spherical,
+        Kind::Floating => Kind::Floating,
+    };
+    let passive = node.passive.iter().map(|p| mbd_runtime::tree::Passive {
+        damping: f(p.damping),
+        stiffness: f(p.stiffness),
+        rest: f(p.rest),
+        armature: f(p.armature),
+    });
+    let passive = passive.collect();
+    Node {
+        parent: node.parent,
+        place,
+        kind,
+        source: node.source,
+        ratio: f(node.ratio),
+        offset: f(node.offset),
+        phase: f(node.phase),
+        quarter: node.quarter,
+        slide: f(node.slide),
+        inertia: mbd_runtime::spatial::RigidInertia {
+            mass: f(node.inertia.mass),
+            moment: node.inertia.moment.map(&mut *f),
+            inertia: node.inertia.inertia.map(&mut *f),
+        },
+        passive,
+        shared: node.shared,
+        deferred: node.deferred,
+        parent_side: node.parent_side,
+        unturned: node.unturned,
+        gather: node.gather,
+        ends: node.ends.clone(),
+        screws: node.screws.clone(),
+        open: node.open.clone(),
+        solve_before: node.solve_before.clone(),
+        solve_after: node.solve_after.clone(),
+    }
+}

@@ -1,0 +1,292 @@
+//! The sweeps of a group as passes over the nodes, one node at a time: the same steps for the whole tree and for one link
+//! alone.
+
+use mbd_runtime::spatial::{ArticulatedInertia, Force, Motion};
+use mbd_runtime::sweep::{Accelerations, Load, Sweeps};
+use mbd_runtime::tree::Tree;
+use mbd_runtime::workspace::Workspace;
+use mbd_runtime::Scalar;
+
+use crate::options::Group;
+use crate::symbolic::{Expr, Graph};
+use crate::trace::Given;
+
+/// Way of a pass.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Leaves to base.
+    Back,
+    /// Base to leaves.
+    Forth,
+}
+
+/// Passes of a group; `None` for groups that have no loop form.
+pub fn passes(group: Group) -> Option<&'static [Way]> {
+    match group {
+        Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),
+        Group::Momenta | Group::InverseDynamics | Group::Bias => Some(&[Way::Forth, Way::Back]),
+        Group::Accelerations => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        _ => None,
+    }
+}
+
+/// A tree on its way through the passes.
+#[derive(Clone)]
+pub struct Stage<'g> {
+    group: Group,
+    graph: &'g Graph,
+    /// Whether momentum rates wait for accumulated momenta.
+    gathers: bool,
+    /// The mechanism, regrouped.
+    pub tree: Tree<Expr<'g>>,
+    work: Workspace<Expr<'g>>,
+    v: Vec<Expr<'g>>,
+    qd: Vec<Expr<'g>>,
+    pd: Vec<Expr<'g>>,
+    p: Vec<Expr<'g>>,
+    /// Twice the kinetic energy, and the potential.
+    energy: [Expr<'g>; 2],
+}
+
+impl<'g> Stage<'g> {
+    /// Nothing done yet.
+    pub fn new(group: Group, graph: &'g Graph, tree: Tree<Expr<'g>>) -> Self {
+        let zeros = |n: usize| vec![Expr::zero(); n];
+        let (nq, nv) = (tree.dims.nq, tree.dims.nv);
+        let work = Workspace::new(&tree);
+        let energy = [Expr::zero(); 2];
+        let gathers = tree.nodes.iter().any(|n| n.gather);
+        Stage { group, graph, gathers, work, v: zeros(nv), qd: zeros(nq), pd: zeros(nv), p: zeros(nv), energy, tree }
+    }
+
+    /// Before the first node of a pass.
+    pub fn begin(&mut self, pass: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let (u, w) = (given.inputs(), &mut self.work);
+        if pass == 0 && self.group != Group::Momenta {
+            // Screws that are carried outward need the joints of the whole tree.
+            for i in 0..self.tree.nodes.len() {
+                sweeps.articulate_node(i, &given.q, &given.drive[0], &mut w.poses);
+            }
+        }
+        let load = Load::velocities(&given.second, &u);
+        match (self.group, pass) {
+            (Group::Momenta, 1) => sweeps.momentum_begin(w),
+            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) | (Group::Accelerations, 0) => {}
+            (Group::Accelerations, 1) => {
+                for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
+                    *f = *f + *tau;
+                }
+                sweeps.factor_begin(&w.poses, &mut w.factor);
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                sweeps.remainder_begin(&load, &mut w.acceleration);
+            }
+            (Group::Accelerations, _) => {
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                sweeps.motion_ground(&w.factor, &load, &mut w.acceleration);
+            }
+            (_, 0) => {
+                sweeps.factor_begin(&w.poses, &mut w.factor);
+                sweeps.remainder_begin(&load, &mut w.velocity);
+                sweeps.moment_begin(w);
+            }
+            (group, _) => {
+                sweeps.motion_ground(&w.factor, &load, &mut w.velocity);
+                if group == Group::Energy {
+                    self.energy[1] = sweeps.weight_potential(&u, w);
+                }
+            }
+        }
+    }
+
+    /// One node of a pass.
+    pub fn node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        match self.group {
+            Group::Momenta => self.momentum_node(pass, i, given),
+            Group::Accelerations => self.acceleration_node(pass, i, given),
+            Group::InverseDynamics | Group::Bias => self.newton_node(pass, i, given),
+            _ => self.velocity_node(pass, i, given),
+        }
+    }
+
+    fn momentum_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let w = &mut self.work;
+        if pass == 1 {
+            return sweeps.momentum_node(i, w, &mut self.p);
+        }
+        sweeps.articulate_node(i, &given.q, &given.drive[0], &mut w.poses);
+        sweeps.velocity_node(i, &given.second, &given.drive[1], w);
+    }
+
+    fn newton_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let w = &mut self.work;
+        if pass == 1 {
+            return sweeps.wrench_back_node(i, w);
+        }
+        sweeps.newton_node(i, &given.second, imposed(self.group, given), &given.inputs(), w);
+        sweeps.newton_wrench_node(i, w);
+    }
+
+    fn acceleration_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let w = &mut self.work;
+        if pass == 0 {
+            sweeps.newton_node(i, &given.second, Accelerations::Chosen, &given.inputs(), w);
+            sweeps.newton_wrench_node(i, w);
+            return sweeps.joint_load_node(i, w);
+        }
+        let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+        if pass == 1 {
+            sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
+            sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
+        } else {
+            sweeps.motion_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
+        }
+    }
+
+    /// Of rates, velocities and energy.
+    fn velocity_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let (u, w) = (given.inputs(), &mut self.work);
+        let load = Load::velocities(&given.second, &u);
+        if pass == 0 {
+            sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
+            sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+            if self.group != Group::Velocities {
+                sweeps.moment_node(i, w);
+            }
+            return;
+        }
+        sweeps.motion_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+        match self.group {
+            Group::Rates => {
+                sweeps.gravity_node(i, &u, w);
+                if !self.gathers {
+                    sweeps.momentum_rate_node(i, w, &mut self.pd);
+                }
+            }
+            Group::Energy => {
+                self.energy[0] = sweeps.kinetic_node(i, &given.second, w, self.energy[0]);
+                self.energy[1] = sweeps.spring_node(i, w, self.energy[1]);
+            }
+            _ => {}
+        }
+    }
+
+    /// After the last node of a pass.
+    pub fn end(&mut self, pass: usize, given: &Given<'g>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        let (u, w) = (given.inputs(), &mut self.work);
+        match (self.group, pass) {
+            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) => {}
+            (Group::Accelerations, 1) => {
+                sweeps.factor_ground(&mut w.factor);
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                sweeps.remainder_ground(&w.factor, &load, &mut w.acceleration);
+            }
+            (Group::Accelerations, _) => {}
+            (_, 0) => {
+                sweeps.factor_ground(&mut w.factor);
+                sweeps.remainder_ground(&w.factor, &Load::velocities(&given.second, &u), &mut w.velocity);
+            }
+            _ => {}
+        }
+    }
+
+    /// Results in the order of the generated function, after the last pass. For a link alone, its own part of them.
+    pub fn finish(&mut self, given: &Given<'g>) -> Vec<Expr<'g>> {
+        let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
+        match self.group {
+            Group::Rates => {
+                sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
+                sweeps.coordinate_rates(&given.q, &self.v, &mut self.qd);
+                if self.gathers {
+                    sweeps.gather_momenta(&given.second, &mut self.work);
+                    (0..self.tree.nodes.len()).for_each(|i| sweeps.momentum_rate_node(i, &self.work, &mut self.pd));
+                }
+                for (pd, tau) in self.pd.iter_mut().zip(&given.tau) {
+                    *pd = *pd + *tau;
+                }
+                [self.qd.as_slice(), &self.pd].concat()
+            }
+            Group::Velocities => {
+                sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
+                self.v.clone()
+            }
+            Group::Momenta => self.p.clone(),
+            Group::Accelerations => {
+                sweeps.collect_rates(&self.work.acceleration, &self.work.first, &mut self.v);
+                (0..self.tree.nodes.len()).for_each(|i| sweeps.add_reference_node(i, &self.work, &mut self.v));
+                self.v.clone()
+            }
+            Group::InverseDynamics | Group::Bias => {
+                let a = imposed(self.group, given);
+                (0..self.tree.nodes.len()).for_each(|i| sweeps.joint_force_node(i, a, &self.work, &mut self.p));
+                self.p.clone()
+            }
+            Group::Energy => {
+                vec![sweeps.kinetic_end(&given.second, &self.work, self.energy[0]), self.energy[1]]
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// What a pass carries through node `i`: on the way back what its children hand to it, on the way forth what it hands
+    /// to its children.
+    pub fn carried(&mut self, pass: usize, i: usize) -> Vec<&mut Expr<'g>> {
+        let w = &mut self.work;
+        match (self.group, pass) {
+            (Group::Momenta, 0) => motion(&mut w.velocity.omega[i]),
+            (Group::InverseDynamics | Group::Bias | Group::Accelerations, 0) => {
+                let newton = &mut w.newton;
+                newton.spin[i].iter_mut().chain(&mut newton.alpha[i]).chain(&mut newton.accel[i]).collect()
+            }
+            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) => force(&mut w.force[i]),
+            (Group::Accelerations, 1) => {
+                let mut all = inertia(&mut w.factor.m[i]);
+                all.extend(force(&mut w.acceleration.d[i]));
+                all
+            }
+            (Group::Accelerations, _) => motion(&mut w.acceleration.omega[i]),
+            (group, 0) => {
+                let mut all = inertia(&mut w.factor.m[i]);
+                all.extend(force(&mut w.velocity.d[i]));
+                if group != Group::Velocities {
+                    all.extend(w.loads.moment[i].iter_mut().chain(Some(&mut w.loads.mass[i])));
+                }
+                all
+            }
+            (group, _) => {
+                let mut all = motion(&mut w.velocity.omega[i]);
+                match group {
+                    Group::Rates => all.extend(w.loads.gravity[i].iter_mut()),
+                    Group::Energy => all.extend(self.energy.iter_mut()),
+                    _ => {}
+                }
+                all
+            }
+        }
+    }
+}
+
+/// Accelerations that the inverse dynamics of a group start from.
+fn imposed<'a, 'g>(group: Group, given: &'a Given<'g>) -> Accelerations<'a, Expr<'g>> {
+    match group {
+        Group::InverseDynamics => Accelerations::Given(&given.third),
+        _ => Accelerations::Zero,
+    }
+}
+
+fn inertia<'a, 'g>(m: &'a mut ArticulatedInertia<Expr<'g>>) -> Vec<&'a mut Expr<'g>> {
+    m.a.iter_mut().chain(m.h.iter_mut().flatten()).chain(m.j.iter_mut()).collect()
+}
+
+fn motion<'a, 'g>(m: &'a mut Motion<Expr<'g>>) -> Vec<&'a mut Expr<'g>> {
+    m.lin.iter_mut().chain(m.ang.iter_mut()).collect()
+}
+
+fn force<'a, 'g>(f: &'a mut Force<Expr<'g>>) -> Vec<&'a mut Expr<'g>> {
+    f.lin.iter_mut().chain(f.ang.iter_mut()).collect()
+}

@@ -1,0 +1,166 @@
+//! The loop form of long chains against the interpreter.
+//!
+//! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
+
+use mbd_codegen::generate::trace;
+use mbd_codegen::loops::{looped, LoopProgram};
+use mbd_codegen::model::Model;
+use mbd_codegen::plan::{Forms, Plan, PlanOptions};
+use mbd_codegen::{Arithmetic, Group, Loops, Options};
+use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+
+/// Inputs of a program in order.
+fn inputs(program: &LoopProgram, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
+    let mut all = Vec::new();
+    for array in &program.inputs {
+        match array.name.as_str() {
+            "q" => all.extend(&s.q),
+            "p" => all.extend(p),
+            "v" => all.extend(&s.v),
+            "a" => all.extend(a),
+            "self.tau" => all.extend(&s.tau),
+            "self.drive_q" => all.extend(&s.drive[0]),
+            "self.drive_v" => all.extend(&s.drive[1]),
+            "self.drive_a" => all.extend(&s.drive[2]),
+            "self.params" => all.extend(&s.params),
+            "self.gravity" => all.extend(&s.gravity),
+            "self.wrenches" => assert_eq!(array.len, 0),
+            other => panic!("no input is named {other}"),
+        }
+    }
+    all
+}
+
+/// Compares every group that has loops; gives the number of nodes in loops.
+fn compare(model: &Model, seed: u64, options: &Options) -> usize {
+    let plan = Plan::new(model, options.plan);
+    let mut s = random_state(&plan, seed);
+    if !options.efforts {
+        s.tau.fill(0.0);
+    }
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let mut i = s.interpreter(&plan);
+    let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+    i.momenta(&s.q, &s.v, &mut p);
+    let mut a = vec![0.0; nv];
+    i.accelerations(&s.q, &s.v, &mut a);
+    let mut nodes = 0;
+    for group in Group::ALL {
+        let Some(program) = looped(&plan, group, options) else { continue };
+        nodes = nodes.max(program.loops.iter().map(|l| l.nodes.len()).sum());
+        let results = program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
+        let expected = match group {
+            Group::Rates => {
+                i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+                [qd.as_slice(), &pd].concat()
+            }
+            Group::Velocities => {
+                i.velocities(&s.q, &p, &mut v);
+                v.clone()
+            }
+            Group::Momenta => p.clone(),
+            Group::Accelerations => a.clone(),
+            Group::InverseDynamics => {
+                i.inverse_dynamics(&s.q, &s.v, &a, &mut v);
+                v.clone()
+            }
+            Group::Bias => {
+                i.bias(&s.q, &s.v, &mut v);
+                v.clone()
+            }
+            _ => {
+                let (kinetic, potential) = i.energy(&s.q, &p);
+                vec![kinetic, potential]
+            }
+        };
+        assert_eq!(results.len(), expected.len());
+        if options.arithmetic == Arithmetic::Fast {
+            // Some hundred roundings and their growth through an inertia whose condition is below 1e3 in chains this
+            // short, against the largest of the results.
+            let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(off <= 1e-11 * size, "seed {seed}: {group:?} is {off:e} off, size {size:e}\n{}", to_toml(model));
+            continue;
+        }
+        for (k, (a, b)) in results.iter().zip(&expected).enumerate() {
+            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
+            assert!(same && a.is_finite(), "seed {seed}: {group:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
+        }
+        let straight = trace(&plan, group, options).map(|g| g.program.counts().total()).unwrap_or_default();
+        let more = program.counts().total();
+        assert!(
+            more >= straight,
+            "seed {seed}: {group:?}: loops have {more} operations, straight-line code {straight}"
+        );
+    }
+    nodes
+}
+
+fn forced(seed: u64) -> Options {
+    let mut rng = Rng::new(seed, 9);
+    // Blocks at the tips stay straight-line and leave little for loops in short chains.
+    let forms = rng.pick(&[Forms::Single, Forms::Single, Forms::Fewest, Forms::Fastest]);
+    Options {
+        arithmetic: Arithmetic::Exact,
+        efforts: rng.chance(0.7),
+        plan: PlanOptions { forms, loops: Loops::Always, ..PlanOptions::default() },
+        ..Options::default()
+    }
+}
+
+#[test]
+fn chains_of_pins() {
+    for seed in 0..30 {
+        let n = 5 + seed as usize % 25;
+        let knobs = Knobs { bodies: (n, n), taper: 1.0, ..Knobs::default() };
+        let nodes = compare(&random_model(seed, &knobs), seed, &forced(seed));
+        assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+    }
+}
+
+#[test]
+fn rewritten_chains() {
+    for seed in 0..12 {
+        let n = 16 + seed as usize;
+        let knobs =
+            Knobs { bodies: (n, n), taper: 1.0, skew: if seed % 2 == 0 { 1.0 } else { 0.0 }, ..Knobs::default() };
+        let options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
+        compare(&random_model(seed, &knobs), seed, &options);
+    }
+}
+
+#[test]
+fn trees_of_everything() {
+    let mut nodes = 0;
+    for seed in 0..300 {
+        let all = Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6 + seed as usize % 20) };
+        // Parameters, followers and drives keep their nodes out of loops.
+        let plain = Knobs { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
+        let knobs = if seed % 3 == 0 { all } else { plain };
+        nodes += compare(&random_model(seed, &knobs), seed, &forced(seed));
+    }
+    assert!(nodes > 150, "only {nodes} nodes were in loops");
+}
+
+#[test]
+fn chains_of_one_kind() {
+    let mut nodes = 0;
+    for seed in 0..120 {
+        let mut kinds = [0.0; 9];
+        kinds[seed as usize % 8] = 1.0;
+        let n = 4 + seed as usize % 9;
+        let knobs = Knobs {
+            wrenches: 0.0,
+            mimic: 0.0,
+            prescribed: 0.0,
+            bodies: (n, n),
+            branching: 0.1,
+            kinds,
+            ..Knobs::everything(seed, n)
+        };
+        nodes += compare(&random_model(seed, &knobs), seed, &forced(seed));
+    }
+    assert!(nodes > 200, "only {nodes} nodes were in loops");
+}
