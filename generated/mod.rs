@@ -21,6 +21,9 @@ pub mod chain100;
 /// From models/ur5.urdf.
 pub mod ur5;
 
+/// From models/ur5.urdf.
+pub mod ur5_fast;
+
 /// From models/panda.urdf.
 pub mod panda;
 

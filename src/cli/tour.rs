@@ -20,6 +20,11 @@ use super::{count, plot, Failure, Outcome};
 mod ur5;
 use ur5::Ur5;
 
+#[path = "../../generated/ur5_fast.rs"]
+#[rustfmt::skip]
+mod ur5_fast;
+use ur5_fast::Ur5Fast;
+
 const FILE: &str = "models/ur5.urdf";
 const TEXT: &str = include_str!("../../models/ur5.urdf");
 const PLOT: &str = "mbd-tour.svg";
@@ -56,7 +61,7 @@ pub fn run(out: &mut dyn Write) -> Outcome {
     let mut generated = Ur5::new();
     let states = states();
     let numbers = compare(&states, &mut generated, &mut interpreter)?;
-    writeln!(out, "\n3. The generated code (generated/ur5.rs, compiled in) against the interpreter, which runs the same sweeps on numbers:")?;
+    writeln!(out, "\n3. The generated code (generated/ur5.rs, exact arithmetic, compiled in) against the interpreter, which runs the same sweeps on numbers:")?;
     writeln!(out, "   {numbers} results on {STATES} random states, equal bit for bit\n")?;
     out.flush()?;
     let record = ten_seconds(&plan, &mut generated, out)?;
@@ -185,7 +190,26 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
         }
         f64::from(rounds) * states.len() as f64 / clock.elapsed().as_secs_f64()
     };
+    let other = Ur5Fast::new();
+    let (mut a, mut b) = (zero, zero);
+    for s in states {
+        generated.rates(&s.q, &s.p, &mut qd, &mut pd);
+        other.rates(&s.q, &s.p, &mut a, &mut b);
+        let size = qd.iter().chain(&pd).fold(1.0_f64, |m, x| m.max(x.abs()));
+        let off = qd.iter().zip(&a).chain(pd.iter().zip(&b)).fold(0.0_f64, |m, (x, y)| m.max((x - y).abs()));
+        // Some hundred roundings, times the condition of the inertia (below 1e3 for this arm).
+        if off.is_nan() || off > 1e-11 * size {
+            return Err(Failure::new(
+                format!("fast and exact arithmetic differ by {off:e} where rates are {size:e}"),
+                "generated/ur5_fast.rs is stale: run `mbd check --generated --update` in the sources and build anew",
+            ));
+        }
+    }
     let fast = timed(300, &mut |s| {
+        other.rates(black_box(&s.q), black_box(&s.p), &mut a, &mut b);
+        black_box((&a, &b));
+    });
+    let exact = timed(300, &mut |s| {
         generated.rates(black_box(&s.q), black_box(&s.p), &mut qd, &mut pd);
         black_box((&qd, &pd));
     });
@@ -196,8 +220,9 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
     writeln!(out, "5. Evaluations of (q, p) -> (q', p') in a second, one after the other, on one core:")?;
     writeln!(
         out,
-        "   generated code {}, interpreter {}: {:.1} times as many",
+        "   generated code {} with fast arithmetic (the default), {} with exact; interpreter {}: {:.0} times fewer",
         millions(fast),
+        millions(exact),
         millions(slow),
         fast / slow
     )?;
