@@ -24,8 +24,11 @@ const LONGEST: usize = 10;
 /// The shortest chain that is tried as a loop.
 const TRIED_AS_LOOP: usize = 8;
 
-/// Chains from this length on are loops without a search: straight-line code is far behind.
+/// Chains from this length on are loops without a search if their straight-line code is long: then it is far behind.
 const LOOP: usize = 24;
+
+/// Bytes of such code: more than a first-level cache has.
+const LONG: f64 = 49152.0;
 
 /// The same where chains are not laid out for loops.
 const LOOP_OTHERWISE: usize = 16;
@@ -477,7 +480,12 @@ pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
         (Loops::Auto, true) => LOOP,
         (Loops::Auto, false) => LOOP_OTHERWISE,
     };
-    for i in paths(plan, least).concat() {
+    let mut long = paths(plan, least);
+    if (options.loops, fastest) == (Loops::Auto, true) && plan.nodes.len() <= LARGEST {
+        let goal = Goal { forms: options.forms, group: Group::Rates };
+        long.retain(|path| goal.look(&plan.branch(path[0]).0).is_none_or(|look| look.cost.bytes > LONG));
+    }
+    for i in long.concat() {
         plan.nodes[i].looped = true;
         plan.nodes[i].parent_side = fastest && eligible(&plan.nodes[i]);
     }
