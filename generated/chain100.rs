@@ -544,11 +544,11 @@ impl Chain100 {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = [[0.0; LANES]; 27];
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 27]);
         let mut rows0 = [[[0.0; LANES]; 48]; 49];
         {
-            let mut angles0 = [[0.0; LANES]; 49];
-            let mut angles1 = [[0.0; LANES]; 49];
+            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
             for k in 0..49 {
                 for l in 0..LANES {
                     let ground_in0 = q.get(1 + 2 * k, l);
@@ -567,7 +567,7 @@ impl Chain100 {
             }
         }
         {
-            let mut results = [[0.0; LANES]; 23];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
             for l in 0..LANES {
                 let ground_in0 = q.get(0, l);
                 // link1: sine and cosine, rotation
@@ -702,7 +702,7 @@ impl Chain100 {
             for k in (0..49).rev() {
                 let row = &mut rows0[k];
                 let table = &Self::RATES_TABLE0[k];
-                let mut results = [[0.0; LANES]; 74];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 74]);
                 for l in 0..LANES {
                     let ground_in0 = table[4];
                     let ground_in1 = carried15[l];
@@ -1206,7 +1206,7 @@ impl Chain100 {
             kept[26] = carried28;
         }
         {
-            let mut results = [[0.0; LANES]; 5];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
             for l in 0..LANES {
                 let link100_in0 = kept[23][l];
                 // link100: gravity and wrenches
@@ -1259,7 +1259,7 @@ impl Chain100 {
             let mut carried8 = [0.0; LANES];
             for k in 0..49 {
                 let row = &mut rows0[k];
-                let mut results = [[0.0; LANES]; 13];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
                 for l in 0..LANES {
                     let link1_in0 = carried5[l];
                     let link1_vel0 = 0.03 * link1_in0;
@@ -1508,7 +1508,7 @@ impl Chain100 {
             kept[14] = carried8;
         }
         {
-            let mut results = [[0.0; LANES]; 3];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
             for l in 0..LANES {
                 let link1_in0 = kept[0][l];
                 // link100: velocity and joint rate (4.40)
@@ -1652,11 +1652,11 @@ impl Chain100 {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = [[0.0; LANES]; 19];
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
         let mut rows0 = [[[0.0; LANES]; 16]; 49];
         {
-            let mut angles0 = [[0.0; LANES]; 49];
-            let mut angles1 = [[0.0; LANES]; 49];
+            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
             for k in 0..49 {
                 for l in 0..LANES {
                     let ground_in0 = q.get(1 + 2 * k, l);
@@ -1675,7 +1675,7 @@ impl Chain100 {
             }
         }
         {
-            let mut results = [[0.0; LANES]; 17];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 17]);
             for l in 0..LANES {
                 let ground_in0 = q.get(99, l);
                 // link100: sine and cosine, rotation
@@ -1790,7 +1790,7 @@ impl Chain100 {
             for k in (0..49).rev() {
                 let row = &mut rows0[k];
                 let table = &Self::VELOCITIES_TABLE0[k];
-                let mut results = [[0.0; LANES]; 39];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 39]);
                 for l in 0..LANES {
                     let ground_in0 = table[4];
                     let ground_in1 = carried15[l];
@@ -2197,7 +2197,7 @@ impl Chain100 {
             kept[18] = carried26;
         }
         {
-            let mut results = [[0.0; LANES]; 2];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
                 let link100_in0 = kept[17][l];
                 // link100: momentum remainder D, D' (4.45, 4.49)
@@ -2225,7 +2225,7 @@ impl Chain100 {
             for l in 0..LANES { carried5[l] = kept[16][l]; }
             for k in 0..49 {
                 let row = &mut rows0[k];
-                let mut results = [[0.0; LANES]; 8];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let link1_in0 = carried5[l];
                     let link1_vel0 = 0.03 * link1_in0;
@@ -2326,7 +2326,7 @@ impl Chain100 {
             kept[15] = carried4;
         }
         {
-            let mut results = [[0.0; LANES]; 1];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
             for l in 0..LANES {
                 let link1_in0 = kept[15][l];
                 // link100: velocity and joint rate (4.40)
@@ -2409,11 +2409,11 @@ impl Chain100 {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = [[0.0; LANES]; 13];
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
         let mut rows0 = [[[0.0; LANES]; 14]; 49];
         {
-            let mut angles0 = [[0.0; LANES]; 49];
-            let mut angles1 = [[0.0; LANES]; 49];
+            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
             for k in 0..49 {
                 for l in 0..LANES {
                     let ground_in0 = q.get(1 + 2 * k, l);
@@ -2442,7 +2442,7 @@ impl Chain100 {
             for k in 0..49 {
                 let row = &mut rows0[k];
                 let table = &Self::MOMENTA_TABLE0[k];
-                let mut results = [[0.0; LANES]; 16];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
                 for l in 0..LANES {
                     let ground_in0 = carried5[l];
                     let link1_vel0 = 0.03 * ground_in0;
@@ -2552,7 +2552,7 @@ impl Chain100 {
             kept[5] = carried5;
         }
         {
-            let mut results = [[0.0; LANES]; 8];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
             for l in 0..LANES {
                 let ground_in0 = q.get(99, l);
                 // link100: sine and cosine, rotation
@@ -2635,7 +2635,7 @@ impl Chain100 {
             for l in 0..LANES { carried5[l] = -kept[12][l]; }
             for k in (0..49).rev() {
                 let row = &mut rows0[k];
-                let mut results = [[0.0; LANES]; 8];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let link2_in0 = carried1[l];
                     let link2_in1 = row[10][l];
@@ -2720,7 +2720,7 @@ impl Chain100 {
             kept[5] = carried5;
         }
         {
-            let mut results = [[0.0; LANES]; 1];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
             for l in 0..LANES {
                 let link1_in0 = kept[6][l];
                 let link100_in0 = kept[5][l];
@@ -2795,11 +2795,11 @@ impl Chain100 {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = [[0.0; LANES]; 23];
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
         let mut rows0 = [[[0.0; LANES]; 16]; 49];
         {
-            let mut angles0 = [[0.0; LANES]; 49];
-            let mut angles1 = [[0.0; LANES]; 49];
+            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
             for k in 0..49 {
                 for l in 0..LANES {
                     let ground_in0 = q.get(1 + 2 * k, l);
@@ -2818,7 +2818,7 @@ impl Chain100 {
             }
         }
         {
-            let mut results = [[0.0; LANES]; 19];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
             for l in 0..LANES {
                 let ground_in0 = q.get(0, l);
                 // link1: sine and cosine, rotation
@@ -2945,7 +2945,7 @@ impl Chain100 {
             for k in (0..49).rev() {
                 let row = &mut rows0[k];
                 let table = &Self::ENERGY_TABLE0[k];
-                let mut results = [[0.0; LANES]; 42];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 42]);
                 for l in 0..LANES {
                     let ground_in0 = table[4];
                     let ground_in1 = carried15[l];
@@ -3377,7 +3377,7 @@ impl Chain100 {
             kept[22] = carried28;
         }
         {
-            let mut results = [[0.0; LANES]; 3];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
             for l in 0..LANES {
                 let link100_in0 = kept[19][l];
                 // link100: gravity and wrenches
@@ -3424,7 +3424,7 @@ impl Chain100 {
             for l in 0..LANES { carried7[l] = kept[17][l]; }
             for k in 0..49 {
                 let row = &mut rows0[k];
-                let mut results = [[0.0; LANES]; 8];
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let link1_in0 = carried5[l];
                     let link1_vel0 = 0.03 * link1_in0;
@@ -3535,7 +3535,7 @@ impl Chain100 {
             kept[1] = carried7;
         }
         {
-            let mut results = [[0.0; LANES]; 2];
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
                 let link1_in0 = kept[20][l];
                 // link100: velocity and joint rate (4.40)
@@ -3627,7 +3627,7 @@ impl Chain100 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 100];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -3728,7 +3728,7 @@ impl Chain100 {
         for l in 0..LANES { given[97][l] = v.get(97, l); }
         for l in 0..LANES { given[98][l] = v.get(98, l); }
         for l in 0..LANES { given[99][l] = v.get(99, l); }
-        let mut results = [[0.0; LANES]; 100];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];

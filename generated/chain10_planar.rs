@@ -98,7 +98,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 10];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -122,7 +122,7 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = [[0.0; LANES]; 20];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -143,7 +143,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[17][l] = tau.get(7, l); }
         for l in 0..LANES { given[18][l] = tau.get(8, l); }
         for l in 0..LANES { given[19][l] = tau.get(9, l); }
-        let mut results = [[0.0; LANES]; 20];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -1107,7 +1107,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 9];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -1129,7 +1129,7 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -1140,7 +1140,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[7][l] = p.get(7, l); }
         for l in 0..LANES { given[8][l] = p.get(8, l); }
         for l in 0..LANES { given[9][l] = p.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -1790,7 +1790,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 9];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -1812,7 +1812,7 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -1823,7 +1823,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[7][l] = v.get(7, l); }
         for l in 0..LANES { given[8][l] = v.get(8, l); }
         for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -2113,7 +2113,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 10];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -2137,7 +2137,7 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -2148,7 +2148,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[7][l] = p.get(7, l); }
         for l in 0..LANES { given[8][l] = p.get(8, l); }
         for l in 0..LANES { given[9][l] = p.get(9, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -2846,7 +2846,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 10];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -2870,7 +2870,7 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = [[0.0; LANES]; 20];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -2891,7 +2891,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[17][l] = tau.get(7, l); }
         for l in 0..LANES { given[18][l] = tau.get(8, l); }
         for l in 0..LANES { given[19][l] = tau.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -3640,7 +3640,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 9];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -3662,7 +3662,7 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut results = [[0.0; LANES]; 100];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
         for l in 0..LANES {
             // link2: sine and cosine, rotation
             let link2_sin0 = sines[0][l];
@@ -4248,7 +4248,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 10];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -4272,7 +4272,7 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = [[0.0; LANES]; 20];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -4293,7 +4293,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[17][l] = a.get(7, l); }
         for l in 0..LANES { given[18][l] = a.get(8, l); }
         for l in 0..LANES { given[19][l] = a.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -4671,7 +4671,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 10];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -4695,7 +4695,7 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -4706,7 +4706,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[7][l] = v.get(7, l); }
         for l in 0..LANES { given[8][l] = v.get(8, l); }
         for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -4997,7 +4997,7 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -5008,7 +5008,7 @@ impl Chain10Planar {
         for l in 0..LANES { given[7][l] = v.get(7, l); }
         for l in 0..LANES { given[8][l] = v.get(8, l); }
         for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = [[0.0; LANES]; 10];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];

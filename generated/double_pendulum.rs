@@ -73,7 +73,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -81,12 +81,12 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = tau.get(0, l); }
         for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -159,16 +159,16 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -209,16 +209,16 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -255,7 +255,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -263,10 +263,10 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -325,7 +325,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -333,12 +333,12 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = tau.get(0, l); }
         for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -406,7 +406,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -414,12 +414,12 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = tau.get(0, l); }
         for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = [[0.0; LANES]; 12];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -541,13 +541,13 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_cos0 = cosines[0][l];
@@ -577,7 +577,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -585,10 +585,10 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = [[0.0; LANES]; 54];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 54]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -732,7 +732,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -740,12 +740,12 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = a.get(0, l); }
         for l in 0..LANES { given[3][l] = a.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -802,7 +802,7 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
             let q_1 = q.get(1, l);
@@ -810,10 +810,10 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -858,13 +858,13 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = [[0.0; LANES]; 36];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_sin0 = sines[0][l];
@@ -962,16 +962,16 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = [[0.0; LANES]; 18];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -1033,10 +1033,10 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 2];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];

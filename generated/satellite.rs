@@ -90,7 +90,7 @@ impl Satellite {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -98,7 +98,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 24];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 24]);
         for l in 0..LANES { given[0][l] = q.get(3, l); }
         for l in 0..LANES { given[1][l] = q.get(4, l); }
         for l in 0..LANES { given[2][l] = q.get(5, l); }
@@ -123,7 +123,7 @@ impl Satellite {
         for l in 0..LANES { given[21][l] = wrenches.get(3, l); }
         for l in 0..LANES { given[22][l] = wrenches.get(4, l); }
         for l in 0..LANES { given[23][l] = wrenches.get(5, l); }
-        let mut results = [[0.0; LANES]; 13];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
         for l in 0..LANES {
             let q_3 = given[0][l];
             let q_4 = given[1][l];
@@ -474,7 +474,7 @@ impl Satellite {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -482,7 +482,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -491,7 +491,7 @@ impl Satellite {
         for l in 0..LANES { given[5][l] = p.get(5, l); }
         for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
         for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -704,7 +704,7 @@ impl Satellite {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -712,7 +712,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -721,7 +721,7 @@ impl Satellite {
         for l in 0..LANES { given[5][l] = v.get(5, l); }
         for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
         for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -904,7 +904,7 @@ impl Satellite {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -912,7 +912,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -921,7 +921,7 @@ impl Satellite {
         for l in 0..LANES { given[5][l] = p.get(5, l); }
         for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
         for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -1173,7 +1173,7 @@ impl Satellite {
 
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -1181,7 +1181,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 22];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -1204,7 +1204,7 @@ impl Satellite {
         for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
         for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
         for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -1624,7 +1624,7 @@ impl Satellite {
 
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -1632,7 +1632,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 22];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -1655,7 +1655,7 @@ impl Satellite {
         for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
         for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
         for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = [[0.0; LANES]; 18];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -2366,7 +2366,7 @@ impl Satellite {
 
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -2374,7 +2374,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut results = [[0.0; LANES]; 36];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin0 = sines[0][l];
@@ -2530,7 +2530,7 @@ impl Satellite {
 
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -2538,7 +2538,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 15];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 15]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -2554,7 +2554,7 @@ impl Satellite {
         for l in 0..LANES { given[12][l] = v.get(5, l); }
         for l in 0..LANES { given[13][l] = drive_v.get(0, l); }
         for l in 0..LANES { given[14][l] = drive_v.get(1, l); }
-        let mut results = [[0.0; LANES]; 54];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 54]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -2827,7 +2827,7 @@ impl Satellite {
 
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -2835,7 +2835,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 22];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -2858,7 +2858,7 @@ impl Satellite {
         for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
         for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
         for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -3184,7 +3184,7 @@ impl Satellite {
 
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -3192,7 +3192,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 16];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -3209,7 +3209,7 @@ impl Satellite {
         for l in 0..LANES { given[13][l] = wrenches.get(3, l); }
         for l in 0..LANES { given[14][l] = wrenches.get(4, l); }
         for l in 0..LANES { given[15][l] = wrenches.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -3496,7 +3496,7 @@ impl Satellite {
 
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -3504,7 +3504,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut results = [[0.0; LANES]; 108];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 108]);
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin0 = sines[0][l];
@@ -3757,7 +3757,7 @@ impl Satellite {
 
     #[inline(always)]
     fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 2];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
             let drive_q_1 = drive_q.get(1, l);
@@ -3765,7 +3765,7 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -3776,7 +3776,7 @@ impl Satellite {
         for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
         for l in 0..LANES { given[8][l] = drive_a.get(0, l); }
         for l in 0..LANES { given[9][l] = drive_a.get(1, l); }
-        let mut results = [[0.0; LANES]; 18];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -3934,7 +3934,7 @@ impl Satellite {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 10];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
         for l in 0..LANES { given[0][l] = q.get(3, l); }
         for l in 0..LANES { given[1][l] = q.get(4, l); }
         for l in 0..LANES { given[2][l] = q.get(5, l); }
@@ -3945,7 +3945,7 @@ impl Satellite {
         for l in 0..LANES { given[7][l] = v.get(3, l); }
         for l in 0..LANES { given[8][l] = v.get(4, l); }
         for l in 0..LANES { given[9][l] = v.get(5, l); }
-        let mut results = [[0.0; LANES]; 7];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 7]);
         for l in 0..LANES {
             let q_3 = given[0][l];
             let q_4 = given[1][l];

@@ -71,14 +71,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -91,7 +91,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[9][l] = tau.get(1, l); }
         for l in 0..LANES { given[10][l] = tau.get(2, l); }
         for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = [[0.0; LANES]; 9];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -283,19 +283,19 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
         for l in 0..LANES { given[3][l] = p.get(3, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -376,19 +376,19 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -460,14 +460,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -476,7 +476,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[5][l] = p.get(1, l); }
         for l in 0..LANES { given[6][l] = p.get(2, l); }
         for l in 0..LANES { given[7][l] = p.get(3, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -586,14 +586,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -606,7 +606,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[9][l] = tau.get(1, l); }
         for l in 0..LANES { given[10][l] = tau.get(2, l); }
         for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -794,14 +794,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -814,7 +814,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[9][l] = tau.get(1, l); }
         for l in 0..LANES { given[10][l] = tau.get(2, l); }
         for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = [[0.0; LANES]; 12];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -1127,14 +1127,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = [[0.0; LANES]; 16];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
@@ -1208,14 +1208,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -1224,7 +1224,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[5][l] = v.get(1, l); }
         for l in 0..LANES { given[6][l] = v.get(2, l); }
         for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = [[0.0; LANES]; 36];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -1411,14 +1411,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -1431,7 +1431,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[9][l] = a.get(1, l); }
         for l in 0..LANES { given[10][l] = a.get(2, l); }
         for l in 0..LANES { given[11][l] = a.get(3, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -1585,14 +1585,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -1601,7 +1601,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[5][l] = v.get(1, l); }
         for l in 0..LANES { given[6][l] = v.get(2, l); }
         for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = [[0.0; LANES]; 4];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];
@@ -1731,14 +1731,14 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = [[0.0; LANES]; 48];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 48]);
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin0 = sines[0][l];
@@ -1861,19 +1861,19 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 1];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
             let tail_pose0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = [[0.0; LANES]; 4];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
-        let mut results = [[0.0; LANES]; 12];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -1954,7 +1954,7 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 8];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
         for l in 0..LANES { given[0][l] = q.get(0, l); }
         for l in 0..LANES { given[1][l] = q.get(1, l); }
         for l in 0..LANES { given[2][l] = q.get(2, l); }
@@ -1963,7 +1963,7 @@ impl SphericalPendulum {
         for l in 0..LANES { given[5][l] = v.get(1, l); }
         for l in 0..LANES { given[6][l] = v.get(2, l); }
         for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = [[0.0; LANES]; 5];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_0 = given[0][l];
             let q_1 = given[1][l];

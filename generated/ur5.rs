@@ -79,7 +79,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -95,7 +95,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -108,7 +108,7 @@ impl Ur5 {
         for l in 0..LANES { given[9][l] = tau.get(3, l); }
         for l in 0..LANES { given[10][l] = tau.get(4, l); }
         for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = [[0.0; LANES]; 12];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -469,7 +469,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -485,14 +485,14 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
         for l in 0..LANES { given[3][l] = p.get(3, l); }
         for l in 0..LANES { given[4][l] = p.get(4, l); }
         for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -727,7 +727,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -743,14 +743,14 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
         for l in 0..LANES { given[4][l] = v.get(4, l); }
         for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -927,7 +927,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -943,14 +943,14 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
         for l in 0..LANES { given[3][l] = p.get(3, l); }
         for l in 0..LANES { given[4][l] = p.get(4, l); }
         for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = [[0.0; LANES]; 2];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -1196,7 +1196,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -1212,7 +1212,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -1225,7 +1225,7 @@ impl Ur5 {
         for l in 0..LANES { given[9][l] = tau.get(3, l); }
         for l in 0..LANES { given[10][l] = tau.get(4, l); }
         for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -1656,7 +1656,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -1672,7 +1672,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut results = [[0.0; LANES]; 36];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin0 = sines[0][l];
@@ -1869,7 +1869,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -1885,7 +1885,7 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
@@ -1898,7 +1898,7 @@ impl Ur5 {
         for l in 0..LANES { given[9][l] = a.get(3, l); }
         for l in 0..LANES { given[10][l] = a.get(4, l); }
         for l in 0..LANES { given[11][l] = a.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -2213,7 +2213,7 @@ impl Ur5 {
 
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -2229,14 +2229,14 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
         for l in 0..LANES { given[4][l] = v.get(4, l); }
         for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
@@ -2487,14 +2487,14 @@ impl Ur5 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
         for l in 0..LANES { given[4][l] = v.get(4, l); }
         for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];

@@ -72,7 +72,7 @@ impl Ur5Fast {
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut angles = [[0.0; LANES]; 5];
+        let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
             let q_2 = q.get(2, l);
@@ -88,7 +88,7 @@ impl Ur5Fast {
             angles[4][l] = wrist_1_link_pose0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<A, LANES, 5>(&angles);
-        let mut given = [[0.0; LANES]; 12];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES { given[0][l] = p.get(0, l); }
         for l in 0..LANES { given[1][l] = p.get(1, l); }
         for l in 0..LANES { given[2][l] = p.get(2, l); }
@@ -101,7 +101,7 @@ impl Ur5Fast {
         for l in 0..LANES { given[9][l] = tau.get(3, l); }
         for l in 0..LANES { given[10][l] = tau.get(4, l); }
         for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = [[0.0; LANES]; 12];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
         for l in 0..LANES {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
@@ -482,14 +482,14 @@ impl Ur5Fast {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = [[0.0; LANES]; 6];
+        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES { given[0][l] = v.get(0, l); }
         for l in 0..LANES { given[1][l] = v.get(1, l); }
         for l in 0..LANES { given[2][l] = v.get(2, l); }
         for l in 0..LANES { given[3][l] = v.get(3, l); }
         for l in 0..LANES { given[4][l] = v.get(4, l); }
         for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = [[0.0; LANES]; 6];
+        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
         for l in 0..LANES {
             let v_0 = given[0][l];
             let v_1 = given[1][l];

@@ -131,6 +131,27 @@ macro_rules! places {
 places!(f64);
 places!(f32);
 
+/// Own arrays of a kernel: `N` rows of `L` lanes, where vectors do not straddle cache lines. (Without `std` there are no
+/// wide vectors, and the stack is dear.)
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "std", repr(align(64)))]
+pub struct Rows<T, const L: usize, const N: usize>(pub [[T; L]; N]);
+
+impl<T, const L: usize, const N: usize> core::ops::Deref for Rows<T, L, N> {
+    type Target = [[T; L]; N];
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<T, const L: usize, const N: usize> core::ops::DerefMut for Rows<T, L, N> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
 /// What the processor offers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {

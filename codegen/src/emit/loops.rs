@@ -59,7 +59,7 @@ impl<'a> Loops<'a> {
             );
             let _ = writeln!(out, "        const LANES: usize = 1;");
         }
-        let _ = writeln!(out, "        let mut kept = [[0.0; LANES]; {}];", self.program.kept);
+        let _ = writeln!(out, "        let mut kept = {};", self.head.rows(self.program.kept));
         for (k, run) in self.program.loops.iter().enumerate() {
             let _ = writeln!(out, "        let mut rows{k} = [[[0.0; LANES]; {}]; {}];", run.row, run.table.len());
         }
@@ -139,7 +139,7 @@ impl<'a> Loops<'a> {
         let names = self.names(block);
         let angles = pairs(block);
         for k in 0..angles.len() {
-            let _ = writeln!(out, "            let mut angles{k} = [[0.0; LANES]; {turns}];");
+            let _ = writeln!(out, "            let mut angles{k} = {};", self.head.rows(turns));
         }
         let _ = writeln!(out, "            for k in 0..{turns} {{");
         self.open_table(out, block, run);
@@ -177,7 +177,7 @@ impl<'a> Loops<'a> {
         let names = self.names(block);
         let n = block.outputs.len();
         if n > 0 {
-            let _ = writeln!(out, "{indent}let mut results = [[0.0; LANES]; {n}];");
+            let _ = writeln!(out, "{indent}let mut results = {};", self.head.rows(n));
         }
         let _ = writeln!(out, "{indent}for l in 0..LANES {{");
         let mut last = None;

@@ -2,7 +2,7 @@
 //!
 //! One text serves one state and many: the compiler drops a loop of one turn, and makes vector instructions of a longer
 //! one. For that the body has no calls that it cannot inline: angles come first, and their sines and cosines are computed
-//! together, before the loop. Nothing is split: compile time grows in proportion to the number of statements, and parts
+//! together, before the loop. No function is split: compile time grows in proportion to the number of statements, and parts
 //! would hand their values over in memory.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,7 +13,7 @@ use super::names::{identifier, quantity};
 use super::ports::{self, Port};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Fma, Op, Operand, Output};
+use crate::symbolic::{Fma, Label, Op, Operand, Output};
 use crate::trace::{GroupProgram, InputArray};
 
 /// What every function begins with.
@@ -87,6 +87,11 @@ impl Head<'_> {
         self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
     }
 
+    /// A kernel's own array.
+    pub fn rows(&self, n: usize) -> String {
+        format!("{}::kernel::Rows([[0.0; LANES]; {n}])", self.options.runtime)
+    }
+
     /// Places of the results in order: port and number in it.
     pub fn places(&self) -> Vec<(&str, usize)> {
         let places = self.ports.iter().filter(|p| p.mutable);
@@ -143,6 +148,16 @@ pub struct Body<'a> {
     group: &'a GroupProgram,
     names: BTreeMap<u32, String>,
     angles: Angles,
+}
+
+/// A `let`.
+struct Statement {
+    text: String,
+    /// Nodes that it gives values to, and those that it needs.
+    makes: Vec<u32>,
+    uses: Vec<u32>,
+    label: Label,
+    is_input: bool,
 }
 
 /// Sines and cosines of a program.
@@ -228,7 +243,7 @@ impl<'a> Body<'a> {
         self.write_given(out);
         let n = self.group.program.outputs.len();
         if n > 0 {
-            let _ = writeln!(out, "        let mut results = [[0.0; LANES]; {n}];");
+            let _ = writeln!(out, "        let mut results = {};", self.head.rows(n));
         }
         let _ = writeln!(out, "        for l in 0..LANES {{");
         self.write_steps(out, &self.angles.after, true);
@@ -243,7 +258,7 @@ impl<'a> Body<'a> {
             return;
         }
         let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
-        let _ = writeln!(out, "        let mut angles = [[0.0; LANES]; {n}];\n        for l in 0..LANES {{");
+        let _ = writeln!(out, "        let mut angles = {};\n        for l in 0..LANES {{", self.head.rows(n));
         self.write_steps(out, &self.angles.before, false);
         for (k, angle) in self.angles.early.keys().enumerate() {
             let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
@@ -254,51 +269,96 @@ impl<'a> Body<'a> {
         let _ = writeln!(out, "        let (sines, cosines) = {call};");
     }
 
-    /// Those of the program's steps that are in a set, in order.
+    /// Those of the program's steps that are in a set, in order. Many are written in blocks that hand on what is needed
+    /// behind them: each `let` is a scope inside the one before it, and debug information of thousands of them is deeper
+    /// than the compiler's stack.
     fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
-        let mut last = None;
         let mut late = self.angles.late.clone();
         // Only the loop over lanes has its inputs copied.
         let given = match lanes {
             true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
             false => BTreeMap::new(),
         };
-        for (id, op, label) in self.group.program.steps.iter().filter(|(id, _, _)| set.contains(id)) {
-            let Some(text) = self.statement(*id, op, &given, &mut late) else { continue };
-            if lanes && last != Some(*label) && !matches!(op, Op::Input(_)) {
-                let body = label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
-                let _ = writeln!(out, "            // {body}: {}", quantity(label.1).1);
-                last = Some(*label);
+        let steps = self.group.program.steps.iter().filter(|(id, _, _)| set.contains(id));
+        let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, &given, &mut late)).collect();
+        let chunk = self.head.options.chunk;
+        if statements.len() <= chunk {
+            return self.write_statements(out, &statements, lanes, "            ");
+        }
+        // What is used at last, and in which chunk.
+        let mut last: BTreeMap<u32, usize> = BTreeMap::new();
+        for (k, statement) in statements.iter().enumerate() {
+            last.extend(statement.uses.iter().map(|id| (*id, k / chunk)));
+        }
+        match lanes {
+            true => last.extend(self.group.program.outputs.iter().filter_map(|output| match output {
+                Output::Node(id, _) => Some((*id, usize::MAX)),
+                Output::Const(_) => None,
+            })),
+            false => last.extend(self.angles.early.keys().map(|id| (*id, usize::MAX))),
+        }
+        for (k, statements) in statements.chunks(chunk).enumerate() {
+            let made = statements.iter().flat_map(|s| &s.makes);
+            let kept = made.filter(|id| last.get(id).is_some_and(|use_| *use_ > k));
+            let kept: Vec<&str> = kept.map(|id| self.names[id].as_str()).collect();
+            let kept = match kept[..] {
+                [one] => one.to_string(),
+                _ => format!("({})", kept.join(", ")),
+            };
+            let _ = writeln!(out, "            let {kept} = {{");
+            self.write_statements(out, statements, lanes, "                ");
+            let _ = writeln!(out, "                {kept}\n            }};");
+        }
+    }
+
+    fn write_statements(&self, out: &mut String, statements: &[Statement], headings: bool, indent: &str) {
+        let mut last = None;
+        for statement in statements {
+            if headings && last != Some(statement.label) && !statement.is_input {
+                let (node, what) = statement.label;
+                let body = node.map_or("ground", |i| self.plan.nodes[i].name.as_str());
+                let _ = writeln!(out, "{indent}// {body}: {}", quantity(what).1);
+                last = Some(statement.label);
             }
-            let _ = writeln!(out, "            {text}");
+            let _ = writeln!(out, "{indent}{}", statement.text);
         }
     }
 
     fn statement(
         &self,
-        id: u32,
-        op: &Op,
+        (id, op, label): &(u32, Op, Label),
         given: &BTreeMap<u32, usize>,
         late: &mut BTreeMap<u32, [Option<u32>; 2]>,
-    ) -> Option<String> {
-        let name = &self.names[&id];
-        if let Some(k) = given.get(&id) {
-            return Some(format!("let {name} = given[{k}][l];"));
+    ) -> Option<Statement> {
+        let (name, is_input) = (&self.names[id], matches!(op, Op::Input(_)));
+        let own = |text: String, uses| Some(Statement { text, makes: vec![*id], uses, label: *label, is_input });
+        if let Some(k) = given.get(id) {
+            return own(format!("let {name} = given[{k}][l];"), Vec::new());
         }
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
             Op::Cos(a) => (a, "cosines"),
-            op => return Some(format!("let {name} = {};", self.expression(op))),
+            op => {
+                let nodes = op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None });
+                return own(format!("let {name} = {};", self.expression(op)), nodes.collect());
+            }
         };
         if let Some(k) = self.angles.early.keys().position(|a| a == angle) {
-            return Some(format!("let {name} = {row}[{k}][l];"));
+            return own(format!("let {name} = {row}[{k}][l];"), Vec::new());
         }
         // The first of a pair to be met stands for both.
         let pair = late.remove(angle)?;
         let [s, c] = pair.map(|id| id.map_or("_", |id| self.names[&id].as_str()));
         let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
         let arithmetic = self.head.arithmetic();
-        Some(format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", self.names[angle]))
+        let text = format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", self.names[angle]);
+        Some(Statement {
+            text,
+            makes: pair.into_iter().flatten().collect(),
+            uses: vec![*angle],
+            label: *label,
+            is_input,
+        })
     }
 
     fn expression(&self, op: &Op) -> String {
@@ -321,7 +381,7 @@ impl<'a> Body<'a> {
     fn write_given(&self, out: &mut String) {
         let n = self.given().count();
         if n > 0 {
-            let _ = writeln!(out, "        let mut given = [[0.0; LANES]; {n}];");
+            let _ = writeln!(out, "        let mut given = {};", self.head.rows(n));
         }
         for (to, (_, k)) in self.given().enumerate() {
             let (array, k) = locate(&self.group.inputs, k as usize);

@@ -142,7 +142,15 @@ impl Function {
     fn block(&mut self, statements: &[Stmt]) {
         for stmt in statements {
             let step = match stmt {
-                Stmt::Local(local) => self.binding(local),
+                Stmt::Local(local) => {
+                    if let Some(syn::LocalInit { expr, .. }) = &local.init {
+                        if let Expr::Block(inner) = &**expr {
+                            self.inner_block(&local.pat, &inner.block.stmts);
+                            continue;
+                        }
+                    }
+                    self.binding(local)
+                }
                 // angles[0][l] = q_1;
                 Stmt::Expr(Expr::Assign(a), Some(_)) => {
                     let (array, k) = self.place(&a.left);
@@ -170,12 +178,35 @@ impl Function {
         }
     }
 
-    /// `let x = ..;`, `let (s, c) = ..pair_f64::<..>(x);`, `let mut angles = [[0.0; LANES]; n];`,
+    /// `let (a, b) = { let a = ..; let b = ..; (a, b) };`
+    fn inner_block(&mut self, names: &Pat, statements: &[Stmt]) {
+        let (Stmt::Expr(kept, None), first) = statements.split_last().expect("a block has a value") else {
+            panic!("a block has a value")
+        };
+        self.locals.push(self.locals.last().expect("a block").clone());
+        self.block(first);
+        let inner = self.locals.pop().expect("the block");
+        let (names, kept): (Vec<&Pat>, Vec<&Expr>) = match (names, kept) {
+            (Pat::Tuple(names), Expr::Tuple(kept)) => (names.elems.iter().collect(), kept.elems.iter().collect()),
+            other => (vec![names], vec![other.1]),
+        };
+        assert_eq!(names.len(), kept.len());
+        for (name, kept) in names.iter().zip(kept) {
+            let Pat::Ident(name) = name else { panic!("unexpected pattern {name:?}") };
+            assert_eq!(name.ident.to_string(), path(kept), "values keep their names");
+            let at = *inner.get(&path(kept)).unwrap_or_else(|| panic!("{} is not defined", path(kept)));
+            let scope = self.locals.last_mut().expect("a block");
+            assert!(scope.insert(path(kept), at).is_none(), "{} is defined twice", path(kept));
+        }
+    }
+
+    /// `let x = ..;`, `let (s, c) = ..pair_f64::<..>(x);`, `let mut angles = ..Rows([[0.0; LANES]; n]);`,
     /// `let (sines, cosines) = ..pairs_f64::<..>(&angles);`
     fn binding(&mut self, local: &syn::Local) -> Step {
         let value = &local.init.as_ref().expect("every binding has a value").expr;
         match (&local.pat, &**value) {
-            (Pat::Ident(name), Expr::Repeat(repeat)) => {
+            (Pat::Ident(name), Expr::Call(call)) if path(&call.func).ends_with("::kernel::Rows") => {
+                let Expr::Repeat(repeat) = &call.args[0] else { panic!("rows of lanes") };
                 assert!(name.mutability.is_some(), "an array that is never filled");
                 Step::NewArray(self.array(name.ident.to_string()), literal(&repeat.len) as usize)
             }
