@@ -174,7 +174,7 @@ pub struct Options {
     pub runtime: String,
     /// Where the model came from, for the header.
     pub source: String,
-    /// Statements in one function at the most; longer programs are split.
+    /// Longer bodies are written in blocks of this many statements.
     pub chunk: usize,
     /// Whether operations may be rewritten.
     pub arithmetic: Arithmetic,

@@ -153,7 +153,7 @@ pub struct CodeArgs {
     /// Frames and bodies of the outputs `frames`, `jacobians`, `drifts`, with commas between [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
-    /// Longer functions are split into parts of this many statements
+    /// Longer bodies are written in blocks of this many statements
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub chunk: u32,
 }

@@ -97,7 +97,7 @@ pub fn schedule(group: &GroupProgram, chunk: usize, out: &mut dyn Write) -> Outc
     writeln!(out, "{}", group.group.name())?;
     writeln!(out, "  order: that of the sweeps; every operation stands after its operands")?;
     let parts = statements.div_ceil(chunk).max(1);
-    let parts = if parts == 1 { "one function".to_string() } else { format!("about {parts} parts of {chunk}") };
+    let parts = if parts == 1 { "one block".to_string() } else { format!("{parts} blocks of {chunk}") };
     writeln!(out, "  operations (sines and cosines one each): {statements}, in {parts}")?;
     let (most, at) = alive(group);
     let place = steps.get(at).map_or("", |(_, _, (_, what))| quantity(*what).1);
