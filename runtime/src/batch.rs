@@ -2,7 +2,7 @@
 //!
 //! A column holds one coordinate of every state, `q[k][s]` that of coordinate `k` in state `s`: so neighbouring states
 //! are computed side by side in vector registers, and nothing is turned around on the way. Generated types have a method
-//! `rates_batch`; with feature `rayon`, [`rates_parallel`] gives the states to several threads.
+//! `rates_batch`; with feature `rayon`, `rates_parallel` gives the states to several threads.
 
 use crate::Scalar;
 

@@ -50,7 +50,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// [`Sweeps::momentum_rates`] for node `i` alone, without `τ`; added to `pd`.
+    /// `momentum_rates` for node `i` alone, without `τ`; added to `pd`.
     pub fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
