@@ -160,7 +160,7 @@ pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgra
         }
         _ => run(&graph, [&tree, &physical], group, state, &given.inputs(), &frames),
     };
-    let program = passes::run(Program::new(&graph, &outputs), options.arithmetic);
+    let program = passes::run(Program::new(&graph, &outputs), options.arithmetic, options.plan.forms);
     Ok(GroupProgram { group, inputs: given.arrays, program, loops: None })
 }
 

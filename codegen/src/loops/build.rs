@@ -205,7 +205,7 @@ impl<'m> Build<'_, 'm, '_> {
         let inputs = self.line.given.arrays.clone();
         for block in &mut blocks {
             let program = std::mem::take(&mut block.program);
-            block.program = passes::run(program, options.arithmetic);
+            block.program = passes::run(program, options.arithmetic, options.plan.forms);
         }
         LoopProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
     }

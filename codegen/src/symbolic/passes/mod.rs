@@ -14,6 +14,7 @@ pub(super) mod terms;
 
 use super::Program;
 use crate::options::Arithmetic;
+use crate::plan::Forms;
 pub(super) use rebuild::width;
 use schedule::Limits;
 
@@ -32,12 +33,24 @@ const WIDE: f64 = 2.0;
 /// Instructions of a long program.
 const LONG: usize = 1400;
 
-/// The program as it is to be emitted.
-pub fn run(program: Program, arithmetic: Arithmetic) -> Program {
+/// The program as it is to be emitted. Whoever wants the fewest operations gets none twice to save time.
+pub fn run(program: Program, arithmetic: Arithmetic, forms: Forms) -> Program {
     match arithmetic {
         Arithmetic::Exact => program,
         Arithmetic::Fast => {
-            let program = shorten::regroup_short(&constants::gather(&fewer(program)));
+            let program = fewer(program);
+            let gathered = constants::gather(&program);
+            let program = match forms {
+                Forms::Fewest => {
+                    let [a, b] = [sums::regroup(&gathered), sums::regroup(&program)];
+                    if a.counts().total() <= b.counts().total() {
+                        a
+                    } else {
+                        b
+                    }
+                }
+                Forms::Fastest | Forms::Single => shorten::regroup_short(&gathered),
+            };
             let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
             match wide && program.instructions() >= LONG {
                 true => program,
@@ -65,13 +78,17 @@ mod tests {
 
     #[test]
     fn values_stay() {
-        random::keeps_values(|p| run(p.clone(), Arithmetic::Fast));
+        for forms in Forms::ALL {
+            random::keeps_values(|p| run(p.clone(), Arithmetic::Fast, forms));
+        }
         random::keeps_values(|p| fewer(p.clone()));
     }
 
     #[test]
     fn counts_do_not_grow() {
-        random::counts_never_grow(|p| run(p.clone(), Arithmetic::Fast));
+        for forms in Forms::ALL {
+            random::counts_never_grow(|p| run(p.clone(), Arithmetic::Fast, forms));
+        }
         random::counts_never_grow(|p| fewer(p.clone()));
     }
 
@@ -79,7 +96,7 @@ mod tests {
     fn the_same_program_gives_the_same_program() {
         for seed in 0..20 {
             let program = random::integer_program(seed, 100);
-            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast));
+            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast, Forms::default()));
             assert_eq!((a.steps, a.outputs), (b.steps, b.outputs));
         }
     }
@@ -87,7 +104,7 @@ mod tests {
     #[test]
     fn exact_programs_are_left_alone() {
         let program = random::integer_program(1, 100);
-        let exact = run(program.clone(), Arithmetic::Exact);
+        let exact = run(program.clone(), Arithmetic::Exact, Forms::default());
         assert_eq!((exact.steps, exact.outputs), (program.steps, program.outputs));
     }
 }
