@@ -2,7 +2,7 @@
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, dot3, Force};
-use crate::tree::WrenchAxes;
+use crate::tree::{TreeWrench, WrenchAxes};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -64,6 +64,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// An external wrench `[force, torque]` (N, N m) in the axes of the frame it acts at, as given or turned from the ground's.
+    pub(super) fn wrench_in_frame(&self, wrench: &TreeWrench<S>, given: &[S; 6], w: &Workspace<S>) -> Force<S> {
+        let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
+        if wrench.axes == WrenchAxes::Ground {
+            let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+            for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
+                f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
+            }
+        }
+        f
+    }
+
     /// External wrenches at the nodes they act on.
     pub(super) fn wrench_loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         if self.tree.wrenches.is_empty() {
@@ -73,13 +85,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (wrench, given) in self.tree.wrenches.iter().zip(u.wrenches) {
             let Some(node) = wrench.frame.node else { continue };
             self.trace.at(Some(node), Quantity::Load);
-            let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
-            if wrench.axes == WrenchAxes::Ground {
-                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
-                for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
-                    f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
-                }
-            }
+            let f = self.wrench_in_frame(wrench, given, w);
             let f = self.on_body(&w.poses, &wrench.frame).rev().fold(f, |f, step| step.force(&f));
             w.loads.own[node] = w.loads.own[node].plus(&f);
         }

@@ -14,13 +14,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (wrench, given) in self.tree.wrenches.iter().zip(u.wrenches) {
             let Some(node) = wrench.frame.node else { continue };
             self.trace.at(Some(node), Quantity::Load);
-            let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
-            if wrench.axes == WrenchAxes::Ground {
-                let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
-                for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
-                    f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
-                }
-            }
+            let f = self.wrench_in_frame(wrench, given, w);
             self.wrench(wrench, &f, w, d);
         }
     }
