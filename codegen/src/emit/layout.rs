@@ -12,8 +12,6 @@ use crate::symbolic::Counts;
 use crate::trace::{chosen_frames, GroupProgram};
 
 /// Shape of one generated function.
-// Some of it is for code in loop form alone.
-#[allow(dead_code)]
 pub struct Function {
     /// Doc comment.
     pub doc: String,
@@ -21,14 +19,6 @@ pub struct Function {
     pub arguments: String,
     /// Return type with its arrow, or nothing.
     pub returns: String,
-    /// Last line of the body.
-    pub tail: String,
-    /// Left-hand sides of the results.
-    pub results: Vec<String>,
-    /// Names of the arguments that are read, and their declarations with a trailing comma.
-    pub inputs: Vec<String>,
-    /// The same as declarations, each followed by a comma.
-    pub input_arguments: String,
 }
 
 impl Function {
@@ -279,10 +269,6 @@ pub fn constructor(out: &mut String, plan: &Plan, options: &Options) {
     let _ = writeln!(out, "        {} {{ {} }}\n    }}", options.type_name, values.join(", "));
 }
 
-fn places(name: &str, n: usize) -> Vec<String> {
-    (0..n).map(|k| format!("{name}[{k}]")).collect()
-}
-
 /// `impl Default`.
 pub fn default(out: &mut String, options: &Options) {
     let name = &options.type_name;
@@ -309,14 +295,8 @@ const MOMENTUM_DERIVATIVES: &str = "Momenta, their rates (accelerations do not e
     /// to `q` as in `derivatives`. `∂p/∂v` is the mass matrix.";
 
 /// Arguments for blocks of `rows` rows.
-fn squares(blocks: &[&str], rows: usize, columns: usize, t: &str) -> String {
-    blocks.iter().map(|b| format!(", {b}: &mut [[{t}; {columns}]; {rows}]")).collect()
-}
-
-/// Their entries, row by row.
-fn entries(blocks: &[&str], rows: usize, columns: usize) -> Vec<String> {
-    let rows = blocks.iter().flat_map(|b| (0..rows).map(move |k| format!("{b}[{k}]")));
-    rows.flat_map(|row| places(&row, columns)).collect()
+fn squares<const N: usize>(blocks: [&str; N], rows: usize, columns: usize, t: &str) -> String {
+    blocks.map(|b| format!("{b}: &mut [[{t}; {columns}]; {rows}]")).join(", ")
 }
 
 /// Signature of a group's function.
@@ -342,91 +322,39 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
         Group::MomentumDerivatives => ("v", MOMENTUM_DERIVATIVES),
         Group::ParameterDerivatives => ("p", "Derivatives of velocities and momentum rates with respect to the parameters, by rows."),
     };
-    let (outputs, returns, tail, results) = match group {
-        Group::Rates => (
-            format!("qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]"),
-            String::new(),
-            String::new(),
-            [places("qd", nq), places("pd", nv)].concat(),
+    let outputs = match group {
+        Group::Rates => format!("qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]"),
+        Group::Velocities => format!("v: &mut [{t}; {nv}]"),
+        Group::Momenta => format!("p: &mut [{t}; {nv}]"),
+        Group::Energy => String::new(),
+        Group::Accelerations => format!("a: &mut [{t}; {nv}]"),
+        Group::Reactions => format!("reactions: &mut [[{t}; 6]; {joints}]"),
+        Group::MassMatrix => format!("m: &mut [[{t}; {nv}]; {nv}]"),
+        Group::InverseDynamics => format!("tau: &mut [{t}; {nv}]"),
+        Group::Bias => format!("h: &mut [{t}; {nv}]"),
+        Group::Jacobians => format!("jacobian: &mut [[[{t}; {nv}]; 6]; {frames}]"),
+        Group::Drifts => format!("drift: &mut [[{t}; 6]; {frames}]"),
+        Group::Frames => format!(
+            "rotation: &mut [[[{t}; 3]; 3]; {frames}], position: &mut [[{t}; 3]; {frames}], velocity: &mut [[{t}; 6]; {frames}]"
         ),
-        Group::Velocities => (format!("v: &mut [{t}; {nv}]"), String::new(), String::new(), places("v", nv)),
-        Group::Momenta => (format!("p: &mut [{t}; {nv}]"), String::new(), String::new(), places("p", nv)),
-        Group::Energy => (
-            String::new(),
-            format!(" -> [{t}; 2]"),
-            "        [kinetic, potential]\n".to_string(),
-            vec!["let kinetic".to_string(), "let potential".to_string()],
-        ),
-        Group::Accelerations => (format!("a: &mut [{t}; {nv}]"), String::new(), String::new(), places("a", nv)),
-        Group::Reactions => (
-            format!("reactions: &mut [[{t}; 6]; {joints}]"),
-            String::new(),
-            String::new(),
-            (0..joints).flat_map(|k| places(&format!("reactions[{k}]"), 6)).collect(),
-        ),
-        Group::MassMatrix => (
-            format!("m: &mut [[{t}; {nv}]; {nv}]"),
-            String::new(),
-            String::new(),
-            (0..nv).flat_map(|k| places(&format!("m[{k}]"), nv)).collect(),
-        ),
-        Group::InverseDynamics => (format!("tau: &mut [{t}; {nv}]"), String::new(), String::new(), places("tau", nv)),
-        Group::Bias => (format!("h: &mut [{t}; {nv}]"), String::new(), String::new(), places("h", nv)),
-        Group::Jacobians => (
-            format!("jacobian: &mut [[[{t}; {nv}]; 6]; {frames}]"),
-            String::new(),
-            String::new(),
-            (0..6 * frames).flat_map(|k| places(&format!("jacobian[{}][{}]", k / 6, k % 6), nv)).collect(),
-        ),
-        Group::Drifts => (
-            format!("drift: &mut [[{t}; 6]; {frames}]"),
-            String::new(),
-            String::new(),
-            (0..frames).flat_map(|k| places(&format!("drift[{k}]"), 6)).collect(),
-        ),
-        Group::Frames => {
-            let rotations =
-                (0..frames).flat_map(|k| (0..3).flat_map(move |i| places(&format!("rotation[{k}][{i}]"), 3)));
-            let rest = (0..frames)
-                .flat_map(|k| places(&format!("position[{k}]"), 3))
-                .chain((0..frames).flat_map(|k| places(&format!("velocity[{k}]"), 6)));
-            let outputs = format!("rotation: &mut [[[{t}; 3]; 3]; {frames}], position: &mut [[{t}; 3]; {frames}], velocity: &mut [[{t}; 6]; {frames}]");
-            (outputs, String::new(), String::new(), rotations.chain(rest).collect())
+        Group::Derivatives => {
+            format!("v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], {}", squares(["dv_dq", "dv_dp", "dpd_dq", "dpd_dp"], nv, nv, t))
         }
-        Group::Derivatives | Group::MomentumDerivatives => {
-            let (first, blocks) = match group {
-                Group::Derivatives => ("v", ["dv_dq", "dv_dp", "dpd_dq", "dpd_dp"]),
-                _ => ("p", ["dp_dq", "dp_dv", "dpd_dq", "dpd_dv"]),
-            };
-            let lists = format!("{first}: &mut [{t}; {nv}], pd: &mut [{t}; {nv}]");
-            let outputs = [lists, squares(&blocks, nv, nv, t)].concat();
-            let results = [places(first, nv), places("pd", nv), entries(&blocks, nv, nv)].concat();
-            (outputs, String::new(), String::new(), results)
+        Group::MomentumDerivatives => {
+            format!("p: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], {}", squares(["dp_dq", "dp_dv", "dpd_dq", "dpd_dv"], nv, nv, t))
         }
-        Group::ParameterDerivatives => {
-            let (blocks, n) = (["dv_dparams", "dpd_dparams"], plan.model.params.len());
-            let outputs = squares(&blocks, nv, n, t).trim_start_matches(", ").to_string();
-            (outputs, String::new(), String::new(), entries(&blocks, nv, n))
-        }
+        Group::ParameterDerivatives => squares(["dv_dparams", "dpd_dparams"], nv, plan.model.params.len(), t),
     };
-    let mut inputs = vec![("q".to_string(), format!("q: &[{t}; {nq}]"))];
+    let returns = if group == Group::Energy { format!(" -> [{t}; 2]") } else { String::new() };
+    let mut arguments = vec![format!("q: &[{t}; {nq}]")];
     if !second.is_empty() {
-        inputs.push((second.to_string(), format!("{second}: &[{t}; {nv}]")));
+        arguments.push(format!("{second}: &[{t}; {nv}]"));
     }
     if group == Group::InverseDynamics {
-        inputs.push(("a".to_string(), format!("a: &[{t}; {nv}]")));
+        arguments.push(format!("a: &[{t}; {nv}]"));
     }
-    let mut arguments: Vec<String> = inputs.iter().map(|(_, d)| d.clone()).collect();
     arguments.extend(Some(outputs).filter(|o| !o.is_empty()));
-    Function {
-        doc: format!("    /// {doc}"),
-        arguments: arguments.join(", "),
-        returns,
-        tail,
-        results,
-        input_arguments: inputs.iter().map(|(_, d)| format!("{d}, ")).collect(),
-        inputs: inputs.into_iter().map(|(n, _)| n).collect(),
-    }
+    Function { doc: format!("    /// {doc}"), arguments: arguments.join(", "), returns }
 }
 
 /// Signature of `coordinate_rates`.
@@ -437,10 +365,6 @@ pub fn coordinate_rates_signature(plan: &Plan, options: &Options) -> Function {
         doc: "    /// Coordinate rates of given velocities: `q̇ = N(q) v`.".to_string(),
         arguments: format!("q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]"),
         returns: String::new(),
-        tail: String::new(),
-        results: places("qd", nq),
-        input_arguments: format!("q: &[{t}; {nq}], v: &[{t}; {nv}], "),
-        inputs: vec!["q".to_string(), "v".to_string()],
     }
 }
 
