@@ -12,5 +12,6 @@ pub mod options;
 pub mod plan;
 pub mod symbolic;
 pub mod trace;
+pub mod wide;
 
 pub use generate::{generate, Arithmetic, Generated, Group, Loops, Options, Precision};

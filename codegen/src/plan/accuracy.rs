@@ -11,7 +11,6 @@ use std::ops::{Add, Div, Mul, Neg, Range, Sub};
 
 use mbd_runtime::tree::Source;
 use mbd_runtime::{Interpreter, Scalar};
-use twofloat::TwoFloat;
 
 use super::forms::options;
 use super::Plan;
@@ -19,6 +18,7 @@ use crate::model::{Gravity, JointKind};
 use crate::options::Group;
 use crate::symbolic::Program;
 use crate::trace::{trace, InputArray};
+use crate::wide::Wide;
 
 /// States that errors are measured on: few for large trees, in which roundings average out.
 const STATES: std::ops::RangeInclusive<usize> = 64..=256;
@@ -47,10 +47,6 @@ const LANES: usize = 8;
 #[derive(Clone, Copy)]
 struct Lanes([f64; LANES]);
 
-/// A double-double number. Sines and cosines are those of doubles: what is judged are the roundings after them.
-#[derive(Clone, Copy)]
-struct Wide(TwoFloat);
-
 macro_rules! operator {
     ($trait:ident, $name:ident) => {
         impl $trait for Lanes {
@@ -58,14 +54,6 @@ macro_rules! operator {
             #[inline]
             fn $name(self, other: Self) -> Self {
                 Lanes(std::array::from_fn(|k| $trait::$name(self.0[k], other.0[k])))
-            }
-        }
-
-        impl $trait for Wide {
-            type Output = Self;
-            #[inline]
-            fn $name(self, other: Self) -> Self {
-                Wide($trait::$name(self.0, other.0))
             }
         }
     };
@@ -83,13 +71,6 @@ impl Neg for Lanes {
     }
 }
 
-impl Neg for Wide {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Wide(-self.0)
-    }
-}
-
 impl Scalar for Lanes {
     fn constant(x: f64) -> Self {
         Lanes([x; LANES])
@@ -100,19 +81,6 @@ impl Scalar for Lanes {
     }
     fn sqrt(self) -> Self {
         Lanes(self.0.map(Scalar::sqrt))
-    }
-}
-
-impl Scalar for Wide {
-    fn constant(x: f64) -> Self {
-        Wide(x.into())
-    }
-    fn sin_cos(self) -> (Self, Self) {
-        let (s, c) = Scalar::sin_cos(self.0.hi());
-        (Self::constant(s), Self::constant(c))
-    }
-    fn sqrt(self) -> Self {
-        Wide(self.0.sqrt())
     }
 }
 

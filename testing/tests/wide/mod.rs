@@ -3,53 +3,12 @@
 //! Sines and cosines are rounded to 53 bits: those that programs on doubles compute. They are inputs of the algebra, the
 //! same in every form, and their own errors are held to an ulp elsewhere; what is compared here are the roundings after them.
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
-
 use mbd_codegen::generate::GroupProgram;
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
+pub use mbd_codegen::wide::Wide;
 use mbd_runtime::Scalar;
 use mbd_testing::state::State;
-use twofloat::TwoFloat;
-
-/// A double-double number as a scalar.
-#[derive(Clone, Copy)]
-pub struct Wide(pub TwoFloat);
-
-macro_rules! operator {
-    ($trait:ident, $name:ident) => {
-        impl $trait for Wide {
-            type Output = Wide;
-            fn $name(self, other: Wide) -> Wide {
-                Wide($trait::$name(self.0, other.0))
-            }
-        }
-    };
-}
-operator!(Add, add);
-operator!(Sub, sub);
-operator!(Mul, mul);
-operator!(Div, div);
-
-impl Neg for Wide {
-    type Output = Wide;
-    fn neg(self) -> Wide {
-        Wide(-self.0)
-    }
-}
-
-impl Scalar for Wide {
-    fn constant(x: f64) -> Self {
-        Wide(x.into())
-    }
-    fn sin_cos(self) -> (Self, Self) {
-        let (s, c) = Scalar::sin_cos(self.0.hi());
-        (Self::constant(s), Self::constant(c))
-    }
-    fn sqrt(self) -> Self {
-        Wide(self.0.sqrt())
-    }
-}
 
 /// Inputs of a program in their order.
 pub fn inputs(group: &GroupProgram, s: &State, p: &[f64]) -> Vec<f64> {
@@ -109,7 +68,7 @@ impl Errors {
     /// Adds a state.
     pub fn add(&mut self, results: &[f64], reference: &[Wide]) {
         let size = reference.iter().fold(0.0_f64, |m, x| m.max(x.0.hi().abs()));
-        let difference = |(r, w): (&f64, &Wide)| (w.0 - TwoFloat::from(*r)).hi().abs();
+        let difference = |(r, w): (&f64, &Wide)| (*w - Wide::constant(*r)).0.hi().abs();
         let off = results.iter().zip(reference).map(difference).fold(0.0_f64, f64::max);
         assert!(results.iter().all(|x| x.is_finite()));
         self.size.push(size);
