@@ -4168,8 +4168,9 @@ impl ::multibody::runtime::System for Chain100 {
         [0.0; 100]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -4180,6 +4181,15 @@ impl ::multibody::runtime::System for Chain100 {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 100], v: &[f64; 100], qd: &mut [f64; 100]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Chain100 {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 100], p: &[f64; 100]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
     }
 }
 

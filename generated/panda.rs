@@ -5354,8 +5354,9 @@ impl ::multibody::runtime::System for Panda {
         [0.0; 8]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -5366,6 +5367,23 @@ impl ::multibody::runtime::System for Panda {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 8], v: &[f64; 8], qd: &mut [f64; 8]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Panda {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 8], p: &[f64; 8]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Panda {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

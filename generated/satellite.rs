@@ -4293,8 +4293,9 @@ impl ::multibody::runtime::System for Satellite {
         [0.0; 6]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[3]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Pose, 0, 0)] }
     }
 
     #[inline]
@@ -4305,6 +4306,23 @@ impl ::multibody::runtime::System for Satellite {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 7], v: &[f64; 6], qd: &mut [f64; 7]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Satellite {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Satellite {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

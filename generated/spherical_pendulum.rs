@@ -2258,8 +2258,9 @@ impl ::multibody::runtime::System for SphericalPendulum {
         [0.0; 4]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[0]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Rotation, 0, 0)] }
     }
 
     #[inline]
@@ -2270,6 +2271,23 @@ impl ::multibody::runtime::System for SphericalPendulum {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 5], v: &[f64; 4], qd: &mut [f64; 5]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for SphericalPendulum {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 5], p: &[f64; 4]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for SphericalPendulum {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

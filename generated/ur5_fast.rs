@@ -603,8 +603,9 @@ impl ::multibody::runtime::System for Ur5Fast {
         [0.0; 6]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]

@@ -12,7 +12,7 @@ pub use mbd_runtime as runtime;
 /// Makes a type from the description of a mechanism.
 ///
 /// ```
-/// use multibody::runtime::integrate::Rk4;
+/// use multibody::runtime::integrate::{Rk4, Stepper};
 /// use multibody::runtime::System;
 ///
 /// multibody::mbd_model! {

@@ -71,7 +71,7 @@ macro_rules! check {
             for state in 0..STATES {
                 let (mut q, mut v, mut p) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
                 random.fill(&mut q, 3.0);
-                for &at in interpreter.quaternions() {
+                for at in interpreter.quaternions() {
                     unit(&mut q[at..at + 4]);
                 }
                 random.fill(&mut v, 2.0);

@@ -3,7 +3,7 @@
 
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::runtime::integrate::Rk4;
+use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::{Interpreter, System};
 
 /// Types as a user's public module has them.
@@ -101,14 +101,14 @@ macro_rules! compare {
             const NV: usize = made::$made::NV;
             let (mut made, mut interpreter) = (made::$made::new(), interpreter($file, $base));
             assert_eq!(made.neutral().as_slice(), interpreter.neutral());
-            assert_eq!(made.quaternions(), interpreter.quaternions());
+            assert_eq!(made.groups(), interpreter.groups());
             for seed in 0..5 {
                 let (mut q, mut p, mut v) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
                 numbers(seed, &mut q);
                 numbers(seed + 50, &mut v);
                 numbers(seed + 90, &mut made.tau);
                 interpreter.inputs.tau.copy_from_slice(&made.tau);
-                for &k in made.quaternions() {
+                for k in made.quaternions() {
                     let norm = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
                     q[k..k + 4].iter_mut().for_each(|x| *x /= norm);
                 }

@@ -251,7 +251,7 @@ robots!(
 fn neutral_states_are_on_the_manifold() {
     let case = Case::read("mixed_tree");
     let q = case.interpreter.neutral();
-    for &k in case.interpreter.quaternions() {
+    for k in case.interpreter.quaternions() {
         assert_eq!(q[k..k + 4], [0.0, 0.0, 0.0, 1.0], "{}", case.name);
     }
     let _ = &case.data;

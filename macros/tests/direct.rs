@@ -10,7 +10,7 @@ pub mod made {
 
 #[test]
 fn a_step_without_std() {
-    use mbd_runtime::integrate::Rk4;
+    use mbd_runtime::integrate::{Rk4, Stepper};
     use mbd_runtime::System;
     let mut pendulum = made::DoublePendulum::new();
     let (mut q, mut p) = ([0.5, 0.0], pendulum.rest());

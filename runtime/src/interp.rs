@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
-use crate::system::{Blocks, Differentiable, Real, System};
+use crate::system::{Accelerated, Blocks, Differentiable, Energetic, Group, GroupKind, Real, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -57,7 +57,7 @@ pub struct Interpreter<S> {
     /// Inputs of the next call.
     pub inputs: InputValues<S>,
     v: Vec<S>,
-    quaternions: Vec<usize>,
+    groups: Vec<Group>,
     neutral: Vec<S>,
     /// Made when [`Differentiable::rate_derivatives`] is first called.
     derivatives: Option<Box<Derivatives<S>>>,
@@ -69,20 +69,24 @@ impl<S: Scalar> Interpreter<S> {
         let tree = physical.regrouped();
         let dims = tree.dims;
         let o = S::zero();
-        let (mut quaternions, mut drive_q) = (Vec::new(), vec![o; dims.drive_q]);
+        let (mut groups, mut drive_q) = (Vec::new(), vec![o; dims.drive_q]);
         let mut neutral = vec![o; dims.nq];
         for node in &tree.nodes {
-            let offset = match node.kind {
-                Kind::Spherical => 0,
-                Kind::Floating => 3,
+            let kind = match node.kind {
+                Kind::Spherical => GroupKind::Rotation,
+                Kind::Floating => GroupKind::Pose,
+                Kind::Planar => GroupKind::Plane,
                 _ => continue,
             };
+            let group = |q, v| Group::new(kind, q, v);
             match node.source {
-                Source::State { q, .. } => {
-                    quaternions.push(q + offset);
-                    neutral[q + offset + 3] = S::one();
+                Source::State { q, v } => {
+                    groups.push(group(q, v));
+                    group(q, v).quaternion().map(|at| neutral[at + 3] = S::one());
                 }
-                Source::Drive { q, .. } => drive_q[q + offset + 3] = S::one(),
+                Source::Drive { q, v } => {
+                    group(q, v).quaternion().map(|at| drive_q[at + 3] = S::one());
+                }
             }
         }
         let inputs = InputValues {
@@ -99,7 +103,7 @@ impl<S: Scalar> Interpreter<S> {
             tree,
             physical,
             inputs,
-            quaternions,
+            groups,
             neutral,
             derivatives: None,
         }
@@ -271,7 +275,7 @@ impl<S: Scalar> FrameState<S> {
     }
 }
 
-impl<S: Scalar> System for Interpreter<S> {
+impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
     type Scalar = S;
     type Coordinates = Vec<S>;
     type Momenta = Vec<S>;
@@ -284,8 +288,8 @@ impl<S: Scalar> System for Interpreter<S> {
         vec![S::zero(); self.tree.dims.nv]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &self.quaternions
+    fn groups(&self) -> &[Group] {
+        &self.groups
     }
 
     fn state_rates(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
@@ -298,7 +302,19 @@ impl<S: Scalar> System for Interpreter<S> {
     }
 }
 
-impl<S: Scalar> Differentiable for Interpreter<S> {
+impl<S: Scalar + core::fmt::Debug> Energetic for Interpreter<S> {
+    fn state_energy(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
+        self.energy(q, p)
+    }
+}
+
+impl<S: Scalar + core::fmt::Debug> Accelerated for Interpreter<S> {
+    fn state_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
+        self.accelerations(q, v, a);
+    }
+}
+
+impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
     type Square = Vec<Vec<S>>;
 
     fn square(&self) -> Vec<Vec<S>> {

@@ -34,4 +34,4 @@ pub use dual::Dual;
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
-pub use system::{Blocks, Differentiable, Real, System};
+pub use system::{Accelerated, Blocks, Differentiable, Energetic, Real, System};

@@ -8,6 +8,16 @@ pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
     fn is_finite(self) -> bool;
     /// As a double.
     fn to_f64(self) -> f64;
+    /// Distance of the next number after one.
+    fn epsilon() -> f64;
+    /// Without its sign.
+    fn abs(self) -> Self {
+        if self < Self::zero() {
+            -self
+        } else {
+            self
+        }
+    }
 }
 
 impl Real for f64 {
@@ -16,6 +26,9 @@ impl Real for f64 {
     }
     fn to_f64(self) -> f64 {
         self
+    }
+    fn epsilon() -> f64 {
+        f64::EPSILON
     }
 }
 
@@ -26,6 +39,9 @@ impl Real for f32 {
     fn to_f64(self) -> f64 {
         self.into()
     }
+    fn epsilon() -> f64 {
+        f32::EPSILON.into()
+    }
 }
 
 /// A mechanism in canonical form, `(q, p) → (q̇, ṗ)`.
@@ -34,18 +50,22 @@ impl Real for f32 {
 /// motions, wrenches and parameters are fields of the implementing type, set between calls.
 pub trait System {
     /// Number type.
-    type Scalar: Scalar;
+    type Scalar: Scalar + core::fmt::Debug;
     /// Coordinates: an array in generated code, a vector in the interpreter.
-    type Coordinates: Clone + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
+    type Coordinates: Clone + core::fmt::Debug + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
     /// Velocities, momenta, joint forces.
-    type Momenta: Clone + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
+    type Momenta: Clone + core::fmt::Debug + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
 
     /// The neutral configuration: zeros and unit quaternions.
     fn neutral(&self) -> Self::Coordinates;
     /// Zero momenta.
     fn rest(&self) -> Self::Momenta;
+    /// Joints whose coordinates or momenta are more than numbers to be added to, in the order of the state.
+    fn groups(&self) -> &[Group];
     /// Index into `q` of the first component of every unit quaternion.
-    fn quaternions(&self) -> &[usize];
+    fn quaternions(&self) -> impl Iterator<Item = usize> {
+        self.groups().iter().filter_map(Group::quaternion)
+    }
     /// Rates of the state at time `t` (s): `q̇` and `ṗ`.
     fn state_rates(
         &mut self,
@@ -59,6 +79,77 @@ pub trait System {
     fn coordinate_rates(&self, q: &Self::Coordinates, v: &Self::Momenta, qd: &mut Self::Coordinates);
 }
 
+/// A joint whose state lies on a Lie group: where it stands, and of which kind it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Group {
+    /// Kind.
+    pub kind: GroupKind,
+    /// Index of its first coordinate.
+    pub q: usize,
+    /// Index of its first velocity and momentum.
+    pub v: usize,
+    /// Whether what stands at the place of momenta are momenta, which turn with the body; not so in acceleration form.
+    pub momenta: bool,
+}
+
+/// Kind of group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GroupKind {
+    /// A rotation: unit quaternion; angular velocity in body axes.
+    Rotation,
+    /// A position in outer axes and a rotation; linear and angular velocity in body axes.
+    Pose,
+    /// Two positions in outer axes and an angle; linear velocity in body axes.
+    Plane,
+}
+
+impl GroupKind {
+    /// Numbers of coordinates and velocities.
+    pub const fn sizes(self) -> (usize, usize) {
+        match self {
+            GroupKind::Rotation => (4, 3),
+            GroupKind::Pose => (7, 6),
+            GroupKind::Plane => (3, 3),
+        }
+    }
+
+    /// How many coordinates, from the first on, are positions or angles that displacements are added to.
+    pub const fn positions(self) -> usize {
+        match self {
+            GroupKind::Rotation => 0,
+            GroupKind::Pose | GroupKind::Plane => 3,
+        }
+    }
+}
+
+impl Group {
+    /// A joint in canonical form.
+    pub const fn new(kind: GroupKind, q: usize, v: usize) -> Self {
+        Group { kind, q, v, momenta: true }
+    }
+
+    /// Index into `q` of the first component of its quaternion.
+    pub const fn quaternion(&self) -> Option<usize> {
+        match self.kind {
+            GroupKind::Rotation => Some(self.q),
+            GroupKind::Pose => Some(self.q + 3),
+            GroupKind::Plane => None,
+        }
+    }
+}
+
+/// A [`System`] whose energy is known.
+pub trait Energetic: System {
+    /// Kinetic and potential energy, J.
+    fn state_energy(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> (Self::Scalar, Self::Scalar);
+}
+
+/// A mechanism that gives accelerations at given velocities.
+pub trait Accelerated: System {
+    /// `(q, v) → v̇`.
+    fn state_accelerations(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
+}
+
 /// A [`System`] that gives the derivatives of its rates as well.
 ///
 /// Columns with respect to `q` are derivatives along `q̇ = N(q) e_k`, the direction in which velocity `k` alone moves the
@@ -66,7 +157,7 @@ pub trait System {
 /// respect to a small displacement in body axes. Joint forces add to `ṗ`: `∂ṗ/∂τ = 1`, `∂v/∂τ = 0`.
 pub trait Differentiable: System {
     /// Rows of an `nv × nv` matrix.
-    type Square: Clone + AsRef<[Self::Momenta]> + AsMut<[Self::Momenta]>;
+    type Square: Clone + core::fmt::Debug + AsRef<[Self::Momenta]> + AsMut<[Self::Momenta]>;
 
     /// A zero matrix.
     fn square(&self) -> Self::Square;

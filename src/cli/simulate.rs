@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use multibody::codegen::model::{Gravity, JointKind, Value};
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::runtime::integrate::Rk4;
+use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::interp::RankLoss;
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
@@ -118,7 +118,7 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
     let v = list("v", &args.v, plan.velocity_names(), vec![0.1; plan.dims.nv])?;
     let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
-    for &at in interpreter.quaternions() {
+    for at in interpreter.quaternions() {
         let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));
         if (norm - 1.0).abs() > 1e-3 {
             return Err(Failure::new(

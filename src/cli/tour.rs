@@ -8,7 +8,7 @@ use std::time::Instant;
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::codegen::{Group, Options};
-use multibody::runtime::integrate::Rk4;
+use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::Interpreter;
 
 use super::output::{note, write_file};

@@ -2,7 +2,7 @@
 
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::integrate::Rk4;
+use mbd_runtime::integrate::{Rk4, Stepper};
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_testing::random::{random_model, Knobs};
 use mbd_testing::state::random_state;

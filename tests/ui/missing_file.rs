@@ -2,7 +2,10 @@
 multibody::mbd_model! { path = "models/double_pendulm.toml", name = Arm }
 
 fn main() {
-    use multibody::runtime::{integrate::Rk4, System};
+    use multibody::runtime::{
+        integrate::{Rk4, Stepper},
+        System,
+    };
     let mut arm = Arm::new();
     let (mut q, mut p) = (arm.neutral(), arm.rest());
     q[1] = 0.5;

@@ -178,7 +178,7 @@ pub fn fields(plan: &Plan, options: &Options) -> Vec<(&'static str, String, Stri
 }
 
 /// The neutral configuration as an array literal, of the state or of the drives.
-fn neutral(plan: &Plan, drives: bool) -> String {
+pub fn neutral(plan: &Plan, drives: bool) -> String {
     let parts = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })) == drives && s.at.is_some());
     let numbers: Vec<&str> = parts
         .flat_map(|s| {
@@ -366,77 +366,4 @@ pub fn coordinate_rates_signature(plan: &Plan, options: &Options) -> Function {
         arguments: format!("q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]"),
         returns: String::new(),
     }
-}
-
-/// `impl System`.
-pub fn system(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let quaternions: Vec<String> = plan
-        .slots
-        .iter()
-        .filter_map(|s| match (s.at, plan.model.joints[s.joint].kind) {
-            (Some(Source::State { q, .. }), JointKind::Spherical) => Some(format!("{q}")),
-            (Some(Source::State { q, .. }), JointKind::Floating) => Some(format!("{}", q + 3)),
-            _ => None,
-        })
-        .collect();
-    let neutral = neutral(plan, false);
-    let quaternions = quaternions.join(", ");
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::System for {name} {{
-    type Scalar = {t};
-    type Coordinates = [{t}; {nq}];
-    type Momenta = [{t}; {nv}];
-
-    fn neutral(&self) -> [{t}; {nq}] {{
-        {neutral}
-    }}
-
-    fn rest(&self) -> [{t}; {nv}] {{
-        [0.0; {nv}]
-    }}
-
-    fn quaternions(&self) -> &[usize] {{
-        &[{quaternions}]
-    }}
-
-    #[inline]
-    fn state_rates(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
-        Self::rates(self, q, p, qd, pd);
-    }}
-
-    #[inline]
-    fn coordinate_rates(&self, q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]) {{
-        Self::coordinate_rates(self, q, v, qd);
-    }}
-}}
-"
-    );
-}
-
-/// `impl Differentiable`.
-pub fn differentiable(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt, nv) = (options.precision.name(), &options.type_name, &options.runtime, plan.dims.nv);
-    let nq = plan.dims.nq;
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Differentiable for {name} {{
-    type Square = [[{t}; {nv}]; {nv}];
-
-    fn square(&self) -> [[{t}; {nv}]; {nv}] {{
-        [[0.0; {nv}]; {nv}]
-    }}
-
-    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], d: {rt}::Blocks<'_, [[{t}; {nv}]; {nv}]>) {{
-        Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
-    }}
-}}
-"
-    );
 }

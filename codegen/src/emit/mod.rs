@@ -6,6 +6,7 @@ mod loops;
 pub(crate) mod names;
 mod ports;
 mod statements;
+mod traits;
 
 use std::fmt::Write;
 
@@ -20,7 +21,13 @@ pub use names::{identifier, quantity};
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
 pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {
     let mut out = String::new();
-    let [rates, derivatives] = [Group::Rates, Group::Derivatives].map(|x| groups.iter().any(|g| g.group == x));
+    let has = |x: Group| groups.iter().any(|g| g.group == x);
+    let rates = has(Group::Rates);
+    let traits: [(bool, fn(&mut String, &Plan, &Options)); 3] = [
+        (has(Group::Energy), traits::energetic),
+        (has(Group::Accelerations), traits::accelerated),
+        (has(Group::Derivatives), traits::differentiable),
+    ];
     layout::header(&mut out, plan, options, groups);
     layout::type_definition(&mut out, plan, options, groups);
     let name = &options.type_name;
@@ -56,9 +63,9 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     lanes::lanes_type(&mut out, plan, options, &kernels);
     layout::default(&mut out, options);
     if rates {
-        layout::system(&mut out, plan, options);
-        if derivatives {
-            layout::differentiable(&mut out, plan, options);
+        traits::system(&mut out, plan, options);
+        for (_, write) in traits.iter().filter(|(wanted, _)| *wanted) {
+            write(&mut out, plan, options);
         }
         lanes::batch_trait(&mut out, plan, options);
     }

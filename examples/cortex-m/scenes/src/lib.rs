@@ -1,7 +1,7 @@
 //! What the firmware and its host twin both run: generated dynamics, 1000 steps of 1 ms.
 #![no_std]
 
-use mbd_runtime::integrate::Rk4;
+use mbd_runtime::integrate::{Rk4, Stepper};
 use mbd_runtime::{Real, Scalar, System};
 
 mbd_macros::mbd_model! {

@@ -1,0 +1,126 @@
+//! Traits of the runtime, implemented for the generated type.
+
+use std::fmt::Write as _;
+
+use mbd_runtime::tree::Source;
+
+use super::layout::neutral;
+use crate::model::JointKind;
+use crate::options::Options;
+use crate::plan::Plan;
+
+/// `impl System`.
+pub fn system(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let groups: Vec<String> = plan
+        .slots
+        .iter()
+        .filter_map(|s| {
+            let Some(Source::State { q, v }) = s.at else { return None };
+            let kind = match plan.model.joints[s.joint].kind {
+                JointKind::Spherical => "Rotation",
+                JointKind::Floating => "Pose",
+                JointKind::Planar { .. } => "Plane",
+                _ => return None,
+            };
+            Some(format!("{rt}::system::Group::new({rt}::system::GroupKind::{kind}, {q}, {v})"))
+        })
+        .collect();
+    let neutral = neutral(plan, false);
+    let groups = groups.join(", ");
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::System for {name} {{
+    type Scalar = {t};
+    type Coordinates = [{t}; {nq}];
+    type Momenta = [{t}; {nv}];
+
+    fn neutral(&self) -> [{t}; {nq}] {{
+        {neutral}
+    }}
+
+    fn rest(&self) -> [{t}; {nv}] {{
+        [0.0; {nv}]
+    }}
+
+    #[inline]
+    fn groups(&self) -> &[{rt}::system::Group] {{
+        const {{ &[{groups}] }}
+    }}
+
+    #[inline]
+    fn state_rates(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
+        Self::rates(self, q, p, qd, pd);
+    }}
+
+    #[inline]
+    fn coordinate_rates(&self, q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]) {{
+        Self::coordinate_rates(self, q, v, qd);
+    }}
+}}
+"
+    );
+}
+
+/// `impl Energetic`.
+pub fn energetic(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Energetic for {name} {{
+    #[inline]
+    fn state_energy(&mut self, q: &[{t}; {nq}], p: &[{t}; {nv}]) -> ({t}, {t}) {{
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }}
+}}
+"
+    );
+}
+
+/// `impl Accelerated`.
+pub fn accelerated(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Accelerated for {name} {{
+    #[inline]
+    fn state_accelerations(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], a: &mut [{t}; {nv}]) {{
+        Self::accelerations(self, q, v, a);
+    }}
+}}
+"
+    );
+}
+
+/// `impl Differentiable`.
+pub fn differentiable(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt, nv) = (options.precision.name(), &options.type_name, &options.runtime, plan.dims.nv);
+    let nq = plan.dims.nq;
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Differentiable for {name} {{
+    type Square = [[{t}; {nv}]; {nv}];
+
+    fn square(&self) -> [[{t}; {nv}]; {nv}] {{
+        [[0.0; {nv}]; {nv}]
+    }}
+
+    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], d: {rt}::Blocks<'_, [[{t}; {nv}]; {nv}]>) {{
+        Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
+    }}
+}}
+"
+    );
+}

@@ -1,0 +1,279 @@
+//! Local coordinates about a state: what the methods integrate.
+//!
+//! A step is a displacement from the state at its start, with as many components as there are velocities. Coordinates of
+//! ordinary joints are moved by it as they stand. A rotation is moved by a vector `φ` in outer axes, `R = cay(φ) R₀`
+//! (Cayley map: quaternion `(φ/2, 1)` scaled to unit length), so it stays a rotation whatever the method does; and the
+//! momenta of its joint are taken in outer axes, those of a joint that also moves along about the point where the step began:
+//!
+//! `π = R p_lin`, `μ = R p_ang + x × π`, so that `π̇ = R (ṗ_lin + ω × p_lin)`, `μ̇ = R (ṗ_ang + ω × p_ang) + ẋ × π + x × π̇`.
+//!
+//! The momenta of a body that nothing acts on are then constants, and any method keeps them to round-off. After Bogfjellmo
+//! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
+//! the exponential: its inverse differential is a polynomial.
+
+use super::group::normalise;
+use super::StepError;
+use crate::system::{Group, Real, System};
+use crate::Scalar;
+
+/// A displacement of a state, or its rate: `nv` coordinates, `nv` momenta.
+#[derive(Clone, Debug)]
+pub struct Point<Y: System> {
+    /// Coordinates: rad, m; rotations by the vector `φ` of the module's text.
+    pub x: Y::Momenta,
+    /// Momenta.
+    pub p: Y::Momenta,
+}
+
+impl<Y: System> Point<Y> {
+    /// No displacement.
+    pub fn zero(system: &Y) -> Self {
+        Point { x: system.rest(), p: system.rest() }
+    }
+
+    /// Both halves.
+    pub fn parts(&self) -> [&[Y::Scalar]; 2] {
+        [self.x.as_ref(), self.p.as_ref()]
+    }
+
+    /// Both halves, to be changed.
+    pub fn parts_mut(&mut self) -> [&mut [Y::Scalar]; 2] {
+        [self.x.as_mut(), self.p.as_mut()]
+    }
+
+    /// All components zero.
+    pub fn clear(&mut self) {
+        for part in self.parts_mut() {
+            part.fill(Y::Scalar::zero());
+        }
+    }
+
+    /// Takes the components of another.
+    pub fn copy_from(&mut self, other: &Self) {
+        for (to, from) in self.parts_mut().into_iter().zip(other.parts()) {
+            to.copy_from_slice(from);
+        }
+    }
+
+    /// `self += w k`.
+    #[inline]
+    pub fn add(&mut self, w: Y::Scalar, k: &Self) {
+        for (sum, k) in self.parts_mut().into_iter().zip(k.parts()) {
+            for (sum, k) in sum.iter_mut().zip(k) {
+                *sum = *sum + w * *k;
+            }
+        }
+    }
+
+    /// `self *= w`.
+    #[inline]
+    pub fn scale(&mut self, w: Y::Scalar) {
+        for part in self.parts_mut() {
+            for x in part {
+                *x = w * *x;
+            }
+        }
+    }
+}
+
+impl<Y: System> Point<Y>
+where
+    Y::Scalar: Real,
+{
+    /// Index of the first component that is not finite, momenta after coordinates.
+    pub fn not_finite(&self) -> Option<usize> {
+        self.parts().into_iter().flatten().position(|x| !x.is_finite())
+    }
+}
+
+/// The state that displacements start from.
+#[derive(Clone, Debug)]
+pub struct Chart<Y: System> {
+    /// Coordinates.
+    q: Y::Coordinates,
+    /// Momenta; those of groups in outer axes.
+    p: Y::Momenta,
+    /// What rounding took from the sums of the last steps, where sums are compensated.
+    carry: Option<Point<Y>>,
+}
+
+/// Stretches of the state that are moved by addition, positions of groups included, each with the group at its end.
+struct Stretches<'a> {
+    groups: core::slice::Iter<'a, Group>,
+    at: (usize, usize),
+    end: (usize, usize),
+}
+
+impl<'a> Stretches<'a> {
+    fn new(groups: &'a [Group], nq: usize, nv: usize) -> Self {
+        Stretches { groups: groups.iter(), at: (0, 0), end: (nq, nv) }
+    }
+}
+
+impl<'a> Iterator for Stretches<'a> {
+    /// First index into `q` and into `v`, how many; the group.
+    type Item = (usize, usize, usize, Option<&'a Group>);
+
+    #[inline]
+    fn next(&mut self) -> Option<Self::Item> {
+        let (q, v) = self.at;
+        if v >= self.end.1 {
+            return None;
+        }
+        let group = self.groups.next();
+        let stop = group.map_or(self.end.1, |g| g.v + g.kind.positions());
+        self.at = group.map_or(self.end, |g| (g.q + g.kind.sizes().0, g.v + g.kind.sizes().1));
+        Some((q, v, stop - v, group))
+    }
+}
+
+impl<Y> Chart<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// About the neutral state. `compensated` sums of steps carry on what rounding takes from them.
+    pub fn new(system: &Y, compensated: bool) -> Self {
+        Chart { q: system.neutral(), p: system.rest(), carry: compensated.then(|| Point::zero(system)) }
+    }
+
+    /// About another state.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`] where a quaternion is off the unit sphere by more than 1e-3; it is scaled otherwise.
+    pub fn load(&mut self, system: &Y, time: f64, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        self.q.as_mut().copy_from_slice(q.as_ref());
+        self.p.as_mut().copy_from_slice(p.as_ref());
+        if let Some(carry) = &mut self.carry {
+            carry.clear();
+        }
+        for group in system.groups() {
+            if let Some(index) = group.quaternion() {
+                let norm = normalise(&mut self.q.as_mut()[index..index + 4]);
+                if !(norm > 0.999 && norm < 1.001) {
+                    return Err(StepError::Quaternion { time, index, norm });
+                }
+            }
+            group.outward(self.q.as_ref(), [Y::Scalar::zero(); 3], self.p.as_mut());
+        }
+        Ok(())
+    }
+
+    /// The state itself.
+    pub fn base(&self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        q.as_mut().copy_from_slice(self.q.as_ref());
+        p.as_mut().copy_from_slice(self.p.as_ref());
+        for group in system.groups() {
+            group.inward(self.q.as_ref(), [Y::Scalar::zero(); 3], p.as_mut());
+        }
+    }
+
+    /// Sizes of the state's components: of coordinates and momenta; zero for rotations.
+    pub fn size(&self, system: &Y, out: &mut Point<Y>) {
+        out.clear();
+        let (q, x) = (self.q.as_ref(), out.x.as_mut());
+        for (at, v, n, _) in Stretches::new(system.groups(), q.len(), x.len()) {
+            for k in 0..n {
+                x[v + k] = q[at + k].abs();
+            }
+        }
+        for (size, p) in out.p.as_mut().iter_mut().zip(self.p.as_ref()) {
+            *size = p.abs();
+        }
+    }
+
+    /// State at a displacement.
+    pub fn state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        let (base, x) = (self.q.as_ref(), point.x.as_ref());
+        let q = q.as_mut();
+        for (p, (base, dp)) in p.as_mut().iter_mut().zip(self.p.as_ref().iter().zip(point.p.as_ref())) {
+            *p = *base + *dp;
+        }
+        for (at, v, n, group) in Stretches::new(system.groups(), base.len(), x.len()) {
+            for k in 0..n {
+                q[at + k] = base[at + k] + x[v + k];
+            }
+            if let Some(group) = group {
+                group.displace(base, x, q);
+                group.inward(q, group.shift(x), p.as_mut());
+            }
+        }
+    }
+
+    /// Rates of the displacement from those of the state `(q, p)` it leads to.
+    pub fn rates(
+        &self,
+        system: &Y,
+        point: &Point<Y>,
+        (q, p): (&Y::Coordinates, &Y::Momenta),
+        (qd, pd): (&Y::Coordinates, &Y::Momenta),
+        out: &mut Point<Y>,
+    ) {
+        let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
+        out.p.as_mut().copy_from_slice(pd.as_ref());
+        for (at, v, n, group) in Stretches::new(system.groups(), qd_.len(), xd.len()) {
+            xd[v..v + n].copy_from_slice(&qd_[at..at + n]);
+            if let Some(group) = group {
+                group.rates(point.x.as_ref(), (q.as_ref(), p.as_ref()), qd_, xd, out.p.as_mut());
+            }
+        }
+    }
+
+    /// Moves the state to a displacement from it.
+    ///
+    /// # Errors
+    /// [`StepError::NotFinite`]; the state has not moved then.
+    pub fn advance(&mut self, system: &Y, time: f64, point: &Point<Y>) -> Result<(), StepError> {
+        if let Some(index) = point.not_finite() {
+            return Err(StepError::NotFinite { time, index });
+        }
+        let (q, x) = (self.q.as_mut(), point.x.as_ref());
+        let mut carry = self.carry.as_mut().map(|c| (c.x.as_mut(), c.p.as_mut()));
+        for (at, v, n, group) in Stretches::new(system.groups(), q.len(), x.len()) {
+            for k in 0..n {
+                sum(&mut q[at + k], x[v + k], carry.as_mut().map(|c| &mut c.0[v + k]));
+            }
+            if let Some(group) = group {
+                group.advance(x, q);
+            }
+        }
+        let p = self.p.as_mut();
+        for (k, (p, dp)) in p.iter_mut().zip(point.p.as_ref()).enumerate() {
+            sum(p, *dp, carry.as_mut().map(|c| &mut c.1[k]));
+        }
+        for group in system.groups() {
+            group.refer(group.shift(x), p);
+        }
+        Ok(())
+    }
+
+    /// What a past point of the motion, `x` from the chart's state, and its rate become when the chart's state is moved by
+    /// `step`. Of the displacement only the coordinates are kept up, its momenta are not read.
+    pub fn follow(system: &Y, step: &Point<Y>, point: &mut Point<Y>, rate: &mut Point<Y>) {
+        let (step, x) = (step.x.as_ref(), point.x.as_mut());
+        for group in system.groups() {
+            group.follow(step, x, rate.x.as_mut(), rate.p.as_mut());
+        }
+        let nq = system.groups().iter().fold(x.len(), |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
+        for (_, v, n, _) in Stretches::new(system.groups(), nq, x.len()) {
+            for k in v..v + n {
+                x[k] = x[k] - step[k];
+            }
+        }
+    }
+}
+
+/// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing truncation
+/// errors*, 1965.
+#[inline]
+fn sum<S: Real>(total: &mut S, x: S, carry: Option<&mut S>) {
+    match carry {
+        None => *total = *total + x,
+        Some(carry) => {
+            let x = x + *carry;
+            let new = *total + x;
+            *carry = x - (new - *total);
+            *total = new;
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Explicit Runge-Kutta methods.
+
+use super::chart::Point;
+use super::field::Field;
+use super::stepper::{norm, Statistics, Stepper};
+use super::tableau::{self, Dense, Tableau};
+use super::StepError;
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// A method with `S` stages, and `X` more for dense output, by name.
+pub trait Method<const S: usize, const X: usize> {
+    /// Its coefficients.
+    const TABLEAU: &'static Tableau<S>;
+}
+
+macro_rules! methods {
+    ($($name:ident $stages:literal $extra:literal $tableau:ident $doc:literal;)*) => {
+        /// Names of methods.
+        pub mod method {
+            $(#[doc = $doc]
+            #[derive(Clone, Copy, Debug)]
+            pub struct $name;
+            impl super::Method<$stages, $extra> for $name {
+                const TABLEAU: &'static super::Tableau<$stages> = &super::tableau::$tableau;
+            })*
+        }
+        $(#[doc = $doc]
+        pub type $name<Y> = Explicit<Y, method::$name, $stages, $extra>;)*
+    };
+}
+
+methods! {
+    Euler 1 0 EULER "Euler's method, order 1: one evaluation a step.";
+    Midpoint 2 0 MIDPOINT "The explicit midpoint rule, order 2: two evaluations a step (C.3).";
+    Rk4 4 0 RK4 "Kutta's method of order 4: four evaluations a step (C.6). W. Kutta, 1901.";
+}
+
+/// Any explicit Runge-Kutta method; take one by its name, [`Rk4`] for example.
+#[derive(Clone, Debug)]
+pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
+    field: Field<Y>,
+    statistics: Statistics,
+    // As numbers of the system: read for every stage.
+    a: [[Y::Scalar; S]; S],
+    b: [Y::Scalar; S],
+    c: [Y::Scalar; S],
+    k: [Point<Y>; S],
+    delta: Point<Y>,
+    /// A stage's displacement; an estimate of the error.
+    stage: Point<Y>,
+    /// Rate at the end, if it is known.
+    end: Point<Y>,
+    end_known: bool,
+    first_known: bool,
+    extra: [Point<Y>; X],
+    extra_known: bool,
+    method: core::marker::PhantomData<T>,
+}
+
+impl<Y, T, const S: usize, const X: usize> Explicit<Y, T, S, X>
+where
+    Y: System,
+    Y::Scalar: Real,
+    T: Method<S, X>,
+{
+    /// Room for the stages of one system.
+    pub fn new(system: &Y) -> Self {
+        Self::with_sums(system, false)
+    }
+
+    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions. Of use where steps
+    /// are small against the precision, above all in `f32`.
+    pub fn compensated(system: &Y) -> Self {
+        Self::with_sums(system, true)
+    }
+
+    fn with_sums(system: &Y, compensated: bool) -> Self {
+        let tableau = T::TABLEAU;
+        let point = || Point::zero(system);
+        Explicit {
+            field: Field::new(system, compensated),
+            statistics: Statistics::default(),
+            a: tableau.a.map(|row| row.map(|x| x.get())),
+            b: tableau.b.map(|x| x.get()),
+            c: tableau.c.map(|x| x.get()),
+            k: core::array::from_fn(|_| point()),
+            delta: point(),
+            stage: point(),
+            end: point(),
+            end_known: false,
+            first_known: false,
+            extra: core::array::from_fn(|_| point()),
+            extra_known: false,
+            method: core::marker::PhantomData,
+        }
+    }
+
+    /// `out = h Σ wᵢ kᵢ`.
+    #[inline]
+    fn combine(h: Y::Scalar, weights: &[Y::Scalar], k: &[Point<Y>], out: &mut Point<Y>) {
+        out.clear();
+        for (w, k) in weights.iter().zip(k) {
+            if *w != Y::Scalar::zero() {
+                out.add(*w, k);
+            }
+        }
+        out.scale(h);
+    }
+
+    /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq. 10.17).
+    fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
+        let mut norms = [0.0; 2];
+        for (norm_, weights) in norms.iter_mut().zip(T::TABLEAU.error) {
+            Self::combine(h, &weights.map(|x| x.get()), &self.k, &mut self.stage);
+            *norm_ = norm(&self.stage, scale);
+        }
+        match T::TABLEAU.error.len() {
+            2 => {
+                let [five, three] = norms;
+                let size = libm::sqrt(five * five + 0.01 * three * three);
+                if size == 0.0 {
+                    0.0
+                } else {
+                    five * five / size
+                }
+            }
+            _ => norms[0],
+        }
+    }
+
+    /// Extra stages of dense output.
+    fn extend(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, dense: &Dense) {
+        self.end_rate(system, t, h);
+        for (i, (c, row)) in dense.c.iter().zip(dense.a).enumerate().take(X) {
+            self.stage.clear();
+            let (known, rest) = self.extra.split_at_mut(i);
+            // If the method's last stage is the end rate, it stands once in the rows.
+            let end = (!T::TABLEAU.fsal).then_some(&self.end);
+            for (w, k) in row.iter().zip(self.k.iter().chain(end).chain(known.iter())) {
+                self.stage.add(w.get(), k);
+            }
+            self.stage.scale(h);
+            self.field.rates(system, t + c.get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+        }
+        self.extra_known = true;
+    }
+}
+
+impl<Y, T, const S: usize, const X: usize> Stepper<Y> for Explicit<Y, T, S, X>
+where
+    Y: System,
+    Y::Scalar: Real,
+    T: Method<S, X>,
+{
+    fn order(&self) -> u32 {
+        T::TABLEAU.order
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        (!T::TABLEAU.error.is_empty()).then_some(T::TABLEAU.error_order)
+    }
+
+    fn begin(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        (self.first_known, self.end_known, self.extra_known) = (false, false, false);
+        self.field.load(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        self.start_rate(system, t);
+        // The last stage of a pair whose last stage is the rate at the end only serves the estimate and the next step.
+        let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
+        for i in 1..stages {
+            let (known, rest) = self.k.split_at_mut(i);
+            Self::combine(h, &self.a[i], known, &mut self.stage);
+            self.field.rates(system, t + self.c[i] * h, &self.stage, &mut rest[0]);
+        }
+        Self::combine(h, &self.b, &self.k, &mut self.delta);
+        (self.end_known, self.extra_known) = (false, false);
+        if T::TABLEAU.fsal && stages == S {
+            self.end.copy_from(&self.k[S - 1]);
+            self.end_known = true;
+        }
+        Ok(scale.map_or(0.0, |scale| self.error(h, scale)))
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (&mut self.field, &mut self.delta)
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        if !self.first_known {
+            self.stage.clear();
+            self.field.rates(system, t, &self.stage, &mut self.k[0]);
+            self.first_known = true;
+        }
+        &self.k[0]
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        if !self.end_known {
+            self.field.rates(system, t + h, &self.delta, &mut self.end);
+            self.end_known = true;
+        }
+        &self.end
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        self.end_rate(system, t, h);
+        self.field.advance(system, t, &self.delta)?;
+        self.k[0].copy_from(&self.end);
+        self.stage.copy_from(&self.delta);
+        super::chart::Chart::follow(system, &self.delta, &mut self.stage, &mut self.k[0]);
+        (self.first_known, self.end_known, self.extra_known) = (true, false, false);
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        self.end_rate(system, t, h);
+        let Some(dense) = T::TABLEAU.dense else {
+            return super::stepper::hermite(h, theta, &self.delta, [&self.k[0], &self.end], out);
+        };
+        if !self.extra_known {
+            self.extend(system, t, h, dense);
+        }
+        out.clear();
+        let end = (!T::TABLEAU.fsal).then_some(&self.end);
+        for (row, k) in dense.weights.iter().zip(self.k.iter().chain(end).chain(&self.extra)) {
+            let weight = row.iter().rev().fold(Y::Scalar::zero(), |sum, x| (sum + x.get()) * theta);
+            out.add(weight, k);
+        }
+        out.scale(h);
+    }
+
+    fn statistics(&self) -> Statistics {
+        Statistics { evaluations: self.field.evaluations(), ..self.statistics }
+    }
+}

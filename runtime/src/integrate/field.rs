@@ -1,0 +1,98 @@
+//! A mechanism as an ordinary differential equation in local coordinates.
+
+use super::chart::{Chart, Point};
+use super::StepError;
+use crate::system::{Real, System};
+
+/// The rates of a system about a state, and how often they were asked for.
+#[derive(Clone, Debug)]
+pub struct Field<Y: System> {
+    chart: Chart<Y>,
+    /// State of the last evaluation, and its rates.
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    qd: Y::Coordinates,
+    pd: Y::Momenta,
+    /// Whether the state was given by the last [`Field::store`].
+    stored: bool,
+    evaluations: u64,
+}
+
+impl<Y> Field<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// Room for one system; `compensated` as in [`Chart::new`].
+    pub fn new(system: &Y, compensated: bool) -> Self {
+        let (q, p) = (system.neutral(), system.rest());
+        let chart = Chart::new(system, compensated);
+        Field { chart, qd: q.clone(), q, pd: p.clone(), p, stored: false, evaluations: 0 }
+    }
+
+    /// Evaluations of the rates so far.
+    pub fn evaluations(&self) -> u64 {
+        self.evaluations
+    }
+
+    /// The chart.
+    pub fn chart(&self) -> &Chart<Y> {
+        &self.chart
+    }
+
+    /// Takes a state as the one displacements start from. If it is the one that [`Field::store`] gave, nothing is done: so
+    /// what was carried over from rounded sums lives on.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    pub fn load(
+        &mut self,
+        system: &Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        let same = self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref();
+        if !same {
+            self.chart.load(system, t.to_f64(), q, p)?;
+        }
+        self.stored = false;
+        Ok(())
+    }
+
+    /// Gives the state that displacements start from.
+    pub fn store(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        self.chart.base(system, &mut self.q, &mut self.p);
+        q.as_mut().copy_from_slice(self.q.as_ref());
+        p.as_mut().copy_from_slice(self.p.as_ref());
+        self.stored = true;
+    }
+
+    /// Moves the state that displacements start from.
+    ///
+    /// # Errors
+    /// [`StepError::NotFinite`]; nothing has moved then.
+    pub fn advance(&mut self, system: &Y, t: Y::Scalar, point: &Point<Y>) -> Result<(), StepError> {
+        self.chart.advance(system, t.to_f64(), point)
+    }
+
+    /// Rates of the displacement at time `t` (s) and displacement `point`.
+    #[inline]
+    pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
+        self.chart.state(system, point, &mut self.q, &mut self.p);
+        self.evaluate(system, t);
+        self.local(system, point, out);
+    }
+
+    fn evaluate(&mut self, system: &mut Y, t: Y::Scalar) {
+        system.state_rates(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
+        self.stored = false;
+        self.evaluations += 1;
+    }
+
+    /// The last rates that were evaluated, as rates of the displacement `point`. After [`Field::advance`] to the state of the
+    /// last evaluation they are those of no displacement from the new one, and need no further evaluation.
+    pub fn local(&self, system: &Y, point: &Point<Y>, out: &mut Point<Y>) {
+        self.chart.rates(system, point, (&self.q, &self.p), (&self.qd, &self.pd), out);
+    }
+}

@@ -1,0 +1,194 @@
+//! The formulas of [`super::chart`] for one joint.
+
+use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, Step, Vec3};
+use crate::system::{Group, GroupKind, Real};
+use crate::Scalar;
+
+/// Three components from an index on.
+fn three<S: Copy>(x: &[S], at: usize) -> Vec3<S> {
+    [x[at], x[at + 1], x[at + 2]]
+}
+
+fn put<S: Copy>(x: &mut [S], at: usize, value: Vec3<S>) {
+    x[at..at + 3].copy_from_slice(&value);
+}
+
+fn sub3<S: Scalar>(a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// Scales a quaternion to unit length and returns the length it had.
+pub(super) fn normalise<S: Real>(quaternion: &mut [S]) -> f64 {
+    let norm = dot4(quaternion, quaternion).sqrt();
+    let scale = S::one() / norm;
+    for x in quaternion {
+        *x = *x * scale;
+    }
+    norm.to_f64()
+}
+
+/// Quaternion of `cay(φ) R(q)`, of unit length.
+fn turned<S: Real>(phi: Vec3<S>, q: &[S]) -> [S; 4] {
+    let half = scale3(S::constant(0.5), phi);
+    let (v, w) = (three(q, 0), q[3]);
+    let vector = add3(add3(v, scale3(w, half)), cross(half, v));
+    let mut out = [vector[0], vector[1], vector[2], w - dot3(half, v)];
+    normalise(&mut out);
+    out
+}
+
+/// `φ̇` of an angular velocity in outer axes: the inverse differential of Cayley's map.
+fn phi_rate<S: Scalar>(phi: Vec3<S>, w: Vec3<S>) -> Vec3<S> {
+    let (half, quarter) = (S::constant(0.5), S::constant(0.25));
+    add3(sub3(w, scale3(half, cross(phi, w))), scale3(quarter * dot3(phi, w), phi))
+}
+
+/// The other way.
+fn angular<S: Scalar>(phi: Vec3<S>, rate: Vec3<S>) -> Vec3<S> {
+    let (half, quarter) = (S::constant(0.5), S::constant(0.25));
+    let scale = S::one() / (S::one() + quarter * dot3(phi, phi));
+    scale3(scale, add3(rate, scale3(half, cross(phi, rate))))
+}
+
+/// Vector of `cay(φ) cay(s)⁻¹`.
+fn from<S: Scalar>(phi: Vec3<S>, s: Vec3<S>) -> Vec3<S> {
+    let (half, quarter) = (S::constant(0.5), S::constant(0.25));
+    let scale = S::one() / (S::one() + quarter * dot3(phi, s));
+    scale3(scale, sub3(sub3(phi, s), scale3(half, cross(phi, s))))
+}
+
+/// Angular velocity in outer axes of the rate of a unit quaternion.
+fn spin<S: Scalar>(q: &[S], qd: &[S]) -> Vec3<S> {
+    let (v, vd) = (three(q, 0), three(qd, 0));
+    let w = add3(sub3(scale3(q[3], vd), scale3(qd[3], v)), cross(v, vd));
+    scale3(S::constant(2.0), w)
+}
+
+impl Group {
+    /// Place of the rotation's vector in the displacement.
+    fn phi(&self) -> Option<usize> {
+        match self.kind {
+            GroupKind::Rotation => Some(self.v),
+            GroupKind::Pose => Some(self.v + 3),
+            GroupKind::Plane => None,
+        }
+    }
+
+    /// From body axes to outer ones at coordinates `q`.
+    fn rotation<S: Real>(&self, q: &[S]) -> Step<S> {
+        let o = S::zero();
+        Step::Rotate(match self.quaternion() {
+            Some(at) => quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]),
+            None => {
+                let (s, c) = q[self.q + 2].sin_cos();
+                [[c, -s, o], [s, c, o], [o, o, S::one()]]
+            }
+        })
+    }
+
+    /// Momenta (or their rates) as two vectors: linear, angular. What the kind does not have is zero.
+    fn split<S: Scalar>(&self, p: &[S]) -> (Vec3<S>, Vec3<S>) {
+        let (o, v) = (S::zero(), self.v);
+        match self.kind {
+            GroupKind::Rotation => ([o; 3], three(p, v)),
+            GroupKind::Pose => (three(p, v), three(p, v + 3)),
+            GroupKind::Plane => ([p[v], p[v + 1], o], [o, o, p[v + 2]]),
+        }
+    }
+
+    fn join<S: Scalar>(&self, (linear, angular): (Vec3<S>, Vec3<S>), p: &mut [S]) {
+        let v = self.v;
+        match self.kind {
+            GroupKind::Rotation => put(p, v, angular),
+            GroupKind::Pose => {
+                put(p, v, linear);
+                put(p, v + 3, angular);
+            }
+            GroupKind::Plane => put(p, v, [linear[0], linear[1], angular[2]]),
+        }
+    }
+
+    /// How far the displacement moves the joint's origin, outer axes.
+    pub(super) fn shift<S: Scalar>(&self, x: &[S]) -> Vec3<S> {
+        match self.kind {
+            GroupKind::Rotation => [S::zero(); 3],
+            GroupKind::Pose => three(x, self.v),
+            GroupKind::Plane => [x[self.v], x[self.v + 1], S::zero()],
+        }
+    }
+
+    /// Momenta from body axes to outer ones, about the point from which the origin is displaced by `shift`.
+    pub(super) fn outward<S: Real>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
+        if self.momenta {
+            let r = self.rotation(q);
+            let (linear, angular) = self.split(p);
+            let linear = r.vector_back(linear);
+            self.join((linear, add3(r.vector_back(angular), cross(shift, linear))), p);
+        }
+    }
+
+    /// The other way.
+    pub(super) fn inward<S: Real>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
+        if self.momenta {
+            let r = self.rotation(q);
+            let (linear, angular) = self.split(p);
+            self.join((r.vector(linear), r.vector(sub3(angular, cross(shift, linear)))), p);
+        }
+    }
+
+    /// Momenta in outer axes about a point that is `shift` further.
+    pub(super) fn refer<S: Real>(&self, shift: Vec3<S>, p: &mut [S]) {
+        if self.momenta && self.kind != GroupKind::Rotation {
+            let (linear, angular) = self.split(p);
+            self.join((linear, sub3(angular, cross(shift, linear))), p);
+        }
+    }
+
+    /// Quaternion at a displacement `x` from `base`.
+    pub(super) fn displace<S: Real>(&self, base: &[S], x: &[S], q: &mut [S]) {
+        if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
+            q[at..at + 4].copy_from_slice(&turned(three(x, phi), &base[at..at + 4]));
+        }
+    }
+
+    /// The same in place.
+    pub(super) fn advance<S: Real>(&self, x: &[S], q: &mut [S]) {
+        if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
+            let turned = turned(three(x, phi), &q[at..at + 4]);
+            q[at..at + 4].copy_from_slice(&turned);
+        }
+    }
+
+    /// Rates of the displacement at the state `(q, p)` it leads to, from `q̇` and, in place, `ṗ`: of the
+    /// rotation and the momenta. The rates of positions are known, they stand in `xd`.
+    pub(super) fn rates<S: Real>(&self, x: &[S], (q, p): (&[S], &[S]), qd: &[S], xd: &mut [S], pd: &mut [S]) {
+        let w = match (self.quaternion(), self.phi()) {
+            (Some(at), Some(phi)) => {
+                let w = spin(&q[at..at + 4], &qd[at..at + 4]);
+                put(xd, phi, phi_rate(three(x, phi), w));
+                w
+            }
+            _ => [S::zero(), S::zero(), qd[self.q + 2]],
+        };
+        if self.momenta {
+            let r = self.rotation(q);
+            let ((lin, ang), (lin_d, ang_d)) = (self.split(p), self.split(pd));
+            let (lin, ang) = (r.vector_back(lin), r.vector_back(ang));
+            let lin_d = add3(r.vector_back(lin_d), cross(w, lin));
+            let ang_d = add3(r.vector_back(ang_d), cross(w, ang));
+            let moved = add3(cross(self.shift(xd), lin), cross(self.shift(x), lin_d));
+            self.join((lin_d, add3(ang_d, moved)), pd);
+        }
+    }
+
+    /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.
+    pub(super) fn follow<S: Real>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
+        if let Some(at) = self.phi() {
+            let (old, moved) = (three(x, at), three(step, at));
+            let new = from(old, moved);
+            put(xd, at, phi_rate(new, angular(old, three(xd, at))));
+            put(x, at, new);
+        }
+        self.refer(self.shift(step), pd);
+    }
+}

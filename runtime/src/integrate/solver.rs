@@ -1,0 +1,369 @@
+//! Drives a method over a time: error control, dense output, statistics.
+
+use super::chart::Point;
+use super::stepper::{norm, Statistics, Stepper};
+use super::StepError;
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// Allowed error of a component `y` in one step: `absolute + relative · |y|`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerance {
+    /// In the unit of the component.
+    pub absolute: f64,
+    /// Relative to its size.
+    pub relative: f64,
+}
+
+/// Allowed errors of a step, by group of components.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Coordinates, rad and m.
+    pub coordinates: Tolerance,
+    /// Rotations by quaternions: tangent vector, rad.
+    pub rotations: f64,
+    /// Momenta. The size of a momentum counts as at least a thousandth of the largest one.
+    pub momenta: Tolerance,
+    /// Which errors the step is chosen by.
+    pub control: Control,
+}
+
+/// Which errors the step is chosen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Control {
+    /// Those of coordinates and momenta.
+    Full,
+    /// Those of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway, and where
+    /// they have small fast parts this saves steps.
+    Coordinates,
+}
+
+impl Tolerances {
+    /// One number for all: rad and m for coordinates and rotations, relative to the size for momenta.
+    pub const fn new(tolerance: f64) -> Self {
+        Tolerances {
+            coordinates: Tolerance { absolute: tolerance, relative: 0.0 },
+            rotations: tolerance,
+            momenta: Tolerance { absolute: 0.0, relative: tolerance },
+            control: Control::Full,
+        }
+    }
+
+    /// The same, with steps chosen by the errors of coordinates alone.
+    pub const fn coordinates_only(self) -> Self {
+        Tolerances { control: Control::Coordinates, ..self }
+    }
+}
+
+/// How the size of steps is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Step {
+    /// Always this many seconds, but for the last one before the end.
+    Fixed(f64),
+    /// By the error.
+    Adaptive(Tolerances),
+}
+
+/// Bounds of the work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Smallest step, s; zero: where the time would no longer change.
+    pub min_step: f64,
+    /// Largest step, s.
+    pub max_step: f64,
+    /// First step, s; zero: chosen from the rates.
+    pub first_step: f64,
+    /// Steps of one call, rejected ones included.
+    pub steps: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits { min_step: 0.0, max_step: f64::INFINITY, first_step: 0.0, steps: u64::MAX }
+    }
+}
+
+/// Share of the step that the error would allow which is taken.
+const SAFETY: f64 = 0.9;
+/// No step is smaller, s.
+const LEAST: f64 = 1e-15;
+/// A step changes by at most these factors.
+const SHRINK: f64 = 0.2;
+const GROW: f64 = 6.0;
+/// Weight of the last error in the choice of the next step: a PI controller (Gustafsson, ACM TOMS 17, 1991).
+const INTEGRAL: f64 = 0.04;
+
+/// Drives a method `M` over a time. It owns the state; look at it with [`Solver::state`].
+#[derive(Clone, Debug)]
+pub struct Solver<Y: System, M> {
+    method: M,
+    step: Step,
+    /// Bounds of the work.
+    pub limits: Limits,
+    t: Y::Scalar,
+    /// What rounding took from the time.
+    t_carry: Y::Scalar,
+    /// Step of the attempt that has not been accepted yet: the state is at its end.
+    pending: Option<Y::Scalar>,
+    /// Next step, s; zero: to be chosen.
+    next: f64,
+    last_error: f64,
+    rejections: u64,
+    scale: Point<Y>,
+    size: Point<Y>,
+    at: Point<Y>,
+}
+
+impl<Y, M> Solver<Y, M>
+where
+    Y: System,
+    Y::Scalar: Real,
+    M: Stepper<Y>,
+{
+    /// At time `t` (s) and a state. Methods that estimate no error take [`Step::Fixed`] only.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`] if one is not of unit length.
+    ///
+    /// # Panics
+    /// If steps are to be chosen by an error that the method does not estimate.
+    pub fn new(
+        system: &mut Y,
+        method: M,
+        step: Step,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<Self, StepError> {
+        let adaptive = matches!(step, Step::Adaptive(_));
+        assert!(!adaptive || method.error_order().is_some(), "this method estimates no error: take Step::Fixed");
+        let point = || Point::zero(system);
+        let (scale, size, at) = (point(), point(), point());
+        let mut solver = Solver {
+            method,
+            step,
+            limits: Limits::default(),
+            t,
+            t_carry: Y::Scalar::zero(),
+            pending: None,
+            next: 0.0,
+            last_error: 1e-4,
+            rejections: 0,
+            scale,
+            size,
+            at,
+        };
+        solver.restart(system, t, q, p)?;
+        Ok(solver)
+    }
+
+    /// Begins anew from another state: after an event, an impact, a change of inputs.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    pub fn restart(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        (self.t, self.t_carry, self.pending) = (t, Y::Scalar::zero(), None);
+        (self.next, self.last_error) = (0.0, 1e-4);
+        self.method.begin(system, t, q, p)
+    }
+
+    /// Time of the state, s.
+    pub fn time(&self) -> Y::Scalar {
+        self.pending.map_or(self.t, |h| self.t + (h + self.t_carry))
+    }
+
+    /// The state.
+    pub fn state(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        match self.pending {
+            None => self.method.parts().0.store(system, q, p),
+            Some(_) => {
+                let (field, delta) = self.method.parts();
+                field.chart().state(system, delta, q, p);
+            }
+        }
+    }
+
+    /// Work done.
+    pub fn statistics(&self) -> Statistics {
+        let mut statistics = self.method.statistics();
+        statistics.steps += u64::from(self.pending.is_some());
+        statistics.rejections += self.rejections;
+        statistics
+    }
+
+    /// Takes steps until `t_end` (s) is reached exactly.
+    ///
+    /// # Errors
+    /// [`StepError`]; the state is then that of the last accepted step.
+    pub fn run(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
+        let mut left = self.limits.steps;
+        while self.time() < t_end {
+            let before = self.rejections;
+            self.advance(system, t_end)?;
+            left = left.saturating_sub(1 + self.rejections - before);
+            if left == 0 && self.time() < t_end {
+                return Err(StepError::TooManySteps { time: self.time().to_f64(), steps: self.limits.steps });
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes one step, not beyond `t_end` (s).
+    ///
+    /// # Errors
+    /// [`StepError`]; the state is then that of the last accepted step.
+    pub fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
+        self.settle(system)?;
+        let rest = (t_end - self.t - self.t_carry).to_f64();
+        match self.step {
+            Step::Fixed(h) => {
+                // A rest that differs from the step by rounding is the step.
+                let h = if rest < h * (1.0 + 1e-9) { rest } else { h };
+                self.method.attempt(system, self.t, Y::Scalar::constant(h), None)?;
+                self.check()?;
+                self.pending = Some(Y::Scalar::constant(h));
+                Ok(())
+            }
+            Step::Adaptive(tolerances) => self.controlled(system, tolerances, rest),
+        }
+    }
+
+    /// Displacement at `t + θ h` of the last step, as a state.
+    pub fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        let h = self.pending.unwrap_or(Y::Scalar::zero());
+        match self.pending {
+            None => self.at.clear(),
+            Some(_) => self.method.interpolate(system, self.t, h, theta, &mut self.at),
+        }
+        let (field, _) = self.method.parts();
+        field.chart().state(system, &self.at, q, p);
+    }
+
+    /// Start and length of the last step, s.
+    pub fn last_step(&self) -> (Y::Scalar, Y::Scalar) {
+        (self.t, self.pending.unwrap_or(Y::Scalar::zero()))
+    }
+
+    /// Accepts what is pending.
+    fn settle(&mut self, system: &mut Y) -> Result<(), StepError> {
+        if let Some(h) = self.pending {
+            self.method.accept(system, self.t, h)?;
+            self.pending = None;
+            let (t, h) = (self.t, h + self.t_carry);
+            self.t = t + h;
+            self.t_carry = h - (self.t - t);
+        }
+        Ok(())
+    }
+
+    fn check(&mut self) -> Result<(), StepError> {
+        let time = self.t.to_f64();
+        let (_, delta) = self.method.parts();
+        delta.not_finite().map_or(Ok(()), |index| Err(StepError::NotFinite { time, index }))
+    }
+
+    /// One step by the error.
+    fn controlled(&mut self, system: &mut Y, tolerances: Tolerances, rest: f64) -> Result<(), StepError> {
+        let exponent = 1.0 / f64::from(self.method.error_order().unwrap_or(0) + 1);
+        if self.next == 0.0 {
+            self.next = self.first(system, &tolerances, exponent, rest);
+        }
+        let least = self.limits.min_step.max(4.0 * Y::Scalar::epsilon() * self.t.to_f64().abs()).max(LEAST);
+        let mut h = self.next.min(self.limits.max_step);
+        let mut rejected = false;
+        loop {
+            let last = rest <= h * 1.0001;
+            // Two steps of half the rest rather than a last one of next to nothing.
+            let tried = if last { rest } else if rest < 2.0 * h { 0.5 * rest } else { h };
+            self.weigh(system, &tolerances, tried);
+            let error = match self.method.attempt(system, self.t, Y::Scalar::constant(tried), Some(&self.scale)) {
+                Ok(error) => error,
+                // An implicit method may succeed with a smaller step.
+                Err(e) if 0.25 * tried < least => return Err(e),
+                Err(_) => f64::NAN,
+            };
+            if error <= 1.0 && self.check().is_ok() {
+                let size = error.max(1e-10);
+                let factor = SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
+                let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
+                // A step cut short by the end says little about the next.
+                self.next = if tried < h { h.max(tried * factor) } else { tried * factor };
+                self.last_error = error.max(1e-4);
+                self.pending = Some(Y::Scalar::constant(tried));
+                return Ok(());
+            }
+            self.rejections += 1;
+            rejected = true;
+            let factor = if error.is_finite() { SAFETY * libm::pow(error, -exponent) } else { SHRINK };
+            h = tried * factor.clamp(SHRINK, SAFETY);
+            if h < least {
+                let start = self.method.start_rate(system, self.t);
+                let time = self.t.to_f64();
+                return Err(match start.not_finite() {
+                    Some(index) => StepError::NotFinite { time, index },
+                    None => StepError::StepTooSmall { time, step: h, error },
+                });
+            }
+        }
+    }
+
+    /// Allowed errors of a step of `h` s from the state.
+    fn weigh(&mut self, system: &mut Y, tolerances: &Tolerances, h: f64) {
+        let (field, _) = self.method.parts();
+        field.chart().size(system, &mut self.size);
+        let rate = self.method.start_rate(system, self.t);
+        let h = Y::Scalar::constant(h);
+        for (size, rate) in self.size.parts_mut().into_iter().zip(rate.parts()) {
+            for (size, rate) in size.iter_mut().zip(rate) {
+                *size = *size + (h * *rate).abs();
+            }
+        }
+        let largest = self.size.p.as_ref().iter().fold(0.0_f64, |m, p| m.max(p.to_f64()));
+        let allowed = |t: Tolerance, size: f64| Y::Scalar::constant(t.absolute + t.relative * size);
+        for (scale, size) in self.scale.x.as_mut().iter_mut().zip(self.size.x.as_ref()) {
+            *scale = allowed(tolerances.coordinates, size.to_f64());
+        }
+        for group in system.groups() {
+            for k in group.kind.positions()..group.kind.sizes().1 {
+                self.scale.x.as_mut()[group.v + k] = Y::Scalar::constant(tolerances.rotations);
+            }
+        }
+        let full = tolerances.control == Control::Full;
+        for (scale, size) in self.scale.p.as_mut().iter_mut().zip(self.size.p.as_ref()) {
+            let size = size.to_f64().max(1e-3 * largest);
+            *scale = if full { allowed(tolerances.momenta, size) } else { Y::Scalar::zero() };
+        }
+    }
+
+    /// First step, s, from the rates and how they change: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations
+    /// I*, II.4.
+    fn first(&mut self, system: &mut Y, tolerances: &Tolerances, exponent: f64, rest: f64) -> f64 {
+        if self.limits.first_step > 0.0 {
+            return self.limits.first_step;
+        }
+        let trial = rest.min(self.limits.max_step).min(1e-5);
+        let h = Y::Scalar::constant(trial);
+        self.weigh(system, tolerances, trial);
+        let start = self.method.start_rate(system, self.t);
+        let first = norm(start, &self.scale);
+        self.at.copy_from(start);
+        self.at.scale(h);
+        self.size.copy_from(start);
+        let (field, delta) = self.method.parts();
+        field.rates(system, self.t + h, &self.at, delta);
+        delta.add(-Y::Scalar::one(), &self.size);
+        let second = norm(delta, &self.scale) / trial;
+        let larger = if second.is_finite() { first.max(second) } else { first.max(1e30) };
+        if larger > 1e-15 {
+            libm::pow(0.01 / larger, exponent).min(100.0 * rest)
+        } else {
+            rest
+        }
+    }
+}

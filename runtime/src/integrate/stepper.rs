@@ -1,0 +1,144 @@
+//! What all methods have in common.
+
+use super::chart::Point;
+use super::field::Field;
+use super::StepError;
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// Work done since a method was made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Steps that were accepted.
+    pub steps: u64,
+    /// Steps that were tried again with a smaller one.
+    pub rejections: u64,
+    /// Evaluations of the rates.
+    pub evaluations: u64,
+    /// Evaluations of their derivatives.
+    pub jacobians: u64,
+    /// Factorisations of a matrix.
+    pub factorisations: u64,
+    /// Iterations of implicit equations.
+    pub iterations: u64,
+}
+
+/// A method that goes from one state to the next.
+///
+/// A step is made in three parts, so that a [`Solver`](super::Solver) can look at it before it counts: [`Stepper::begin`]
+/// takes a state, [`Stepper::attempt`] computes a displacement from it, [`Stepper::accept`] moves to it and has what the next
+/// attempt needs. [`Stepper::step`] is all of it at once, for loops that keep the state themselves.
+pub trait Stepper<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// Order of convergence.
+    fn order(&self) -> u32;
+
+    /// Order of the result that the error is estimated of, where it is: the estimate falls with `h` to one more.
+    fn error_order(&self) -> Option<u32>;
+
+    /// Takes a state.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    fn begin(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError>;
+
+    /// Tries a step of `h` s from time `t`. With `scale`, returns the error relative to it, root mean square over all
+    /// components whose scale is not zero; 0 where no error is estimated. A NaN means that the step is too large to be judged.
+    ///
+    /// # Errors
+    /// Of implicit methods: [`StepError::NoConvergence`], [`StepError::Singular`].
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError>;
+
+    /// The equation, and the displacement of the last attempt.
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>);
+
+    /// Rate at the start of the step, known after [`Stepper::begin`] and [`Stepper::accept`].
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y>;
+
+    /// Rate at the end of the last attempt, in the coordinates of its start. Evaluated when first asked for, used again by
+    /// the next attempt.
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y>;
+
+    /// Moves the state by the displacement of the last attempt, at most corrected a little, and gets ready for the next.
+    ///
+    /// # Errors
+    /// [`StepError::NotFinite`]; the state has not moved then.
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
+
+    /// Displacement at `t + θ h` within the last attempt, before it is accepted.
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>);
+
+    /// Work done.
+    fn statistics(&self) -> Statistics;
+
+    /// One step of `h` s from time `t` (s). Nothing is kept from one call to the next that the state does not carry, but for
+    /// multistep methods, whose history starts anew when `q` and `p` are not those they gave.
+    ///
+    /// # Errors
+    /// [`StepError`]; `q` and `p` are then as they were.
+    fn step(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), StepError> {
+        self.begin(system, t, q, p)?;
+        self.attempt(system, t, h, None)?;
+        let (field, delta) = self.parts();
+        field.advance(system, t, delta)?;
+        field.store(system, q, p);
+        Ok(())
+    }
+}
+
+/// Cubic through both ends and their rates, for [`Stepper::interpolate`].
+pub(super) fn hermite<Y: System>(
+    h: Y::Scalar,
+    theta: Y::Scalar,
+    delta: &Point<Y>,
+    ends: [&Point<Y>; 2],
+    out: &mut Point<Y>,
+) where
+    Y::Scalar: Real,
+{
+    let c = Y::Scalar::constant;
+    let rest = c(1.0) - theta;
+    out.copy_from(delta);
+    out.scale(theta * theta * (c(3.0) - theta - theta));
+    out.add(h * theta * rest * rest, ends[0]);
+    out.add(-(h * theta * theta * rest), ends[1]);
+}
+
+/// Root mean square of `error / scale` over the components whose scale is not zero.
+pub fn norm<Y: System>(error: &Point<Y>, scale: &Point<Y>) -> f64
+where
+    Y::Scalar: Real,
+{
+    let (mut sum, mut n) = (0.0, 0.0_f64);
+    for (error, scale) in error.parts().into_iter().flatten().zip(scale.parts().into_iter().flatten()) {
+        let scale = scale.to_f64();
+        if scale > 0.0 {
+            let ratio = error.to_f64() / scale;
+            sum += ratio * ratio;
+            n += 1.0;
+        }
+    }
+    libm::sqrt(sum / n.max(1.0))
+}
