@@ -42,27 +42,36 @@ impl<Y: System> Point<Y> {
     }
 
     /// All components zero.
+    #[inline]
     pub fn clear(&mut self) {
-        for part in self.parts_mut() {
-            part.fill(Y::Scalar::zero());
-        }
+        self.x.as_mut().fill(Y::Scalar::zero());
+        self.p.as_mut().fill(Y::Scalar::zero());
     }
 
     /// Takes the components of another.
+    #[inline]
     pub fn copy_from(&mut self, other: &Self) {
-        for (to, from) in self.parts_mut().into_iter().zip(other.parts()) {
-            to.copy_from_slice(from);
-        }
+        self.x.as_mut().copy_from_slice(other.x.as_ref());
+        self.p.as_mut().copy_from_slice(other.p.as_ref());
     }
 
     /// `self += w k`.
     #[inline]
     pub fn add(&mut self, w: Y::Scalar, k: &Self) {
-        for (sum, k) in self.parts_mut().into_iter().zip(k.parts()) {
+        let add = |sum: &mut [Y::Scalar], k: &[Y::Scalar]| {
             for (sum, k) in sum.iter_mut().zip(k) {
                 *sum = *sum + w * *k;
             }
-        }
+        };
+        add(self.x.as_mut(), k.x.as_ref());
+        add(self.p.as_mut(), k.p.as_ref());
+    }
+
+    /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
+    #[inline]
+    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Y::Scalar)], k: &[Self]) {
+        combine(self.x.as_mut(), h, weights, |j| k[j].x.as_ref());
+        combine(self.p.as_mut(), h, weights, |j| k[j].p.as_ref());
     }
 
     /// `self *= w`.
@@ -73,6 +82,31 @@ impl<Y: System> Point<Y> {
                 *x = w * *x;
             }
         }
+    }
+}
+
+/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers.
+#[inline(always)]
+fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: impl Fn(usize) -> &'a [S]) {
+    let n = out.len();
+    let mut at = 0;
+    while at + 4 <= n {
+        let mut sum = [S::zero(); 4];
+        for &(j, w) in weights {
+            let k = &k(j)[at..at + 4];
+            for l in 0..4 {
+                sum[l] = sum[l] + w * k[l];
+            }
+        }
+        for l in 0..4 {
+            out[at + l] = h * sum[l];
+        }
+        at += 4;
+    }
+    while at < n {
+        let sum = weights.iter().fold(S::zero(), |sum, &(j, w)| sum + w * k(j)[at]);
+        out[at] = h * sum;
+        at += 1;
     }
 }
 
@@ -183,16 +217,17 @@ where
     }
 
     /// State at a displacement.
+    #[inline]
     pub fn state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         let (base, x) = (self.q.as_ref(), point.x.as_ref());
         let q = q.as_mut();
-        for (p, (base, dp)) in p.as_mut().iter_mut().zip(self.p.as_ref().iter().zip(point.p.as_ref())) {
-            *p = *base + *dp;
+        if system.groups().is_empty() {
+            displaced(base, x, q);
+            return displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
         }
+        displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
         for (at, v, n, group) in Stretches::new(system.groups(), base.len(), x.len()) {
-            for k in 0..n {
-                q[at + k] = base[at + k] + x[v + k];
-            }
+            displaced(&base[at..at + n], &x[v..v + n], &mut q[at..at + n]);
             if let Some(group) = group {
                 group.displace(base, x, q);
                 group.inward(q, group.shift(x), p.as_mut());
@@ -201,6 +236,7 @@ where
     }
 
     /// Rates of the displacement from those of the state `(q, p)` it leads to.
+    #[inline]
     pub fn rates(
         &self,
         system: &Y,
@@ -211,6 +247,9 @@ where
     ) {
         let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
         out.p.as_mut().copy_from_slice(pd.as_ref());
+        if system.groups().is_empty() {
+            return xd.copy_from_slice(qd_);
+        }
         for (at, v, n, group) in Stretches::new(system.groups(), qd_.len(), xd.len()) {
             xd[v..v + n].copy_from_slice(&qd_[at..at + n]);
             if let Some(group) = group {
@@ -260,6 +299,14 @@ where
                 x[k] = x[k] - step[k];
             }
         }
+    }
+}
+
+/// `out = base + x`.
+#[inline(always)]
+fn displaced<S: Scalar>(base: &[S], x: &[S], out: &mut [S]) {
+    for (out, (base, x)) in out.iter_mut().zip(base.iter().zip(x)) {
+        *out = *base + *x;
     }
 }
 

@@ -1,6 +1,7 @@
 //! Explicit Runge-Kutta methods.
 
-use super::chart::Point;
+use super::chart::{Chart, Point};
+use super::constant::Constant;
 use super::field::Field;
 use super::stepper::{norm, Statistics, Stepper};
 use super::tableau::{self, Dense, Tableau};
@@ -42,8 +43,8 @@ pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     field: Field<Y>,
     statistics: Statistics,
     // As numbers of the system: read for every stage.
-    a: [[Y::Scalar; S]; S],
-    b: [Y::Scalar; S],
+    a: [Weights<Y::Scalar, S>; S],
+    b: Weights<Y::Scalar, S>,
     c: [Y::Scalar; S],
     k: [Point<Y>; S],
     delta: Point<Y>,
@@ -56,6 +57,32 @@ pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     extra: [Point<Y>; X],
     extra_known: bool,
     method: core::marker::PhantomData<T>,
+}
+
+/// Weights that are not zero, with the stages they belong to.
+#[derive(Clone, Copy, Debug)]
+struct Weights<R, const S: usize> {
+    list: [(usize, R); S],
+    n: usize,
+}
+
+impl<R: Real, const S: usize> Weights<R, S> {
+    fn new(row: [Constant; S]) -> Self {
+        let mut out = Weights { list: [(0, R::zero()); S], n: 0 };
+        for (stage, weight) in row.into_iter().enumerate() {
+            let weight: R = weight.get();
+            if weight != R::zero() {
+                out.list[out.n] = (stage, weight);
+                out.n += 1;
+            }
+        }
+        out
+    }
+
+    #[inline]
+    fn list(&self) -> &[(usize, R)] {
+        &self.list[..self.n]
+    }
 }
 
 impl<Y, T, const S: usize, const X: usize> Explicit<Y, T, S, X>
@@ -81,8 +108,8 @@ where
         Explicit {
             field: Field::new(system, compensated),
             statistics: Statistics::default(),
-            a: tableau.a.map(|row| row.map(|x| x.get())),
-            b: tableau.b.map(|x| x.get()),
+            a: tableau.a.map(Weights::new),
+            b: Weights::new(tableau.b),
             c: tableau.c.map(|x| x.get()),
             k: core::array::from_fn(|_| point()),
             delta: point(),
@@ -96,23 +123,11 @@ where
         }
     }
 
-    /// `out = h Σ wᵢ kᵢ`.
-    #[inline]
-    fn combine(h: Y::Scalar, weights: &[Y::Scalar], k: &[Point<Y>], out: &mut Point<Y>) {
-        out.clear();
-        for (w, k) in weights.iter().zip(k) {
-            if *w != Y::Scalar::zero() {
-                out.add(*w, k);
-            }
-        }
-        out.scale(h);
-    }
-
     /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq. 10.17).
     fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
         for (norm_, weights) in norms.iter_mut().zip(T::TABLEAU.error) {
-            Self::combine(h, &weights.map(|x| x.get()), &self.k, &mut self.stage);
+            self.stage.combine(h, Weights::new(*weights).list(), &self.k);
             *norm_ = norm(&self.stage, scale);
         }
         match T::TABLEAU.error.len() {
@@ -161,13 +176,7 @@ where
         (!T::TABLEAU.error.is_empty()).then_some(T::TABLEAU.error_order)
     }
 
-    fn begin(
-        &mut self,
-        system: &mut Y,
-        t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
-    ) -> Result<(), StepError> {
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
         (self.first_known, self.end_known, self.extra_known) = (false, false, false);
         self.field.load(system, t, q, p)
     }
@@ -184,10 +193,10 @@ where
         let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
         for i in 1..stages {
             let (known, rest) = self.k.split_at_mut(i);
-            Self::combine(h, &self.a[i], known, &mut self.stage);
+            self.stage.combine(h, self.a[i].list(), known);
             self.field.rates(system, t + self.c[i] * h, &self.stage, &mut rest[0]);
         }
-        Self::combine(h, &self.b, &self.k, &mut self.delta);
+        self.delta.combine(h, self.b.list(), &self.k);
         (self.end_known, self.extra_known) = (false, false);
         if T::TABLEAU.fsal && stages == S {
             self.end.copy_from(&self.k[S - 1]);
@@ -222,7 +231,7 @@ where
         self.field.advance(system, t, &self.delta)?;
         self.k[0].copy_from(&self.end);
         self.stage.copy_from(&self.delta);
-        super::chart::Chart::follow(system, &self.delta, &mut self.stage, &mut self.k[0]);
+        Chart::follow(system, &self.delta, &mut self.stage, &mut self.k[0]);
         (self.first_known, self.end_known, self.extra_known) = (true, false, false);
         self.statistics.steps += 1;
         Ok(())

@@ -45,13 +45,7 @@ where
     ///
     /// # Errors
     /// [`StepError::Quaternion`].
-    pub fn load(
-        &mut self,
-        system: &Y,
-        t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
-    ) -> Result<(), StepError> {
+    pub fn load(&mut self, system: &Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
         let same = self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref();
         if !same {
             self.chart.load(system, t.to_f64(), q, p)?;
