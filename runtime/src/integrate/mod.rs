@@ -1,7 +1,10 @@
 //! Integrators of [`System`]s. No allocation in a step.
 
+pub(crate) mod constant;
 mod rk4;
+pub mod tableau;
 
+pub use constant::{decimal, ratio, Constant};
 pub use rk4::Rk4;
 
 use crate::spatial::dot4;
