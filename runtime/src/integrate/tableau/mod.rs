@@ -1,7 +1,9 @@
 //! Coefficients of one-step methods.
 
 mod dop853;
+mod implicit;
 mod low;
+mod rosenbrock;
 mod tsit5;
 mod verner9;
 
@@ -9,7 +11,9 @@ mod verner9;
 mod tests;
 
 pub use dop853::DOP853;
+pub use implicit::{Collocation, BACKWARD_EULER, GAUSS12, GAUSS4, GAUSS6, IMPLICIT_MIDPOINT, RADAU5};
 pub use low::{CASH_KARP, EULER, MIDPOINT, RK4, RKF45};
+pub use rosenbrock::{Rosenbrock, RODAS5P};
 pub use tsit5::TSIT5;
 pub use verner9::VERNER9;
 

@@ -51,6 +51,8 @@ type Number = Wide;
 /// A method with all its stages: those of the step, the rate at the end, those of the interpolant.
 struct Stages {
     a: Vec<Vec<Number>>,
+    /// Instead of `a` for a branch that is alone: with the Jacobian's part, in Rosenbrock methods.
+    alone: Option<Vec<Vec<Number>>>,
     c: Vec<Number>,
 }
 
@@ -60,7 +62,8 @@ fn numbers(list: &[Constant]) -> Vec<Number> {
 
 impl Stages {
     fn new<const S: usize>(t: &Tableau<S>) -> Self {
-        let mut stages = Stages { a: t.a.iter().map(|row| numbers(row)).collect(), c: numbers(&t.c) };
+        let a = t.a.iter().map(|row| numbers(row)).collect();
+        let mut stages = Stages { a, alone: None, c: numbers(&t.c) };
         if let Some(dense) = t.dense {
             if !t.fsal {
                 stages.a.push(numbers(&t.b));
@@ -75,11 +78,15 @@ impl Stages {
     /// Elementary weights of every stage for every tree: products over branches of what the row makes of the branch.
     fn weights(&self, trees: &[Tree]) -> Vec<Vec<Number>> {
         let mut weights: Vec<Vec<Number>> = Vec::new();
-        let mut branches: Vec<Vec<Number>> = Vec::new();
         for tree in trees {
-            let product = |i: usize| tree.branches.iter().fold(Number::one(), |p, k| p * branches[*k][i]);
-            let weight: Vec<Number> = (0..self.a.len()).map(product).collect();
-            branches.push(self.a.iter().map(|row| dot(row, &weight)).collect());
+            let matrix = match &self.alone {
+                Some(alone) if tree.branches.len() == 1 => alone,
+                _ => &self.a,
+            };
+            let product = |row: &Vec<Number>| {
+                tree.branches.iter().fold(Number::one(), |product, k| product * dot(row, &weights[*k]))
+            };
+            let weight = matrix.iter().map(product).collect();
             weights.push(weight);
         }
         weights
@@ -196,9 +203,124 @@ fn pairs() {
 #[test]
 fn coefficients_are_the_published_ones() {
     // Digits that polishing must not have moved: as doubles they are those of the programs named.
-    assert_eq!(DOP853.a[11][10].hi(), 6.43392746015763530355970484046e-1);
-    assert_eq!(DOP853.b[7].hi(), -5.8012039600105847814672114227);
-    assert_eq!(DOP853.dense.unwrap().a[2][14].hi(), -9.15095847217987001081870187138);
-    assert_eq!(TSIT5.a[4][3].hi(), -0.09249506636175525);
-    assert_eq!(VERNER9.a[15][8].hi(), -3.442515027624453437985);
+    assert_eq!(DOP853.a[11][10].hi(), 0.643_392_746_015_763_6);
+    assert_eq!(DOP853.b[7].hi(), -5.801_203_960_010_585);
+    assert_eq!(DOP853.dense.unwrap().a[2][14].hi(), -9.150_958_472_179_87);
+    assert_eq!(TSIT5.a[4][3].hi(), -0.092_495_066_361_755_25);
+    assert_eq!(VERNER9.a[15][8].hi(), -3.442_515_027_624_453_6);
+}
+
+/// Butcher's simplifying assumptions B(order), C(stages), D(rest): they make the order (E. Hairer, G. Wanner, Solving
+/// Ordinary Differential Equations II, theorem IV.5.1).
+fn check_collocation<const S: usize>(t: &Collocation<S>) {
+    let (a, b, c) = (t.a.map(|row| numbers(&row)), numbers(&t.b), numbers(&t.c));
+    let power = |k: u32| c.iter().map(|x| (0..k).fold(Number::one(), |p, _| p * *x)).collect::<Vec<Number>>();
+    let over = |x: Number, k: u32| x / Number::constant(f64::from(k));
+    let quadrature = |k: u32| (dot(&b, &power(k - 1)) - over(Number::one(), k)).to_f64().abs();
+    for k in 1..=t.order {
+        assert!(quadrature(k) < 1e-30, "{}: B({k})", t.name);
+    }
+    assert!(quadrature(t.order + 1) > 1e-8, "{}: of higher order", t.name);
+    for k in 1..=S as u32 {
+        let misses = (0..S).map(|i| dot(&a[i], &power(k - 1)) - over(power(k)[i], k));
+        assert!(largest(misses) < 1e-30, "{}: C({k})", t.name);
+    }
+    for k in 1..=t.order - S as u32 {
+        let weighted: Vec<Number> = b.iter().zip(power(k - 1)).map(|(b, x)| *b * x).collect();
+        let column = |j: usize| a.iter().map(|row| row[j]).collect::<Vec<Number>>();
+        let misses = (0..S).map(|j| dot(&weighted, &column(j)) - over(b[j] * (Number::one() - power(k)[j]), k));
+        assert!(largest(misses) < 1e-30, "{}: D({k})", t.name);
+    }
+    if t.order == 2 * S as u32 {
+        let pairs = (0..S).flat_map(|i| (0..S).map(move |j| (i, j)));
+        let misses = pairs.map(|(i, j)| b[i] * a[i][j] + b[j] * a[j][i] - b[i] * b[j]);
+        assert!(largest(misses) < 1e-30, "{}: not symplectic", t.name);
+    } else {
+        assert_eq!(t.a[S - 1], t.b, "{}: the last stage is not the end", t.name);
+    }
+}
+
+#[test]
+fn collocation() {
+    check_collocation(&IMPLICIT_MIDPOINT);
+    check_collocation(&GAUSS4);
+    check_collocation(&GAUSS6);
+    check_collocation(&GAUSS12);
+    check_collocation(&BACKWARD_EULER);
+    check_collocation(&RADAU5);
+}
+
+/// `1 / ((1 / γ) - C)`: the weights of rates in the variables `u`, lower triangular.
+fn gamma<const S: usize>(t: &Rosenbrock<S>) -> Vec<Vec<Number>> {
+    let mut rows: Vec<Vec<Number>> = Vec::new();
+    for i in 0..S {
+        let unit = |j: usize| Number::constant(f64::from(i == j));
+        let earlier = |j: usize| (0..i).fold(unit(j), |sum, k| sum + t.coupling[i][k].get::<Number>() * rows[k][j]);
+        let row = (0..S).map(|j| earlier(j) * t.gamma.get()).collect();
+        rows.push(row);
+    }
+    rows
+}
+
+/// The order conditions of Rosenbrock methods (Hairer, Wanner, theorem IV.7.3) in the usual variables.
+#[test]
+fn rosenbrock() {
+    // Sixteen digits of numbers up to 147, in sums.
+    const DIGITS: f64 = 1e-12;
+    let t = &RODAS5P;
+    let (trees, gamma) = (trees(t.order + 1), gamma(t));
+    // Weights of the rates from weights of `u`.
+    let rates = |u: &[Number]| -> Vec<Number> {
+        let column = |j: usize| gamma.iter().map(|row| row[j]).collect::<Vec<Number>>();
+        (0..u.len()).map(|j| dot(u, &column(j))).collect()
+    };
+    let a: Vec<Vec<Number>> = t.a.iter().map(|row| rates(&numbers(row))).collect();
+    let sum = |x: &[Number], y: &[Number]| x.iter().zip(y).map(|(x, y)| *x + *y).collect::<Vec<Number>>();
+    let alone = a.iter().zip(&gamma).map(|(x, y)| sum(x, y)).collect();
+    let row_sums = |rows: &[Vec<Number>], sums: &[Constant]| {
+        largest(rows.iter().zip(sums).map(|(row, s)| row.iter().fold(-s.get::<Number>(), |sum, x| sum + *x)))
+    };
+    assert!(row_sums(&a, &t.c) < DIGITS);
+    assert!(row_sums(&gamma, &t.d) < DIGITS);
+
+    let last = numbers(&t.a[7]);
+    let mut whole = last.clone();
+    whole[7] = Number::one();
+    let phi = Stages { a, alone: Some(alone), c: numbers(&t.c) }.weights(&trees);
+    for (u, order) in [(&whole, t.order), (&last, t.error_order)] {
+        let b = rates(u);
+        let worst = (1..=order).map(|n| miss(&trees, &phi, n, &b, 1.0)).fold(0.0, f64::max);
+        assert!(worst < DIGITS, "order {order} misses by {worst:e}");
+        assert!(miss(&trees, &phi, order + 1, &b, 1.0) > MISSED);
+    }
+    // Powers of θ in the formula of dense output.
+    let zero = vec![Number::zero(); 8];
+    let part = |m: usize| t.dense.get(m).map_or(zero.clone(), |row| numbers(row));
+    for m in 0..4 {
+        let minus: Vec<Number> = if m > 0 { part(m - 1).iter().map(|x| -*x).collect() } else { whole.clone() };
+        let b = rates(&sum(&minus, &part(m)));
+        let target = |order: u32| f64::from(m as u32 + 1 == order);
+        let worst = (1..=t.dense_order).map(|n| miss(&trees, &phi, n, &b, target(n))).fold(0.0, f64::max);
+        assert!(worst < DIGITS, "dense output misses power {} by {worst:e}", m + 1);
+    }
+}
+
+/// On `y' = z y`: never growing on the left of the plane's axis, nothing left of what is infinitely stiff.
+#[test]
+fn rosenbrock_is_stable() {
+    let t = &RODAS5P;
+    let factor = |z: f64| {
+        let mut u = [0.0; 8];
+        for i in 0..8 {
+            let part = |row: &[Constant; 8]| row.iter().zip(&u).map(|(x, u)| x.hi() * u).sum::<f64>();
+            u[i] = (z * (1.0 + part(&t.a[i])) + part(&t.coupling[i])) / (1.0 / t.gamma.hi() - z);
+        }
+        1.0 + t.a[7].iter().zip(&u).map(|(x, u)| x.hi() * u).sum::<f64>() + u[7]
+    };
+    for k in -20..20 {
+        let z = -2.0_f64.powi(k);
+        assert!(factor(z).abs() < 1.0, "{z}");
+    }
+    assert!((factor(-0.01) - f64::exp(-0.01)).abs() < 1e-13);
+    assert!(factor(-1e9).abs() < 1e-7);
 }
