@@ -27,6 +27,8 @@ pub mod system;
 #[cfg(feature = "alloc")]
 pub mod tree;
 pub mod trig;
+#[cfg(any(test, feature = "wide"))]
+pub mod wide;
 #[cfg(feature = "alloc")]
 pub mod workspace;
 

@@ -7,7 +7,6 @@ use super::stepper::{norm, Statistics, Stepper};
 use super::tableau::{self, Dense, Tableau};
 use super::StepError;
 use crate::system::{Real, System};
-use crate::Scalar;
 
 /// A method with `S` stages, and `X` more for dense output, by name.
 pub trait Method<const S: usize, const X: usize> {
@@ -35,6 +34,11 @@ methods! {
     Euler 1 0 EULER "Euler's method, order 1: one evaluation a step.";
     Midpoint 2 0 MIDPOINT "The explicit midpoint rule, order 2: two evaluations a step (C.3).";
     Rk4 4 0 RK4 "Kutta's method of order 4: four evaluations a step (C.6). W. Kutta, 1901.";
+    Rkf45 6 0 RKF45 "Fehlberg's pair of orders 4 and 5: six evaluations a step. E. Fehlberg, NASA TR R-315, 1969.";
+    CashKarp 6 0 CASH_KARP "Cash and Karp's pair of orders 5 and 4: six evaluations a step. ACM TOMS 16, 1990.";
+    Tsit5 7 0 TSIT5 "Tsitouras' pair of orders 5 and 4: six evaluations a step. Comput. Math. Appl. 62, 2011.";
+    Dop853 12 3 DOP853 "Dormand and Prince's method of order 8: twelve evaluations a step. Hairer, Nørsett, Wanner, II.5.";
+    Verner9 16 4 VERNER9 "Verner's most efficient pair of orders 9 and 8: sixteen evaluations a step. Numer. Algorithms 53, 2010.";
 }
 
 /// Any explicit Runge-Kutta method; take one by its name, [`Rk4`] for example.
@@ -247,9 +251,10 @@ where
         }
         out.clear();
         let end = (!T::TABLEAU.fsal).then_some(&self.end);
-        for (row, k) in dense.weights.iter().zip(self.k.iter().chain(end).chain(&self.extra)) {
-            let weight = row.iter().rev().fold(Y::Scalar::zero(), |sum, x| (sum + x.get()) * theta);
-            out.add(weight, k);
+        for (i, (row, k)) in dense.weights.iter().zip(self.k.iter().chain(end).chain(&self.extra)).enumerate() {
+            if !row.is_empty() {
+                out.add(dense.weight(i, theta), k);
+            }
         }
         out.scale(h);
     }

@@ -5,7 +5,7 @@
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 
 pub mod chart;
-mod constant;
+pub(crate) mod constant;
 mod error;
 mod explicit;
 mod field;
@@ -17,7 +17,7 @@ pub mod tableau;
 pub use chart::{Chart, Point};
 pub use constant::{decimal, ratio, Constant};
 pub use error::StepError;
-pub use explicit::{method, Euler, Explicit, Method, Midpoint, Rk4};
+pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};

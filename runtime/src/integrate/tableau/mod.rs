@@ -1,56 +1,70 @@
-//! temporary
-use super::constant::{ratio, Constant};
+//! Coefficients of one-step methods.
+
+mod dop853;
+mod implicit;
+mod low;
+mod rosenbrock;
+mod tsit5;
+mod verner9;
+
+#[cfg(test)]
+mod tests;
+
+pub use dop853::DOP853;
+pub use implicit::{Collocation, BACKWARD_EULER, GAUSS12, GAUSS4, GAUSS6, IMPLICIT_MIDPOINT, RADAU5};
+pub use low::{CASH_KARP, EULER, MIDPOINT, RK4, RKF45};
+pub use rosenbrock::{Rosenbrock, RODAS5P};
+pub use tsit5::TSIT5;
+pub use verner9::VERNER9;
+
+use super::constant::Constant;
+use crate::Scalar;
+
+/// An explicit Runge-Kutta method with `S` stages.
+///
+/// Rates `k_i = f(t + c_i h, y + h Σ_j a_ij k_j)`, the new point `y + h Σ_i b_i k_i`.
 #[derive(Clone, Copy, Debug)]
 pub struct Tableau<const S: usize> {
+    /// What it is called.
     pub name: &'static str,
+    /// Order of the new point.
     pub order: u32,
+    /// Nodes.
     pub c: [Constant; S],
+    /// Weights of the stages, strictly lower triangular.
     pub a: [[Constant; S]; S],
+    /// Weights of the new point.
     pub b: [Constant; S],
+    /// Weights of error estimates `h Σ_i e_i k_i`: none, one, or two rows (of [`DOP853`], which says what becomes of them).
     pub error: &'static [[Constant; S]],
+    /// The estimate behaves as h to this plus one: the order of the lower method. Zero without an estimate.
     pub error_order: u32,
+    /// The last stage is the rate at the new point: the first one of the next step.
     pub fsal: bool,
+    /// What gives the points within a step.
     pub dense: Option<&'static Dense>,
 }
+
+/// A continuous extension of a method, once continuously differentiable over many steps:
+/// `y(t + θ h) = y + h Σ_i w_i(θ) k_i`.
+///
+/// The sum runs over the stages, then the rate at the end of the step (of a method that has it as its last stage this is not
+/// repeated), then the extra stages.
 #[derive(Clone, Copy, Debug)]
 pub struct Dense {
+    /// Order of the points within the step.
     pub order: u32,
+    /// Nodes of the extra stages.
     pub c: &'static [Constant],
+    /// Their rows: over stages, the rate at the end, earlier extra stages.
     pub a: &'static [&'static [Constant]],
+    /// Row `i`: the coefficients of θ, θ², … of `w_i`; empty where it is zero.
     pub weights: &'static [&'static [Constant]],
 }
-const O: Constant = Constant::ZERO;
-const HALF: Constant = ratio(1, 2);
-pub const EULER: Tableau<1> = Tableau {
-    name: "Euler",
-    order: 1,
-    c: [O],
-    a: [[O]],
-    b: [ratio(1, 1)],
-    error: &[],
-    error_order: 0,
-    fsal: false,
-    dense: None,
-};
-pub const MIDPOINT: Tableau<2> = Tableau {
-    name: "midpoint",
-    order: 2,
-    c: [O, HALF],
-    a: [[O, O], [HALF, O]],
-    b: [O, ratio(1, 1)],
-    error: &[],
-    error_order: 0,
-    fsal: false,
-    dense: None,
-};
-pub const RK4: Tableau<4> = Tableau {
-    name: "RK4",
-    order: 4,
-    c: [O, HALF, HALF, ratio(1, 1)],
-    a: [[O; 4], [HALF, O, O, O], [O, HALF, O, O], [O, O, ratio(1, 1), O]],
-    b: [ratio(1, 6), ratio(1, 3), ratio(1, 3), ratio(1, 6)],
-    error: &[],
-    error_order: 0,
-    fsal: false,
-    dense: None,
-};
+
+impl Dense {
+    /// `w_i(θ)`.
+    pub fn weight<S: Scalar>(&self, i: usize, theta: S) -> S {
+        self.weights[i].iter().rev().fold(S::zero(), |sum, c| (sum + c.get()) * theta)
+    }
+}

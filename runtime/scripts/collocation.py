@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+"""Coefficients of collocation methods, as they stand in src/integrate/tableau/implicit.rs.
+
+Needs mpmath. The nodes are the zeros of a Legendre polynomial (Gauss) or of P_s(2c - 1) - P_(s-1)(2c - 1) (Radau IIA);
+row i of A are the integrals of the Lagrange polynomials from 0 to c_i, b those from 0 to 1.
+"""
+from mpmath import mp, mpf, nstr, polyroots, taylor, legendre
+
+mp.dps = 80
+
+
+def shifted_legendre(s):
+    """Coefficients of P_s(2 x - 1), constant first."""
+    return [mpf(round(c)) for c in taylor(lambda x: legendre(s, 2 * x - 1), 0, s)]
+
+
+def lagrange(c, j):
+    """Coefficients of the polynomial that is 1 at node j and 0 at the others, constant first."""
+    p = [mpf(1)]
+    for k, ck in enumerate(c):
+        if k != j:
+            p = [(a - ck * b) / (c[j] - ck) for a, b in zip([0] + p, p + [0])]
+    return p
+
+
+def text(x):
+    """36 digits behind the first that counts, without zeros at the end."""
+    if abs(x) < mpf(10) ** -60:
+        return "0"
+    return nstr(x, 36, strip_zeros=True, min_fixed=-30, max_fixed=30).removesuffix(".0")
+
+
+def show(title, polynomial):
+    c = sorted(polyroots(polynomial[::-1], maxsteps=500, extraprec=500))
+    s = len(c)
+    polynomials = [lagrange(c, j) for j in range(s)]
+    integral = lambda p, x: sum(a * x ** (k + 1) / (k + 1) for k, a in enumerate(p))
+    print(f"{title}, {s} stages")
+    print("c:", " ".join(map(text, c)))
+    for x in c:
+        print("a:", " ".join(text(integral(p, x)) for p in polynomials))
+    print("b:", " ".join(text(integral(p, 1)) for p in polynomials))
+
+
+for s in (2, 3, 6):
+    show("Gauss", shifted_legendre(s))
+high, low = shifted_legendre(3), shifted_legendre(2) + [mpf(0)]
+show("Radau IIA", [a - b for a, b in zip(high, low)])
