@@ -32,6 +32,11 @@ pub enum StepError {
         /// Error of that step relative to the tolerances; not a number where the rates were not finite.
         error: f64,
     },
+    /// Steps are to be chosen by an error that the method does not estimate.
+    NoEstimate {
+        /// Time, s.
+        time: f64,
+    },
     /// The limit of steps is used up.
     TooManySteps {
         /// Time that was reached, s.
@@ -68,6 +73,7 @@ impl StepError {
             StepError::NotFinite { time, .. }
             | StepError::Quaternion { time, .. }
             | StepError::StepTooSmall { time, .. }
+            | StepError::NoEstimate { time }
             | StepError::TooManySteps { time, .. }
             | StepError::NoConvergence { time, .. }
             | StepError::Singular { time, .. } => time,
@@ -87,6 +93,7 @@ impl core::fmt::Display for StepError {
             StepError::StepTooSmall { time, step, error } => {
                 write!(f, "the step fell to {step:e} s at t = {time} s with {error:.1e} times the allowed error: loosen the tolerances, or take an implicit method")
             }
+            StepError::NoEstimate { .. } => write!(f, "this method estimates no error: give it a fixed step"),
             StepError::TooManySteps { time, steps } => {
                 write!(f, "{steps} steps were used up at t = {time} s: raise the limit, loosen the tolerances, or take an implicit method")
             }

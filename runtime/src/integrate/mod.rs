@@ -4,6 +4,8 @@
 //! with error control, dense output, events and statistics. Methods work on displacements from the state at the start of a
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 
+#[cfg(feature = "alloc")]
+pub mod catalogue;
 pub mod chart;
 pub(crate) mod constant;
 mod error;

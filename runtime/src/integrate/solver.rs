@@ -123,10 +123,7 @@ where
     /// At time `t` (s) and a state. Methods that estimate no error take [`Step::Fixed`] only.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`] if one is not of unit length.
-    ///
-    /// # Panics
-    /// If steps are to be chosen by an error that the method does not estimate.
+    /// [`StepError::Quaternion`] if one is not of unit length, [`StepError::NoEstimate`].
     pub fn new(
         system: &mut Y,
         method: M,
@@ -135,8 +132,9 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<Self, StepError> {
-        let adaptive = matches!(step, Step::Adaptive(_));
-        assert!(!adaptive || method.error_order().is_some(), "this method estimates no error: take Step::Fixed");
+        if matches!(step, Step::Adaptive(_)) && method.error_order().is_none() {
+            return Err(StepError::NoEstimate { time: t.to_f64() });
+        }
         let point = || Point::zero(system);
         let (scale, size, at) = (point(), point(), point());
         let mut solver = Solver {
