@@ -9,6 +9,14 @@ pub use mbd_codegen as codegen;
 pub use mbd_macros as macros;
 pub use mbd_runtime as runtime;
 
+// Generated code of the scenes names its runtime from outside.
+#[cfg(feature = "bench")]
+extern crate self as multibody;
+
+#[cfg(feature = "scenes")]
+#[doc(hidden)]
+pub mod scenes;
+
 /// Makes a type from the description of a mechanism.
 ///
 /// ```

@@ -1,0 +1,7 @@
+//! Generated code of scenes.
+
+#[path = "../../generated/scenes/mod.rs"]
+#[rustfmt::skip]
+mod code;
+
+pub use code::*;

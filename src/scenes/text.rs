@@ -1,0 +1,142 @@
+//! Model files of chains and trees, written out: the number of links is an argument.
+
+use std::fmt::Write;
+
+/// A model file that grows.
+pub(super) struct Text(String);
+
+/// A body and the pin that carries it.
+pub(super) struct Link<'a> {
+    /// Names of the body and of its parent, `None` for the ground.
+    pub name: &'a str,
+    pub parent: Option<&'a str>,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub com: [f64; 3],
+    /// Moments about it, kg m².
+    pub inertia: [f64; 3],
+    /// Place of the pin on the parent, m.
+    pub place: [f64; 3],
+    pub axis: [f64; 3],
+    /// N m s/rad.
+    pub damping: f64,
+}
+
+impl Text {
+    /// The head of a file. `gravity` in m/s².
+    pub fn new(name: &str, comment: &str, gravity: [f64; 3]) -> Text {
+        Text(format!("# {comment}\nname = \"{name}\"\ngravity = {gravity:?}\n"))
+    }
+
+    /// One more link; its joint is called `pin_` and the name of the body.
+    pub fn link(&mut self, link: &Link<'_>) {
+        let Link { name, mass, com, inertia, place, axis, .. } = link;
+        // Writing to a string cannot fail.
+        let _ = write!(self.0, "\n[[body]]\nname = \"{name}\"\nmass = {mass:?}\ncom = {com:?}\ninertia = {inertia:?}\n");
+        let _ = write!(self.0, "\n[[joint]]\nname = \"pin_{name}\"\ntype = \"pin\"\nchild = \"{name}\"\nxyz = {place:?}\n");
+        let _ = writeln!(self.0, "axis = {axis:?}");
+        if let Some(parent) = link.parent {
+            let _ = writeln!(self.0, "parent = \"{parent}\"");
+        }
+        if link.damping != 0.0 {
+            let _ = writeln!(self.0, "damping = {:?}", link.damping);
+        }
+    }
+
+    /// The file.
+    pub fn finish(self) -> String {
+        self.0
+    }
+}
+
+/// A link of thesis 7.2, kg and m: uniform and slender, so `m l²/3` about its pin.
+const MASS: f64 = 0.01;
+const LENGTH: f64 = 0.05;
+/// Viscous friction of every pin there, N m s/rad.
+pub(super) const FRICTION: f64 = 0.001;
+/// In the plane x-y, m/s².
+const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
+
+fn thesis_link(text: &mut Text, name: &str, parent: Option<&str>, damping: f64) {
+    let across = MASS * LENGTH * LENGTH / 12.0;
+    text.link(&Link {
+        name,
+        parent,
+        mass: MASS,
+        com: [LENGTH / 2.0, 0.0, 0.0],
+        inertia: [0.0, across, across],
+        place: [if parent.is_some() { LENGTH } else { 0.0 }, 0.0, 0.0],
+        axis: [0.0, 0.0, 1.0],
+        damping,
+    });
+}
+
+/// Open planar chain of thesis 7.2, straight along x at zero angles, pins about z.
+pub(super) fn chain(name: &str, n: usize, damping: f64) -> String {
+    let comment = format!("Open planar chain of {n} equal links (thesis 7.2), along x at zero angles.");
+    let mut text = Text::new(name, &comment, GRAVITY);
+    let mut parent: Option<String> = None;
+    for k in 1..=n {
+        let link = format!("link{k}");
+        thesis_link(&mut text, &link, parent.as_deref(), damping);
+        parent = Some(link);
+    }
+    text.finish()
+}
+
+/// Tree of thesis 7.2: branches of ten links that fork in two, `levels` times ten links deep; links are numbered level by
+/// level, and in a level branch by branch. Straight along x at zero angles.
+pub(super) fn tree(name: &str, levels: u32, damping: f64) -> String {
+    let comment = format!("Planar tree (thesis 7.2): branches of ten links that fork in two, {levels} levels.");
+    let mut text = Text::new(name, &comment, GRAVITY);
+    let mut tips: Vec<Option<String>> = vec![None];
+    let mut number = 0;
+    for level in 0..levels {
+        let mut next = Vec::new();
+        for branch in 0..1_usize << level {
+            let mut parent = tips[branch / 2].clone();
+            for k in 0..10 {
+                number += 1;
+                // The first link of a branch says to which side it forks.
+                let side = match (level, k, branch % 2) {
+                    (0, ..) | (_, 1.., _) => "",
+                    (_, _, 0) => "left",
+                    _ => "right",
+                };
+                let link = format!("link{number}{side}");
+                thesis_link(&mut text, &link, parent.as_deref(), damping);
+                parent = Some(link);
+            }
+            next.push(parent);
+        }
+        tips = next;
+    }
+    text.finish()
+}
+
+/// Six slender links of 0.3 m in space, hanging at zero angles, pins about y and x in turn; the first weighs `mass` kg, each
+/// further one `ratio` times the one before.
+pub(super) fn tapered(name: &str, mass: f64, ratio: f64) -> String {
+    let comment = format!("Six links in space, each of {ratio:?} times the mass of the one before, no friction.");
+    let mut text = Text::new(name, &comment, [0.0, 0.0, -9.81]);
+    let (mut parent, mut mass): (Option<String>, f64) = (None, mass);
+    for k in 0..6 {
+        let link = format!("link{}", k + 1);
+        let across = mass * 0.3 * 0.3 / 12.0;
+        text.link(&Link {
+            name: &link,
+            parent: parent.as_deref(),
+            mass,
+            com: [0.0, 0.0, -0.15],
+            // A radius of 1 cm: m r²/2.
+            inertia: [across, across, mass * 5e-5],
+            place: [0.0, 0.0, if k == 0 { 0.0 } else { -0.3 }],
+            axis: if k % 2 == 0 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] },
+            damping: 0.0,
+        });
+        parent = Some(link);
+        mass *= ratio;
+    }
+    text.finish()
+}
