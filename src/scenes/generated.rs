@@ -1,7 +1,93 @@
-//! Generated code of scenes.
+//! Generated code of scenes, by their names.
 
 #[path = "../../generated/scenes/mod.rs"]
 #[rustfmt::skip]
 mod code;
 
 pub use code::*;
+
+use super::dynamics::Dynamics;
+use crate::runtime::Differentiable;
+
+/// What is done with the generated system of a scene.
+pub trait Visit<S> {
+    /// What comes of it.
+    type Out;
+    /// Does it.
+    fn visit<Y: Dynamics<Scalar = S>>(self, system: Y) -> Self::Out;
+}
+
+/// The same where derivatives are needed.
+pub trait VisitDifferentiable<S> {
+    /// What comes of it.
+    type Out;
+    /// Does it.
+    fn visit<Y: Dynamics<Scalar = S> + Differentiable>(self, system: Y) -> Self::Out;
+}
+
+macro_rules! dynamics {
+    ($type:ty, $scalar:ty) => {
+        impl Dynamics for $type {
+            fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta) {
+                self.momenta(q, v, p);
+            }
+
+            fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> [$scalar; 2] {
+                self.energy(q, p)
+            }
+
+            fn accelerations_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta) {
+                self.accelerations(q, v, a);
+            }
+        }
+    };
+}
+
+/// One number type: its types with derivatives, then those without, each with the scenes it belongs to.
+macro_rules! scenes {
+    ($scalar:ty, $any:ident, $differentiable:ident,
+     { $($($smooth:literal)|+ => $with:ty,)* }, { $($plain:literal => $without:ty,)* }) => {
+        $(dynamics!($with, $scalar);)*
+        $(dynamics!($without, $scalar);)*
+
+        /// Does something with the generated system of a scene; `None` where there is none.
+        pub fn $any<V: Visit<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
+            match scene {
+                $($($smooth)|+ => Some(visitor.visit(<$with>::new())),)*
+                $($plain => Some(visitor.visit(<$without>::new())),)*
+                _ => None,
+            }
+        }
+
+        /// The same for those with derivatives.
+        pub fn $differentiable<V: VisitDifferentiable<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
+            match scene {
+                $($($smooth)|+ => Some(visitor.visit(<$with>::new())),)*
+                _ => None,
+            }
+        }
+    };
+}
+
+scenes!(f64, visit_f64, visit_differentiable_f64, {
+    "double_pendulum" | "double_pendulum_chaotic" => double_pendulum::DoublePendulum,
+    "ur5" => ur5::Ur5,
+    "panda_arm" => panda_arm::PandaArm,
+    "arm7" => arm7::Arm7,
+    "chain10" => chain10::Chain10,
+    "chain10_friction" => chain10_friction::Chain10Friction,
+    "rotor" => rotor::Rotor,
+}, {
+    "chain50_friction" => chain50_friction::Chain50Friction,
+    "chain100_friction" => chain100_friction::Chain100Friction,
+    "tree150_friction" => tree150_friction::Tree150Friction,
+    "quadruped" => quadruped::Quadruped,
+});
+
+scenes!(f32, visit_f32, visit_differentiable_f32, {
+    "double_pendulum" | "double_pendulum_chaotic" => double_pendulum_f32::DoublePendulumF32,
+    "ur5" => ur5_f32::Ur5F32,
+    "panda_arm" => panda_arm_f32::PandaArmF32,
+    "arm7" => arm7_f32::Arm7F32,
+    "chain10" => chain10_f32::Chain10F32,
+}, {});

@@ -260,7 +260,13 @@ fn forked(model: &Model) -> (Vec<f64>, Vec<f64>) {
     let (mut q, v) = rest(model);
     for (q, joint) in q.iter_mut().zip(&model.joints) {
         let name = joint.name.as_str();
-        *q = if name.ends_with("left") { 0.3 } else if name.ends_with("right") { -0.3 } else { 0.0 };
+        *q = if name.ends_with("left") {
+            0.3
+        } else if name.ends_with("right") {
+            -0.3
+        } else {
+            0.0
+        };
     }
     (q, v)
 }

@@ -3,12 +3,15 @@
 //! `list.rs` is the list; a further scene is a further entry there. Not part of the library's interface: it may change in
 //! any release.
 
+mod dynamics;
 mod list;
 mod text;
 
 /// Code of the scenes that the benchmarks run generated; see `generated/scenes/manifest.toml`.
 #[cfg(feature = "bench")]
 pub mod generated;
+
+pub use dynamics::Dynamics;
 
 use std::borrow::Cow;
 

@@ -33,8 +33,10 @@ impl Text {
     pub fn link(&mut self, link: &Link<'_>) {
         let Link { name, mass, com, inertia, place, axis, .. } = link;
         // Writing to a string cannot fail.
-        let _ = write!(self.0, "\n[[body]]\nname = \"{name}\"\nmass = {mass:?}\ncom = {com:?}\ninertia = {inertia:?}\n");
-        let _ = write!(self.0, "\n[[joint]]\nname = \"pin_{name}\"\ntype = \"pin\"\nchild = \"{name}\"\nxyz = {place:?}\n");
+        let _ =
+            write!(self.0, "\n[[body]]\nname = \"{name}\"\nmass = {mass:?}\ncom = {com:?}\ninertia = {inertia:?}\n");
+        let _ =
+            write!(self.0, "\n[[joint]]\nname = \"pin_{name}\"\ntype = \"pin\"\nchild = \"{name}\"\nxyz = {place:?}\n");
         let _ = writeln!(self.0, "axis = {axis:?}");
         if let Some(parent) = link.parent {
             let _ = writeln!(self.0, "parent = \"{parent}\"");

@@ -1,0 +1,56 @@
+//! What benchmarks ask of a system beside its rates, by one name for the interpreter and for generated code.
+
+use super::Scene;
+use crate::codegen::plan::{Plan, PlanOptions};
+use crate::runtime::{Interpreter, Scalar, System};
+
+/// A [`System`] with its momenta, energy and accelerations.
+pub trait Dynamics: System {
+    /// `p = M(q) v`.
+    fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
+    /// Kinetic and potential energy, J.
+    fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> [Self::Scalar; 2];
+    /// Accelerations `v̇`.
+    fn accelerations_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
+}
+
+impl<S: Scalar> Dynamics for Interpreter<S> {
+    fn momenta_of(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
+        self.momenta(q, v, p);
+    }
+
+    fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> [S; 2] {
+        self.energy(q, p).into()
+    }
+
+    fn accelerations_of(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
+        self.accelerations(q, v, a);
+    }
+}
+
+impl Scene {
+    /// The interpreter of its model, in any number type.
+    pub fn interpreter<S: Scalar>(&self) -> Interpreter<S> {
+        let plan = Plan::new(&self.model, PlanOptions::default());
+        let params = plan.default_params();
+        let gravity = plan.gravity(&params).map(S::constant);
+        let params: Vec<S> = params.into_iter().map(S::constant).collect();
+        Interpreter::new(plan.tree(&params), gravity)
+    }
+
+    /// Coordinates and momenta at the start, of a system made from its model.
+    pub fn start<Y: Dynamics>(&self, system: &mut Y) -> (Y::Coordinates, Y::Momenta) {
+        let (mut q, mut v) = (system.neutral(), system.rest());
+        fill(q.as_mut(), &self.q);
+        fill(v.as_mut(), &self.v);
+        let mut p = system.rest();
+        system.momenta_of(&q, &v, &mut p);
+        (q, p)
+    }
+}
+
+fn fill<S: Scalar>(out: &mut [S], from: &[f64]) {
+    for (out, x) in out.iter_mut().zip(from) {
+        *out = S::constant(*x);
+    }
+}
