@@ -5202,8 +5202,9 @@ impl ::multibody::runtime::System for Arm7F32 {
         [0.0; 7]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -5214,6 +5215,23 @@ impl ::multibody::runtime::System for Arm7F32 {
     #[inline]
     fn coordinate_rates(&self, q: &[f32; 7], v: &[f32; 7], qd: &mut [f32; 7]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Arm7F32 {
+    #[inline]
+    fn state_energy(&mut self, q: &[f32; 7], p: &[f32; 7]) -> (f32, f32) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Arm7F32 {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f32; 7], v: &[f32; 7], a: &mut [f32; 7]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

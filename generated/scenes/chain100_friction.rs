@@ -2361,8 +2361,9 @@ impl ::multibody::runtime::System for Chain100Friction {
         [0.0; 100]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -2373,6 +2374,23 @@ impl ::multibody::runtime::System for Chain100Friction {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 100], v: &[f64; 100], qd: &mut [f64; 100]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Chain100Friction {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 100], p: &[f64; 100]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Chain100Friction {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 100], v: &[f64; 100], a: &mut [f64; 100]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

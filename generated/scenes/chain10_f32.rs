@@ -7149,8 +7149,9 @@ impl ::multibody::runtime::System for Chain10F32 {
         [0.0; 10]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -7161,6 +7162,23 @@ impl ::multibody::runtime::System for Chain10F32 {
     #[inline]
     fn coordinate_rates(&self, q: &[f32; 10], v: &[f32; 10], qd: &mut [f32; 10]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Chain10F32 {
+    #[inline]
+    fn state_energy(&mut self, q: &[f32; 10], p: &[f32; 10]) -> (f32, f32) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Chain10F32 {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f32; 10], v: &[f32; 10], a: &mut [f32; 10]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

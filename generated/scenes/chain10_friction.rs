@@ -7531,8 +7531,9 @@ impl ::multibody::runtime::System for Chain10Friction {
         [0.0; 10]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -7543,6 +7544,23 @@ impl ::multibody::runtime::System for Chain10Friction {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Chain10Friction {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 10], p: &[f64; 10]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Chain10Friction {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

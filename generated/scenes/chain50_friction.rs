@@ -1711,8 +1711,9 @@ impl ::multibody::runtime::System for Chain50Friction {
         [0.0; 50]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -1723,6 +1724,23 @@ impl ::multibody::runtime::System for Chain50Friction {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 50], v: &[f64; 50], qd: &mut [f64; 50]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Chain50Friction {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 50], p: &[f64; 50]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Chain50Friction {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 50], v: &[f64; 50], a: &mut [f64; 50]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

@@ -641,8 +641,9 @@ impl ::multibody::runtime::System for DoublePendulum {
         [0.0; 2]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -653,6 +654,23 @@ impl ::multibody::runtime::System for DoublePendulum {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for DoublePendulum {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 2], p: &[f64; 2]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for DoublePendulum {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

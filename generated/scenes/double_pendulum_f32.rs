@@ -641,8 +641,9 @@ impl ::multibody::runtime::System for DoublePendulumF32 {
         [0.0; 2]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -653,6 +654,23 @@ impl ::multibody::runtime::System for DoublePendulumF32 {
     #[inline]
     fn coordinate_rates(&self, q: &[f32; 2], v: &[f32; 2], qd: &mut [f32; 2]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for DoublePendulumF32 {
+    #[inline]
+    fn state_energy(&mut self, q: &[f32; 2], p: &[f32; 2]) -> (f32, f32) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for DoublePendulumF32 {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f32; 2], v: &[f32; 2], a: &mut [f32; 2]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

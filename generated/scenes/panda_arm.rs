@@ -5506,8 +5506,9 @@ impl ::multibody::runtime::System for PandaArm {
         [0.0; 7]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -5518,6 +5519,23 @@ impl ::multibody::runtime::System for PandaArm {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 7], v: &[f64; 7], qd: &mut [f64; 7]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for PandaArm {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 7]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for PandaArm {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 7], v: &[f64; 7], a: &mut [f64; 7]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

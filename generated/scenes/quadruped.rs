@@ -8538,8 +8538,9 @@ impl ::multibody::runtime::System for Quadruped {
         [0.0; 18]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[3]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Pose, 0, 0)] }
     }
 
     #[inline]
@@ -8550,6 +8551,23 @@ impl ::multibody::runtime::System for Quadruped {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 19], v: &[f64; 18], qd: &mut [f64; 19]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Quadruped {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 19], p: &[f64; 18]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Quadruped {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

@@ -603,8 +603,9 @@ impl ::multibody::runtime::System for Rotor {
         [0.0; 3]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[0]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Rotation, 0, 0)] }
     }
 
     #[inline]
@@ -615,6 +616,23 @@ impl ::multibody::runtime::System for Rotor {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 4], v: &[f64; 3], qd: &mut [f64; 4]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Rotor {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 4], p: &[f64; 3]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Rotor {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 4], v: &[f64; 3], a: &mut [f64; 3]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

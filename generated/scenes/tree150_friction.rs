@@ -18082,8 +18082,9 @@ impl ::multibody::runtime::System for Tree150Friction {
         [0.0; 150]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -18094,6 +18095,23 @@ impl ::multibody::runtime::System for Tree150Friction {
     #[inline]
     fn coordinate_rates(&self, q: &[f64; 150], v: &[f64; 150], qd: &mut [f64; 150]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Tree150Friction {
+    #[inline]
+    fn state_energy(&mut self, q: &[f64; 150], p: &[f64; 150]) -> (f64, f64) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Tree150Friction {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f64; 150], v: &[f64; 150], a: &mut [f64; 150]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

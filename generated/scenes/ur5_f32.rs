@@ -2853,8 +2853,9 @@ impl ::multibody::runtime::System for Ur5F32 {
         [0.0; 6]
     }
 
-    fn quaternions(&self) -> &[usize] {
-        &[]
+    #[inline]
+    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+        const { &[] }
     }
 
     #[inline]
@@ -2865,6 +2866,23 @@ impl ::multibody::runtime::System for Ur5F32 {
     #[inline]
     fn coordinate_rates(&self, q: &[f32; 6], v: &[f32; 6], qd: &mut [f32; 6]) {
         Self::coordinate_rates(self, q, v, qd);
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Energetic for Ur5F32 {
+    #[inline]
+    fn state_energy(&mut self, q: &[f32; 6], p: &[f32; 6]) -> (f32, f32) {
+        let [kinetic, potential] = Self::energy(self, q, p);
+        (kinetic, potential)
+    }
+}
+
+#[rustfmt::skip]
+impl ::multibody::runtime::Accelerated for Ur5F32 {
+    #[inline]
+    fn state_accelerations(&mut self, q: &[f32; 6], v: &[f32; 6], a: &mut [f32; 6]) {
+        Self::accelerations(self, q, v, a);
     }
 }
 

@@ -1,36 +1,26 @@
-//! What benchmarks ask of a system beside its rates, by one name for the interpreter and for generated code.
+//! What benchmarks ask of a system, by one name for the interpreter and for generated code.
+
+use std::fmt::Debug;
 
 use super::Scene;
 use crate::codegen::plan::{Plan, PlanOptions};
-use crate::runtime::{Interpreter, Scalar, System};
+use crate::runtime::{Accelerated, Energetic, Interpreter, Scalar};
 
-/// A [`System`] with its momenta, energy and accelerations.
-pub trait Dynamics: System {
+/// A system with energy, accelerations and momenta.
+pub trait Dynamics: Energetic + Accelerated {
     /// `p = M(q) v`.
     fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
-    /// Kinetic and potential energy, J.
-    fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> [Self::Scalar; 2];
-    /// Accelerations `v̇`.
-    fn accelerations_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
 }
 
-impl<S: Scalar> Dynamics for Interpreter<S> {
+impl<S: Scalar + Debug> Dynamics for Interpreter<S> {
     fn momenta_of(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
         self.momenta(q, v, p);
-    }
-
-    fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> [S; 2] {
-        self.energy(q, p).into()
-    }
-
-    fn accelerations_of(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
-        self.accelerations(q, v, a);
     }
 }
 
 impl Scene {
     /// The interpreter of its model, in any number type.
-    pub fn interpreter<S: Scalar>(&self) -> Interpreter<S> {
+    pub fn interpreter<S: Scalar + Debug>(&self) -> Interpreter<S> {
         let plan = Plan::new(&self.model, PlanOptions::default());
         let params = plan.default_params();
         let gravity = plan.gravity(&params).map(S::constant);

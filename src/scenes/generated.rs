@@ -26,18 +26,10 @@ pub trait VisitDifferentiable<S> {
 }
 
 macro_rules! dynamics {
-    ($type:ty, $scalar:ty) => {
+    ($type:ty) => {
         impl Dynamics for $type {
             fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta) {
                 self.momenta(q, v, p);
-            }
-
-            fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> [$scalar; 2] {
-                self.energy(q, p)
-            }
-
-            fn accelerations_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta) {
-                self.accelerations(q, v, a);
             }
         }
     };
@@ -47,8 +39,8 @@ macro_rules! dynamics {
 macro_rules! scenes {
     ($scalar:ty, $any:ident, $differentiable:ident,
      { $($($smooth:literal)|+ => $with:ty,)* }, { $($plain:literal => $without:ty,)* }) => {
-        $(dynamics!($with, $scalar);)*
-        $(dynamics!($without, $scalar);)*
+        $(dynamics!($with);)*
+        $(dynamics!($without);)*
 
         /// Does something with the generated system of a scene; `None` where there is none.
         pub fn $any<V: Visit<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
