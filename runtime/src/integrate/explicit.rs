@@ -243,20 +243,17 @@ where
 
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.end_rate(system, t, h);
-        let Some(dense) = T::TABLEAU.dense else {
-            return super::stepper::hermite(h, theta, &self.delta, [&self.k[0], &self.end], out);
-        };
+        super::stepper::hermite(h, theta, &self.delta, [&self.k[0], &self.end], out);
+        let Some(dense) = T::TABLEAU.dense else { return };
         if !self.extra_known {
             self.extend(system, t, h, dense);
         }
-        out.clear();
         let end = (!T::TABLEAU.fsal).then_some(&self.end);
-        for (i, (row, k)) in dense.weights.iter().zip(self.k.iter().chain(end).chain(&self.extra)).enumerate() {
+        for (i, (row, k)) in dense.bend.iter().zip(self.k.iter().chain(end).chain(&self.extra)).enumerate() {
             if !row.is_empty() {
-                out.add(dense.weight(i, theta), k);
+                out.add(h * dense.weight(i, theta), k);
             }
         }
-        out.scale(h);
     }
 
     fn statistics(&self) -> Statistics {

@@ -142,37 +142,61 @@ fn check<const S: usize>(t: &Tableau<S>, rows: &[u32]) {
     }
 }
 
-/// Order of the points within a step; value and slope at its ends.
+/// Coefficients of 1, θ, θ², … of the weight of a rate: of the cubic, which has weights `b`, and of what is added to it.
+fn powers(b: Number, at: [bool; 2], bend: &[Constant]) -> Vec<Number> {
+    let number = |x: f64| Number::constant(x);
+    let times = |p: &[Number], q: &[f64]| {
+        let mut product = vec![Number::zero(); p.len() + q.len() - 1];
+        for (i, x) in p.iter().enumerate() {
+            for (j, y) in q.iter().enumerate() {
+                product[i + j] = product[i + j] + *x * number(*y);
+            }
+        }
+        product
+    };
+    let mut sum = vec![Number::zero(); 4 + bend.len().max(1)];
+    let mut add = |p: &[Number]| p.iter().enumerate().for_each(|(k, x)| sum[k] = sum[k] + *x);
+    add(&times(&[b], &[0.0, 0.0, 3.0, -2.0]));
+    add(&times(&[number(f64::from(at[0]))], &[0.0, 1.0, -2.0, 1.0]));
+    add(&times(&[number(f64::from(at[1]))], &[0.0, 0.0, -1.0, 1.0]));
+    let mut basis = vec![0.0, 0.0, 1.0, -2.0, 1.0];
+    for c in bend {
+        add(&times(&[c.get()], &basis));
+        let next = times(&basis.iter().map(|x| number(*x)).collect::<Vec<Number>>(), &[-0.5, 1.0]);
+        basis = next.iter().map(|x| x.to_f64()).collect();
+    }
+    sum
+}
+
+/// Order of the points within a step; their value at the end.
 fn check_dense<const S: usize>(t: &Tableau<S>, dense: &Dense, trees: &[Tree], phi: &[Vec<Number>]) {
     let end = if t.fsal { S - 1 } else { S };
     let count = end + 1 + dense.c.len();
-    assert_eq!(dense.weights.len(), count, "{}: weights", t.name);
+    assert_eq!(dense.bend.len(), count, "{}: weights", t.name);
     for (k, row) in dense.a.iter().enumerate() {
         assert_eq!(row.len(), end + 1 + k, "{}: row of extra stage {k}", t.name);
     }
-    let powers = dense.weights.iter().map(|w| w.len()).max().unwrap();
-    let of_power = |m: usize| dense.weights.iter().map(|w| w.get(m).map_or(Number::zero(), |x| x.get())).collect();
-    let columns: Vec<Vec<Number>> = (0..powers).map(of_power).collect();
-    let one_off = |order: u32, m: usize| miss(trees, phi, order, &columns[m], f64::from(m as u32 + 1 == order));
+    let b = |i: usize| t.b.get(i).map_or(Number::zero(), |x| x.get());
+    let weights: Vec<Vec<Number>> = (0..count).map(|i| powers(b(i), [i == 0, i == end], dense.bend[i])).collect();
+    let highest = weights.iter().map(|w| w.len()).max().unwrap();
+    let of_power = |m: usize| weights.iter().map(|w| w.get(m).map_or(Number::zero(), |x| *x)).collect();
+    let columns: Vec<Vec<Number>> = (0..highest).map(of_power).collect();
+    let one_off = |order: u32, m: usize| miss(trees, phi, order, &columns[m], f64::from(m as u32 == order));
     for order in 1..=dense.order {
-        let miss = (0..powers).map(|m| one_off(order, m)).fold(0.0, f64::max);
+        let miss = (0..highest).map(|m| one_off(order, m)).fold(0.0, f64::max);
         assert!(miss < EXACT, "{}: dense output misses order {order} by {miss:e}", t.name);
     }
-    if dense.order < t.order {
-        let miss = (0..powers).map(|m| one_off(dense.order + 1, m)).fold(0.0, f64::max);
-        assert!(miss > MISSED, "{}: dense output of higher order", t.name);
-    }
+    let miss = (0..highest).map(|m| one_off(dense.order + 1, m)).fold(0.0, f64::max);
+    assert!(miss > MISSED, "{}: dense output of higher order", t.name);
+    // What is added to the cubic, in doubles: good to their rounding, and none of it at the ends.
     for i in 0..count {
-        let b = t.b.get(i).map_or(Number::zero(), |x| x.get());
-        let value = dense.weight(i, Number::one()) - b;
-        let coefficient = |m: usize| columns[m][i];
-        let slope_start = coefficient(0) - Number::constant(f64::from(i == 0));
-        let slope_end = (0..powers).fold(-Number::constant(f64::from(i == end)), |sum, m| {
-            sum + Number::constant((m + 1) as f64) * coefficient(m)
-        });
-        let miss = largest([value, slope_start, slope_end].into_iter());
-        assert!(miss < EXACT, "{}: weight {i} at the ends, {miss:e}", t.name);
-        assert_eq!(dense.weight(i, 0.0), 0.0);
+        for theta in [0.0, 0.125, 0.5, 0.75, 1.0] {
+            let cubic = powers(b(i), [i == 0, i == end], &[]);
+            let value = |p: &[Number]| p.iter().rev().fold(Number::zero(), |v, c| v * Number::constant(theta) + *c);
+            let exact = (value(&weights[i]) - value(&cubic)).to_f64();
+            let miss = (dense.weight(i, theta) - exact).abs();
+            assert!(miss < 2e-15, "{}: weight {i} at {theta} is off by {miss:e}", t.name);
+        }
     }
 }
 
