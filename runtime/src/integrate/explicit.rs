@@ -161,13 +161,7 @@ where
         (!T::TABLEAU.error.is_empty()).then_some(T::TABLEAU.error_order)
     }
 
-    fn begin(
-        &mut self,
-        system: &mut Y,
-        t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
-    ) -> Result<(), StepError> {
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
         (self.first_known, self.end_known, self.extra_known) = (false, false, false);
         self.field.load(system, t, q, p)
     }

@@ -5,19 +5,27 @@
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 
 pub mod chart;
+mod composition;
 mod constant;
+mod doubled;
+mod doubling;
 mod error;
 mod explicit;
 mod field;
 mod group;
+mod semi_implicit;
 mod solver;
 mod stepper;
 pub mod tableau;
 
 pub use chart::{Chart, Point};
+pub use composition::{Composition, Symmetric};
 pub use constant::{decimal, ratio, Constant};
+pub use doubled::Doubled;
+pub use doubling::StepDoubling;
 pub use error::StepError;
 pub use explicit::{method, Euler, Explicit, Method, Midpoint, Rk4};
 pub use field::Field;
+pub use semi_implicit::SemiImplicitEuler;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};

@@ -280,7 +280,13 @@ where
         loop {
             let last = rest <= h * 1.0001;
             // Two steps of half the rest rather than a last one of next to nothing.
-            let tried = if last { rest } else if rest < 2.0 * h { 0.5 * rest } else { h };
+            let tried = if last {
+                rest
+            } else if rest < 2.0 * h {
+                0.5 * rest
+            } else {
+                h
+            };
             self.weigh(system, &tolerances, tried);
             let error = match self.method.attempt(system, self.t, Y::Scalar::constant(tried), Some(&self.scale)) {
                 Ok(error) => error,
@@ -290,7 +296,8 @@ where
             };
             if error <= 1.0 && self.check().is_ok() {
                 let size = error.max(1e-10);
-                let factor = SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
+                let factor =
+                    SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
                 let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
                 // A step cut short by the end says little about the next.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };

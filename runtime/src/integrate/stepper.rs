@@ -43,13 +43,7 @@ where
     ///
     /// # Errors
     /// [`StepError::Quaternion`].
-    fn begin(
-        &mut self,
-        system: &mut Y,
-        t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
-    ) -> Result<(), StepError>;
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError>;
 
     /// Tries a step of `h` s from time `t`. With `scale`, returns the error relative to it, root mean square over all
     /// components whose scale is not zero; 0 where no error is estimated. A NaN means that the step is too large to be judged.
