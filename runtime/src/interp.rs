@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
-use crate::system::{Accelerated, Blocks, Differentiable, Energetic, Group, GroupKind, Real, System};
+use crate::system::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Group, GroupKind, Real, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -305,6 +305,12 @@ impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
 impl<S: Scalar + core::fmt::Debug> Energetic for Interpreter<S> {
     fn state_energy(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
         self.energy(q, p)
+    }
+}
+
+impl<S: Scalar + core::fmt::Debug> Conjugate for Interpreter<S> {
+    fn state_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
+        self.momenta(q, v, p);
     }
 }
 

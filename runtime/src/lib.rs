@@ -10,6 +10,8 @@ extern crate alloc;
 #[cfg(feature = "std")]
 extern crate std;
 
+#[cfg(feature = "alloc")]
+mod acceleration_form;
 pub mod batch;
 mod dual;
 pub mod integrate;
@@ -32,8 +34,10 @@ pub mod wide;
 #[cfg(feature = "alloc")]
 pub mod workspace;
 
+#[cfg(feature = "alloc")]
+pub use acceleration_form::AccelerationForm;
 pub use dual::Dual;
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
-pub use system::{Accelerated, Blocks, Differentiable, Energetic, Real, System};
+pub use system::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Real, System};

@@ -144,6 +144,12 @@ pub trait Energetic: System {
     fn state_energy(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> (Self::Scalar, Self::Scalar);
 }
 
+/// A mechanism that gives the momenta of given velocities.
+pub trait Conjugate: System {
+    /// `(q, v) → p`.
+    fn state_momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
+}
+
 /// A mechanism that gives accelerations at given velocities.
 pub trait Accelerated: System {
     /// `(q, v) → v̇`.

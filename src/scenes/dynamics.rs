@@ -4,19 +4,12 @@ use std::fmt::Debug;
 
 use super::Scene;
 use crate::codegen::plan::{Plan, PlanOptions};
-use crate::runtime::{Accelerated, Energetic, Interpreter, Scalar};
+use crate::runtime::{Accelerated, Conjugate, Energetic, Interpreter, Scalar};
 
 /// A system with energy, accelerations and momenta.
-pub trait Dynamics: Energetic + Accelerated {
-    /// `p = M(q) v`.
-    fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
-}
+pub trait Dynamics: Energetic + Accelerated + Conjugate {}
 
-impl<S: Scalar + Debug> Dynamics for Interpreter<S> {
-    fn momenta_of(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
-        self.momenta(q, v, p);
-    }
-}
+impl<Y: Energetic + Accelerated + Conjugate> Dynamics for Y {}
 
 impl Scene {
     /// The interpreter of its model, in any number type.
@@ -34,7 +27,7 @@ impl Scene {
         fill(q.as_mut(), &self.q);
         fill(v.as_mut(), &self.v);
         let mut p = system.rest();
-        system.momenta_of(&q, &v, &mut p);
+        system.state_momenta(&q, &v, &mut p);
         (q, p)
     }
 }

@@ -25,23 +25,10 @@ pub trait VisitDifferentiable<S> {
     fn visit<Y: Dynamics<Scalar = S> + Differentiable>(self, system: Y) -> Self::Out;
 }
 
-macro_rules! dynamics {
-    ($type:ty) => {
-        impl Dynamics for $type {
-            fn momenta_of(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta) {
-                self.momenta(q, v, p);
-            }
-        }
-    };
-}
-
 /// One number type: its types with derivatives, then those without, each with the scenes it belongs to.
 macro_rules! scenes {
     ($scalar:ty, $any:ident, $differentiable:ident,
      { $($($smooth:literal)|+ => $with:ty,)* }, { $($plain:literal => $without:ty,)* }) => {
-        $(dynamics!($with);)*
-        $(dynamics!($without);)*
-
         /// Does something with the generated system of a scene; `None` where there is none.
         pub fn $any<V: Visit<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
             match scene {

@@ -23,7 +23,8 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     let mut out = String::new();
     let has = |x: Group| groups.iter().any(|g| g.group == x);
     let rates = has(Group::Rates);
-    let traits: [(bool, fn(&mut String, &Plan, &Options)); 3] = [
+    let traits: [(bool, fn(&mut String, &Plan, &Options)); 4] = [
+        (has(Group::Momenta), traits::conjugate),
         (has(Group::Energy), traits::energetic),
         (has(Group::Accelerations), traits::accelerated),
         (has(Group::Derivatives), traits::differentiable),

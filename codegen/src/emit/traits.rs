@@ -84,6 +84,24 @@ impl {rt}::Energetic for {name} {{
     );
 }
 
+/// `impl Conjugate`.
+pub fn conjugate(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Conjugate for {name} {{
+    #[inline]
+    fn state_momenta(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], p: &mut [{t}; {nv}]) {{
+        Self::momenta(self, q, v, p);
+    }}
+}}
+"
+    );
+}
+
 /// `impl Accelerated`.
 pub fn accelerated(out: &mut String, plan: &Plan, options: &Options) {
     let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);

@@ -171,6 +171,18 @@ where
         Chart { q: system.neutral(), p: system.rest(), carry: compensated.then(|| Point::zero(system)) }
     }
 
+    /// About the state of another chart, what it carries on included if this one carries something on.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.q.as_mut().copy_from_slice(other.q.as_ref());
+        self.p.as_mut().copy_from_slice(other.p.as_ref());
+        if let Some(carry) = &mut self.carry {
+            match &other.carry {
+                Some(other) => carry.copy_from(other),
+                None => carry.clear(),
+            }
+        }
+    }
+
     /// About another state.
     ///
     /// # Errors
@@ -286,6 +298,30 @@ where
         Ok(())
     }
 
+    /// Appends a displacement from where `total` leads: `total` becomes both, in the chart of its start.
+    pub fn compose(system: &Y, step: &Point<Y>, total: &mut Point<Y>) {
+        let (x, p) = (total.x.as_mut(), total.p.as_mut());
+        for group in system.groups() {
+            group.compose((step.x.as_ref(), step.p.as_ref()), x, p);
+        }
+        for_positions(system, x.len(), |k| x[k] = x[k] + step.x.as_ref()[k]);
+        for (sum, dp) in p.iter_mut().zip(step.p.as_ref()) {
+            *sum = *sum + *dp;
+        }
+    }
+
+    /// The other way: takes `step` off the front of `point`, which becomes a displacement from where `step` leads.
+    pub fn relative(system: &Y, step: &Point<Y>, point: &mut Point<Y>) {
+        let (x, p) = (point.x.as_mut(), point.p.as_mut());
+        for (p, dp) in p.iter_mut().zip(step.p.as_ref()) {
+            *p = *p - *dp;
+        }
+        for group in system.groups() {
+            group.relative(step.x.as_ref(), x, p);
+        }
+        for_positions(system, x.len(), |k| x[k] = x[k] - step.x.as_ref()[k]);
+    }
+
     /// What a past point of the motion, `x` from the chart's state, and its rate become when the chart's state is moved by
     /// `step`. Of the displacement only the coordinates are kept up, its momenta are not read.
     pub fn follow(system: &Y, step: &Point<Y>, point: &mut Point<Y>, rate: &mut Point<Y>) {
@@ -293,12 +329,16 @@ where
         for group in system.groups() {
             group.follow(step, x, rate.x.as_mut(), rate.p.as_mut());
         }
-        let nq = system.groups().iter().fold(x.len(), |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
-        for (_, v, n, _) in Stretches::new(system.groups(), nq, x.len()) {
-            for k in v..v + n {
-                x[k] = x[k] - step[k];
-            }
-        }
+        for_positions(system, x.len(), |k| x[k] = x[k] - step[k]);
+    }
+}
+
+/// The components, of `nv`, that displacements are added to.
+#[inline]
+fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) {
+    let nq = system.groups().iter().fold(nv, |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
+    for (_, v, n, _) in Stretches::new(system.groups(), nq, nv) {
+        (v..v + n).for_each(&mut with);
     }
 }
 

@@ -46,12 +46,23 @@ where
     /// # Errors
     /// [`StepError::Quaternion`].
     pub fn load(&mut self, system: &Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        let same = self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref();
-        if !same {
+        if !self.holds(q, p) {
             self.chart.load(system, t.to_f64(), q, p)?;
         }
         self.stored = false;
         Ok(())
+    }
+
+    /// Whether a state is the one that [`Field::store`] gave last, and nothing has been evaluated since: where methods with
+    /// a history go on.
+    pub fn holds(&self, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
+        self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref()
+    }
+
+    /// Starts displacements where those of another field start, to the last bit.
+    pub fn join(&mut self, other: &Self) {
+        self.chart.copy_from(&other.chart);
+        self.stored = false;
     }
 
     /// Gives the state that displacements start from.
@@ -75,6 +86,15 @@ where
     pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
         self.evaluate(system, t);
+        self.local(system, point, out);
+    }
+
+    /// The coordinates' part of [`Field::rates`] where what stands at the place of momenta are velocities: `q̇ = N(q) v`, which
+    /// takes no evaluation of the system. Momenta of `out` are without meaning.
+    pub fn velocities(&mut self, system: &Y, point: &Point<Y>, out: &mut Point<Y>) {
+        self.chart.state(system, point, &mut self.q, &mut self.p);
+        system.coordinate_rates(&self.q, &self.p, &mut self.qd);
+        self.stored = false;
         self.local(system, point, out);
     }
 

@@ -181,6 +181,28 @@ impl Group {
         }
     }
 
+    /// Appends the displacement `(step, dp)` to `(x, p)`: what addition alone would get wrong.
+    pub(super) fn compose<S: Real>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
+        if self.momenta && self.kind != GroupKind::Rotation {
+            // About the point where the first of both begins.
+            let (linear, angular) = self.split(p);
+            self.join((linear, add3(angular, cross(self.shift(x), self.split(dp).0))), p);
+        }
+        if let Some(at) = self.phi() {
+            let back = scale3(-S::one(), three(x, at));
+            put(x, at, from(three(step, at), back));
+        }
+    }
+
+    /// Takes the displacement `step` off the front of `(x, p)`, of whose momenta those of `step` are taken off already: what
+    /// subtraction alone would get wrong.
+    pub(super) fn relative<S: Real>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
+        self.refer(self.shift(step), p);
+        if let Some(at) = self.phi() {
+            put(x, at, from(three(x, at), three(step, at)));
+        }
+    }
+
     /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.
     pub(super) fn follow<S: Real>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
         if let Some(at) = self.phi() {

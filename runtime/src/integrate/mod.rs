@@ -7,19 +7,27 @@
 #[cfg(feature = "alloc")]
 pub mod catalogue;
 pub mod chart;
+mod composition;
 pub(crate) mod constant;
+mod doubled;
+mod doubling;
 mod error;
 mod explicit;
 mod field;
 mod group;
+mod semi_implicit;
 mod solver;
 mod stepper;
 pub mod tableau;
 
 pub use chart::{Chart, Point};
+pub use composition::{Composition, Symmetric};
 pub use constant::{decimal, ratio, Constant};
+pub use doubled::Doubled;
+pub use doubling::StepDoubling;
 pub use error::StepError;
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
+pub use semi_implicit::SemiImplicitEuler;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};

@@ -1,0 +1,69 @@
+//! The equations of motion in velocities instead of momenta.
+
+use alloc::vec::Vec;
+
+use crate::system::{Accelerated, Conjugate, Energetic, Group, System};
+
+/// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] at whose place of momenta velocities stand, so that
+/// every integrator runs it. Against [`System`] itself it shows what momenta are good for.
+///
+/// Velocities of joints with quaternions and of planar joints are in body axes. Their rates are added up as they stand: what is
+/// conserved exactly of momenta is not of velocities.
+#[derive(Clone, Debug)]
+pub struct AccelerationForm<Y> {
+    /// The mechanism, with its inputs.
+    pub system: Y,
+    groups: Vec<Group>,
+}
+
+impl<Y: System> AccelerationForm<Y> {
+    /// Of a mechanism.
+    pub fn new(system: Y) -> Self {
+        let groups = system.groups().iter().map(|g| Group { momenta: false, ..*g }).collect();
+        AccelerationForm { system, groups }
+    }
+}
+
+impl<Y: Accelerated> System for AccelerationForm<Y> {
+    type Scalar = Y::Scalar;
+    type Coordinates = Y::Coordinates;
+    type Momenta = Y::Momenta;
+
+    fn neutral(&self) -> Y::Coordinates {
+        self.system.neutral()
+    }
+
+    fn rest(&self) -> Y::Momenta {
+        self.system.rest()
+    }
+
+    fn groups(&self) -> &[Group] {
+        &self.groups
+    }
+
+    /// Velocities stand for `p`, accelerations for `pd`.
+    fn state_rates(
+        &mut self,
+        _t: Y::Scalar,
+        q: &Y::Coordinates,
+        v: &Y::Momenta,
+        qd: &mut Y::Coordinates,
+        a: &mut Y::Momenta,
+    ) {
+        self.system.coordinate_rates(q, v, qd);
+        self.system.state_accelerations(q, v, a);
+    }
+
+    fn coordinate_rates(&self, q: &Y::Coordinates, v: &Y::Momenta, qd: &mut Y::Coordinates) {
+        self.system.coordinate_rates(q, v, qd);
+    }
+}
+
+impl<Y: Accelerated + Conjugate + Energetic> Energetic for AccelerationForm<Y> {
+    /// By way of the momenta.
+    fn state_energy(&mut self, q: &Y::Coordinates, v: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
+        let mut p = self.system.rest();
+        self.system.state_momenta(q, v, &mut p);
+        self.system.state_energy(q, &p)
+    }
+}

@@ -1,0 +1,307 @@
+//! Displacements one after the other, step doubling, compositions, the doubled phase space.
+
+use mbd_runtime::integrate::{
+    Chart, Composition, Doubled, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling,
+    Stepper, Symmetric, Tolerances,
+};
+use mbd_runtime::system::{Group, GroupKind};
+use mbd_runtime::System;
+
+/// An ordinary coordinate, a rotation, a pose, a planar joint: for charts alone.
+struct Kinds([Group; 3]);
+
+impl Kinds {
+    fn new(momenta: bool) -> Self {
+        let group = |kind, q, v| Group { momenta, ..Group::new(kind, q, v) };
+        Kinds([group(GroupKind::Rotation, 1, 1), group(GroupKind::Pose, 5, 4), group(GroupKind::Plane, 12, 10)])
+    }
+}
+
+impl System for Kinds {
+    type Scalar = f64;
+    type Coordinates = [f64; 16];
+    type Momenta = [f64; 14];
+
+    fn neutral(&self) -> [f64; 16] {
+        let mut q = [0.0; 16];
+        (q[4], q[11]) = (1.0, 1.0);
+        q
+    }
+    fn rest(&self) -> [f64; 14] {
+        [0.0; 14]
+    }
+    fn groups(&self) -> &[Group] {
+        &self.0
+    }
+    fn state_rates(&mut self, _t: f64, _q: &[f64; 16], _p: &[f64; 14], _qd: &mut [f64; 16], _pd: &mut [f64; 14]) {}
+    fn coordinate_rates(&self, _q: &[f64; 16], _v: &[f64; 14], _qd: &mut [f64; 16]) {}
+}
+
+/// Numbers between -1 and 1.
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn point(system: &Kinds, seed: &mut u64) -> Point<Kinds> {
+    let mut point = Point::zero(system);
+    point.parts_mut().into_iter().flatten().for_each(|x| *x = random(seed));
+    point
+}
+
+fn largest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
+#[test]
+fn displacements_one_after_the_other() {
+    let seed = &mut 1;
+    for momenta in [true, false].repeat(50) {
+        let system = Kinds::new(momenta);
+        let (mut q, mut p) = (system.neutral(), system.rest());
+        q.iter_mut().chain(&mut p).for_each(|x| *x += 0.5 * random(seed));
+        for at in [1, 8] {
+            let norm = q[at..at + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
+            q[at..at + 4].iter_mut().for_each(|x| *x /= norm);
+        }
+        let mut chart = Chart::new(&system, false);
+        chart.load(&system, 0.0, &q, &p).unwrap();
+        let (first, second) = (point(&system, seed), point(&system, seed));
+        let mut both = first.clone();
+        Chart::compose(&system, &second, &mut both);
+
+        // In one, and one after the other.
+        let (mut q1, mut p1) = (q, p);
+        chart.state(&system, &both, &mut q1, &mut p1);
+        chart.advance(&system, 0.0, &first).unwrap();
+        let (mut q2, mut p2) = (q, p);
+        chart.state(&system, &second, &mut q2, &mut p2);
+        assert!(largest(&q1, &q2) < 2e-15, "{q1:?} {q2:?}");
+        assert!(largest(&p1, &p2) < 1e-14, "{p1:?} {p2:?}");
+        assert!(largest(&p, &p2) > 0.1);
+
+        Chart::relative(&system, &first, &mut both);
+        let [x, p] = both.parts();
+        assert!(largest(x, &second.x).max(largest(p, &second.p)) < 1e-14, "{both:?} {second:?}");
+    }
+}
+
+/// A pendulum of length and mass 1 with a slider on it that stiffens with its length: not separable. `H = p₀²/2(1 + q₁²) +
+/// p₁²/2 + cos q₀ (1 − q₁) + 4 q₁²`.
+#[derive(Clone, Copy)]
+struct Swing;
+
+impl Swing {
+    fn energy(q: &[f64; 2], p: &[f64; 2]) -> f64 {
+        p[0] * p[0] / (2.0 * (1.0 + q[1] * q[1])) + p[1] * p[1] / 2.0 + q[0].cos() * (q[1] - 1.0) + 4.0 * q[1] * q[1]
+    }
+
+    /// Away from rest.
+    const START: ([f64; 2], [f64; 2]) = ([1.2, 0.3], [0.4, -0.2]);
+}
+
+impl System for Swing {
+    type Scalar = f64;
+    type Coordinates = [f64; 2];
+    type Momenta = [f64; 2];
+
+    fn neutral(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
+    fn rest(&self) -> [f64; 2] {
+        [0.0; 2]
+    }
+    fn groups(&self) -> &[Group] {
+        &[]
+    }
+    fn state_rates(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
+        let inertia = 1.0 + q[1] * q[1];
+        *qd = [p[0] / inertia, p[1]];
+        *pd = [q[0].sin() * (q[1] - 1.0), p[0] * p[0] * q[1] / (inertia * inertia) - q[0].cos() - 8.0 * q[1]];
+    }
+    fn coordinate_rates(&self, _q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
+        *qd = *v;
+    }
+}
+
+fn state(method: &mut impl Stepper<Swing>, time: f64, steps: u32) -> [f64; 4] {
+    let (mut q, mut p) = Swing::START;
+    let h = time / f64::from(steps);
+    for k in 0..steps {
+        method.step(&mut Swing, f64::from(k) * h, h, &mut q, &mut p).unwrap();
+    }
+    [q[0], q[1], p[0], p[1]]
+}
+
+fn reference(time: f64) -> [f64; 4] {
+    state(&mut Composition::new(&Swing, Doubled::new(&Swing, 2.0), Symmetric::KAHAN_LI_8), time, 400 * time as u32)
+}
+
+/// Conditions of order on the lengths: all sums of odd powers (*Geometric Numerical Integration*, V.3.2), the ones of mixed
+/// kind show in [`orders_of_compositions`].
+#[test]
+fn lengths() {
+    fn check<const S: usize>(lengths: Symmetric<S>) {
+        let steps: [f64; S] = lengths.steps();
+        assert!((0..S).all(|k| steps[k] == steps[S - 1 - k]));
+        for power in (1..lengths.order as i32).step_by(2) {
+            let sum: f64 = steps.iter().map(|x| x.powi(power)).sum();
+            let size: f64 = steps.iter().map(|x| x.abs().powi(power)).sum();
+            let expected = f64::from(u8::from(power == 1));
+            assert!((sum - expected).abs() < 4.0 * f64::from(power) * size * f64::EPSILON, "{S}: {power}: {sum}");
+        }
+    }
+    check(Symmetric::YOSHIDA_4);
+    check(Symmetric::SUZUKI_4);
+    check(Symmetric::YOSHIDA_6);
+    check(Symmetric::KAHAN_LI_6);
+    check(Symmetric::KAHAN_LI_8);
+}
+
+#[test]
+fn orders_of_compositions() {
+    let time = 4.0;
+    let exact = reference(time);
+    let order = |run: &dyn Fn(u32) -> [f64; 4], steps: u32| {
+        let [coarse, fine] = [steps, 2 * steps].map(|n| largest(&run(n), &exact));
+        println!("{steps} steps: error {coarse:.1e}, {fine:.1e}, order {:.2}", (coarse / fine).log2());
+        (coarse / fine).log2()
+    };
+    fn of<const S: usize>(lengths: Symmetric<S>) -> impl Fn(u32) -> [f64; 4] {
+        move |n| state(&mut Composition::new(&Swing, Doubled::new(&Swing, 2.0), lengths), 4.0, n)
+    }
+    assert!((order(&|n| state(&mut Doubled::new(&Swing, 2.0), time, n), 200) - 2.0).abs() < 0.1);
+    assert!((order(&of(Symmetric::YOSHIDA_4), 200) - 4.0).abs() < 0.2);
+    assert!((order(&of(Symmetric::SUZUKI_4), 100) - 4.0).abs() < 0.2);
+    assert!((order(&of(Symmetric::YOSHIDA_6), 100) - 6.0).abs() < 0.4);
+    assert!((order(&of(Symmetric::KAHAN_LI_6), 50) - 6.0).abs() < 0.4);
+    assert!((order(&of(Symmetric::KAHAN_LI_8), 20) - 8.0).abs() < 0.6);
+}
+
+/// A symmetric method, run backwards, comes back. From equal copies the doubled phase space does so only if they are kept.
+#[test]
+fn compositions_come_back() {
+    let mut method = Composition::new(&Swing, Doubled::new(&Swing, 2.0), Symmetric::SUZUKI_4);
+    let (mut q, mut p) = Swing::START;
+    for h in [[0.1; 50], [-0.1; 50]].concat() {
+        method.step(&mut Swing, 0.0, h, &mut q, &mut p).unwrap();
+    }
+    let (q0, p0) = Swing::START;
+    assert!(largest(&q, &q0).max(largest(&p, &p0)) < 1e-12, "{q:?} {p:?}");
+}
+
+#[test]
+fn copies_stay_near_each_other() {
+    let mut method = Doubled::new(&Swing, 10.0);
+    let (mut q, mut p) = Swing::START;
+    let energy = Swing::energy(&q, &p);
+    let mut gap = Point::zero(&Swing);
+    let (mut widest, mut drift) = (0.0_f64, 0.0_f64);
+    for k in 0..100_000 {
+        method.step(&mut Swing, f64::from(k) * 0.01, 0.01, &mut q, &mut p).unwrap();
+        method.gap(&mut gap);
+        widest = widest.max(largest(&gap.x, &[0.0; 2])).max(largest(&gap.p, &[0.0; 2]));
+        drift = drift.max((Swing::energy(&q, &p) - energy).abs());
+    }
+    println!("gap {widest:.1e}, energy {drift:.1e}");
+    // Of the size of the square of the step, over a thousand seconds.
+    assert!(widest > 0.0 && widest < 1e-3, "{widest:e}");
+    assert!(drift < 1e-3, "{drift:e}");
+    // Three evaluations a step, and the first one.
+    assert_eq!(method.statistics().evaluations, 300_001);
+}
+
+/// Where the Hamiltonian is separable this is the symplectic method: for the oscillator `H = (p² + q²)/2` it keeps
+/// `p² + q² − h q p` to round-off; the energy stays within `h/2`.
+#[test]
+fn semi_implicit_euler_is_symplectic_where_the_hamiltonian_is_separable() {
+    struct Oscillator;
+    impl System for Oscillator {
+        type Scalar = f64;
+        type Coordinates = [f64; 1];
+        type Momenta = [f64; 1];
+        fn neutral(&self) -> [f64; 1] {
+            [0.0]
+        }
+        fn rest(&self) -> [f64; 1] {
+            [0.0]
+        }
+        fn groups(&self) -> &[Group] {
+            &[]
+        }
+        fn state_rates(&mut self, _t: f64, q: &[f64; 1], p: &[f64; 1], qd: &mut [f64; 1], pd: &mut [f64; 1]) {
+            (*qd, *pd) = (*p, [-q[0]]);
+        }
+        fn coordinate_rates(&self, _q: &[f64; 1], v: &[f64; 1], qd: &mut [f64; 1]) {
+            *qd = *v;
+        }
+    }
+    let (h, steps) = (0.1, 100_000);
+    let mut method = SemiImplicitEuler::new(&Oscillator);
+    let (mut q, mut p) = ([1.0], [0.0]);
+    let kept = |q: &[f64; 1], p: &[f64; 1]| p[0] * p[0] + q[0] * q[0] - h * q[0] * p[0];
+    for k in 0..steps {
+        method.step(&mut Oscillator, f64::from(k) * h, h, &mut q, &mut p).unwrap();
+    }
+    // A random walk of roundings of a few last places.
+    let walk = f64::from(steps).sqrt() * 4.0 * f64::EPSILON;
+    assert!((kept(&q, &p) - 1.0).abs() < walk, "{:e}", kept(&q, &p) - 1.0);
+    assert_eq!(method.statistics().evaluations, 200_000);
+}
+
+/// The documentation says that it drifts where the Hamiltonian is not separable.
+#[test]
+fn semi_implicit_euler_drifts_where_it_is_not() {
+    let drift = |steps: u32| {
+        let [a, b, c, d] = state(&mut SemiImplicitEuler::new(&Swing), 200.0, steps);
+        Swing::energy(&[a, b], &[c, d]) - Swing::energy(&Swing::START.0, &Swing::START.1)
+    };
+    let [coarse, fine] = [20_000, 40_000].map(drift);
+    println!("{coarse:.2e}, with half the step {fine:.2e}");
+    assert!(coarse.abs() < 0.2);
+}
+
+#[test]
+fn step_doubling_meets_tolerances() {
+    let time = 10.0;
+    let exact = reference(time);
+    fn run<M: Stepper<Swing>>(method: M, tolerance: f64, time: f64) -> ([f64; 4], [u64; 3]) {
+        let (mut q, mut p) = Swing::START;
+        let step = Step::Adaptive(Tolerances::new(tolerance));
+        let mut solver = Solver::new(&mut Swing, method, step, 0.0, &q, &p).unwrap();
+        solver.limits = Limits { steps: 100_000, ..Limits::default() };
+        solver.run(&mut Swing, time).unwrap();
+        solver.state(&Swing, &mut q, &mut p);
+        let s = solver.statistics();
+        ([q[0], q[1], p[0], p[1]], [s.steps, s.rejections, s.evaluations])
+    }
+    for tolerance in [1e-5, 1e-8] {
+        let (state, counts) = run(StepDoubling::new(&Swing, Rk4::new(&Swing)), tolerance, time);
+        let (better, same) = run(StepDoubling::extrapolated(&Swing, Rk4::new(&Swing)), tolerance, time);
+        let (other, more) = run(StepDoubling::new(&Swing, Midpoint::new(&Swing)), tolerance, time);
+        let [a, b, c] = [&state, &better, &other].map(|s| largest(s, &exact) / tolerance);
+        println!("{tolerance:e}: {a:.1} {counts:?}, extrapolated {b:.1} {same:?}, midpoint {c:.1} {more:?}");
+        // Errors of steps add up: ten seconds are some two periods.
+        assert!(a < 40.0 && b < 40.0 && c < 100.0);
+        // Eleven a step and a rejection; two more for the choice of the first step; the last start.
+        let tries = counts[0] + counts[1];
+        assert!(counts[2] >= 11 * tries && counts[2] <= 12 * tries + 3, "{counts:?}");
+        assert!(more[0] > counts[0]);
+    }
+}
+
+#[test]
+fn orders_of_step_doubling() {
+    let exact = reference(4.0);
+    let order = |run: &dyn Fn(u32) -> [f64; 4], steps: u32| {
+        let [coarse, fine] = [steps, 2 * steps].map(|n| largest(&run(n), &exact));
+        (coarse / fine).log2()
+    };
+    assert!(
+        (order(&|n| state(&mut StepDoubling::extrapolated(&Swing, Euler::new(&Swing)), 4.0, n), 400) - 2.0).abs() < 0.2
+    );
+    assert!((order(&|n| state(&mut StepDoubling::new(&Swing, Rk4::new(&Swing)), 4.0, n), 50) - 4.0).abs() < 0.2);
+    assert!(
+        (order(&|n| state(&mut StepDoubling::extrapolated(&Swing, Rk4::new(&Swing)), 4.0, n), 50) - 5.0).abs() < 0.4
+    );
+}
