@@ -4185,6 +4185,14 @@ impl ::multibody::runtime::System for Chain100 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain100 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 100], v: &[f64; 100], p: &mut [f64; 100]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain100 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 100], p: &[f64; 100]) -> (f64, f64) {

@@ -5201,6 +5201,14 @@ impl ::multibody::runtime::System for Chain6 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain6 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain6 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {

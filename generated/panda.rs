@@ -5371,6 +5371,14 @@ impl ::multibody::runtime::System for Panda {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Panda {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Panda {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 8], p: &[f64; 8]) -> (f64, f64) {

@@ -4310,6 +4310,14 @@ impl ::multibody::runtime::System for Satellite {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Satellite {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 7], v: &[f64; 6], p: &mut [f64; 6]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Satellite {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {

@@ -9997,6 +9997,14 @@ impl ::multibody::runtime::System for Solo12 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Solo12 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Solo12 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 19], p: &[f64; 18]) -> (f64, f64) {

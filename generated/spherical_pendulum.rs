@@ -2275,6 +2275,14 @@ impl ::multibody::runtime::System for SphericalPendulum {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for SphericalPendulum {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 5], v: &[f64; 4], p: &mut [f64; 4]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for SphericalPendulum {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 5], p: &[f64; 4]) -> (f64, f64) {

@@ -5219,6 +5219,14 @@ impl ::multibody::runtime::System for Arm7 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Arm7 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 7], v: &[f64; 7], p: &mut [f64; 7]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Arm7 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 7]) -> (f64, f64) {

@@ -7166,6 +7166,14 @@ impl ::multibody::runtime::System for Chain10 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain10 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain10 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 10], p: &[f64; 10]) -> (f64, f64) {

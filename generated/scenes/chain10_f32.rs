@@ -7166,6 +7166,14 @@ impl ::multibody::runtime::System for Chain10F32 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain10F32 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f32; 10], v: &[f32; 10], p: &mut [f32; 10]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain10F32 {
     #[inline]
     fn state_energy(&mut self, q: &[f32; 10], p: &[f32; 10]) -> (f32, f32) {

@@ -7548,6 +7548,14 @@ impl ::multibody::runtime::System for Chain10Friction {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain10Friction {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain10Friction {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 10], p: &[f64; 10]) -> (f64, f64) {

@@ -1728,6 +1728,14 @@ impl ::multibody::runtime::System for Chain50Friction {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Chain50Friction {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 50], v: &[f64; 50], p: &mut [f64; 50]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain50Friction {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 50], p: &[f64; 50]) -> (f64, f64) {

@@ -658,6 +658,14 @@ impl ::multibody::runtime::System for DoublePendulum {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for DoublePendulum {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 2], v: &[f64; 2], p: &mut [f64; 2]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for DoublePendulum {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 2], p: &[f64; 2]) -> (f64, f64) {

@@ -658,6 +658,14 @@ impl ::multibody::runtime::System for DoublePendulumF32 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for DoublePendulumF32 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f32; 2], v: &[f32; 2], p: &mut [f32; 2]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for DoublePendulumF32 {
     #[inline]
     fn state_energy(&mut self, q: &[f32; 2], p: &[f32; 2]) -> (f32, f32) {

@@ -5523,6 +5523,14 @@ impl ::multibody::runtime::System for PandaArm {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for PandaArm {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 7], v: &[f64; 7], p: &mut [f64; 7]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for PandaArm {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 7]) -> (f64, f64) {

@@ -5523,6 +5523,14 @@ impl ::multibody::runtime::System for PandaArmF32 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for PandaArmF32 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f32; 7], v: &[f32; 7], p: &mut [f32; 7]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for PandaArmF32 {
     #[inline]
     fn state_energy(&mut self, q: &[f32; 7], p: &[f32; 7]) -> (f32, f32) {

@@ -8555,6 +8555,14 @@ impl ::multibody::runtime::System for Quadruped {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Quadruped {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Quadruped {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 19], p: &[f64; 18]) -> (f64, f64) {

@@ -620,6 +620,14 @@ impl ::multibody::runtime::System for Rotor {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Rotor {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 4], v: &[f64; 3], p: &mut [f64; 3]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Rotor {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 4], p: &[f64; 3]) -> (f64, f64) {

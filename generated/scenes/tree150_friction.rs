@@ -18099,6 +18099,14 @@ impl ::multibody::runtime::System for Tree150Friction {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Tree150Friction {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 150], v: &[f64; 150], p: &mut [f64; 150]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Tree150Friction {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 150], p: &[f64; 150]) -> (f64, f64) {

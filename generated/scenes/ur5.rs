@@ -2870,6 +2870,14 @@ impl ::multibody::runtime::System for Ur5 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Ur5 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Ur5 {
     #[inline]
     fn state_energy(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {

@@ -2870,6 +2870,14 @@ impl ::multibody::runtime::System for Ur5F32 {
 }
 
 #[rustfmt::skip]
+impl ::multibody::runtime::Conjugate for Ur5F32 {
+    #[inline]
+    fn state_momenta(&mut self, q: &[f32; 6], v: &[f32; 6], p: &mut [f32; 6]) {
+        Self::momenta(self, q, v, p);
+    }
+}
+
+#[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Ur5F32 {
     #[inline]
     fn state_energy(&mut self, q: &[f32; 6], p: &[f32; 6]) -> (f32, f32) {

@@ -1,6 +1,8 @@
 //! The command line. Every command takes its arguments and a writer, and returns what went wrong.
 
 mod args;
+#[cfg(feature = "bench")]
+mod bench;
 mod check;
 mod count;
 mod eval;
@@ -79,5 +81,12 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Eval(a)) => eval::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
+        #[cfg(feature = "bench")]
+        Some(Command::Bench(a)) => bench::run(&a, out),
+        #[cfg(not(feature = "bench"))]
+        Some(Command::Bench(_)) => Err(Failure::new(
+            "this build leaves out the generated code that the benches run",
+            "from a checkout: cargo run --release --features bench -- bench ...",
+        )),
     }
 }

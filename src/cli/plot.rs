@@ -16,7 +16,7 @@ pub struct Panel {
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// The backend rounds to whole units: drawn so much larger than shown, lines are smooth.
-const SCALE: u32 = 3;
+pub const SCALE: u32 = 3;
 const WIDTH: u32 = 1100 * SCALE;
 /// Width of the legend.
 const LEGEND: u32 = 210 * SCALE;
@@ -41,7 +41,7 @@ pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
 }
 
 /// The picture at the size it is shown; what is drawn keeps its units by the `viewBox`.
-fn shrunk(text: &str) -> String {
+pub fn shrunk(text: &str) -> String {
     let number = |key: &str| {
         let value = text.split(key).nth(1).and_then(|rest| rest.split('"').next());
         value.and_then(|v| v.parse::<u32>().ok()).map(|v| (format!("{key}{v}\""), format!("{key}{}\"", v / SCALE)))
@@ -76,7 +76,7 @@ fn draw(
 }
 
 /// Colours far apart, in the order of the lines; the lightness alternates so that neighbours differ in print too.
-fn colour(k: usize) -> HSLColor {
+pub fn colour(k: usize) -> HSLColor {
     let hue = (0.61 + k as f64 * 0.381_966) % 1.0;
     HSLColor(hue, 0.75, [0.42, 0.3, 0.55][k % 3])
 }

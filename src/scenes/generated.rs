@@ -14,7 +14,7 @@ pub trait Visit<S> {
     /// What comes of it.
     type Out;
     /// Does it.
-    fn visit<Y: Dynamics<Scalar = S>>(self, system: Y) -> Self::Out;
+    fn visit<Y: Dynamics<Scalar = S> + 'static>(self, system: Y) -> Self::Out;
 }
 
 /// The same where derivatives are needed.
@@ -22,7 +22,7 @@ pub trait VisitDifferentiable<S> {
     /// What comes of it.
     type Out;
     /// Does it.
-    fn visit<Y: Dynamics<Scalar = S> + Differentiable>(self, system: Y) -> Self::Out;
+    fn visit<Y: Dynamics<Scalar = S> + Differentiable + 'static>(self, system: Y) -> Self::Out;
 }
 
 /// One number type: its types with derivatives, then those without, each with the scenes it belongs to.

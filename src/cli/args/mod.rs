@@ -1,5 +1,7 @@
 //! Arguments of all commands, and the help that teaches them.
 
+#[cfg_attr(not(feature = "bench"), allow(dead_code))]
+pub mod bench;
 mod values;
 
 use std::path::PathBuf;
@@ -55,6 +57,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Show what the generator made of a model on the way
     Explain(ExplainArgs),
+    /// Measure integrators: work against error, long runs, stress
+    Bench(bench::BenchArgs),
 }
 
 /// How the file is read.

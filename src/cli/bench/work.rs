@@ -1,0 +1,223 @@
+//! Work against error.
+
+use multibody::runtime::integrate::catalogue::{self, Entry, Start};
+use multibody::runtime::wide::Wide;
+use multibody::runtime::{AccelerationForm, Differentiable, Energetic, Real};
+use multibody::scenes::generated::{visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable};
+use multibody::scenes::{Dynamics, Expect, Scene};
+
+use super::erased::Erased;
+use super::sample::{end_error, measure, run, step, Maker, Sample};
+use crate::cli::output::note;
+
+/// How a scene is run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variant {
+    /// Generated code in canonical form, f64.
+    Hamilton,
+    /// Generated code in acceleration form, f64.
+    Acceleration,
+    /// The interpreter, f64.
+    Interpreted,
+    /// Generated code in canonical form, f32, sums compensated.
+    Single,
+}
+
+impl Variant {
+    /// All.
+    pub const ALL: [Variant; 4] = [Variant::Hamilton, Variant::Acceleration, Variant::Interpreted, Variant::Single];
+
+    /// As tables name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Variant::Hamilton => "generated",
+            Variant::Acceleration => "generated, accelerations",
+            Variant::Interpreted => "interpreted",
+            Variant::Single => "generated, f32",
+        }
+    }
+
+    /// Whether a method is run in it: all in the first, and of the explicit ones a choice in the others.
+    fn runs(self, method: &Entry) -> bool {
+        let few = ["rk4", "dop853", "verner9"];
+        match self {
+            Variant::Hamilton => true,
+            Variant::Acceleration | Variant::Interpreted => few.contains(&method.name),
+            Variant::Single => !method.implicit && method.name != "verner9",
+        }
+    }
+}
+
+/// State at the end that others are compared with.
+pub struct Reference {
+    /// Coordinates.
+    pub q: Vec<f64>,
+    /// How far two computations of it are apart.
+    pub error: f64,
+    /// How it was computed.
+    pub how: &'static str,
+}
+
+/// Makes the boxed system of a scene from its generated type.
+struct Boxed<'a>(&'a Scene);
+
+impl<S: Real + 'static> Visit<S> for Boxed<'_> {
+    type Out = Erased<S>;
+    fn visit<Y: Dynamics<Scalar = S> + 'static>(self, system: Y) -> Erased<S> {
+        Erased::new(self.0, system)
+    }
+}
+
+/// Adds generated derivatives to a boxed system.
+struct Derived<S: Real>(Erased<S>);
+
+impl<S: Real + 'static> VisitDifferentiable<S> for Derived<S> {
+    type Out = Erased<S>;
+    fn visit<Y: Dynamics<Scalar = S> + Differentiable + 'static>(self, system: Y) -> Erased<S> {
+        self.0.with_derivatives(system)
+    }
+}
+
+/// Generated code of a scene, or the interpreter where there is none.
+pub fn generated(scene: &Scene) -> (Erased<f64>, bool) {
+    match visit_f64(scene.name, Boxed(scene)) {
+        None => (Erased::interpreted(scene), false),
+        Some(plain) => {
+            let (again, _) = (visit_f64(scene.name, Boxed(scene)), ());
+            let smooth = visit_differentiable_f64(scene.name, Derived(plain));
+            (smooth.or(again).unwrap_or_else(|| Erased::interpreted(scene)), true)
+        }
+    }
+}
+
+/// Scenes of at most so many freedoms have a reference in double-double numbers.
+const WIDE: usize = 14;
+
+/// A state at the end that is right to far more digits than what is compared with it, where that can be had in seconds.
+pub fn reference(scene: &Scene) -> Option<Reference> {
+    let solve = |system: &mut Erased<f64>, method: &str| -> Option<Vec<f64>> {
+        let (q, p) = scene.start(system);
+        let start = Start { q: &q, p: &p, step: step(method, 1e-14, false), compensated: true };
+        let make: &Maker<Erased<f64>> = &|s, start| catalogue::explicit(method, s, start);
+        let run = run(system, make, &start, scene.t_end)?.ok()?;
+        run.failure.is_none().then_some(run.q)
+    };
+    let (mut system, _) = generated(scene);
+    let quick = solve(&mut system, "verner9")?;
+    if scene.v.len() <= WIDE && scene.name != "stiff_spring" {
+        let mut system = scene.interpreter::<Wide>();
+        let (q, p) = scene.start(&mut system);
+        let end = |tolerance: f64, system: &mut multibody::runtime::Interpreter<Wide>| {
+            let start = Start { q: &q, p: &p, step: step("verner9", tolerance, false), compensated: false };
+            let make: &Maker<multibody::runtime::Interpreter<Wide>> =
+                &|s, start| catalogue::explicit("verner9", s, start);
+            let run = run(system, make, &start, scene.t_end)?.ok()?;
+            run.failure.is_none().then(|| run.q.iter().map(|x| x.to_f64()).collect::<Vec<f64>>())
+        };
+        let (coarse, fine) = (end(1e-16, &mut system)?, end(1e-18, &mut system)?);
+        return Some(Reference { error: end_error(&coarse, &fine), q: fine, how: "double-double, Verner 9, 1e-18" });
+    }
+    let other = solve(&mut system, "dop853")?;
+    Some(Reference { error: end_error(&quick, &other), q: quick, how: "f64, Verner 9 and DOP853, 1e-14" })
+}
+
+/// Time after which a series of ever finer runs ends, s.
+const LONGEST: f64 = 0.6;
+
+/// One method at all its settings.
+fn series<Y>(
+    system: &mut Y,
+    make: &Maker<'_, Y>,
+    scene: &Scene,
+    state: (&Y::Coordinates, &Y::Momenta),
+    reference: &Reference,
+    (variant, method): (Variant, &Entry),
+) -> Vec<Sample>
+where
+    Y: Energetic,
+    Y::Scalar: Real,
+{
+    let single = variant == Variant::Single;
+    let settings: Vec<f64> = match (method.adaptive, single) {
+        (true, false) => (3..=13).map(|k| 10.0_f64.powi(-k)).collect(),
+        (true, true) => (2..=6).map(|k| 10.0_f64.powi(-k)).collect(),
+        (false, _) => (0..22).map(|k| scene.rk4_step * 8.0 * 0.5_f64.powi(k)).collect(),
+    };
+    let mut samples: Vec<Sample> = Vec::new();
+    for setting in settings {
+        let start = Start { q: state.0, p: state.1, step: step(method.name, setting, false), compensated: single };
+        let sample = Sample {
+            tool: "multibody".into(),
+            variant: variant.name().into(),
+            scene: scene.name.into(),
+            method: method.name.into(),
+            setting,
+            ..Sample::default()
+        };
+        let Some(mut sample) = measure(system, make, &start, scene.t_end, &reference.q, sample) else { break };
+        if !scene.conservative {
+            sample.energy_error = None;
+        }
+        let (slow, failed) = (sample.cpu_s > LONGEST, sample.failure.is_some());
+        let error = sample.end_error.unwrap_or(f64::INFINITY);
+        samples.push(sample);
+        // Finer steps of an explicit method on a stiff scene come through where coarse ones do not.
+        if slow || (failed && method.adaptive) || error < 1e-13 {
+            break;
+        }
+    }
+    samples
+}
+
+/// All runs of a scene.
+pub fn scene(scene: &Scene, variants: &[Variant], methods: &[String]) -> (Option<Reference>, Vec<Sample>) {
+    if scene.expect == Expect::Stops {
+        return (None, Vec::new());
+    }
+    note(format_args!("{}: reference", scene.name));
+    let Some(reference) = reference(scene) else { return (None, Vec::new()) };
+    let mut samples = Vec::new();
+    for &variant in variants {
+        let chosen =
+            |e: &&'static Entry| variant.runs(e) && (methods.is_empty() || methods.iter().any(|m| m == e.name));
+        for entry in catalogue::entries().filter(chosen) {
+            note(format_args!("{}: {}, {}", scene.name, variant.name(), entry.name));
+            samples.extend(one(scene, &reference, variant, entry));
+        }
+    }
+    (Some(reference), samples)
+}
+
+fn one(scene: &Scene, reference: &Reference, variant: Variant, entry: &Entry) -> Vec<Sample> {
+    let with = (variant, entry);
+    match variant {
+        Variant::Hamilton | Variant::Interpreted => {
+            let (mut system, code) = match variant {
+                Variant::Hamilton => generated(scene),
+                _ => (Erased::interpreted(scene), true),
+            };
+            if !code {
+                return Vec::new();
+            }
+            let (q, p) = scene.start(&mut system);
+            let make: &Maker<Erased<f64>> = &|s, start| catalogue::any(entry.name, s, start);
+            series(&mut system, make, scene, (&q, &p), reference, with)
+        }
+        Variant::Acceleration => {
+            let (inner, code) = generated(scene);
+            if !code {
+                return Vec::new();
+            }
+            let mut system = AccelerationForm::new(inner);
+            let (q, v) = (scene.q.clone(), scene.v.clone());
+            let make: &Maker<AccelerationForm<Erased<f64>>> = &|s, start| catalogue::explicit(entry.name, s, start);
+            series(&mut system, make, scene, (&q, &v), reference, with)
+        }
+        Variant::Single => {
+            let Some(mut system) = visit_f32(scene.name, Boxed(scene)) else { return Vec::new() };
+            let (q, p) = scene.start(&mut system);
+            let make: &Maker<Erased<f32>> = &|s, start| catalogue::explicit(entry.name, s, start);
+            series(&mut system, make, scene, (&q, &p), reference, with)
+        }
+    }
+}
