@@ -5,7 +5,7 @@ mod wide;
 
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::integrate::{Dop853, Stepper, Verner9};
+use mbd_runtime::integrate::{Dop853, Point, Rk4, Stepper, Tsit5, Verner9};
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{Interpreter, Real, Scalar};
 use mbd_testing::random::{random_model, Knobs};
@@ -169,4 +169,35 @@ fn methods_converge_far_below_doubles() {
     });
     assert!((nine.0 - 9.0).abs() < 0.25 && (eight.0 - 8.0).abs() < 0.25, "{nine:?} {eight:?}");
     assert!(nine.1 < 1e-24 && eight.1 < 1e-21, "{nine:?} {eight:?}");
+}
+
+/// Points within a step against a step that ends there: the difference falls with the order of the interpolant and one.
+#[test]
+fn points_within_a_step_have_their_order() {
+    fn order(scene: &Scene, mut method: impl Stepper<Interpreter<Number>>) -> f64 {
+        let mut i = scene.i.clone();
+        let [coarse, fine] = [256.0, 512.0].map(|steps| {
+            let (t, h) = (Number::zero(), Number::constant(1.0 / steps));
+            let (mut off, mut within) = (0.0_f64, Point::zero(&i));
+            for theta in [0.25, 0.5, 0.875].map(Number::constant) {
+                method.begin(&mut i, t, &scene.q, &scene.p).unwrap();
+                method.attempt(&mut i, t, h, None).unwrap();
+                method.interpolate(&mut i, t, h, theta, &mut within);
+                method.attempt(&mut i, t, theta * h, None).unwrap();
+                off = off.max(self::off(&within.x, &method.parts().1.x));
+            }
+            off
+        });
+        (coarse / fine).log2()
+    }
+    let scene = Scene::all().swap_remove(0);
+    let i = &scene.i;
+    let orders = [
+        (4.0, order(&scene, Rk4::new(i))),
+        (5.0, order(&scene, Tsit5::new(i))),
+        (8.0, order(&scene, Dop853::new(i))),
+        (9.0, order(&scene, Verner9::new(i))),
+    ];
+    println!("{orders:?}");
+    assert!(orders.iter().all(|(right, found)| (found - right).abs() < 0.2), "{orders:?}");
 }
