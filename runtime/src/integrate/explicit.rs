@@ -148,15 +148,24 @@ where
         }
     }
 
+    /// The rates that rows of dense output are over. The last stage may be the rate at the end; then it stands once, and
+    /// may not have been evaluated as a stage.
+    fn rates_of_rows<'a>(
+        k: &'a [Point<Y>; S],
+        end: &'a Point<Y>,
+        extra: &'a [Point<Y>],
+    ) -> impl Iterator<Item = &'a Point<Y>> {
+        k[..S - usize::from(T::TABLEAU.fsal)].iter().chain([end]).chain(extra)
+    }
+
     /// Extra stages of dense output.
     fn extend(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, dense: &Dense) {
         self.end_rate(system, t, h);
         for (i, (c, row)) in dense.c.iter().zip(dense.a).enumerate().take(X) {
             self.stage.clear();
             let (known, rest) = self.extra.split_at_mut(i);
-            // If the method's last stage is the end rate, it stands once in the rows.
-            let end = (!T::TABLEAU.fsal).then_some(&self.end);
-            for (w, k) in row.iter().zip(self.k.iter().chain(end).chain(known.iter())) {
+            let rates = Self::rates_of_rows(&self.k, &self.end, known);
+            for (w, k) in row.iter().zip(rates) {
                 self.stage.add(w.get(), k);
             }
             self.stage.scale(h);
@@ -248,8 +257,8 @@ where
         if !self.extra_known {
             self.extend(system, t, h, dense);
         }
-        let end = (!T::TABLEAU.fsal).then_some(&self.end);
-        for (i, (row, k)) in dense.bend.iter().zip(self.k.iter().chain(end).chain(&self.extra)).enumerate() {
+        let rates = Self::rates_of_rows(&self.k, &self.end, &self.extra);
+        for (i, (row, k)) in dense.bend.iter().zip(rates).enumerate() {
             if !row.is_empty() {
                 out.add(h * dense.weight(i, theta), k);
             }
