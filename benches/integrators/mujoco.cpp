@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
-#include <memory>
 #include <stdexcept>
 
 #include "scenes.hpp"

@@ -5,8 +5,6 @@
 #include <pinocchio/algorithm/aba.hpp>
 
 #include <cstdlib>
-#include <cstring>
-#include <memory>
 
 #include "../rivals/theirs/model.hpp"
 #include "dop853.hpp"

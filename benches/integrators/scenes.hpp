@@ -2,6 +2,7 @@
 #pragma once
 #include <time.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <limits>

@@ -1,13 +1,18 @@
 """The scenes of the work-precision bench: `python scenes.py WORK`.
 
-Writes for each what Pinocchio is built from (`NAME.model`, plain numbers, as benches/rivals), a URDF for MuJoCo and Drake
-(`NAME.urdf`), and `scenes.txt`: name, end time, number of joints, start q, start v.
+Writes for each what Pinocchio is built from (`NAME.model`, plain numbers, as in benches/rivals), the same as a URDF for MuJoCo,
+Drake and the project (`NAME.urdf`), and `scenes.txt`: name, end time, number of joints, start q, start v.
+
+The URDF holds what Pinocchio's reader makes of the model: a body a joint, fixed ones merged into it, since not every reader
+does that. Nothing damps, limits, or drives; angles next to right ones are right ones, as the generator takes them.
 """
 
 import math
 import pathlib
-import re
 import sys
+
+import numpy as np
+import pinocchio as pin
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -16,11 +21,8 @@ sys.path[:0] = [str(ROOT / "benches" / "rivals"), str(ROOT / "tests" / "referenc
 import models  # noqa: E402
 import urdf_model  # noqa: E402
 
-# Name, file, seconds simulated. The motions are chaotic (README.md): no longer than doubles can follow to 1e-11.
+# Name, file, seconds simulated. The motions are chaotic (README.md): no longer than doubles can follow to 1e-12.
 SCENES = [("ur5", "models/ur5.urdf", 5.0), ("panda_arm", "models/panda_arm.urdf", 1.0)]
-
-# Read by MuJoCo only: inertias stay as they are written.
-MUJOCO = '<mujoco><compiler fusestatic="true" balanceinertia="false" boundmass="0" boundinertia="0"/></mujoco>'
 
 
 def start(n):
@@ -28,31 +30,46 @@ def start(n):
     return [0.3 if i % 2 == 0 else -0.3 for i in range(n)], [0.5] * n
 
 
-def angles(match):
-    """Right angles as the generator takes them: a decimal π/2 is one."""
-    def snap(word):
-        x = float(word)
-        turns = round(x / (math.pi / 2))
-        return repr(turns * math.pi / 2) if abs(x - turns * math.pi / 2) < models.SNAP else word
-    return 'rpy="' + " ".join(snap(w) for w in match.group(1).split()) + '"'
+def angles(rotation):
+    """Roll, pitch, yaw."""
+    quarter = math.pi / 2
+    found = pin.rpy.matrixToRpy(models.snapped(rotation))
+    return [round(x / quarter) * quarter if abs(x - round(x / quarter) * quarter) < models.SNAP else x for x in found]
 
 
-def plain(text):
-    """The mechanism alone: nothing damps, nothing limits."""
-    text = re.sub(r"<(limit|dynamics)\b[^>]*/>", "", text)
-    text = text.replace('type="revolute"', 'type="continuous"')
-    text = re.sub(r'rpy="([^"]*)"', angles, text)
-    return text.replace("</robot>", MUJOCO + "\n</robot>")
+def urdf(name, model):
+    parts = [f'<robot name="{name}">', '<link name="world"/>']
+    for i in range(1, model.njoints):
+        _, axis = models.kind(model.joints[i])
+        place, body = model.jointPlacements[i], model.inertias[i]
+        assert model.armature[model.joints[i].idx_v] == 0
+        inertia = models.cleaned(body.inertia)
+        entries = " ".join(f'i{"xyz"[a]}{"xyz"[b]}="{float(inertia[a, b])!r}"' for a, b in zip(*np.triu_indices(3)))
+        parent = f"body{model.parents[i]}" if model.parents[i] else "world"
+        parts.append(f"""<link name="body{i}">
+  <inertial>
+    <origin xyz="{models.numbers(models.cleaned(body.lever))}" rpy="0 0 0"/>
+    <mass value="{float(body.mass)!r}"/>
+    <inertia {entries}/>
+  </inertial>
+</link>
+<joint name="{model.names[i]}" type="continuous">
+  <parent link="{parent}"/>
+  <child link="body{i}"/>
+  <origin xyz="{models.numbers(place.translation)}" rpy="{models.numbers(angles(place.rotation))}"/>
+  <axis xyz="{models.numbers(axis)}"/>
+</joint>""")
+    return "\n".join([*parts, "</robot>"]) + "\n"
 
 
 def main(folder):
     folder.mkdir(parents=True, exist_ok=True)
     lines = []
     for name, file, end in SCENES:
-        system = urdf_model.load(ROOT, file)
-        (folder / f"{name}.model").write_text(models.flat(name, system.model))
-        (folder / f"{name}.urdf").write_text(plain((ROOT / file).read_text()))
-        q, v = start(system.model.nv)
+        model = urdf_model.load(ROOT, file).model
+        (folder / f"{name}.model").write_text(models.flat(name, model))
+        (folder / f"{name}.urdf").write_text(urdf(name, model))
+        q, v = start(model.nv)
         lines.append(f"{name} {end!r} {len(q)} {models.numbers(q)} {models.numbers(v)}")
     (folder / "scenes.txt").write_text("\n".join(lines) + "\n")
 
