@@ -16,7 +16,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
 # Name and least accuracy, as a power of ten.
 SCHEMES = {"runge_kutta3": 11, "bogacki_shampine3": 10, "runge_kutta5": 15}
-# Longest step, s: Drake's own default. With the whole time as the longest, runge_kutta5 never ends.
+# Longest step, s: Drake's own default. With the whole time as the longest, runge_kutta5 did not come back within minutes.
 LONGEST = 0.1
 # s for one setting
 BUDGET = 4.0
