@@ -16,7 +16,7 @@ macro_rules! file {
 }
 
 /// All of them, in the order of reports.
-pub(super) static SCENES: [Entry; 20] = [
+pub(super) static SCENES: [Entry; 21] = [
     Entry {
         name: "double_pendulum",
         title: "double pendulum, regular",
@@ -52,7 +52,7 @@ pub(super) static SCENES: [Entry; 20] = [
         title: "Panda arm swinging freely",
         model: file!("panda_arm.urdf", undamped, Base::Fixed),
         start: |m| swing(m, 0.5),
-        t_end: 2.0,
+        t_end: 1.0,
         rk4_step: 0.002,
         conservative: true,
         expect: Expect::Runs,
@@ -204,6 +204,16 @@ pub(super) static SCENES: [Entry; 20] = [
         start: |_| (vec![0.0, std::f64::consts::FRAC_PI_2 - 0.5], vec![0.01, 0.0]),
         t_end: 2.0,
         rk4_step: 1e-4,
+        conservative: true,
+        expect: Expect::Runs,
+    },
+    Entry {
+        name: "mujoco2896",
+        title: "two joints of MuJoCo issue 2896",
+        model: file!("mujoco2896.toml"),
+        start: |_| (vec![0.0, 0.0, 0.0, 0.0, 1.0], vec![0.0; 4]),
+        t_end: 5.0,
+        rk4_step: 0.002,
         conservative: true,
         expect: Expect::Runs,
     },

@@ -19,8 +19,8 @@ pub struct Sample {
     pub scene: String,
     /// Method.
     pub method: String,
-    /// Tolerance of adaptive methods, step (s) of others.
-    pub setting: f64,
+    /// Tolerance of adaptive methods, step (s) of others, as text.
+    pub setting: String,
     /// Time of the processor, s: the least of some runs.
     pub cpu_s: f64,
     /// Evaluations of the rates.
@@ -74,7 +74,12 @@ pub struct Run<Y: System> {
 }
 
 /// Runs from zero to `t_end` once.
-pub fn run<Y>(system: &mut Y, make: &Maker<'_, Y>, start: &Start<'_, Y>, t_end: f64) -> Option<Result<Run<Y>, StepError>>
+pub fn run<Y>(
+    system: &mut Y,
+    make: &Maker<'_, Y>,
+    start: &Start<'_, Y>,
+    t_end: f64,
+) -> Option<Result<Run<Y>, StepError>>
 where
     Y: System,
     Y::Scalar: Real,

@@ -151,7 +151,7 @@ where
             variant: variant.name().into(),
             scene: scene.name.into(),
             method: method.name.into(),
-            setting,
+            setting: format!("{}{setting:.3e}", if method.adaptive { "tol=" } else { "h=" }),
             ..Sample::default()
         };
         let Some(mut sample) = measure(system, make, &start, scene.t_end, &reference.q, sample) else { break };
