@@ -195,6 +195,7 @@ fn explains() {
 #[test]
 fn committed_code_is_fresh() {
     good(run(&["check", "--generated"]));
+    good(run(&["check", "--generated", "generated/scenes"]));
 }
 
 #[test]
@@ -225,6 +226,13 @@ fn stale_code_is_found_and_mended() {
     std::fs::remove_file(folder.join("stray.rs")).expect("removed");
     write(&folder, "manifest.toml", &manifest.replace("[\"rates\"]", "[\"rate\"]"));
     bad(run_in(&root, &["check", "--generated"]), &["`pendulum.rs`: `rate` is no output"]);
+    let scene = |key: &str| manifest.replace("model = \"../models/double_pendulum.toml\"", key);
+    write(&folder, "manifest.toml", &scene("scene = \"no_scene\""));
+    bad(run_in(&root, &["check", "--generated"]), &["`pendulum.rs`: `no_scene` is no scene"]);
+    write(&folder, "manifest.toml", &scene("scene = \"rotor\"\nbase = \"floating\""));
+    bad(run_in(&root, &["check", "--generated"]), &["`pendulum.rs`: a scene has its base and its gravity"]);
+    write(&folder, "manifest.toml", &scene(""));
+    bad(run_in(&root, &["check", "--generated"]), &["`pendulum.rs`: it needs one of `model` and `scene`"]);
     write(&folder, "manifest.toml", &manifest.replace("outputs", "outptus"));
     bad(run_in(&root, &["check", "--generated"]), &["manifest.toml:5:1: error: unknown field `outptus`"]);
 }

@@ -94,8 +94,8 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str =
-    "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps `base`, \
-                    `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
+    "a manifest has `runtime` and [[file]] tables with `file`, `model` (or `scene`), `type`, `outputs`, and perhaps \
+                    `base`, `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// What a file should hold.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
