@@ -8,6 +8,7 @@
 pub mod catalogue;
 pub mod chart;
 mod composition;
+mod collocation;
 pub(crate) mod constant;
 mod doubled;
 mod doubling;
@@ -16,12 +17,24 @@ mod explicit;
 mod field;
 mod group;
 mod semi_implicit;
+#[cfg(test)]
+mod implicit_tests;
+mod jacobian;
+mod linear;
+mod newton;
+mod rosenbrock;
+#[cfg(test)]
+mod scenes;
 mod solver;
 mod stepper;
 pub mod tableau;
 
 pub use chart::{Chart, Point};
 pub use composition::{Composition, Symmetric};
+pub use collocation::{
+    formula, BackwardEuler, Collocation, Formula, Gauss12, Gauss12Inserted, Gauss4, Gauss6, Gauss6Inserted,
+    ImplicitMidpoint, Radau5,
+};
 pub use constant::{decimal, ratio, Constant};
 pub use doubled::Doubled;
 pub use doubling::StepDoubling;
@@ -29,5 +42,7 @@ pub use error::StepError;
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
 pub use semi_implicit::SemiImplicitEuler;
+pub use newton::{FixedPoint, Iteration, Newton};
+pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};
