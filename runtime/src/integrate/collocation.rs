@@ -72,10 +72,10 @@ const RADAU5_ERROR: [Constant; 3] = super::constant::list(
 
 /// Part of the allowed error that the iteration may leave.
 const PART: f64 = 0.01;
-/// Round-off, in epsilons of the state, down to which a step of given size is iterated, and that an iteration which
-/// no longer converges may leave.
+/// Round-off, in epsilons of the state, down to which a step of given size is iterated, and at which a single change that is
+/// not smaller than the one before ends it.
 const FLOOR: f64 = 0.25;
-const STUCK: f64 = 64.0;
+const STUCK: f64 = 16.0;
 /// Derivatives are used for another step if the iteration contracted as well as this with them.
 const KEEP: f64 = 0.02;
 
@@ -309,35 +309,40 @@ where
         scale: Option<&Point<Y>>,
     ) -> Result<(), StepError> {
         self.weigh(system, scale);
-        self.eta = libm::pow(self.eta.max(f64::EPSILON), 0.8);
+        // One good contraction says little about the next step's, and with insertion about the next iteration's.
+        let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
+        self.eta = libm::pow(self.eta, 0.8).max(least);
         let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
         self.theta = 0.0;
-        for k in 1..=I::LIMIT {
+        let limit = I::LIMITS[usize::from(scale.is_some())];
+        for k in 1..=limit {
             self.iterate(system, t, h);
             let sum = self.r.iter().map(|r| norm(r, &self.weight)).fold(0.0, |sum, x| sum + x * x);
             change = libm::sqrt(sum / S as f64);
             if k > 1 {
                 let theta = change / last;
+                // Two at a time: what insertion changes in coordinates it changes in momenta one iteration later.
                 self.theta = if k == 2 { theta } else { libm::sqrt(theta * self.theta) };
-                if theta < 1.0 {
-                    self.eta = theta / (1.0 - theta);
-                } else {
-                    // No further: at round-off that is the solution.
-                    if scale.is_none() && change <= STUCK / FLOOR {
-                        return Ok(());
-                    }
-                    grown += 1;
+                let slowest = theta.max(self.theta);
+                if slowest < 1.0 {
+                    self.eta = (slowest / (1.0 - slowest)).max(if I::DERIVATIVES { 0.0 } else { least });
                 }
+                grown = if theta < 1.0 { 0 } else { grown + 1 };
             }
             if self.eta * change <= 1.0 || change == 0.0 {
                 return Ok(());
             }
-            if !change.is_finite() || grown > 1 {
+            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell.
+            let noise = if grown > 2 { libm::pow(Y::Scalar::epsilon(), 0.3) } else { 1.0 / STUCK };
+            if scale.is_none() && grown > 0 && noise * FLOOR * change <= 1.0 {
+                return Ok(());
+            }
+            if !change.is_finite() || grown > 2 {
                 return Err(self.failure(t, h, k, change));
             }
             last = change;
         }
-        Err(self.failure(t, h, I::LIMIT, change))
+        Err(self.failure(t, h, limit, change))
     }
 
     fn failure(&mut self, t: Y::Scalar, h: Y::Scalar, iterations: u32, change: f64) -> StepError {

@@ -8,8 +8,8 @@ use crate::system::{Differentiable, Real, System};
 
 /// What improves the displacements `z_i` of a collocation method's stages, `z_i = h Σ_j a_ij f(z_j)`.
 pub trait Iteration<Y: System, const S: usize> {
-    /// Iterations after which it is given up.
-    const LIMIT: u32;
+    /// Iterations after which a step of given size is given up, and one that may be chosen smaller.
+    const LIMITS: [u32; 2];
     /// Whether derivatives are used.
     const DERIVATIVES: bool;
 
@@ -37,7 +37,7 @@ pub trait Iteration<Y: System, const S: usize> {
 pub struct FixedPoint;
 
 impl<Y: System, const S: usize> Iteration<Y, S> for FixedPoint {
-    const LIMIT: u32 = 60;
+    const LIMITS: [u32; 2] = [60, 20];
     const DERIVATIVES: bool = false;
 
     fn new(_: &Y, _: &'static [Mode<S>]) -> Self {
@@ -116,7 +116,7 @@ where
     Y: Differentiable,
     Y::Scalar: Real,
 {
-    const LIMIT: u32 = 12;
+    const LIMITS: [u32; 2] = [30, 10];
     const DERIVATIVES: bool = true;
 
     fn new(system: &Y, modes: &'static [Mode<S>]) -> Self {
