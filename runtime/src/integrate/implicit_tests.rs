@@ -154,7 +154,7 @@ fn orders_by_halving_the_step() {
     order("Gauss 6 inserted", 6.0, [0.03; 3], Gauss6Inserted::new);
     order("Radau 5", 5.0, [0.02; 3], Radau5::new);
     order("Rodas5P", 5.0, [0.02; 3], Rodas5P::new);
-    order("Gauss 12", 12.0, [0.11, 0.2, 0.17], Gauss12::new);
+    order("Gauss 12", 12.0, [0.11, 0.14, 0.15], Gauss12::new);
 }
 
 #[test]
