@@ -417,19 +417,6 @@ where
     }
 }
 
-/// Rewrites a point of a step, both halves, about the state at its end.
-fn behind<Y: System>(system: &Y, delta: &Point<Y>, point: &mut Point<Y>, work: &mut Point<Y>)
-where
-    Y::Scalar: Real,
-{
-    // Momenta are moved to another point of reference as their rates are.
-    work.copy_from(point);
-    work.add(-Y::Scalar::one(), delta);
-    work.x.as_mut().fill(Y::Scalar::zero());
-    Chart::follow(system, delta, point, work);
-    point.p.as_mut().copy_from_slice(work.p.as_ref());
-}
-
 /// Weights at `θ` of the values at the nodes `c`, and of that at 0, in the polynomial through all of them.
 fn polynomial<N: Real, const S: usize>(c: &[N; S], theta: N) -> ([N; S], N) {
     let mut weights = [N::one(); S];
@@ -510,10 +497,10 @@ where
         self.field.advance(system, t, &self.delta)?;
         for (past, z) in self.past.iter_mut().zip(&self.z) {
             past.copy_from(z);
-            behind(system, &self.delta, past, &mut self.weight);
+            Chart::relative(system, &self.delta, past);
         }
         self.origin.clear();
-        behind(system, &self.delta, &mut self.origin, &mut self.weight);
+        Chart::relative(system, &self.delta, &mut self.origin);
         self.past_h = h;
         if self.end_known {
             self.first.copy_from(&self.end);

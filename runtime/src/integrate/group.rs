@@ -186,7 +186,7 @@ impl Group {
     }
 
     /// Appends the displacement `(step, dp)` to `(x, p)`: what addition alone would get wrong.
-    pub(super) fn compose<S: Real>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
+    pub(super) fn compose<S: Scalar>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
         if self.momenta && self.kind != GroupKind::Rotation {
             // About the point where the first of both begins.
             let (linear, angular) = self.split(p);
@@ -200,7 +200,7 @@ impl Group {
 
     /// Takes the displacement `step` off the front of `(x, p)`, of whose momenta those of `step` are taken off already: what
     /// subtraction alone would get wrong.
-    pub(super) fn relative<S: Real>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
+    pub(super) fn relative<S: Scalar>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
         self.refer(self.shift(step), p);
         if let Some(at) = self.phi() {
             put(x, at, from(three(x, at), three(step, at)));

@@ -141,7 +141,8 @@ fn order<M: Stepper<I>>(name: &str, expected: f64, h: [f64; 3], new: impl Fn(&I)
         let order = (coarse / fine).log2();
         println!("{name}, {}: order {order:.2}, difference {fine:.1e}", scene.name);
         assert!(fine > 1e-13, "{name}, {}: {fine:e} is round-off", scene.name);
-        assert!((order - expected).abs() < 0.4, "{name}, {}: order {order}", scene.name);
+        // Steps that are short enough for the fourth part of an order are, of high orders, lost in round-off.
+        assert!((order - expected).abs() < 0.2 + 0.04 * expected, "{name}, {}: order {order}", scene.name);
     }
 }
 

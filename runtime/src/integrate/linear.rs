@@ -63,6 +63,7 @@ impl<Y: Differentiable> Matrix<Y> {
     }
 
     /// `out = self · vector`.
+    #[cfg(test)]
     pub(super) fn times(&self, vector: &Point<Y>, out: &mut Point<Y>) {
         for (rows, out) in self.blocks.iter().zip(out.parts_mut()) {
             out.fill(Y::Scalar::zero());
