@@ -2,9 +2,10 @@
 """Coefficients of collocation methods, as they stand in src/integrate/tableau/implicit.rs.
 
 Needs mpmath. The nodes are the zeros of a Legendre polynomial (Gauss) or of P_s(2c - 1) - P_(s-1)(2c - 1) (Radau IIA);
-row i of A are the integrals of the Lagrange polynomials from 0 to c_i, b those from 0 to 1.
+row i of A are the integrals of the Lagrange polynomials from 0 to c_i, b those from 0 to 1. The modes of A, its eigenvalues
+with right and left eigenvectors, stand in src/integrate/tableau/modes.rs.
 """
-from mpmath import mp, mpf, nstr, polyroots, taylor, legendre
+from mpmath import eig, im, legendre, matrix, mp, mpf, nstr, polyroots, re, taylor
 
 mp.dps = 80
 
@@ -30,6 +31,23 @@ def text(x):
     return nstr(x, 36, strip_zeros=True, min_fixed=-30, max_fixed=30).removesuffix(".0")
 
 
+def modes(a):
+    """Eigenvalues of A, of a pair the one with positive imaginary part, the real one first. Products of left with right
+    eigenvectors are 1, of pairs 2; the largest component of a right one is 1."""
+    values, left, right = eig(matrix(a), left=True, right=True)
+    s = len(a)
+    order = sorted((k for k in range(s) if im(values[k]) > -mpf(10) ** -60), key=lambda k: abs(im(values[k])))
+    for k in order:
+        r, l = [right[i, k] for i in range(s)], [left[k, i] for i in range(s)]
+        largest = max(r, key=abs)
+        r = [x / largest for x in r]
+        scale = sum(x * y for x, y in zip(l, r)) / (1 if abs(im(values[k])) < mpf(10) ** -60 else 2)
+        l = [x / scale for x in l]
+        print("value:", text(re(values[k])), text(im(values[k])))
+        for name, v in (("right", r), ("left", l)):
+            print(f"{name}:", " ".join(text(re(x)) for x in v), "|", " ".join(text(im(x)) for x in v))
+
+
 def show(title, polynomial):
     c = sorted(polyroots(polynomial[::-1], maxsteps=500, extraprec=500))
     s = len(c)
@@ -37,9 +55,11 @@ def show(title, polynomial):
     integral = lambda p, x: sum(a * x ** (k + 1) / (k + 1) for k, a in enumerate(p))
     print(f"{title}, {s} stages")
     print("c:", " ".join(map(text, c)))
-    for x in c:
-        print("a:", " ".join(text(integral(p, x)) for p in polynomials))
+    a = [[integral(p, x) for p in polynomials] for x in c]
+    for row in a:
+        print("a:", " ".join(map(text, row)))
     print("b:", " ".join(text(integral(p, 1)) for p in polynomials))
+    modes(a)
 
 
 for s in (2, 3, 6):

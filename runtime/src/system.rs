@@ -10,6 +10,14 @@ pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
     fn to_f64(self) -> f64;
     /// Distance of the next number after one.
     fn epsilon() -> f64;
+    /// A count, such as the number of a row: exact up to 2²⁴ in any type.
+    fn from_index(index: usize) -> Self {
+        Self::constant(index as f64)
+    }
+    /// The other way.
+    fn index(self) -> usize {
+        self.to_f64() as usize
+    }
     /// Without its sign.
     fn abs(self) -> Self {
         if self < Self::zero() {
@@ -41,6 +49,13 @@ impl Real for f32 {
     }
     fn epsilon() -> f64 {
         f32::EPSILON.into()
+    }
+    // Without a detour over doubles, which small processors have in software only.
+    fn from_index(index: usize) -> Self {
+        index as f32
+    }
+    fn index(self) -> usize {
+        self as usize
     }
 }
 
@@ -167,6 +182,10 @@ pub trait Differentiable: System {
 
     /// A zero matrix.
     fn square(&self) -> Self::Square;
+    /// Whether the rates change with time at a fixed state. Rosenbrock methods then ask for them twice more in a step.
+    fn depends_on_time(&self) -> bool {
+        false
+    }
     /// Velocities and momentum rates at time `t` (s), and their derivatives.
     fn rate_derivatives(
         &mut self,

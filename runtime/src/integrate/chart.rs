@@ -195,7 +195,7 @@ where
         }
         for group in system.groups() {
             if let Some(index) = group.quaternion() {
-                let norm = normalise(&mut self.q.as_mut()[index..index + 4]);
+                let norm = normalise(&mut self.q.as_mut()[index..index + 4]).to_f64();
                 if !(norm > 0.999 && norm < 1.001) {
                     return Err(StepError::Quaternion { time, index, norm });
                 }
@@ -212,6 +212,11 @@ where
         for group in system.groups() {
             group.inward(self.q.as_ref(), [Y::Scalar::zero(); 3], p.as_mut());
         }
+    }
+
+    /// The state itself as it is held: momenta of groups in outer axes.
+    pub(super) fn held(&self) -> (&[Y::Scalar], &[Y::Scalar]) {
+        (self.q.as_ref(), self.p.as_ref())
     }
 
     /// Sizes of the state's components: of coordinates and momenta; zero for rotations.

@@ -7,14 +7,14 @@ use crate::system::{Real, System};
 /// The rates of a system about a state, and how often they were asked for.
 #[derive(Clone, Debug)]
 pub struct Field<Y: System> {
-    chart: Chart<Y>,
+    pub(super) chart: Chart<Y>,
     /// State of the last evaluation, and its rates.
-    q: Y::Coordinates,
-    p: Y::Momenta,
+    pub(super) q: Y::Coordinates,
+    pub(super) p: Y::Momenta,
     qd: Y::Coordinates,
     pd: Y::Momenta,
     /// Whether the state was given by the last [`Field::store`].
-    stored: bool,
+    pub(super) stored: bool,
     evaluations: u64,
 }
 

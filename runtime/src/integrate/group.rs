@@ -1,7 +1,7 @@
 //! The formulas of [`super::chart`] for one joint.
 
 use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, Step, Vec3};
-use crate::system::{Group, GroupKind, Real};
+use crate::system::{Group, GroupKind};
 use crate::Scalar;
 
 /// Three components from an index on.
@@ -18,17 +18,17 @@ fn sub3<S: Scalar>(a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
 }
 
 /// Scales a quaternion to unit length and returns the length it had.
-pub(super) fn normalise<S: Real>(quaternion: &mut [S]) -> f64 {
+pub(super) fn normalise<S: Scalar>(quaternion: &mut [S]) -> S {
     let norm = dot4(quaternion, quaternion).sqrt();
     let scale = S::one() / norm;
     for x in quaternion {
         *x = *x * scale;
     }
-    norm.to_f64()
+    norm
 }
 
 /// Quaternion of `cay(φ) R(q)`, of unit length.
-fn turned<S: Real>(phi: Vec3<S>, q: &[S]) -> [S; 4] {
+fn turned<S: Scalar>(phi: Vec3<S>, q: &[S]) -> [S; 4] {
     let half = scale3(S::constant(0.5), phi);
     let (v, w) = (three(q, 0), q[3]);
     let vector = add3(add3(v, scale3(w, half)), cross(half, v));
@@ -75,7 +75,7 @@ impl Group {
     }
 
     /// From body axes to outer ones at coordinates `q`.
-    fn rotation<S: Real>(&self, q: &[S]) -> Step<S> {
+    fn rotation<S: Scalar>(&self, q: &[S]) -> Step<S> {
         let o = S::zero();
         Step::Rotate(match self.quaternion() {
             Some(at) => quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]),
@@ -118,7 +118,7 @@ impl Group {
     }
 
     /// Momenta from body axes to outer ones, about the point from which the origin is displaced by `shift`.
-    pub(super) fn outward<S: Real>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
+    pub(super) fn outward<S: Scalar>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
         if self.momenta {
             let r = self.rotation(q);
             let (linear, angular) = self.split(p);
@@ -128,7 +128,7 @@ impl Group {
     }
 
     /// The other way.
-    pub(super) fn inward<S: Real>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
+    pub(super) fn inward<S: Scalar>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
         if self.momenta {
             let r = self.rotation(q);
             let (linear, angular) = self.split(p);
@@ -137,7 +137,7 @@ impl Group {
     }
 
     /// Momenta in outer axes about a point that is `shift` further.
-    pub(super) fn refer<S: Real>(&self, shift: Vec3<S>, p: &mut [S]) {
+    pub(super) fn refer<S: Scalar>(&self, shift: Vec3<S>, p: &mut [S]) {
         if self.momenta && self.kind != GroupKind::Rotation {
             let (linear, angular) = self.split(p);
             self.join((linear, sub3(angular, cross(shift, linear))), p);
@@ -145,14 +145,14 @@ impl Group {
     }
 
     /// Quaternion at a displacement `x` from `base`.
-    pub(super) fn displace<S: Real>(&self, base: &[S], x: &[S], q: &mut [S]) {
+    pub(super) fn displace<S: Scalar>(&self, base: &[S], x: &[S], q: &mut [S]) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
             q[at..at + 4].copy_from_slice(&turned(three(x, phi), &base[at..at + 4]));
         }
     }
 
     /// The same in place.
-    pub(super) fn advance<S: Real>(&self, x: &[S], q: &mut [S]) {
+    pub(super) fn advance<S: Scalar>(&self, x: &[S], q: &mut [S]) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
             let turned = turned(three(x, phi), &q[at..at + 4]);
             q[at..at + 4].copy_from_slice(&turned);
@@ -161,15 +161,19 @@ impl Group {
 
     /// Rates of the displacement at the state `(q, p)` it leads to, from `q̇` and, in place, `ṗ`: of the
     /// rotation and the momenta. The rates of positions are known, they stand in `xd`.
-    pub(super) fn rates<S: Real>(&self, x: &[S], (q, p): (&[S], &[S]), qd: &[S], xd: &mut [S], pd: &mut [S]) {
-        let w = match (self.quaternion(), self.phi()) {
-            (Some(at), Some(phi)) => {
-                let w = spin(&q[at..at + 4], &qd[at..at + 4]);
-                put(xd, phi, phi_rate(three(x, phi), w));
-                w
-            }
-            _ => [S::zero(), S::zero(), qd[self.q + 2]],
+    pub(super) fn rates<S: Scalar>(&self, x: &[S], state: (&[S], &[S]), qd: &[S], xd: &mut [S], pd: &mut [S]) {
+        let w = match self.quaternion() {
+            Some(at) => spin(&state.0[at..at + 4], &qd[at..at + 4]),
+            None => [S::zero(), S::zero(), qd[self.q + 2]],
         };
+        self.rates_of_spin(x, state, w, xd, pd);
+    }
+
+    /// The same from the angular velocity in outer axes.
+    fn rates_of_spin<S: Scalar>(&self, x: &[S], (q, p): (&[S], &[S]), w: Vec3<S>, xd: &mut [S], pd: &mut [S]) {
+        if let Some(phi) = self.phi() {
+            put(xd, phi, phi_rate(three(x, phi), w));
+        }
         if self.momenta {
             let r = self.rotation(q);
             let ((lin, ang), (lin_d, ang_d)) = (self.split(p), self.split(pd));
@@ -182,7 +186,7 @@ impl Group {
     }
 
     /// Appends the displacement `(step, dp)` to `(x, p)`: what addition alone would get wrong.
-    pub(super) fn compose<S: Real>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
+    pub(super) fn compose<S: Scalar>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
         if self.momenta && self.kind != GroupKind::Rotation {
             // About the point where the first of both begins.
             let (linear, angular) = self.split(p);
@@ -196,15 +200,43 @@ impl Group {
 
     /// Takes the displacement `step` off the front of `(x, p)`, of whose momenta those of `step` are taken off already: what
     /// subtraction alone would get wrong.
-    pub(super) fn relative<S: Real>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
+    pub(super) fn relative<S: Scalar>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
         self.refer(self.shift(step), p);
         if let Some(at) = self.phi() {
             put(x, at, from(three(x, at), three(step, at)));
         }
     }
 
+    /// The same from velocities `v` in body axes; the rates of positions are found as well.
+    pub(super) fn rates_of_velocity<S: Scalar>(
+        &self,
+        x: &[S],
+        state: (&[S], &[S]),
+        v: &[S],
+        xd: &mut [S],
+        pd: &mut [S],
+    ) {
+        let r = self.rotation(state.0);
+        let (linear, angular) = self.split(v);
+        let w = r.vector_back(angular);
+        self.join((r.vector_back(linear), w), xd);
+        self.rates_of_spin(x, state, w, xd, pd);
+    }
+
+    /// Displacement in body axes by which coordinates change from `q` by `dq`, in the limit of small ones.
+    pub(super) fn body<S: Scalar>(&self, q: &[S], dq: &[S], out: &mut [S]) {
+        let r = self.rotation(q);
+        let angular = match self.quaternion() {
+            Some(at) => spin(&q[at..at + 4], &dq[at..at + 4]),
+            None => [S::zero(), S::zero(), dq[self.q + 2]],
+        };
+        // Positions stand first: where `shift` looks for those of a displacement.
+        let linear = Group { v: self.q, ..*self }.shift(dq);
+        self.join((r.vector(linear), r.vector(angular)), out);
+    }
+
     /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.
-    pub(super) fn follow<S: Real>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
+    pub(super) fn follow<S: Scalar>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
         if let Some(at) = self.phi() {
             let (old, moved) = (three(x, at), three(step, at));
             let new = from(old, moved);

@@ -7,6 +7,7 @@
 #[cfg(feature = "alloc")]
 pub mod catalogue;
 pub mod chart;
+mod collocation;
 mod composition;
 pub(crate) mod constant;
 mod doubled;
@@ -15,12 +16,24 @@ mod error;
 mod explicit;
 mod field;
 mod group;
+#[cfg(test)]
+mod implicit_tests;
+mod jacobian;
+mod linear;
+mod newton;
+mod rosenbrock;
+#[cfg(test)]
+mod scenes;
 mod semi_implicit;
 mod solver;
 mod stepper;
 pub mod tableau;
 
 pub use chart::{Chart, Point};
+pub use collocation::{
+    formula, BackwardEuler, Collocation, Formula, Gauss12, Gauss12Inserted, Gauss4, Gauss6, Gauss6Inserted,
+    ImplicitMidpoint, Radau5,
+};
 pub use composition::{Composition, Symmetric};
 pub use constant::{decimal, ratio, Constant};
 pub use doubled::Doubled;
@@ -28,6 +41,8 @@ pub use doubling::StepDoubling;
 pub use error::StepError;
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
+pub use newton::{FixedPoint, Iteration, Newton};
+pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::SemiImplicitEuler;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};

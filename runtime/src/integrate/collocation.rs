@@ -1,0 +1,538 @@
+//! Collocation methods: Gauss-Legendre and Radau IIA.
+//!
+//! The unknowns are displacements `z_i` of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`. They are solved for as
+//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8 describe: simplified Newton iteration, or
+//! insertion ([`Iteration`]), from the last step's polynomial, which is rewritten about the new state; or, without a last step,
+//! from the solution of the linearised equations. The iteration ends when its rate of contraction says that what is left is
+//! below a hundredth of the allowed error, or, in steps of given size, below round-off.
+
+use super::chart::{Chart, Point};
+use super::field::Field;
+use super::newton::{FixedPoint, Iteration, Newton};
+use super::stepper::{hermite, norm, Statistics, Stepper};
+use super::tableau::{self, Mode};
+use super::{Constant, StepError};
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// A method with `S` stages, by name.
+pub trait Formula<const S: usize> {
+    /// Its coefficients.
+    const TABLEAU: &'static tableau::Collocation<S>;
+    /// Its modes, real ones first.
+    const MODES: &'static [Mode<S>];
+    /// Weights `e` of the error estimate `μ (1 − h μ J)⁻¹ (h f(y) + Σ e_i z_i)`, of third order.
+    const ERROR: Option<[Constant; S]> = None;
+}
+
+macro_rules! formulas {
+    ($($name:ident $stages:literal $real:literal $pairs:literal $tableau:ident $modes:ident $error:expr, $doc:literal;)*) => {
+        /// Names of collocation methods.
+        pub mod formula {
+            use super::*;
+            $(#[doc = $doc]
+            #[derive(Clone, Copy, Debug)]
+            pub struct $name;
+            impl Formula<$stages> for $name {
+                const TABLEAU: &'static tableau::Collocation<$stages> = &tableau::$tableau;
+                const MODES: &'static [Mode<$stages>] = &tableau::$modes;
+                const ERROR: Option<[Constant; $stages]> = $error;
+            })*
+        }
+        $(#[doc = $doc]
+        pub type $name<Y> = Collocation<Y, formula::$name, Newton<Y, $stages, $real, $pairs>, $stages>;)*
+    };
+}
+
+formulas! {
+    BackwardEuler 1 1 0 BACKWARD_EULER BACKWARD_EULER_MODES None,
+        "Backward Euler, order 1: L-stable, takes energy out.";
+    ImplicitMidpoint 1 1 0 IMPLICIT_MIDPOINT IMPLICIT_MIDPOINT_MODES None,
+        "The implicit midpoint rule, order 2: A-stable, symplectic, symmetric.";
+    Gauss4 2 0 1 GAUSS4 GAUSS4_MODES None,
+        "Gauss-Legendre of order 4: A-stable, symplectic, symmetric.";
+    Gauss6 3 1 1 GAUSS6 GAUSS6_MODES None,
+        "Gauss-Legendre of order 6: A-stable, symplectic, symmetric.";
+    Gauss12 6 0 3 GAUSS12 GAUSS12_MODES None,
+        "Gauss-Legendre of order 12: A-stable, symplectic, symmetric; for long regular motion, with compensated sums.";
+    Radau5 3 1 1 RADAU5 RADAU5_MODES Some(RADAU5_ERROR),
+        "Radau IIA of order 5 with the error estimate of `RADAU5`: L-stable, for stiff mechanisms.";
+}
+
+/// [`Gauss12`] by insertion: no derivatives are needed.
+pub type Gauss12Inserted<Y> = Collocation<Y, formula::Gauss12, FixedPoint, 6>;
+/// [`Gauss6`] by insertion: no derivatives are needed.
+pub type Gauss6Inserted<Y> = Collocation<Y, formula::Gauss6, FixedPoint, 3>;
+
+/// `(−13 ∓ 7 √6) / 3, −1/3`: Hairer and Wanner, IV.8, eq. 8.19.
+const RADAU5_ERROR: [Constant; 3] = super::constant::list(
+    "-10.0488093998274155624603295076470799 1.38214273316074889579366284098041325 \
+     -0.333333333333333333333333333333333333",
+);
+
+/// Part of the allowed error that the iteration may leave.
+const PART: f64 = 0.01;
+/// Round-off, in epsilons of the state, down to which a step of given size is iterated, and at which a single change that is
+/// not smaller than the one before ends it.
+const FLOOR: f64 = 0.25;
+const STUCK: f64 = 16.0;
+/// Derivatives are used for another step if the iteration contracted as well as this with them.
+const KEEP: f64 = 0.02;
+
+/// Where the derivatives in use are from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Derivatives {
+    None,
+    /// The start of an earlier step.
+    Old,
+    /// The start of this step.
+    New,
+}
+
+/// Any collocation method; take one by its name, [`Radau5`] for example.
+#[derive(Clone, Debug)]
+pub struct Collocation<Y: System, T, I, const S: usize> {
+    field: Field<Y>,
+    statistics: Statistics,
+    iteration: I,
+    /// Iterations of every step, if their number is given.
+    iterations: Option<u32>,
+    a: [[Y::Scalar; S]; S],
+    b: [Y::Scalar; S],
+    c: [Y::Scalar; S],
+    /// Weights of the new point over the stages' displacements.
+    last: [Y::Scalar; S],
+    /// Displacements of stages, their rates, residuals and changes.
+    z: [Point<Y>; S],
+    f: [Point<Y>; S],
+    r: [Point<Y>; S],
+    delta: Point<Y>,
+    first: Point<Y>,
+    first_known: bool,
+    end: Point<Y>,
+    end_known: bool,
+    /// What counts as solved.
+    weight: Point<Y>,
+    derivatives: Derivatives,
+    /// Step that the matrix is factored for; zero: none.
+    factored: Y::Scalar,
+    /// Contraction of the last iteration, and what it leaves of the last change.
+    theta: f64,
+    eta: f64,
+    /// Stages and start of the last step, from the present state; the size of that step, zero if there is none.
+    past: [Point<Y>; S],
+    origin: Point<Y>,
+    past_h: Y::Scalar,
+    formula: core::marker::PhantomData<T>,
+}
+
+impl<Y, T, I, const S: usize> Collocation<Y, T, I, S>
+where
+    Y: System,
+    Y::Scalar: Real,
+    T: Formula<S>,
+    I: Iteration<Y, S>,
+{
+    /// Room for one system.
+    pub fn new(system: &Y) -> Self {
+        Self::with_sums(system, false)
+    }
+
+    /// With compensated sums of steps, as [`Explicit::compensated`](super::Explicit::compensated).
+    pub fn compensated(system: &Y) -> Self {
+        Self::with_sums(system, true)
+    }
+
+    /// Exactly `n` iterations a step, after a start by the linearised equations, which costs no evaluation: for real time. With
+    /// derivatives this is one evaluation of them, one factorisation and `n S` evaluations of the rates a step, whatever
+    /// happens, and no failure to converge; what is not converged counts as an error of the method.
+    pub fn with_iterations(self, n: u32) -> Self {
+        Collocation { iterations: Some(n), ..self }
+    }
+
+    fn with_sums(system: &Y, compensated: bool) -> Self {
+        let tableau = T::TABLEAU;
+        let point = || Point::zero(system);
+        let points = || core::array::from_fn(|_| point());
+        let c = tableau.c.map(|x| x.get());
+        Collocation {
+            field: Field::new(system, compensated),
+            statistics: Statistics::default(),
+            iteration: I::new(system, T::MODES),
+            iterations: None,
+            a: tableau.a.map(|row| row.map(|x| x.get())),
+            b: tableau.b.map(|x| x.get()),
+            last: polynomial(&c, Y::Scalar::one()).0,
+            c,
+            z: points(),
+            f: points(),
+            r: points(),
+            delta: point(),
+            first: point(),
+            first_known: false,
+            end: point(),
+            end_known: false,
+            weight: point(),
+            derivatives: Derivatives::None,
+            factored: Y::Scalar::zero(),
+            theta: 1.0,
+            eta: 1.0,
+            past: points(),
+            origin: point(),
+            past_h: Y::Scalar::zero(),
+            formula: core::marker::PhantomData,
+        }
+    }
+
+    /// Rate at the start, with derivatives if they are due.
+    fn start(&mut self, system: &mut Y, t: Y::Scalar) {
+        let due = match self.derivatives {
+            Derivatives::None => true,
+            Derivatives::Old => self.iterations.is_some() || self.theta > KEEP,
+            Derivatives::New => false,
+        };
+        if I::DERIVATIVES && due {
+            self.iteration.linearise(&mut self.field, system, t, &mut self.first);
+            (self.derivatives, self.factored) = (Derivatives::New, Y::Scalar::zero());
+            self.statistics.jacobians += 1;
+            self.first_known = true;
+        }
+    }
+
+    fn rate(&mut self, system: &mut Y, t: Y::Scalar) {
+        self.start(system, t);
+        if !self.first_known {
+            self.delta.clear();
+            self.field.rates(system, t, &self.delta, &mut self.first);
+            self.first_known = true;
+        }
+    }
+
+    fn factor(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if I::DERIVATIVES && self.factored != h {
+            self.factored = Y::Scalar::zero();
+            self.statistics.factorisations += 1;
+            if let Err(column) = self.iteration.factor(h) {
+                self.rate(system, t);
+                return Err(match self.first.not_finite() {
+                    Some(index) => StepError::NotFinite { time: t.to_f64(), index },
+                    None => StepError::Singular { time: t.to_f64(), step: h.to_f64(), column },
+                });
+            }
+            self.factored = h;
+        }
+        Ok(())
+    }
+
+    /// Stages of the linearised equations.
+    fn linear(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+        self.rate(system, t);
+        for (z, c) in self.z.iter_mut().zip(&self.c) {
+            z.copy_from(&self.first);
+            z.scale(h * *c);
+        }
+        self.iteration.correct(&mut self.z);
+    }
+
+    /// Stages on the last step's polynomial.
+    fn extrapolate(&mut self, h: Y::Scalar) {
+        for (z, c) in self.z.iter_mut().zip(&self.c) {
+            let (weights, origin) = polynomial(&self.c, Y::Scalar::one() + *c * (h / self.past_h));
+            z.clear();
+            for (past, w) in self.past.iter().zip(&weights) {
+                z.add(*w, past);
+            }
+            z.add(origin, &self.origin);
+        }
+    }
+
+    /// One iteration: rates of all stages, residuals, changes.
+    fn iterate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+        for ((z, f), c) in self.z.iter().zip(&mut self.f).zip(&self.c) {
+            self.field.rates(system, t + *c * h, z, f);
+        }
+        for ((r, row), z) in self.r.iter_mut().zip(&self.a).zip(&self.z) {
+            r.clear();
+            for (f, a) in self.f.iter().zip(row) {
+                r.add(*a, f);
+            }
+            r.scale(h);
+            r.add(-Y::Scalar::one(), z);
+        }
+        self.iteration.correct(&mut self.r);
+        for (z, r) in self.z.iter_mut().zip(&self.r) {
+            z.add(Y::Scalar::one(), r);
+        }
+        self.statistics.iterations += 1;
+    }
+
+    /// What counts as solved: part of the allowed errors, but not less than round-off.
+    fn weigh(&mut self, system: &Y, scale: Option<&Point<Y>>) {
+        self.field.chart().size(system, &mut self.weight);
+        if let Some(z) = self.z.last() {
+            for (w, z) in self.weight.parts_mut().into_iter().flatten().zip(z.parts().into_iter().flatten()) {
+                *w = *w + z.abs();
+            }
+        }
+        for part in self.weight.parts_mut() {
+            let largest = part.iter().fold(Y::Scalar::zero(), |m, x| if *x > m { *x } else { m });
+            let least = Y::Scalar::constant(1e-3) * largest;
+            for x in part {
+                *x = if *x > least { *x } else { least };
+            }
+        }
+        for group in system.groups() {
+            let x = self.weight.x.as_mut();
+            x[group.v + group.kind.positions()..group.v + group.kind.sizes().1].fill(Y::Scalar::one());
+        }
+        let (floor, part) = match scale {
+            None => (FLOOR * Y::Scalar::epsilon(), None),
+            Some(scale) => (STUCK * Y::Scalar::epsilon(), Some(scale)),
+        };
+        self.weight.scale(Y::Scalar::constant(floor));
+        if let Some(scale) = part {
+            let part = Y::Scalar::constant(PART);
+            for (w, scale) in self.weight.parts_mut().into_iter().flatten().zip(scale.parts().into_iter().flatten()) {
+                let allowed = part * *scale;
+                // What is not controlled need not be solved either.
+                *w = if allowed > *w || allowed == Y::Scalar::zero() { allowed } else { *w };
+            }
+        }
+    }
+
+    /// Iterates until solved.
+    fn converge(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<(), StepError> {
+        self.weigh(system, scale);
+        // One good contraction says little about the next step's, and with insertion about the next iteration's.
+        let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
+        self.eta = libm::pow(self.eta, 0.8).max(least);
+        let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
+        self.theta = 0.0;
+        let limit = I::LIMITS[usize::from(scale.is_some())];
+        for k in 1..=limit {
+            self.iterate(system, t, h);
+            let sum = self.r.iter().map(|r| norm(r, &self.weight)).fold(0.0, |sum, x| sum + x * x);
+            change = libm::sqrt(sum / S as f64);
+            if k > 1 {
+                let theta = change / last;
+                // Two at a time: what insertion changes in coordinates it changes in momenta one iteration later.
+                self.theta = if k == 2 { theta } else { libm::sqrt(theta * self.theta) };
+                let slowest = theta.max(self.theta);
+                if slowest < 1.0 {
+                    self.eta = (slowest / (1.0 - slowest)).max(if I::DERIVATIVES { 0.0 } else { least });
+                }
+                grown = if theta < 1.0 { 0 } else { grown + 1 };
+            }
+            if self.eta * change <= 1.0 || change == 0.0 {
+                return Ok(());
+            }
+            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell.
+            let noise = if grown > 2 { libm::pow(Y::Scalar::epsilon(), 0.3) } else { 1.0 / STUCK };
+            if scale.is_none() && grown > 0 && noise * FLOOR * change <= 1.0 {
+                return Ok(());
+            }
+            if !change.is_finite() || grown > 2 {
+                return Err(self.failure(t, h, k, change));
+            }
+            last = change;
+        }
+        Err(self.failure(t, h, limit, change))
+    }
+
+    fn failure(&mut self, t: Y::Scalar, h: Y::Scalar, iterations: u32, change: f64) -> StepError {
+        (self.eta, self.theta) = (1.0, 1.0);
+        StepError::NoConvergence { time: t.to_f64(), step: h.to_f64(), iterations, change }
+    }
+
+    /// Solves for the stages.
+    fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: Option<&Point<Y>>) -> Result<(), StepError> {
+        self.start(system, t);
+        self.factor(system, t, h)?;
+        if let Some(n) = self.iterations {
+            self.linear(system, t, h);
+            for _ in 0..n {
+                self.iterate(system, t, h);
+            }
+            return Ok(());
+        }
+        if self.past_h != Y::Scalar::zero() {
+            self.extrapolate(h);
+            let result = self.converge(system, t, h, scale);
+            if result.is_ok() {
+                return result;
+            }
+            // Once more from nothing: a long step away from the last one's polynomial, or derivatives that are too old.
+            if self.derivatives == Derivatives::Old {
+                self.derivatives = Derivatives::None;
+            }
+            self.start(system, t);
+            self.factor(system, t, h)?;
+        }
+        self.linear(system, t, h);
+        self.converge(system, t, h, scale)
+    }
+
+    /// Displacement of the step from those of the stages.
+    fn finish(&mut self, h: Y::Scalar) {
+        self.delta.clear();
+        if I::DERIVATIVES {
+            for (z, w) in self.z.iter().zip(&self.last) {
+                if *w != Y::Scalar::zero() {
+                    self.delta.add(*w, z);
+                }
+            }
+        } else {
+            for (f, b) in self.f.iter().zip(&self.b) {
+                self.delta.add(*b, f);
+            }
+            self.delta.scale(h);
+        }
+    }
+
+    fn error(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: &Point<Y>, e: [Constant; S]) -> f64 {
+        let [sum, estimate, ..] = &mut self.r[..] else { return 0.0 };
+        sum.clear();
+        for (z, e) in self.z.iter().zip(e) {
+            sum.add(e.get(), z);
+        }
+        estimate.copy_from(sum);
+        estimate.add(h, &self.first);
+        self.iteration.filter(estimate);
+        let error = norm(estimate, scale);
+        // The estimate is too large where the step is much longer than the fast motions; filtered once more it is not.
+        if error > 1.0 {
+            self.field.rates(system, t, estimate, &mut self.end);
+            estimate.copy_from(sum);
+            estimate.add(h, &self.end);
+            self.iteration.filter(estimate);
+            return norm(estimate, scale);
+        }
+        error
+    }
+}
+
+/// Weights at `θ` of the values at the nodes `c`, and of that at 0, in the polynomial through all of them.
+fn polynomial<N: Real, const S: usize>(c: &[N; S], theta: N) -> ([N; S], N) {
+    let mut weights = [N::one(); S];
+    let mut origin = N::one();
+    for (j, (weight, cj)) in weights.iter_mut().zip(c).enumerate() {
+        *weight = theta / *cj;
+        for (k, ck) in c.iter().enumerate() {
+            if k != j {
+                *weight = *weight * ((theta - *ck) / (*cj - *ck));
+            }
+        }
+        origin = origin * ((*cj - theta) / *cj);
+    }
+    (weights, origin)
+}
+
+impl<Y, T, I, const S: usize> Stepper<Y> for Collocation<Y, T, I, S>
+where
+    Y: System,
+    Y::Scalar: Real,
+    T: Formula<S>,
+    I: Iteration<Y, S>,
+{
+    fn order(&self) -> u32 {
+        T::TABLEAU.order
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        T::ERROR.map(|_| 3)
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        (self.first_known, self.end_known) = (false, false);
+        (self.derivatives, self.factored) = (Derivatives::None, Y::Scalar::zero());
+        self.past_h = Y::Scalar::zero();
+        (self.theta, self.eta) = (1.0, 1.0);
+        self.field.load(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        self.end_known = false;
+        self.solve(system, t, h, scale)?;
+        let error = match (T::ERROR, scale) {
+            (Some(e), Some(scale)) => {
+                self.rate(system, t);
+                self.error(system, t, h, scale, e)
+            }
+            _ => 0.0,
+        };
+        self.finish(h);
+        Ok(error)
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (&mut self.field, &mut self.delta)
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        self.rate(system, t);
+        &self.first
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        if !self.end_known {
+            self.field.rates(system, t + h, &self.delta, &mut self.end);
+            self.end_known = true;
+        }
+        &self.end
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        self.field.advance(system, t, &self.delta)?;
+        for (past, z) in self.past.iter_mut().zip(&self.z) {
+            past.copy_from(z);
+            Chart::relative(system, &self.delta, past);
+        }
+        self.origin.clear();
+        Chart::relative(system, &self.delta, &mut self.origin);
+        self.past_h = h;
+        if self.end_known {
+            self.first.copy_from(&self.end);
+            self.weight.copy_from(&self.delta);
+            Chart::follow(system, &self.delta, &mut self.weight, &mut self.first);
+        }
+        (self.first_known, self.end_known) = (self.end_known, false);
+        if self.derivatives == Derivatives::New {
+            self.derivatives = Derivatives::Old;
+        }
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    /// The collocation polynomial; of methods with less than three stages the cubic through both ends and their rates.
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        if S < 3 {
+            if !self.first_known {
+                out.clear();
+                self.field.rates(system, t, out, &mut self.first);
+                self.first_known = true;
+            }
+            self.end_rate(system, t, h);
+            return hermite(h, theta, &self.delta, [&self.first, &self.end], out);
+        }
+        out.clear();
+        for (z, w) in self.z.iter().zip(polynomial(&self.c, theta).0) {
+            out.add(w, z);
+        }
+    }
+
+    fn statistics(&self) -> Statistics {
+        Statistics { evaluations: self.field.evaluations(), ..self.statistics }
+    }
+}
