@@ -5,10 +5,10 @@
 //! cancel, some last places of the largest term. Such errors have no sign, so after `n` steps they amount to `√n` times that.
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Gravity, JointKind, Value};
+use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Composition, Doubled, Euler, Midpoint, Rk4, SemiImplicitEuler, StepDoubling, Stepper, Symmetric,
+    Composition, Doubled, Euler, Midpoint, Rk4, SemiImplicitEuler, StepDoubling, Stepper, Symmetric, Verner9,
 };
 use mbd_runtime::spatial::{add3, cross, quaternion_matrix, Vec3};
 use mbd_runtime::sweep::FrameState;
@@ -29,6 +29,7 @@ fn methods(i: &Interpreter<f64>) -> Vec<(&'static str, Any)> {
         ("RK4 doubled, extrapolated", Box::new(StepDoubling::extrapolated(i, Rk4::new(i)))),
         ("doubled phase space", Box::new(Doubled::new(i, 10.0))),
         ("Suzuki 4", Box::new(composed)),
+        ("Verner 9", Box::new(Verner9::new(i))),
     ]
 }
 
@@ -96,13 +97,14 @@ fn spin_bound(steps: u64, h: f64) -> f64 {
 fn angular_momentum_of_a_free_rotor() {
     let (i, ..) = rotor();
     for (name, mut method) in methods(&i) {
-        let (steps, h) = (100_000, 1e-3);
+        let h = 1e-3;
+        let steps = if ["semi-implicit Euler", "RK4", "Verner 9"].contains(&name) { 100_000 } else { 20_000 };
         let (change, flips) = spin(&mut *method, steps, h);
         let bound = spin_bound(steps, h);
         println!("{name}: {change:.1e} of {bound:.1e}, {flips} flips");
         assert!(change < bound, "{name}: {change:e} {bound:e}");
-        // It does flip over, so the momentum in body axes is not just left alone. (Low orders may stop doing so.)
-        assert!(flips > 10 || name.contains("Euler"), "{name}: {flips}");
+        // It does flip over, so the momentum in body axes is not just left alone.
+        assert!(flips >= steps / 5000, "{name}: {flips}");
     }
 }
 
@@ -139,6 +141,7 @@ impl Floating {
         let root = model.joints.iter().position(|j| j.parent.is_none()).expect("a tree has a root");
         let joint = &mut model.joints[root];
         joint.kind = JointKind::Floating;
+        joint.placement = Placement::IDENTITY;
         for list in [&mut joint.damping, &mut joint.stiffness, &mut joint.rest, &mut joint.armature] {
             list.clear();
         }
@@ -182,7 +185,7 @@ impl Floating {
 }
 
 /// Steps of the multibody tests, and the length of one, s.
-const STEPS: (u32, f64) = (2000, 1e-3);
+const STEPS: (u32, f64) = (500, 1e-3);
 
 /// Both momenta as long as nothing acts; with gravity `g` the linear one is `P + m g t`.
 fn fly(seed: u64, gravity: f64) {
@@ -204,7 +207,10 @@ fn fly(seed: u64, gravity: f64) {
         }
         // Terms of the rates that cancel are products of velocities (of a few 1/s) and momenta: `h` times them is small
         // against the momenta themselves, of which a step rounds half a last place.
-        let bound = 4.0 * f64::EPSILON * reach * f64::from(steps).sqrt();
+        let steps = f64::from(steps);
+        let bound = 4.0 * f64::EPSILON * reach * steps.sqrt();
+        // The same force is added in every step, and rounded the same way in many: there these errors have a sign.
+        let bound = if gravity == 0.0 { bound } else { bound + 0.5 * f64::EPSILON * reach * steps };
         println!("{seed}, {name}: linear {:.1e}, angular {:.1e}, bound {bound:.1e}", change[0], change[1]);
         assert!(change[0] < bound, "{seed}, {name}: linear {:e} {bound:e}", change[0]);
         assert!(gravity != 0.0 || change[1] < bound, "{seed}, {name}: angular {:e} {bound:e}", change[1]);
