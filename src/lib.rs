@@ -4,6 +4,9 @@
 //! your program compiles. The same generator is in [`codegen`] for build scripts; [`runtime`] has the integrators, and an
 //! interpreter for models that are known at run time only.
 
+#[cfg(feature = "diffsol")]
+pub mod diffsol;
+
 pub use mbd_codegen as codegen;
 #[doc(hidden)]
 pub use mbd_macros as macros;

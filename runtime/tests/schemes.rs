@@ -8,6 +8,7 @@ use mbd_runtime::system::{Group, GroupKind};
 use mbd_runtime::System;
 
 /// An ordinary coordinate, a rotation, a pose, a planar joint: for charts alone.
+#[derive(Clone, Debug)]
 struct Kinds([Group; 3]);
 
 impl Kinds {
@@ -258,7 +259,8 @@ fn semi_implicit_euler_drifts_where_it_is_not() {
     };
     let [coarse, fine] = [20_000, 40_000].map(drift);
     println!("{coarse:.2e}, with half the step {fine:.2e}");
-    assert!(coarse.abs() < 0.2);
+    // Some per cent of the energy in seventy periods, less with smaller steps.
+    assert!(coarse.abs() > 1e-3 && coarse.abs() < 2e-2 && fine.abs() < coarse.abs());
 }
 
 #[test]
@@ -281,8 +283,8 @@ fn step_doubling_meets_tolerances() {
         let (other, more) = run(StepDoubling::new(&Swing, Midpoint::new(&Swing)), tolerance, time);
         let [a, b, c] = [&state, &better, &other].map(|s| largest(s, &exact) / tolerance);
         println!("{tolerance:e}: {a:.1} {counts:?}, extrapolated {b:.1} {same:?}, midpoint {c:.1} {more:?}");
-        // Errors of steps add up: ten seconds are some two periods.
-        assert!(a < 40.0 && b < 40.0 && c < 100.0);
+        // Every step adds at most one tolerance; what the motion makes of them is of the size of one in two periods.
+        assert!(a < counts[0] as f64 && b < same[0] as f64 && c < more[0] as f64);
         // Eleven a step and a rejection; two more for the choice of the first step; the last start.
         let tries = counts[0] + counts[1];
         assert!(counts[2] >= 11 * tries && counts[2] <= 12 * tries + 3, "{counts:?}");

@@ -16,7 +16,7 @@ use crate::Scalar;
 /// long time performance*, Physical Review E 94, 043303, 2016 (arXiv:1609.02212), eq. 1 to 5.
 ///
 /// It is symplectic in the doubled phase space where displacements are canonical coordinates, that is without quaternions and
-/// planar joints; on those it is a symmetric method of order 2 all the same. The state shown is the mean of the copies. They
+/// planar joints; on those it is a method of order 2 all the same. The state shown is the mean of the copies. They
 /// are equal when a state is taken, and go on apart as long as steps go on from the states given: so two runs are
 /// the same only if both started at the same state. Damping and other forces that depend on time or velocity are allowed.
 #[derive(Clone, Debug)]
