@@ -62,8 +62,9 @@ fn a_pendulum_by_its_quarter_periods() {
         events.happened
     }
     // At the start p = 0: no event. Of one instant the first function comes first.
-    let expected: Vec<(usize, f64)> =
-        (0..3).flat_map(|k| [(0, 1), (2, 1), (3, 2), (1, 3), (2, 3)].map(|(e, n)| (e, f64::from(n + 4 * k) * quarter))).collect();
+    let expected: Vec<(usize, f64)> = (0..3)
+        .flat_map(|k| [(0, 1), (2, 1), (3, 2), (1, 3), (2, 3)].map(|(e, n)| (e, f64::from(n + 4 * k) * quarter)))
+        .collect();
     for (name, times, tolerance) in [
         // Errors of the motion are about ten tolerances here, those of dense output of low order a little more.
         ("tsit5", times(pendulum(), Tsit5::new, 1e-8, 12.0 * quarter), 3e-7),
@@ -159,9 +160,10 @@ fn events_at_one_instant() {
     let mut y = oscillator();
     let method = Verner9::new(&y);
     let mut solver = adaptive(&mut y, method, 1e-10, (&[1.0], &[0.0]));
-    let mut events = Watched::new([(Both, false), (Both, true), (Both, true), (Both, false)], |_, q: &[f64], p: &[f64]| {
-        [q[0] * 3.0, q[0], q[0] * q[0] * q[0], q[0] / (p[0].abs() + 0.1)]
-    });
+    let mut events =
+        Watched::new([(Both, false), (Both, true), (Both, true), (Both, false)], |_, q: &[f64], p: &[f64]| {
+            [q[0] * 3.0, q[0], q[0] * q[0] * q[0], q[0] / (p[0].abs() + 0.1)]
+        });
     let mut ends = 0;
     while let Outcome::Event { index, .. } = solver.run_events(&mut y, 10.0 * HALF_PI, &mut events).expect("a run") {
         assert!(index == 1 || index == 2);
