@@ -235,6 +235,10 @@ where
         if !self.end_known {
             self.field.rates(system, t + h, &self.delta, &mut self.end);
             self.end_known = true;
+            if T::TABLEAU.fsal {
+                // The stage that was left out, for dense output.
+                self.k[S - 1].copy_from(&self.end);
+            }
         }
         &self.end
     }

@@ -6,7 +6,7 @@ use super::StepError;
 use crate::system::{Real, System};
 use crate::Scalar;
 
-/// Allowed error of a component `y` in one step: `absolute + relative · |y|`.
+/// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero nothing is controlled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// In the unit of the component.
@@ -103,15 +103,30 @@ pub struct Solver<Y: System, M> {
     t: Y::Scalar,
     /// What rounding took from the time.
     t_carry: Y::Scalar,
-    /// Step of the attempt that has not been accepted yet: the state is at its end.
-    pending: Option<Y::Scalar>,
+    /// The attempt that has not been accepted yet: the state is at its end.
+    pending: Option<Pending<Y::Scalar>>,
     /// Next step, s; zero: to be chosen.
     next: f64,
     last_error: f64,
     rejections: u64,
+    /// Steps that were cut by an event or a restart before the method accepted them.
+    cut: u64,
     scale: Point<Y>,
     size: Point<Y>,
     at: Point<Y>,
+    /// A state that events are looked at.
+    pub(super) looked: (Y::Coordinates, Y::Momenta),
+    /// Which events the last run ended with, a bit for each, and when.
+    pub(super) handled: (u64, Y::Scalar),
+}
+
+/// A step that waits to be accepted.
+#[derive(Clone, Copy, Debug)]
+struct Pending<S> {
+    h: S,
+    /// Time at its end, and what rounding takes from it.
+    end: S,
+    carry: S,
 }
 
 impl<Y, M> Solver<Y, M>
@@ -147,6 +162,9 @@ where
             next: 0.0,
             last_error: 1e-4,
             rejections: 0,
+            cut: 0,
+            looked: (system.neutral(), system.rest()),
+            handled: (0, t),
             scale,
             size,
             at,
@@ -166,31 +184,67 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), StepError> {
+        self.cut += u64::from(self.pending.is_some());
         (self.t, self.t_carry, self.pending) = (t, Y::Scalar::zero(), None);
         (self.next, self.last_error) = (0.0, 1e-4);
         self.method.begin(system, t, q, p)
     }
 
+    /// Ends the last step early, at `t + θ h`: the state becomes that of the dense output there.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`], only where a rate was not finite.
+    pub fn cut(&mut self, system: &mut Y, theta: Y::Scalar) -> Result<(), StepError> {
+        let time = self.look(system, theta);
+        self.cut += u64::from(self.pending.is_some());
+        // The motion goes on as it was: so does the choice of steps.
+        (self.t, self.t_carry, self.pending) = (time, Y::Scalar::zero(), None);
+        self.method.begin(system, time, &self.looked.0, &self.looked.1)
+    }
+
+    /// Looks at the state at `t + θ h` of the last step; its time. At the end it is the state that the next step starts from,
+    /// bit for bit.
+    pub(super) fn look(&mut self, system: &mut Y, theta: Y::Scalar) -> Y::Scalar {
+        let Solver { method, at, looked: (q, p), .. } = self;
+        match self.pending {
+            None => {
+                method.parts().0.store(system, q, p);
+                self.t
+            }
+            Some(step) => {
+                let inside = theta < Y::Scalar::one();
+                if inside {
+                    method.interpolate(system, self.t, step.h, theta, at);
+                }
+                let (field, delta) = method.parts();
+                field.chart().state(system, if inside { at } else { delta }, q, p);
+                if inside {
+                    self.t + theta * step.h
+                } else {
+                    step.end
+                }
+            }
+        }
+    }
+
     /// Time of the state, s.
     pub fn time(&self) -> Y::Scalar {
-        self.pending.map_or(self.t, |h| self.t + (h + self.t_carry))
+        self.pending.map_or(self.t, |step| step.end)
     }
 
     /// The state.
     pub fn state(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        let (field, delta) = self.method.parts();
         match self.pending {
-            None => self.method.parts().0.store(system, q, p),
-            Some(_) => {
-                let (field, delta) = self.method.parts();
-                field.chart().state(system, delta, q, p);
-            }
+            None => field.store(system, q, p),
+            Some(_) => field.chart().state(system, delta, q, p),
         }
     }
 
     /// Work done.
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.method.statistics();
-        statistics.steps += u64::from(self.pending.is_some());
+        statistics.steps += self.cut + u64::from(self.pending.is_some());
         statistics.rejections += self.rejections;
         statistics
     }
@@ -202,60 +256,79 @@ where
     pub fn run(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
         let mut left = self.limits.steps;
         while self.time() < t_end {
-            let before = self.rejections;
-            self.advance(system, t_end)?;
-            left = left.saturating_sub(1 + self.rejections - before);
-            if left == 0 && self.time() < t_end {
-                return Err(StepError::TooManySteps { time: self.time().to_f64(), steps: self.limits.steps });
-            }
+            self.counted(system, t_end, &mut left)?;
         }
         Ok(())
     }
 
-    /// Takes one step, not beyond `t_end` (s).
+    /// One step of at most `left`, rejected ones included.
+    pub(super) fn counted(&mut self, system: &mut Y, t_end: Y::Scalar, left: &mut u64) -> Result<(), StepError> {
+        if *left == 0 {
+            return Err(StepError::TooManySteps { time: self.time().to_f64(), steps: self.limits.steps });
+        }
+        let before = self.rejections;
+        self.advance(system, t_end)?;
+        *left = left.saturating_sub(1 + self.rejections - before);
+        Ok(())
+    }
+
+    /// Takes one step, not beyond `t_end` (s); none if that is not ahead.
     ///
     /// # Errors
     /// [`StepError`]; the state is then that of the last accepted step.
     pub fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
         self.settle(system)?;
-        let rest = (t_end - self.t - self.t_carry).to_f64();
+        // Small against the time, it is exact; and it is what a last step must be to land on the end.
+        let rest = t_end - self.t - self.t_carry;
+        if rest <= Y::Scalar::zero() {
+            return Ok(());
+        }
         match self.step {
-            Step::Fixed(h) => {
-                // A rest that differs from the step by rounding is the step.
-                let h = if rest < h * (1.0 + 1e-9) { rest } else { h };
-                self.method.attempt(system, self.t, Y::Scalar::constant(h), None)?;
-                self.check()?;
-                self.pending = Some(Y::Scalar::constant(h));
-                Ok(())
-            }
-            Step::Adaptive(tolerances) => self.controlled(system, tolerances, rest),
+            Step::Fixed(h) => self.fixed(system, h, t_end, rest),
+            Step::Adaptive(tolerances) => self.controlled(system, tolerances, t_end, rest),
         }
     }
 
-    /// Displacement at `t + θ h` of the last step, as a state.
-    pub fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
-        let h = self.pending.unwrap_or(Y::Scalar::zero());
-        match self.pending {
-            None => self.at.clear(),
-            Some(_) => self.method.interpolate(system, self.t, h, theta, &mut self.at),
+    fn fixed(&mut self, system: &mut Y, h: f64, t_end: Y::Scalar, rest: Y::Scalar) -> Result<(), StepError> {
+        if h.is_nan() || h <= 0.0 {
+            return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
         }
-        let (field, _) = self.method.parts();
-        field.chart().state(system, &self.at, q, p);
+        // A rest that differs from the step by rounding is the step.
+        let last = rest.to_f64() < h * (1.0 + 1e-9) + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
+        let step = if last { rest } else { Y::Scalar::constant(h) };
+        self.method.attempt(system, self.t, step, None)?;
+        self.check()?;
+        self.wait(step, last.then_some(t_end));
+        Ok(())
+    }
+
+    /// Notes a step that succeeded; `end` if it leads exactly there.
+    fn wait(&mut self, h: Y::Scalar, end: Option<Y::Scalar>) {
+        let step = h + self.t_carry;
+        let sum = self.t + step;
+        self.pending = Some(match end {
+            Some(end) => Pending { h, end, carry: Y::Scalar::zero() },
+            None => Pending { h, end: sum, carry: step - (sum - self.t) },
+        });
+    }
+
+    /// State at `t + θ h` of the last step, `0 ≤ θ ≤ 1`.
+    pub fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        self.look(system, theta);
+        q.as_mut().copy_from_slice(self.looked.0.as_ref());
+        p.as_mut().copy_from_slice(self.looked.1.as_ref());
     }
 
     /// Start and length of the last step, s.
     pub fn last_step(&self) -> (Y::Scalar, Y::Scalar) {
-        (self.t, self.pending.unwrap_or(Y::Scalar::zero()))
+        (self.t, self.pending.map_or(Y::Scalar::zero(), |step| step.h))
     }
 
     /// Accepts what is pending.
     fn settle(&mut self, system: &mut Y) -> Result<(), StepError> {
-        if let Some(h) = self.pending {
-            self.method.accept(system, self.t, h)?;
-            self.pending = None;
-            let (t, h) = (self.t, h + self.t_carry);
-            self.t = t + h;
-            self.t_carry = h - (self.t - t);
+        if let Some(step) = self.pending {
+            self.method.accept(system, self.t, step.h)?;
+            (self.t, self.t_carry, self.pending) = (step.end, step.carry, None);
         }
         Ok(())
     }
@@ -267,13 +340,23 @@ where
     }
 
     /// One step by the error.
-    fn controlled(&mut self, system: &mut Y, tolerances: Tolerances, rest: f64) -> Result<(), StepError> {
+    fn controlled(
+        &mut self,
+        system: &mut Y,
+        tolerances: Tolerances,
+        t_end: Y::Scalar,
+        all: Y::Scalar,
+    ) -> Result<(), StepError> {
+        let rest = all.to_f64();
         let exponent = 1.0 / f64::from(self.method.error_order().unwrap_or(0) + 1);
         if self.next == 0.0 {
             self.next = self.first(system, &tolerances, exponent, rest);
         }
         let least = self.limits.min_step.max(4.0 * Y::Scalar::epsilon() * self.t.to_f64().abs()).max(LEAST);
-        let mut h = self.next.min(self.limits.max_step);
+        let mut h = self.next.max(least).min(self.limits.max_step);
+        if h <= 0.0 {
+            return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
+        }
         let mut rejected = false;
         loop {
             let last = rest <= h * 1.0001;
@@ -286,7 +369,8 @@ where
                 h
             };
             self.weigh(system, &tolerances, tried);
-            let error = match self.method.attempt(system, self.t, Y::Scalar::constant(tried), Some(&self.scale)) {
+            let step = if last { all } else { Y::Scalar::constant(tried) };
+            let error = match self.method.attempt(system, self.t, step, Some(&self.scale)) {
                 Ok(error) => error,
                 // An implicit method may succeed with a smaller step.
                 Err(e) if 0.25 * tried < least => return Err(e),
@@ -300,7 +384,7 @@ where
                 // A step cut short by the end says little about the next.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };
                 self.last_error = error.max(1e-4);
-                self.pending = Some(Y::Scalar::constant(tried));
+                self.wait(step, last.then_some(t_end));
                 return Ok(());
             }
             self.rejections += 1;
