@@ -180,7 +180,7 @@ mod generated {
             fill(q.as_mut(), &state[0]);
             fill(v.as_mut(), &state[1]);
             let (mut qd, mut pd, mut a) = (system.neutral(), system.rest(), system.rest());
-            system.momenta_of(&q, &v, &mut p);
+            system.state_momenta(&q, &v, &mut p);
             system.state_accelerations(&q, &v, &mut a);
             results.push(("momenta", doubles(p.as_ref())));
             fill(p.as_mut(), &state[2]);
