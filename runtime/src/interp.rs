@@ -82,10 +82,14 @@ impl<S: Scalar> Interpreter<S> {
             match node.source {
                 Source::State { q, v } => {
                     groups.push(group(q, v));
-                    group(q, v).quaternion().map(|at| neutral[at + 3] = S::one());
+                    if let Some(at) = group(q, v).quaternion() {
+                        neutral[at + 3] = S::one();
+                    }
                 }
                 Source::Drive { q, v } => {
-                    group(q, v).quaternion().map(|at| drive_q[at + 3] = S::one());
+                    if let Some(at) = group(q, v).quaternion() {
+                        drive_q[at + 3] = S::one();
+                    }
                 }
             }
         }

@@ -53,7 +53,7 @@ scenes!(f64, visit_f64, visit_differentiable_f64, {
     "ur5" => ur5::Ur5,
     "panda_arm" => panda_arm::PandaArm,
     "arm7" => arm7::Arm7,
-    "chain10" => chain10::Chain10,
+    "chain10" | "chain10_swing" => chain10::Chain10,
     "chain10_friction" => chain10_friction::Chain10Friction,
     "rotor" => rotor::Rotor,
 }, {
@@ -68,5 +68,5 @@ scenes!(f32, visit_f32, visit_differentiable_f32, {
     "ur5" => ur5_f32::Ur5F32,
     "panda_arm" => panda_arm_f32::PandaArmF32,
     "arm7" => arm7_f32::Arm7F32,
-    "chain10" => chain10_f32::Chain10F32,
+    "chain10" | "chain10_swing" => chain10_f32::Chain10F32,
 }, {});

@@ -111,24 +111,41 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     Some(Long { evaluations: driver.statistics().evaluations, seconds, energy, failure })
 }
 
-/// The setting at which a method needs `work` times the evaluations of RK4 at its step: by bisection on a short run.
-fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, work: f64, t_end: f64) -> Option<f64> {
+/// The setting at which a method needs as many evaluations as RK4 at its step: by bisection on a short run, then corrected
+/// on tenths of the run, which meet the motion at its roughest.
+fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) -> Option<f64> {
     let rk4 = 4.0 / scene.rk4_step;
     let adaptive = catalogue::entry(method)?.adaptive;
-    let mut per_second = |setting: f64| -> Option<f64> {
+    let mut work = |setting: f64, t_end: f64| -> Option<f64> {
         let run = long(scene, system, method, step(method, setting, false), false, t_end)?;
-        run.failure.is_none().then(|| run.evaluations as f64 / t_end)
+        run.failure.is_none().then(|| run.evaluations as f64 / t_end / rk4)
     };
+    let short = (t_end / 1000.0).max(scene.t_end);
     // Powers of ten between which the work is bisected; failures count as too little of it.
     let (mut coarse, mut fine) = if adaptive { (0.0, -14.0) } else { (scene.rk4_step.log10() + 1.5, -5.5) };
-    for _ in 0..14 {
+    for _ in 0..10 {
         let middle = 0.5 * (coarse + fine);
-        match per_second(10.0_f64.powf(middle)) {
-            Some(n) if n > work * rk4 => fine = middle,
+        match work(10.0_f64.powf(middle), short) {
+            Some(n) if n > 1.0 => fine = middle,
             _ => coarse = middle,
         }
     }
-    Some(10.0_f64.powf(0.5 * (coarse + fine)))
+    let mut at = 0.5 * (coarse + fine);
+    if !adaptive {
+        return Some(10.0_f64.powf(at));
+    }
+    // log(work) falls with log(tolerance) at this slope.
+    let slope = match (work(10.0_f64.powf(at - 1.0), short), work(10.0_f64.powf(at + 1.0), short)) {
+        (Some(more), Some(less)) if more > 1.05 * less => 0.5 * (more / less).log10(),
+        _ => 0.1,
+    };
+    for _ in 0..3 {
+        match work(10.0_f64.powf(at), 0.1 * t_end) {
+            Some(n) => at = (at + n.log10() / slope).clamp(-14.0, -1.0),
+            None => at -= 1.0,
+        }
+    }
+    Some(10.0_f64.powf(at))
 }
 
 /// One scene, some methods, each at the work of RK4 at its step over `steps` of those.
@@ -137,19 +154,16 @@ pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
     let height = height(scene, &mut system);
     let reference = reference(scene);
     let t_end = scene.rk4_step * steps as f64;
-    let pilot = (t_end / 100.0).max(scene.t_end);
     let mut rows = Vec::new();
     let mut rk4_seconds = f64::NAN;
     for method in methods {
+        let setting = match method.as_str() {
+            "rk4" => Some(scene.rk4_step),
+            _ => setting(scene, &mut system, method, t_end),
+        };
+        let Some(setting) = setting else { continue };
         for project in [false, true] {
             note(format_args!("{}: {method}{}", scene.name, if project { ", projected" } else { "" }));
-            let setting = match method.as_str() {
-                "rk4" => scene.rk4_step,
-                _ => match setting(scene, &mut system, method, 1.0, pilot) {
-                    Some(setting) => setting,
-                    None => continue,
-                },
-            };
             let step = step(method, setting, false);
             let Some(run) = long(scene, &mut system, method, step, project, t_end) else { continue };
             if method == "rk4" && !project {

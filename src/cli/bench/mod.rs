@@ -125,7 +125,7 @@ fn write_figure(measured: &Measured, directory: &Path) -> Outcome {
 }
 
 /// Scenes of the long runs unless others are asked for.
-pub const LONG: [&str; 4] = ["double_pendulum", "double_pendulum_chaotic", "arm7", "chain10"];
+pub const LONG: [&str; 4] = ["double_pendulum", "double_pendulum_chaotic", "arm7", "chain10_swing"];
 
 fn longrun(args: &LongArgs, out: &mut dyn Write) -> Outcome {
     let mut choice = args.choice.clone();
