@@ -296,6 +296,7 @@ where
                 let size = error.max(1e-10);
                 let factor =
                     SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
+                let factor = self.method.advise().unwrap_or(factor);
                 let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
                 // A step cut short by the end says little about the next.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };

@@ -58,6 +58,12 @@ where
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError>;
 
+    /// Of methods that choose their order: takes the order for the next attempt from the errors of the last one, which met
+    /// the tolerances, and returns by which factor the step may change. Others leave that to the solver.
+    fn advise(&mut self) -> Option<f64> {
+        None
+    }
+
     /// The equation, and the displacement of the last attempt.
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>);
 
