@@ -293,10 +293,10 @@ where
                 Err(_) => f64::NAN,
             };
             if error <= 1.0 && self.check().is_ok() {
-                let size = error.max(1e-10);
-                let factor =
-                    SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
-                let factor = self.method.advise().unwrap_or(factor);
+                let factor = self.method.advise().unwrap_or_else(|| {
+                    let size = error.max(1e-10);
+                    SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL)
+                });
                 let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
                 // A step cut short by the end says little about the next.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };

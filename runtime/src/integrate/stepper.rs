@@ -45,6 +45,20 @@ where
     /// [`StepError::Quaternion`].
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError>;
 
+    /// As [`Stepper::begin`], but if the state is the one that the method gave last, its history goes on.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    fn resume(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        self.begin(system, t, q, p)
+    }
+
     /// Tries a step of `h` s from time `t`. With `scale`, returns the error relative to it, root mean square over all
     /// components whose scale is not zero; 0 where no error is estimated. A NaN means that the step is too large to be judged.
     ///

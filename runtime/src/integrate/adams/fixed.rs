@@ -2,7 +2,7 @@
 
 use super::history::History;
 use super::start::Extrapolation;
-use super::weights::integrals;
+use super::weights::{Weights, NODES};
 use crate::integrate::chart::Point;
 use crate::integrate::field::Field;
 use crate::integrate::stepper::{hermite, Statistics, Stepper};
@@ -41,9 +41,10 @@ const SAME: f64 = 1e-6;
 pub struct Adams<Y: System, const K: usize, const CORRECT: bool> {
     field: Field<Y>,
     steps: u64,
-    predictor: [Y::Scalar; K],
-    /// Weight of the new rate, then of the past ones from the newest on.
-    corrector: [Y::Scalar; K],
+    /// Weights of the past rates, one unused before them.
+    predictor: [Y::Scalar; NODES],
+    /// Weight of the new rate, then of the past ones.
+    corrector: [Y::Scalar; NODES],
     history: History<Y, K>,
     /// The newest rate of the history is that at the start.
     start_known: bool,
@@ -78,14 +79,14 @@ where
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
-        let nodes = |first: f64| core::array::from_fn::<_, K, _>(|j| Y::Scalar::constant(first - j as f64));
-        let (mut predictor, mut corrector) = ([Y::Scalar::zero(); K], [Y::Scalar::zero(); K]);
-        integrals(&nodes(0.0), Y::Scalar::one(), &mut predictor);
-        integrals(&nodes(1.0), Y::Scalar::one(), &mut corrector);
+        let places: [Y::Scalar; NODES] = core::array::from_fn(|j| Y::Scalar::constant(1.0 - j as f64));
+        let weights = |past: usize| Weights::new(&places[..=past], past, Y::Scalar::one());
+        // Of order 1 the corrector is the implicit Euler method, with no past rate.
+        let corrector = if K > 1 { weights(K - 1).corrector } else { core::array::from_fn(|j| places[(2 * j).min(1)]) };
         Adams {
             field: Field::new(system, compensated),
             steps: 0,
-            predictor,
+            predictor: weights(K).predictor,
             corrector,
             history: History::new(system),
             start_known: false,
@@ -95,22 +96,6 @@ where
             end: Point::zero(system),
             end_known: false,
         }
-    }
-
-    /// Takes a state; the history stays if it leads there.
-    fn take(
-        &mut self,
-        system: &Y,
-        t: Y::Scalar,
-        (q, p): (&Y::Coordinates, &Y::Momenta),
-        goes_on: bool,
-    ) -> Result<(), StepError> {
-        if !goes_on {
-            self.history.keep(0);
-            self.start_known = false;
-        }
-        self.end_known = false;
-        self.field.load(system, t, q, p)
     }
 
     /// The chart has moved by the last attempt.
@@ -145,7 +130,23 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), StepError> {
-        self.take(system, t, (q, p), false)
+        self.history.keep(0);
+        (self.start_known, self.end_known) = (false, false);
+        self.field.load(system, t, q, p)
+    }
+
+    fn resume(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        if !self.field.gave(q, p) {
+            return self.begin(system, t, q, p);
+        }
+        self.end_known = false;
+        self.field.load(system, t, q, p)
     }
 
     fn attempt(
@@ -165,12 +166,11 @@ where
             self.start.step(equation, (t, h), K, start, &mut self.delta);
             return Ok(0.0);
         }
-        self.history.combine(&self.predictor, &mut self.delta);
+        self.history.combine(&self.predictor[..=K], &self.end, &mut self.delta);
         self.delta.scale(h);
         if CORRECT {
             self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.history.combine(&self.corrector[1..], &mut self.delta);
-            self.delta.add(self.corrector[0], &self.end);
+            self.history.combine(&self.corrector[..K], &self.end, &mut self.delta);
             self.delta.scale(h);
         }
         Ok(0.0)
@@ -221,8 +221,7 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), StepError> {
-        let goes_on = self.field.gave(q, p);
-        self.take(system, t, (q, p), goes_on)?;
+        self.resume(system, t, q, p)?;
         self.attempt(system, t, h, None)?;
         self.accept(system, t, h)?;
         self.field.store(system, q, p);

@@ -83,12 +83,25 @@ where
         }
     }
 
-    /// `out = Σ wⱼ fⱼ`.
+    /// `out = w₀ new + Σ wⱼ fⱼ₋₁`: `weights[0]` is that of a rate newer than all.
     #[inline]
-    pub fn combine(&self, weights: &[Y::Scalar], out: &mut Point<Y>) {
+    pub fn combine(&self, weights: &[Y::Scalar], new: &Point<Y>, out: &mut Point<Y>) {
+        let rate = |j: usize| if j == 0 { new } else { self.rate(j - 1) };
         out.clear();
-        for (j, w) in weights.iter().enumerate() {
-            out.add(*w, self.rate(j));
+        let mut j = 0;
+        while j + 4 <= weights.len() {
+            // Four at once: less to load and store.
+            let (w, rates) = ([0, 1, 2, 3].map(|i| weights[j + i]), [0, 1, 2, 3].map(|i| rate(j + i).parts()));
+            for (part, out) in out.parts_mut().into_iter().enumerate() {
+                let [a, b, c, d] = rates.map(|rate| &rate[part][..out.len()]);
+                for i in 0..out.len() {
+                    out[i] = out[i] + ((w[0] * a[i] + w[1] * b[i]) + (w[2] * c[i] + w[3] * d[i]));
+                }
+            }
+            j += 4;
+        }
+        for j in j..weights.len() {
+            out.add(weights[j], rate(j));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The Adams method with steps and orders of any size.
 
 use super::history::History;
-use super::weights::{integrals, inverse, product, NODES};
+use super::weights::{Weights, NODES};
 use crate::integrate::chart::Point;
 use crate::integrate::field::Field;
 use crate::integrate::stepper::{norm, Statistics, Stepper};
@@ -29,12 +29,13 @@ pub struct VariableAdams<Y: System> {
     used: usize,
     /// Since the start every step has raised the order.
     starting: bool,
-    /// Errors of the last attempt at orders `used − 2` to `used + 1`; infinite where not known.
-    errors: [f64; 4],
+    /// Errors of the last attempt at orders `used − 1` to `used + 1`; infinite where not known.
+    errors: [f64; 3],
     delta: Point<Y>,
     end: Point<Y>,
     end_known: bool,
     work: Point<Y>,
+    pub tune: [f64; 6],
 }
 
 impl<Y> VariableAdams<Y>
@@ -62,33 +63,23 @@ where
             order: 1,
             used: 1,
             starting: true,
-            errors: [f64::INFINITY; 4],
+            errors: [f64::INFINITY; 3],
             delta: point(),
             end: point(),
             end_known: false,
             work: point(),
+            tune: [0.5, 2.0, 1.0, 1.0, 1.0, 12.0],
         }
     }
 
-    /// Places of the new rate and of the past ones, in steps of `h` from the start.
-    fn nodes(&self, h: Y::Scalar) -> [Y::Scalar; NODES] {
-        let mut nodes = [Y::Scalar::one(); NODES];
-        for j in 0..self.history.len() {
-            nodes[j + 1] = -(self.history.age(j) / h);
+    /// Weights at order `k` up to `theta` of a step of `h`.
+    fn weights(&self, k: usize, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
+        let mut places = [Y::Scalar::one(); NODES];
+        let count = (k + 1).min(self.history.len()).min(HIGHEST);
+        for (j, place) in places[1..=count].iter_mut().enumerate() {
+            *place = -(self.history.age(j) / h);
         }
-        nodes
-    }
-
-    /// Error at order `m`: what one node more changes.
-    fn error(&mut self, m: usize, nodes: &[Y::Scalar], h: Y::Scalar, scale: &Point<Y>) -> f64 {
-        let mut weights = [Y::Scalar::zero(); NODES];
-        for j in 0..=m {
-            weights[j] = inverse(&nodes[..=m], j);
-        }
-        self.history.combine(&weights[1..=m], &mut self.work);
-        self.work.add(weights[0], &self.end);
-        self.work.scale(h * product(&nodes[..m]));
-        norm(&self.work, scale)
+        Weights::new(&places[..=count], k, theta)
     }
 }
 
@@ -128,27 +119,25 @@ where
         self.end_known = false;
         let k = self.order.min(self.history.len());
         self.used = k;
-        let nodes = self.nodes(h);
-        let mut weights = [Y::Scalar::zero(); NODES];
-        integrals(&nodes[1..=k], Y::Scalar::one(), &mut weights[..k]);
-        self.history.combine(&weights[..k], &mut self.delta);
+        let weights = self.weights(k, h, Y::Scalar::one());
+        self.history.combine(&weights.predictor[..=k], &self.end, &mut self.delta);
         self.delta.scale(h);
         self.field.rates(system, t + h, &self.delta, &mut self.end);
-        integrals(&nodes[..=k], Y::Scalar::one(), &mut weights[..=k]);
-        self.history.combine(&weights[1..=k], &mut self.delta);
-        self.delta.add(weights[0], &self.end);
+        self.history.combine(&weights.corrector[..=k], &self.end, &mut self.delta);
         self.delta.scale(h);
         let Some(scale) = scale else { return Ok(0.0) };
-        self.errors = [f64::INFINITY; 4];
-        for (i, m) in (k as isize - 2..=k as isize + 1).enumerate() {
-            if m >= 1 && m as usize <= self.history.len() && m as usize <= HIGHEST {
-                self.errors[i] = self.error(m as usize, &nodes, h, scale);
+        let known = [k > 1, true, k < HIGHEST && k < self.history.len()];
+        for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
+            self.errors[i] = f64::INFINITY;
+            if known {
+                self.history.combine(&weights[..k + i], &self.end, &mut self.work);
+                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale);
             }
         }
-        let error = self.errors[2];
+        let [lower, error, _] = self.errors;
         if !(error <= 1.0) {
             self.starting = false;
-            if self.errors[1] <= error {
+            if lower <= error {
                 self.order = (k - 1).max(1);
             }
         }
@@ -157,30 +146,23 @@ where
 
     fn advise(&mut self) -> Option<f64> {
         let k = self.used;
-        let factor = |m: usize, error: f64| libm::pow(0.5 / error.max(1e-12), 1.0 / (m as f64 + 1.0));
-        let [_, lower, error, higher] = self.errors;
+        let [lower, error, higher] = self.errors;
+        // Logarithm of the factor by which the step could grow.
+        let growth = |error: f64, k: usize| libm::log(self.tune[0] / error.max(1e-12)) / (k as f64 + 1.0);
+        let mut best = growth(error, k);
+        self.starting &= k < HIGHEST && (k == 1 || lower > error);
         if self.starting {
-            self.starting = k < HIGHEST && !(k > 1 && lower <= error);
-            if self.starting {
-                self.order = k + 1;
-                return Some(factor(k, error).clamp(0.5, GROW));
+            self.order = k + 1;
+        } else {
+            self.order = k;
+            for (order, error) in [(k - 1, lower), (k + 1, higher)] {
+                let growth = growth(error, order);
+                if growth > best {
+                    (self.order, best) = (order, growth);
+                }
             }
         }
-        let mut best = (k, factor(k, error));
-        if k > 1 {
-            let f = factor(k - 1, lower.max(self.errors[0].min(lower)));
-            if f > best.1 {
-                best = (k - 1, f);
-            }
-        }
-        if k < HIGHEST {
-            let f = factor(k + 1, higher);
-            if f > best.1 {
-                best = (k + 1, f);
-            }
-        }
-        self.order = best.0;
-        Some(best.1.clamp(0.5, GROW))
+        Some(libm::exp(best).clamp(0.5, GROW))
     }
 
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
@@ -219,11 +201,8 @@ where
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.end_rate(system, t, h);
         let k = self.used;
-        let nodes = self.nodes(h);
-        let mut weights = [Y::Scalar::zero(); NODES];
-        integrals(&nodes[..=k], theta, &mut weights[..=k]);
-        self.history.combine(&weights[1..=k], out);
-        out.add(weights[0], &self.end);
+        let weights = self.weights(k, h, theta).corrector;
+        self.history.combine(&weights[..=k], &self.end, out);
         out.scale(h);
     }
 
