@@ -1,6 +1,6 @@
 //! Adams methods with steps of one size.
 
-use super::history::History;
+use super::shared::{of_core, Core};
 use super::start::Extrapolation;
 use super::weights::{Weights, NODES};
 use crate::integrate::chart::Point;
@@ -26,35 +26,27 @@ pub type Abm4<Y> = AdamsMoulton<Y, 4>;
 pub type Abm6<Y> = AdamsMoulton<Y, 6>;
 /// Adams-Bashforth-Moulton of order 8: two evaluations a step.
 pub type Abm8<Y> = AdamsMoulton<Y, 8>;
-/// Adams-Bashforth-Moulton of order 12: two evaluations a step.
+/// Adams-Bashforth-Moulton of order 12: two evaluations a step. Only for slow motion: it is stable for small steps alone.
 pub type Abm12<Y> = AdamsMoulton<Y, 12>;
 
-/// Steps whose sizes differ by less count as equal: the last one before an end differs by rounding of the time.
+/// Steps whose sizes differ by a smaller part count as equal: the last one before an end differs by rounding of the time.
 const SAME: f64 = 1e-6;
 
 /// An Adams method of order `K`, 1 to 12, with steps of one size; with `CORRECT` a predictor and a corrector.
 ///
-/// The first `K − 1` steps extrapolate the midpoint rule to order `K` or one more, with `⌈K/2⌉²` evaluations each instead of
-/// one or two; so do those after a change of the step, and [`Stepper::step`] after a state that is not the one it gave.
-/// A jump of the joint forces spoils the order for `K` steps: call [`Stepper::begin`] where it matters.
+/// The first `K − 1` steps extrapolate the midpoint rule to order `K` or one more, with `⌈K/2⌉²` evaluations and the one at
+/// the start; so do those after a change of the step, and [`Stepper::step`] after a state that is not the one it gave. A jump
+/// of the joint forces spoils the order for `K` steps: call [`Stepper::begin`] where it matters.
 #[derive(Clone, Debug)]
 pub struct Adams<Y: System, const K: usize, const CORRECT: bool> {
-    field: Field<Y>,
-    steps: u64,
+    core: Core<Y, K>,
     /// Weights of the past rates, one unused before them.
     predictor: [Y::Scalar; NODES],
     /// Weight of the new rate, then of the past ones.
     corrector: [Y::Scalar; NODES],
-    history: History<Y, K>,
-    /// The newest rate of the history is that at the start.
-    start_known: bool,
     /// Between the rates of the history, s.
     spacing: Y::Scalar,
     start: Extrapolation<Y>,
-    delta: Point<Y>,
-    /// Rate at the prediction, or at the end if that is known.
-    end: Point<Y>,
-    end_known: bool,
 }
 
 impl<Y, const K: usize, const CORRECT: bool> Adams<Y, K, CORRECT>
@@ -79,34 +71,20 @@ where
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
+        let one = Y::Scalar::one();
         let places: [Y::Scalar; NODES] = core::array::from_fn(|j| Y::Scalar::constant(1.0 - j as f64));
-        let weights = |past: usize| Weights::new(&places[..=past], past, Y::Scalar::one());
-        // Of order 1 the corrector is the implicit Euler method, with no past rate.
-        let corrector = if K > 1 { weights(K - 1).corrector } else { core::array::from_fn(|j| places[(2 * j).min(1)]) };
+        let mut corrector = [Y::Scalar::zero(); NODES];
+        corrector[0] = one;
+        if Self::ORDER > 1 {
+            corrector = Weights::new(&places[..K], K - 1, one).corrector;
+        }
         Adams {
-            field: Field::new(system, compensated),
-            steps: 0,
-            predictor: weights(K).predictor,
+            core: Core::new(system, compensated),
+            predictor: Weights::new(&places[..=K], K, one).predictor,
             corrector,
-            history: History::new(system),
-            start_known: false,
             spacing: Y::Scalar::zero(),
             start: Extrapolation::new(system),
-            delta: Point::zero(system),
-            end: Point::zero(system),
-            end_known: false,
         }
-    }
-
-    /// The chart has moved by the last attempt.
-    fn moved(&mut self, system: &Y, h: Y::Scalar) {
-        if self.end_known {
-            self.history.push(Some((&self.delta, h))).copy_from(&self.end);
-        }
-        (self.start_known, self.end_known) = (self.end_known, false);
-        self.history.follow(system, &self.delta, h);
-        self.spacing = h;
-        self.steps += 1;
     }
 }
 
@@ -130,23 +108,7 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), StepError> {
-        self.history.keep(0);
-        (self.start_known, self.end_known) = (false, false);
-        self.field.load(system, t, q, p)
-    }
-
-    fn resume(
-        &mut self,
-        system: &mut Y,
-        t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
-    ) -> Result<(), StepError> {
-        if !self.field.gave(q, p) {
-            return self.begin(system, t, q, p);
-        }
-        self.end_known = false;
-        self.field.load(system, t, q, p)
+        self.core.begin(system, t, q, p)
     }
 
     fn attempt(
@@ -156,75 +118,32 @@ where
         h: Y::Scalar,
         _: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start_rate(system, t);
-        self.end_known = false;
-        if self.history.len() > 1 && (h - self.spacing).abs() > self.spacing.abs() * Y::Scalar::constant(SAME) {
-            self.history.keep(1);
+        self.core.attempt(system, t);
+        let Core { field, history, delta, .. } = &mut self.core;
+        if history.len() > 1 && (h - self.spacing).abs() > self.spacing.abs() * Y::Scalar::constant(SAME) {
+            history.keep(1);
         }
-        if self.history.len() < K {
-            let (equation, start) = ((&mut self.field, system), self.history.rate(0));
-            self.start.step(equation, (t, h), K, start, &mut self.delta);
+        if history.len() < K {
+            self.start.step((field, system), (t, h), K, history.rate(0), delta);
             return Ok(0.0);
         }
-        self.history.combine(&self.predictor[..=K], &self.end, &mut self.delta);
-        self.delta.scale(h);
+        self.core.predict(h, &self.predictor[..=K]);
         if CORRECT {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.history.combine(&self.corrector[..K], &self.end, &mut self.delta);
-            self.delta.scale(h);
+            self.core.correct(system, t, h, &self.corrector[..K]);
         }
         Ok(0.0)
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
-    }
-
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        if !self.start_known {
-            self.end.clear();
-            let rate = self.history.push(None);
-            self.field.rates(system, t, &self.end, rate);
-            self.start_known = true;
-        }
-        self.history.rate(0)
-    }
-
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
-        }
-        &self.end
-    }
-
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        self.moved(system, h);
-        Ok(())
+        self.spacing = h;
+        self.core.accept(system, t, h)
     }
 
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.end_rate(system, t, h);
-        hermite(h, theta, &self.delta, [self.history.rate(0), &self.end], out);
+        self.core.end_rate(system, t, h);
+        let Core { history, delta, end, .. } = &self.core;
+        hermite(h, theta, delta, [history.rate(0), end], out);
     }
 
-    fn statistics(&self) -> Statistics {
-        Statistics { steps: self.steps, evaluations: self.field.evaluations(), ..Statistics::default() }
-    }
-
-    fn step(
-        &mut self,
-        system: &mut Y,
-        t: Y::Scalar,
-        h: Y::Scalar,
-        q: &mut Y::Coordinates,
-        p: &mut Y::Momenta,
-    ) -> Result<(), StepError> {
-        self.resume(system, t, q, p)?;
-        self.attempt(system, t, h, None)?;
-        self.accept(system, t, h)?;
-        self.field.store(system, q, p);
-        Ok(())
-    }
+    of_core!();
 }

@@ -2,6 +2,7 @@
 
 mod fixed;
 mod history;
+mod shared;
 mod start;
 mod variable;
 mod weights;

@@ -1,6 +1,6 @@
 //! The Adams method with steps and orders of any size.
 
-use super::history::History;
+use super::shared::{of_core, Core};
 use super::weights::{Weights, NODES};
 use crate::integrate::chart::Point;
 use crate::integrate::field::Field;
@@ -11,31 +11,35 @@ use crate::Scalar;
 
 /// Highest order of the predictor.
 const HIGHEST: usize = 12;
-/// Rates that are kept: one more tells whether a higher order would do better.
-const KEPT: usize = HIGHEST + 1;
-/// A step grows by at most this factor.
+/// Share of the allowed error that the next step aims at.
+const AIM: f64 = 0.1;
+/// A step changes by at most these factors.
+const SHRINK: f64 = 0.5;
 const GROW: f64 = 2.0;
 
-/// Variable-step, variable-order Adams-Bashforth-Moulton method.
+/// Adams-Bashforth-Moulton with variable steps and orders: predictor of order 1 to 12, corrector of one more, two
+/// evaluations of the rates a step.
+///
+/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, and a restart at every jump. Its
+/// own work is some ten times that of a Runge-Kutta stage, so it is for mechanisms whose rates cost more than that. Made for
+/// error control: with steps of a fixed size the order rises from one, whose error stays; take [`Adams`](super::Adams) then.
+///
+/// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters 5 to 7:
+/// the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every step from the
+/// places of the past rates, instead of their modified divided differences: the rates are rewritten by rotations
+/// ([`Chart::follow`](crate::integrate::Chart::follow)), which differences would not survive.
 #[derive(Clone, Debug)]
 pub struct VariableAdams<Y: System> {
-    field: Field<Y>,
-    steps: u64,
-    history: History<Y, KEPT>,
-    start_known: bool,
+    core: Core<Y, HIGHEST>,
     /// Order of the predictor in the next attempt.
     order: usize,
-    /// Order of the last attempt.
+    /// In the last one.
     used: usize,
-    /// Since the start every step has raised the order.
+    /// Every step since the start has raised the order.
     starting: bool,
     /// Errors of the last attempt at orders `used − 1` to `used + 1`; infinite where not known.
     errors: [f64; 3],
-    delta: Point<Y>,
-    end: Point<Y>,
-    end_known: bool,
     work: Point<Y>,
-    pub tune: [f64; 6],
 }
 
 impl<Y> VariableAdams<Y>
@@ -48,38 +52,43 @@ where
         Self::with_sums(system, false)
     }
 
-    /// With compensated sums.
+    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions.
     pub fn compensated(system: &Y) -> Self {
         Self::with_sums(system, true)
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
-        let point = || Point::zero(system);
         VariableAdams {
-            field: Field::new(system, compensated),
-            steps: 0,
-            history: History::new(system),
-            start_known: false,
+            core: Core::new(system, compensated),
             order: 1,
             used: 1,
             starting: true,
             errors: [f64::INFINITY; 3],
-            delta: point(),
-            end: point(),
-            end_known: false,
-            work: point(),
-            tune: [0.5, 2.0, 1.0, 1.0, 1.0, 12.0],
+            work: Point::zero(system),
         }
     }
 
-    /// Weights at order `k` up to `theta` of a step of `h`.
-    fn weights(&self, k: usize, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
+    /// Weights at the order of the last attempt, up to `theta` of a step of `h`.
+    fn weights(&self, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
         let mut places = [Y::Scalar::one(); NODES];
-        let count = (k + 1).min(self.history.len()).min(HIGHEST);
+        let count = (self.used + 1).min(self.core.history.len());
         for (j, place) in places[1..=count].iter_mut().enumerate() {
-            *place = -(self.history.age(j) / h);
+            *place = -(self.core.history.age(j) / h);
         }
-        Weights::new(&places[..=count], k, theta)
+        Weights::new(&places[..=count], self.used, theta)
+    }
+
+    /// Errors of the last attempt at the orders around its own: by how much one rate more changes the integral.
+    fn estimate(&mut self, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
+        let k = self.used;
+        let known = [k > 1, true, k < self.core.history.len()];
+        for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
+            self.errors[i] = f64::INFINITY;
+            if known {
+                self.core.history.combine(&weights[..k + i], &self.core.end, &mut self.work);
+                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale);
+            }
+        }
     }
 }
 
@@ -88,10 +97,12 @@ where
     Y: System,
     Y::Scalar: Real,
 {
+    /// The highest.
     fn order(&self) -> u32 {
         HIGHEST as u32 + 1
     }
 
+    /// Of the next attempt.
     fn error_order(&self) -> Option<u32> {
         Some(self.order as u32)
     }
@@ -103,9 +114,8 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), StepError> {
-        self.history.keep(0);
-        (self.start_known, self.end_known, self.starting, self.order) = (false, false, true, 1);
-        self.field.load(system, t, q, p)
+        (self.order, self.starting) = (1, true);
+        self.core.begin(system, t, q, p)
     }
 
     fn attempt(
@@ -115,31 +125,22 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start_rate(system, t);
-        self.end_known = false;
-        let k = self.order.min(self.history.len());
-        self.used = k;
-        let weights = self.weights(k, h, Y::Scalar::one());
-        self.history.combine(&weights.predictor[..=k], &self.end, &mut self.delta);
-        self.delta.scale(h);
-        self.field.rates(system, t + h, &self.delta, &mut self.end);
-        self.history.combine(&weights.corrector[..=k], &self.end, &mut self.delta);
-        self.delta.scale(h);
-        let Some(scale) = scale else { return Ok(0.0) };
-        let known = [k > 1, true, k < HIGHEST && k < self.history.len()];
-        for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
-            self.errors[i] = f64::INFINITY;
-            if known {
-                self.history.combine(&weights[..k + i], &self.end, &mut self.work);
-                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale);
-            }
-        }
+        self.core.attempt(system, t);
+        self.used = self.order.min(self.core.history.len());
+        let k = self.used;
+        let weights = self.weights(h, Y::Scalar::one());
+        self.core.predict(h, &weights.predictor[..=k]);
+        self.core.correct(system, t, h, &weights.corrector[..=k]);
+        let Some(scale) = scale else {
+            self.order = (k + 1).min(HIGHEST);
+            return Ok(0.0);
+        };
+        self.estimate(&weights, h, scale);
         let [lower, error, _] = self.errors;
+        // Not a number is too large as well.
         if !(error <= 1.0) {
             self.starting = false;
-            if lower <= error {
-                self.order = (k - 1).max(1);
-            }
+            self.order = if k > 1 && lower <= error { k - 1 } else { k };
         }
         Ok(error)
     }
@@ -147,14 +148,12 @@ where
     fn advise(&mut self) -> Option<f64> {
         let k = self.used;
         let [lower, error, higher] = self.errors;
-        // Logarithm of the factor by which the step could grow.
-        let growth = |error: f64, k: usize| libm::log(self.tune[0] / error.max(1e-12)) / (k as f64 + 1.0);
+        // Logarithm of the factor that the step may change by.
+        let growth = |error: f64, k: usize| libm::log(AIM / error.max(1e-12)) / (k as f64 + 1.0);
         let mut best = growth(error, k);
         self.starting &= k < HIGHEST && (k == 1 || lower > error);
-        if self.starting {
-            self.order = k + 1;
-        } else {
-            self.order = k;
+        self.order = if self.starting { k + 1 } else { k };
+        if !self.starting {
             for (order, error) in [(k - 1, lower), (k + 1, higher)] {
                 let growth = growth(error, order);
                 if growth > best {
@@ -162,51 +161,19 @@ where
                 }
             }
         }
-        Some(libm::exp(best).clamp(0.5, GROW))
-    }
-
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
-    }
-
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        if !self.start_known {
-            self.end.clear();
-            let rate = self.history.push(None);
-            self.field.rates(system, t, &self.end, rate);
-            self.start_known = true;
-        }
-        self.history.rate(0)
-    }
-
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
-        }
-        &self.end
+        Some(libm::exp(best).clamp(SHRINK, GROW))
     }
 
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        if self.end_known {
-            self.history.push(Some((&self.delta, h))).copy_from(&self.end);
-        }
-        (self.start_known, self.end_known) = (self.end_known, false);
-        self.history.follow(system, &self.delta, h);
-        self.steps += 1;
-        Ok(())
+        self.core.accept(system, t, h)
     }
 
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.end_rate(system, t, h);
-        let k = self.used;
-        let weights = self.weights(k, h, theta).corrector;
-        self.history.combine(&weights[..=k], &self.end, out);
+        self.core.end_rate(system, t, h);
+        let weights = self.weights(h, theta).corrector;
+        self.core.history.combine(&weights[..=self.used], &self.core.end, out);
         out.scale(h);
     }
 
-    fn statistics(&self) -> Statistics {
-        Statistics { steps: self.steps, evaluations: self.field.evaluations(), ..Statistics::default() }
-    }
+    of_core!();
 }

@@ -115,3 +115,69 @@ fn inverses<S: Scalar>(places: &[S]) -> [S; NODES] {
     }
     products.map(|x| S::one() / x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The polynomial through `count` rates `s^m` is `s^m` if `m < count`: places from `first` on.
+    fn moments(weights: &[f64], places: &[f64], first: usize, end: f64) {
+        for m in 0..(weights.len() - first) as i32 {
+            let sum: f64 = weights[first..].iter().zip(&places[first..]).map(|(w, s)| w * s.powi(m)).sum();
+            let size: f64 = weights[first..].iter().zip(&places[first..]).map(|(w, s)| (w * s.powi(m)).abs()).sum();
+            let exact = end.powi(m + 1) / f64::from(m + 1);
+            // Weights are good to some twenty roundings each.
+            assert!((sum - exact).abs() <= 20.0 * f64::EPSILON * size, "{m}: {sum} {exact}");
+        }
+    }
+
+    #[test]
+    fn equal_steps_give_the_known_methods() {
+        let places: [f64; NODES] = core::array::from_fn(|j| 1.0 - j as f64);
+        let (predictor, corrector) =
+            (Weights::new(&places[..5], 4, 1.0).predictor, Weights::new(&places[..4], 3, 1.0).corrector);
+        // (C.19), (C.20).
+        for (w, known) in predictor[1..5].iter().zip([55.0, -59.0, 37.0, -9.0]) {
+            assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
+        }
+        for (w, known) in corrector[..4].iter().zip([9.0, 19.0, -5.0, 1.0]) {
+            assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
+        }
+        let single: [f32; NODES] = places.map(|x| x as f32);
+        let single = Weights::new(&single[..13], 12, 1.0).predictor;
+        let double = Weights::new(&places[..13], 12, 1.0).predictor;
+        for (a, b) in single.into_iter().zip(double) {
+            assert!((f64::from(a) - b).abs() <= 20.0 * f64::from(f32::EPSILON) * b.abs(), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn polynomials_are_integrated_exactly() {
+        // Steps that double, shrink, stay.
+        let mut places = [1.0, 0.0, -0.3, -1.7, -2.0, -2.1, -2.5, -5.0, -5.5, -6.0, -6.5, -7.5, -7.6, -10.0];
+        for end in [1.0, 0.37] {
+            for k in 1..=12 {
+                let w = Weights::new(&places[..=k + 1], k, end);
+                moments(&w.predictor[..=k], &places, 1, end);
+                moments(&w.corrector[..=k], &places, 0, end);
+                let more = Weights::new(&places[..=k + 1], k + 1, end).corrector;
+                let less = if k > 1 { Weights::new(&places[..k], k - 1, end).corrector } else { [0.0; NODES] };
+                for j in 0..=k + 1 {
+                    let size = 50.0 * f64::EPSILON * (w.corrector[j].abs() + more[j].abs() + less[j].abs());
+                    assert!((w.changes[2][j] - (more[j] - w.corrector[j])).abs() <= size, "{k} {j}");
+                    if k > 1 {
+                        assert!((w.changes[1][j] - (w.corrector[j] - less[j])).abs() <= size, "{k} {j}");
+                    }
+                }
+                if k > 2 {
+                    let least = Weights::new(&places[..k - 1], k - 2, end).corrector;
+                    for j in 0..k {
+                        let size = 50.0 * f64::EPSILON * (least[j].abs() + less[j].abs());
+                        assert!((w.changes[0][j] - (less[j] - least[j])).abs() <= size, "{k} {j}");
+                    }
+                }
+            }
+            places.iter_mut().skip(1).for_each(|x| *x *= 1.9);
+        }
+    }
+}
