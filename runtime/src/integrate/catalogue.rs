@@ -2,6 +2,7 @@
 
 use alloc::boxed::Box;
 
+use super::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, VariableAdams};
 use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 use super::{Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::system::{Differentiable, Real, System};
@@ -141,6 +142,13 @@ catalogue! {
         "tsit5" "Tsitouras 5(4)" true Tsit5 new compensated;
         "dop853" "Dormand-Prince 8(5,3)" true Dop853 new compensated;
         "verner9" "Verner 9(8)" true Verner9 new compensated;
+        "ab4" "Adams-Bashforth, order 4, one evaluation a step" false Ab4 new compensated;
+        "ab6" "Adams-Bashforth, order 6, one evaluation a step" false Ab6 new compensated;
+        "abm4" "Adams-Bashforth-Moulton, order 4" false Abm4 new compensated;
+        "abm6" "Adams-Bashforth-Moulton, order 6" false Abm6 new compensated;
+        "abm8" "Adams-Bashforth-Moulton, order 8" false Abm8 new compensated;
+        "abm12" "Adams-Bashforth-Moulton, order 12" false Abm12 new compensated;
+        "adams" "Adams-Bashforth-Moulton, variable steps and orders" true VariableAdams new compensated;
     }
 }
 

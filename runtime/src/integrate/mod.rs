@@ -4,6 +4,7 @@
 //! with error control, dense output, events and statistics. Methods work on displacements from the state at the start of a
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 
+mod adams;
 #[cfg(feature = "alloc")]
 pub mod catalogue;
 pub mod chart;
@@ -15,11 +16,13 @@ mod error;
 mod explicit;
 mod field;
 mod group;
+mod projection;
 mod semi_implicit;
 mod solver;
 mod stepper;
 pub mod tableau;
 
+pub use adams::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton, VariableAdams};
 pub use chart::{Chart, Point};
 pub use composition::{Composition, Symmetric};
 pub use constant::{decimal, ratio, Constant};
@@ -28,6 +31,7 @@ pub use doubling::StepDoubling;
 pub use error::StepError;
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
+pub use projection::Projection;
 pub use semi_implicit::SemiImplicitEuler;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};
 pub use stepper::{norm, Statistics, Stepper};

@@ -117,7 +117,7 @@ macro_rules! of_core {
             q: &Y::Coordinates,
             p: &Y::Momenta,
         ) -> Result<(), StepError> {
-            match self.core.field.gave(q, p) {
+            match self.core.field.holds(q, p) {
                 true => self.core.field.load(system, t, q, p),
                 false => self.begin(system, t, q, p),
             }
