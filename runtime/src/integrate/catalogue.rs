@@ -2,9 +2,12 @@
 
 use alloc::boxed::Box;
 
-use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
-use super::{Limits, Solver, Statistics, Step, StepError, Stepper};
-use crate::system::{Differentiable, Real, System};
+use super::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, VariableAdams};
+use super::{BackwardEuler, Gauss12, Gauss12Inserted, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
+use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
+use super::{Composition, Doubled, StepDoubling, Symmetric};
+use super::{Limits, Projection, Solver, Statistics, Step, StepError, Stepper};
+use crate::system::{Differentiable, Energetic, Real, System};
 
 /// What there is to know of a method before it is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +46,10 @@ pub trait Drive<Y: System> {
     fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta);
     /// [`Solver::statistics`].
     fn statistics(&self) -> Statistics;
+    /// [`Solver::project`].
+    fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    where
+        Y: Energetic;
 }
 
 impl<Y, M> Drive<Y> for Solver<Y, M>
@@ -75,6 +82,12 @@ where
     fn statistics(&self) -> Statistics {
         Solver::statistics(self)
     }
+    fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    where
+        Y: Energetic,
+    {
+        Solver::project(self, system, projection);
+    }
 }
 
 /// Where a run starts and how its steps are chosen.
@@ -106,23 +119,24 @@ where
 
 /// A table of methods, and the function that makes one of them at time zero.
 macro_rules! catalogue {
-    ($(#[$doc:meta])* $list:ident, $make:ident, $bound:ident, $implicit:literal,
-     { $($name:literal $title:literal $adaptive:literal $type:ident $new:ident $compensated:ident;)* }) => {
+    ($(#[$doc:meta])* $list:ident, $make:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
+     { $($name:literal $title:literal $adaptive:literal $method:expr;)* }) => {
         $(#[$doc])*
         pub static $list: &[Entry] = &[
             $(Entry { name: $name, title: $title, adaptive: $adaptive, implicit: $implicit },)*
         ];
 
         /// One of them by name, at time zero. A method that estimates no error takes [`Step::Fixed`] only.
-        pub fn $make<'a, Y>(name: &str, system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
+        pub fn $make<'a, Y>(name: &str, $system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
         where
             Y: $bound + 'a,
             Y::Scalar: Real,
         {
+            let $compensated = start.compensated;
             match name {
                 $($name => {
-                    let method = if start.compensated { $type::$compensated(system) } else { $type::$new(system) };
-                    boxed(system, method, start)
+                    let method = $method;
+                    boxed($system, method, start)
                 })*
                 _ => None,
             }
@@ -130,17 +144,59 @@ macro_rules! catalogue {
     };
 }
 
+/// A method with or without compensated sums.
+macro_rules! sums {
+    ($type:ident, $system:ident, $compensated:ident) => {
+        if $compensated {
+            $type::compensated($system)
+        } else {
+            $type::new($system)
+        }
+    };
+}
+
 catalogue! {
     /// Methods that need the rates only.
-    EXPLICIT, explicit, System, false, {
-        "euler" "Euler" false Euler new compensated;
-        "midpoint" "explicit midpoint, order 2" false Midpoint new compensated;
-        "rk4" "classical Runge-Kutta, order 4" false Rk4 new compensated;
-        "rkf45" "Runge-Kutta-Fehlberg 5(4)" true Rkf45 new compensated;
-        "cash-karp" "Cash-Karp 5(4)" true CashKarp new compensated;
-        "tsit5" "Tsitouras 5(4)" true Tsit5 new compensated;
-        "dop853" "Dormand-Prince 8(5,3)" true Dop853 new compensated;
-        "verner9" "Verner 9(8)" true Verner9 new compensated;
+    EXPLICIT, explicit, System, false, |system, c| {
+        "euler" "Euler" false sums!(Euler, system, c);
+        "semi-implicit-euler" "semi-implicit Euler" false sums!(SemiImplicitEuler, system, c);
+        "midpoint" "explicit midpoint, order 2" false sums!(Midpoint, system, c);
+        "rk4" "classical Runge-Kutta, order 4" false sums!(Rk4, system, c);
+        "rk4-doubling" "classical Runge-Kutta, step doubling" true StepDoubling::extrapolated(system, sums!(Rk4, system, c));
+        "rkf45" "Runge-Kutta-Fehlberg 5(4)" true sums!(Rkf45, system, c);
+        "cash-karp" "Cash-Karp 5(4)" true sums!(CashKarp, system, c);
+        "tsit5" "Tsitouras 5(4)" true sums!(Tsit5, system, c);
+        "dop853" "Dormand-Prince 8(5,3)" true sums!(Dop853, system, c);
+        "verner9" "Verner 9(8)" true sums!(Verner9, system, c);
+        "ab4" "Adams-Bashforth, order 4, one evaluation a step" false sums!(Ab4, system, c);
+        "ab6" "Adams-Bashforth, order 6, one evaluation a step" false sums!(Ab6, system, c);
+        "abm4" "Adams-Bashforth-Moulton, order 4" false sums!(Abm4, system, c);
+        "abm6" "Adams-Bashforth-Moulton, order 6" false sums!(Abm6, system, c);
+        "abm8" "Adams-Bashforth-Moulton, order 8" false sums!(Abm8, system, c);
+        "abm12" "Adams-Bashforth-Moulton, order 12" false sums!(Abm12, system, c);
+        "adams" "Adams-Bashforth-Moulton, variable steps and orders" true sums!(VariableAdams, system, c);
+        "gauss12" "Gauss-Legendre, order 12, by insertion" false sums!(Gauss12Inserted, system, c);
+        "doubled" "phase space doubled, order 2 (experiment)" false Doubled::new(system, BINDING);
+        "doubled-6" "phase space doubled, composed to order 6 (experiment)" false
+            Composition::new(system, Doubled::new(system, BINDING), Symmetric::KAHAN_LI_6);
+    }
+}
+
+/// Binding of the two copies of the doubled phase space, 1/s.
+const BINDING: f64 = 20.0;
+
+catalogue! {
+    /// Methods that need derivatives of the rates.
+    IMPLICIT, implicit, Differentiable, true, |system, c| {
+        "backward-euler" "backward Euler" false sums!(BackwardEuler, system, c);
+        "implicit-midpoint" "implicit midpoint, order 2" false sums!(ImplicitMidpoint, system, c);
+        "implicit-midpoint-6" "implicit midpoint, composed to order 6" false
+            Composition::new(system, sums!(ImplicitMidpoint, system, c), Symmetric::KAHAN_LI_6);
+        "gauss4" "Gauss-Legendre, order 4" false sums!(Gauss4, system, c);
+        "gauss6" "Gauss-Legendre, order 6" false sums!(Gauss6, system, c);
+        "gauss12-newton" "Gauss-Legendre, order 12, by Newton" false sums!(Gauss12, system, c);
+        "radau5" "Radau IIA, order 5" true sums!(Radau5, system, c);
+        "rodas5p" "Rosenbrock Rodas5P, order 5" true sums!(Rodas5P, system, c);
     }
 }
 
@@ -150,12 +206,12 @@ where
     Y: Differentiable + 'a,
     Y::Scalar: Real,
 {
-    explicit(name, system, start)
+    implicit(name, system, start).or_else(|| explicit(name, system, start))
 }
 
 /// All methods.
 pub fn entries() -> impl Iterator<Item = &'static Entry> {
-    EXPLICIT.iter()
+    EXPLICIT.iter().chain(IMPLICIT)
 }
 
 /// What is known of a method.

@@ -275,6 +275,25 @@ where
         }
     }
 
+    /// From the rate at a displacement, in canonical form and without forces that do work: the derivatives of the energy by
+    /// the displacement, Hamilton's equations turned round. Derivatives by momenta of groups are left out, as zeros.
+    pub fn gradient(&self, system: &Y, point: &Point<Y>, rate: &mut Point<Y>) {
+        let (gx, gp) = (rate.x.as_mut(), rate.p.as_mut());
+        for (x, p) in gx.iter_mut().zip(gp.iter_mut()) {
+            (*x, *p) = (-*p, *x);
+        }
+        for group in system.groups() {
+            let (from, n) = (group.v, group.kind.sizes().1);
+            let mut p = [Y::Scalar::zero(); 6];
+            for (k, p) in p.iter_mut().enumerate().take(n) {
+                *p = self.p.as_ref()[from + k] + point.p.as_ref()[from + k];
+            }
+            let part = from..from + n;
+            let group = Group { v: 0, ..*group };
+            group.gradient(&point.x.as_ref()[part.clone()], &p, &mut gx[part.clone()], &mut gp[part]);
+        }
+    }
+
     /// Moves the state to a displacement from it.
     ///
     /// # Errors

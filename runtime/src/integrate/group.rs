@@ -235,6 +235,28 @@ impl Group {
         self.join((r.vector(linear), r.vector(angular)), out);
     }
 
+    /// Derivatives of the energy by the displacement, momenta held as they are in outer axes: of the parts of `x`. `p` are the
+    /// momenta there; `gx` and `gp` hold `-ṗ` and `ẋ`. Those by the momenta are set to zero.
+    ///
+    /// With `L = μ − x × π`, force and torque `π̇` and `μ̇ − x × π̇`: `∂H/∂x = ω × π − π̇` and
+    /// `∂H/∂φ = ẋ × π + ω × L − μ̇ + x × π̇`, this by a turn from the displaced rotation.
+    pub(super) fn gradient<S: Scalar>(&self, x: &[S], p: &[S], gx: &mut [S], gp: &mut [S]) {
+        let (place, speed) = (self.shift(x), self.shift(gp));
+        let spin = match self.phi() {
+            Some(at) => angular(three(x, at), three(gp, at)),
+            None => [S::zero(), S::zero(), gp[self.v + 2]],
+        };
+        let ((linear, about), (force, torque)) = (self.split(p), self.split(gx));
+        let about = sub3(about, cross(place, linear));
+        let turn = add3(add3(cross(speed, linear), cross(spin, about)), sub3(torque, cross(place, force)));
+        self.join((add3(cross(spin, linear), force), turn), gx);
+        if let Some(at) = self.phi() {
+            let back = scale3(-S::one(), three(x, at));
+            put(gx, at, angular(back, turn));
+        }
+        self.join(([S::zero(); 3], [S::zero(); 3]), gp);
+    }
+
     /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.
     pub(super) fn follow<S: Scalar>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
         if let Some(at) = self.phi() {

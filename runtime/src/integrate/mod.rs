@@ -4,6 +4,7 @@
 //! with error control, dense output, events and statistics. Methods work on displacements from the state at the start of a
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 
+mod adams;
 #[cfg(feature = "alloc")]
 pub mod catalogue;
 pub mod chart;
@@ -22,6 +23,7 @@ mod implicit_tests;
 mod jacobian;
 mod linear;
 mod newton;
+mod projection;
 mod rosenbrock;
 #[cfg(test)]
 mod scenes;
@@ -30,6 +32,7 @@ mod solver;
 mod stepper;
 pub mod tableau;
 
+pub use adams::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton, VariableAdams};
 pub use chart::{Chart, Point};
 pub use collocation::{
     formula, BackwardEuler, Collocation, Formula, Gauss12, Gauss12Inserted, Gauss4, Gauss6, Gauss6Inserted,
@@ -44,6 +47,7 @@ pub use events::{Direction, Events, Outcome, Watch};
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
 pub use newton::{FixedPoint, Iteration, Newton};
+pub use projection::Projection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::SemiImplicitEuler;
 pub use solver::{Control, Limits, Solver, Step, Tolerance, Tolerances};

@@ -2,8 +2,8 @@
 
 use super::chart::Point;
 use super::stepper::{norm, Statistics, Stepper};
-use super::StepError;
-use crate::system::{Real, System};
+use super::{Projection, StepError};
+use crate::system::{Energetic, Real, System};
 use crate::Scalar;
 
 /// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero nothing is controlled.
@@ -319,6 +319,16 @@ where
         p.as_mut().copy_from_slice(self.looked.1.as_ref());
     }
 
+    /// Moves the end of the last step back to the energy that was there at the start, before the next step begins.
+    pub fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    where
+        Y: Energetic,
+    {
+        if let Some(step) = self.pending {
+            projection.correct(&mut self.method, system, self.t, step.h);
+        }
+    }
+
     /// Start and length of the last step, s.
     pub fn last_step(&self) -> (Y::Scalar, Y::Scalar) {
         (self.t, self.pending.map_or(Y::Scalar::zero(), |step| step.h))
@@ -377,9 +387,10 @@ where
                 Err(_) => f64::NAN,
             };
             if error <= 1.0 && self.check().is_ok() {
-                let size = error.max(1e-10);
-                let factor =
-                    SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL);
+                let factor = self.method.advise().unwrap_or_else(|| {
+                    let size = error.max(1e-10);
+                    SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL)
+                });
                 let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
                 // A step cut short by the end says little about the next.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };

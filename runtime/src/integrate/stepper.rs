@@ -45,6 +45,14 @@ where
     /// [`StepError::Quaternion`].
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError>;
 
+    /// As [`Stepper::begin`], but if the state is the one that the method gave last, its history goes on.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        self.begin(system, t, q, p)
+    }
+
     /// Tries a step of `h` s from time `t`. With `scale`, returns the error relative to it, root mean square over all
     /// components whose scale is not zero; 0 where no error is estimated. A NaN means that the step is too large to be judged.
     ///
@@ -57,6 +65,12 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError>;
+
+    /// Of methods that choose their order: takes the order for the next attempt from the errors of the last one, which met
+    /// the tolerances, and returns by which factor the step may change. Others leave that to the solver.
+    fn advise(&mut self) -> Option<f64> {
+        None
+    }
 
     /// The equation, and the displacement of the last attempt.
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>);

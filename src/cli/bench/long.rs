@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use multibody::runtime::integrate::catalogue::{self, Start};
-use multibody::runtime::integrate::Step;
+use multibody::runtime::integrate::{Projection, Step};
 use multibody::runtime::{Energetic, System};
 use multibody::scenes::Scene;
 use serde::Serialize;
@@ -85,6 +85,7 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     let mut driver = catalogue::any(method, system, &start)?.ok()?;
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = total(system.state_energy(&q, &p));
+    let mut projection = Projection::new(system, &q, &p, 1);
     let (mut energy, mut failure) = (0.0_f64, None);
     let clock = Instant::now();
     let mut looking = 0.0;
@@ -92,10 +93,10 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
         if driver.time() >= t_end {
             break;
         }
-        let done = driver.advance(system, t_end).and_then(|()| match project {
-            true => super::project(driver.as_mut(), system, before),
-            false => Ok(()),
-        });
+        let done = driver.advance(system, t_end);
+        if project {
+            driver.project(system, &mut projection);
+        }
         if let Err(e) = done {
             failure = Some(e.to_string());
             break;
@@ -173,11 +174,11 @@ pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
                 let (mut q, mut p) = scene.start(&mut system);
                 let start = Start { q: &q, p: &p, step, compensated: true };
                 let mut driver = catalogue::any(method, &mut system, &start)?.ok()?;
-                let total = system.state_energy(&q, &p);
+                let mut projection = Projection::new(&mut system, &q, &p, 1);
                 while driver.time() < scene.t_end {
                     driver.advance(&mut system, scene.t_end).ok()?;
                     if project {
-                        super::project(driver.as_mut(), &mut system, total.0 + total.1).ok()?;
+                        driver.project(&mut system, &mut projection);
                     }
                 }
                 driver.state(&system, &mut q, &mut p);

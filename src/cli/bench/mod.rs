@@ -143,12 +143,3 @@ fn longrun(args: &LongArgs, out: &mut dyn Write) -> Outcome {
     }
     Ok(())
 }
-
-/// TEMPORARY until projection is merged.
-fn project(
-    _: &mut dyn catalogue::Drive<erased::Erased<f64>>,
-    _: &mut erased::Erased<f64>,
-    _: f64,
-) -> Result<(), multibody::runtime::integrate::StepError> {
-    Ok(())
-}

@@ -1,0 +1,176 @@
+//! The Adams method with steps and orders of any size.
+
+use super::shared::{of_core, Core};
+use super::weights::{Weights, NODES};
+use crate::integrate::chart::Point;
+use crate::integrate::field::Field;
+use crate::integrate::stepper::{norm, Statistics, Stepper};
+use crate::integrate::StepError;
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// Highest order of the predictor.
+const HIGHEST: usize = 12;
+/// Share of the tolerance that a step may use up: for the same error a Runge-Kutta method takes an eighth as many steps, and
+/// the errors of all add up.
+const SHARE: f64 = 0.05;
+/// Share of that which the next step aims at.
+const AIM: f64 = 0.1;
+/// A step changes by at most these factors.
+const SHRINK: f64 = 0.5;
+const GROW: f64 = 2.0;
+
+/// Adams-Bashforth-Moulton with variable steps and orders: predictor of order 1 to 12, corrector of one more, two
+/// evaluations of the rates a step.
+///
+/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, and a restart at every jump. Its
+/// own work is some ten times that of a Runge-Kutta stage, so it is for mechanisms whose rates cost more than that. Made for
+/// error control: with steps of a fixed size the order rises from one, whose error stays; take [`Adams`](super::Adams) then.
+///
+/// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters 5 to 7:
+/// the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every step from the
+/// places of the past rates, instead of their modified divided differences: the rates are rewritten by rotations
+/// ([`Chart::follow`](crate::integrate::Chart::follow)), which differences would not survive.
+#[derive(Clone, Debug)]
+pub struct VariableAdams<Y: System> {
+    core: Core<Y, HIGHEST>,
+    /// Order of the predictor in the next attempt.
+    order: usize,
+    /// In the last one.
+    used: usize,
+    /// Every step since the start has raised the order.
+    starting: bool,
+    /// Errors of the last attempt at orders `used − 1` to `used + 1`; infinite where not known.
+    errors: [f64; 3],
+    work: Point<Y>,
+}
+
+impl<Y> VariableAdams<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// Room for the history of one system.
+    pub fn new(system: &Y) -> Self {
+        Self::with_sums(system, false)
+    }
+
+    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions.
+    pub fn compensated(system: &Y) -> Self {
+        Self::with_sums(system, true)
+    }
+
+    fn with_sums(system: &Y, compensated: bool) -> Self {
+        VariableAdams {
+            core: Core::new(system, compensated),
+            order: 1,
+            used: 1,
+            starting: true,
+            errors: [f64::INFINITY; 3],
+            work: Point::zero(system),
+        }
+    }
+
+    /// Weights at the order of the last attempt, up to `theta` of a step of `h`.
+    fn weights(&self, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
+        let mut places = [Y::Scalar::one(); NODES];
+        let count = (self.used + 1).min(self.core.history.len());
+        for (j, place) in places[1..=count].iter_mut().enumerate() {
+            *place = -(self.core.history.age(j) / h);
+        }
+        Weights::new(&places[..=count], self.used, theta)
+    }
+
+    /// Errors of the last attempt at the orders around its own: by how much one rate more changes the integral.
+    fn estimate(&mut self, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
+        let k = self.used;
+        let known = [k > 1, true, k < self.core.history.len()];
+        for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
+            self.errors[i] = f64::INFINITY;
+            if known {
+                self.core.history.combine(&weights[..k + i], &self.core.end, &mut self.work);
+                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale) / SHARE;
+            }
+        }
+    }
+}
+
+impl<Y> Stepper<Y> for VariableAdams<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// The highest.
+    fn order(&self) -> u32 {
+        HIGHEST as u32 + 1
+    }
+
+    /// Of the next attempt.
+    fn error_order(&self) -> Option<u32> {
+        Some(self.order as u32)
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        (self.order, self.starting) = (1, true);
+        self.core.begin(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        self.core.attempt(system, t);
+        self.used = self.order.min(self.core.history.len());
+        let k = self.used;
+        let weights = self.weights(h, Y::Scalar::one());
+        self.core.predict(h, &weights.predictor[..=k]);
+        self.core.correct(system, t, h, &weights.corrector[..=k]);
+        let Some(scale) = scale else {
+            self.order = (k + 1).min(HIGHEST);
+            return Ok(0.0);
+        };
+        self.estimate(&weights, h, scale);
+        let [lower, error, _] = self.errors;
+        // Not a number is too large as well.
+        if !(error <= 1.0) {
+            self.starting = false;
+            self.order = if k > 1 && lower <= error { k - 1 } else { k };
+        }
+        Ok(error)
+    }
+
+    fn advise(&mut self) -> Option<f64> {
+        let k = self.used;
+        let [lower, error, higher] = self.errors;
+        // Logarithm of the factor that the step may change by.
+        let growth = |error: f64, k: usize| libm::log(AIM / error.max(1e-12)) / (k as f64 + 1.0);
+        let mut best = growth(error, k);
+        self.starting &= k < HIGHEST && (k == 1 || lower > error);
+        self.order = if self.starting { k + 1 } else { k };
+        if !self.starting {
+            for (order, error) in [(k - 1, lower), (k + 1, higher)] {
+                let growth = growth(error, order);
+                if growth > best {
+                    (self.order, best) = (order, growth);
+                }
+            }
+        }
+        Some(libm::exp(best).clamp(SHRINK, GROW))
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        self.core.accept(system, t, h)
+    }
+
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        self.core.end_rate(system, t, h);
+        let weights = self.weights(h, theta).corrector;
+        self.core.history.combine(&weights[..=self.used], &self.core.end, out);
+        out.scale(h);
+    }
+
+    of_core!();
+}
