@@ -87,3 +87,8 @@ macro_rules! mbd_model {
         $crate::macros::mbd_model! { runtime = $crate::runtime, $($argument)* }
     };
 }
+
+/// The code in the guide compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/integrators.md")]
+struct Guide;

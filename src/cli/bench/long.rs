@@ -113,7 +113,7 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
 }
 
 /// The setting at which a method needs as many evaluations as RK4 at its step: by bisection on a short run, then corrected
-/// on tenths of the run, which meet the motion at its roughest.
+/// on longer ones.
 fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) -> Option<f64> {
     let rk4 = 4.0 / scene.rk4_step;
     let adaptive = catalogue::entry(method)?.adaptive;
@@ -140,8 +140,10 @@ fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) ->
         (Some(more), Some(less)) if more > 1.05 * less => 0.5 * (more / less).log10(),
         _ => 0.1,
     };
-    for _ in 0..3 {
-        match work(10.0_f64.powf(at), 0.1 * t_end) {
+    // A rough motion takes more than its first part says: the last correction is by the whole run.
+    for part in [0.1, 0.1, 1.0, 1.0] {
+        match work(10.0_f64.powf(at), part * t_end) {
+            Some(n) if part == 1.0 && (0.9..1.02).contains(&n) => break,
             Some(n) => at = (at + n.log10() / slope).clamp(-14.0, -1.0),
             None => at -= 1.0,
         }
