@@ -115,8 +115,8 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     derivatives: Derivatives,
     /// Step that the matrix is factored for; zero: none.
     factored: Y::Scalar,
-    /// Contraction of the last iteration, and what it leaves of the last change.
-    theta: f64,
+    /// Whether the last iteration contracted well enough to use its derivatives again, and what it leaves of its last change.
+    keep: bool,
     eta: f64,
     /// Stages and start of the last step, from the present state; the size of that step, zero if there is none.
     past: [Point<Y>; S],
@@ -171,7 +171,7 @@ where
             weight: point(),
             derivatives: Derivatives::None,
             factored: Y::Scalar::zero(),
-            theta: 1.0,
+            keep: false,
             eta: 1.0,
             past: points(),
             origin: point(),
@@ -184,7 +184,7 @@ where
     fn start(&mut self, system: &mut Y, t: Y::Scalar) {
         let due = match self.derivatives {
             Derivatives::None => true,
-            Derivatives::Old => self.theta > KEEP,
+            Derivatives::Old => !self.keep,
             Derivatives::New => false,
         };
         if I::DERIVATIVES && due {
@@ -309,7 +309,8 @@ where
         let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
         self.eta = libm::pow(self.eta, 0.8).max(least);
         let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
-        self.theta = 0.0;
+        let mut mean = 0.0;
+        self.keep = true;
         let limit = I::LIMITS[usize::from(scale.is_some())];
         for k in 1..=limit {
             self.iterate(system, t, h);
@@ -318,8 +319,9 @@ where
             if k > 1 {
                 let theta = change / last;
                 // Two at a time: what insertion changes in coordinates it changes in momenta one iteration later.
-                self.theta = if k == 2 { theta } else { libm::sqrt(theta * self.theta) };
-                let slowest = theta.max(self.theta);
+                mean = if k == 2 { theta } else { libm::sqrt(theta * mean) };
+                self.keep = mean <= KEEP;
+                let slowest = theta.max(mean);
                 if slowest < 1.0 {
                     self.eta = (slowest / (1.0 - slowest)).max(if I::DERIVATIVES { 0.0 } else { least });
                 }
@@ -342,7 +344,7 @@ where
     }
 
     fn failure(&mut self, t: Y::Scalar, h: Y::Scalar, iterations: u32, change: f64) -> StepError {
-        (self.eta, self.theta) = (1.0, 1.0);
+        (self.eta, self.keep) = (1.0, false);
         StepError::NoConvergence { time: t.to_f64(), step: h.to_f64(), iterations, change }
     }
 
@@ -471,7 +473,7 @@ where
         (self.first_known, self.end_known) = (false, false);
         (self.derivatives, self.factored) = (Derivatives::None, Y::Scalar::zero());
         self.past_h = Y::Scalar::zero();
-        (self.theta, self.eta) = (1.0, 1.0);
+        (self.keep, self.eta) = (false, 1.0);
         self.field.load(system, t, q, p)
     }
 

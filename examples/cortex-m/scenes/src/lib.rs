@@ -1,7 +1,7 @@
 //! What the firmware and its host twin both run: generated dynamics, 1000 steps of 1 ms.
 #![no_std]
 
-use mbd_runtime::integrate::{ImplicitMidpoint, Rk4, Stepper};
+use mbd_runtime::integrate::{FixedIterations, ImplicitMidpoint, Rk4, Stepper};
 use mbd_runtime::{Differentiable, Real, Scalar, System};
 
 mbd_macros::mbd_model! {
@@ -46,7 +46,7 @@ where
 
 /// The implicit midpoint rule with two iterations: the derivatives of the dynamics once, their matrix factored once, and two
 /// evaluations of the dynamics a step.
-pub fn midpoint<Y>(system: &Y) -> ImplicitMidpoint<Y>
+pub fn midpoint<Y>(system: &Y) -> FixedIterations<ImplicitMidpoint<Y>>
 where
     Y: Differentiable,
     Y::Scalar: Real,
