@@ -70,8 +70,8 @@ impl<Y: System> Point<Y> {
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
     pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Y::Scalar)], k: &[Self]) {
-        combine(self.x.as_mut(), h, weights, |j| k[j].x.as_ref());
-        combine(self.p.as_mut(), h, weights, |j| k[j].p.as_ref());
+        combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
+        combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
     }
 
     /// `self *= w`.
@@ -85,28 +85,27 @@ impl<Y: System> Point<Y> {
     }
 }
 
-/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers.
+/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
+/// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
 fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: impl Fn(usize) -> &'a [S]) {
-    let n = out.len();
-    let mut at = 0;
-    while at + 4 <= n {
+    let whole = out.len() - out.len() % 4;
+    let mut chunks = out.chunks_exact_mut(4);
+    for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
         let mut sum = [S::zero(); 4];
         for &(j, w) in weights {
-            let k = &k(j)[at..at + 4];
+            let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
             for l in 0..4 {
                 sum[l] = sum[l] + w * k[l];
             }
         }
-        for l in 0..4 {
-            out[at + l] = h * sum[l];
+        for (out, sum) in out.iter_mut().zip(sum) {
+            *out = h * sum;
         }
-        at += 4;
     }
-    while at < n {
-        let sum = weights.iter().fold(S::zero(), |sum, &(j, w)| sum + w * k(j)[at]);
-        out[at] = h * sum;
-        at += 1;
+    for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
+        let term = |j: usize, w: S| k(j).get(at).map_or(S::zero(), |k| w * *k);
+        *out = h * weights.iter().fold(S::zero(), |sum, &(j, w)| sum + term(j, w));
     }
 }
 

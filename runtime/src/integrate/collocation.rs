@@ -8,6 +8,7 @@
 
 use super::chart::{Chart, Point};
 use super::field::Field;
+use super::fixed::FixedIterations;
 use super::newton::{FixedPoint, Iteration, Newton};
 use super::stepper::{hermite, norm, Statistics, Stepper};
 use super::tableau::{self, Mode};
@@ -95,8 +96,6 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     field: Field<Y>,
     statistics: Statistics,
     iteration: I,
-    /// Iterations of every step, if their number is given.
-    iterations: Option<u32>,
     a: [[Y::Scalar; S]; S],
     b: [Y::Scalar; S],
     c: [Y::Scalar; S],
@@ -116,8 +115,8 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     derivatives: Derivatives,
     /// Step that the matrix is factored for; zero: none.
     factored: Y::Scalar,
-    /// Contraction of the last iteration, and what it leaves of the last change.
-    theta: f64,
+    /// Whether the last iteration contracted well enough to use its derivatives again, and what it leaves of its last change.
+    keep: bool,
     eta: f64,
     /// Stages and start of the last step, from the present state; the size of that step, zero if there is none.
     past: [Point<Y>; S],
@@ -143,11 +142,9 @@ where
         Self::with_sums(system, true)
     }
 
-    /// Exactly `n` iterations a step, after a start by the linearised equations, which costs no evaluation: for real time. With
-    /// derivatives this is one evaluation of them, one factorisation and `n S` evaluations of the rates a step, whatever
-    /// happens, and no failure to converge; what is not converged counts as an error of the method.
-    pub fn with_iterations(self, n: u32) -> Self {
-        Collocation { iterations: Some(n), ..self }
+    /// Exactly `n` iterations a step, for real time.
+    pub fn with_iterations(self, n: u32) -> FixedIterations<Self> {
+        FixedIterations::new(self, n)
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
@@ -159,7 +156,6 @@ where
             field: Field::new(system, compensated),
             statistics: Statistics::default(),
             iteration: I::new(system, T::MODES),
-            iterations: None,
             a: tableau.a.map(|row| row.map(|x| x.get())),
             b: tableau.b.map(|x| x.get()),
             last: polynomial(&c, Y::Scalar::one()).0,
@@ -175,7 +171,7 @@ where
             weight: point(),
             derivatives: Derivatives::None,
             factored: Y::Scalar::zero(),
-            theta: 1.0,
+            keep: false,
             eta: 1.0,
             past: points(),
             origin: point(),
@@ -188,7 +184,7 @@ where
     fn start(&mut self, system: &mut Y, t: Y::Scalar) {
         let due = match self.derivatives {
             Derivatives::None => true,
-            Derivatives::Old => self.iterations.is_some() || self.theta > KEEP,
+            Derivatives::Old => !self.keep,
             Derivatives::New => false,
         };
         if I::DERIVATIVES && due {
@@ -313,7 +309,8 @@ where
         let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
         self.eta = libm::pow(self.eta, 0.8).max(least);
         let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
-        self.theta = 0.0;
+        let mut mean = 0.0;
+        self.keep = true;
         let limit = I::LIMITS[usize::from(scale.is_some())];
         for k in 1..=limit {
             self.iterate(system, t, h);
@@ -322,8 +319,9 @@ where
             if k > 1 {
                 let theta = change / last;
                 // Two at a time: what insertion changes in coordinates it changes in momenta one iteration later.
-                self.theta = if k == 2 { theta } else { libm::sqrt(theta * self.theta) };
-                let slowest = theta.max(self.theta);
+                mean = if k == 2 { theta } else { libm::sqrt(theta * mean) };
+                self.keep = mean <= KEEP;
+                let slowest = theta.max(mean);
                 if slowest < 1.0 {
                     self.eta = (slowest / (1.0 - slowest)).max(if I::DERIVATIVES { 0.0 } else { least });
                 }
@@ -346,7 +344,7 @@ where
     }
 
     fn failure(&mut self, t: Y::Scalar, h: Y::Scalar, iterations: u32, change: f64) -> StepError {
-        (self.eta, self.theta) = (1.0, 1.0);
+        (self.eta, self.keep) = (1.0, false);
         StepError::NoConvergence { time: t.to_f64(), step: h.to_f64(), iterations, change }
     }
 
@@ -354,13 +352,6 @@ where
     fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: Option<&Point<Y>>) -> Result<(), StepError> {
         self.start(system, t);
         self.factor(system, t, h)?;
-        if let Some(n) = self.iterations {
-            self.linear(system, t, h);
-            for _ in 0..n {
-                self.iterate(system, t, h);
-            }
-            return Ok(());
-        }
         if self.past_h != Y::Scalar::zero() {
             self.extrapolate(h);
             let result = self.converge(system, t, h, scale);
@@ -376,6 +367,36 @@ where
         }
         self.linear(system, t, h);
         self.converge(system, t, h, scale)
+    }
+
+    /// Stages of the linearised equations, then `n` iterations.
+    #[inline]
+    pub(super) fn solve_by(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, n: u32) -> Result<(), StepError> {
+        if self.derivatives == Derivatives::Old {
+            self.derivatives = Derivatives::None;
+        }
+        self.start(system, t);
+        self.factor(system, t, h)?;
+        self.linear(system, t, h);
+        for _ in 0..n {
+            self.iterate(system, t, h);
+        }
+        Ok(())
+    }
+
+    /// Displacement and error of a step whose stages are known.
+    #[inline]
+    pub(super) fn conclude(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: Option<&Point<Y>>) -> f64 {
+        let error = match (T::ERROR, scale) {
+            (Some(e), Some(scale)) => {
+                self.rate(system, t);
+                self.error(system, t, h, scale, e)
+            }
+            _ => 0.0,
+        };
+        self.end_known = false;
+        self.finish(h);
+        error
     }
 
     /// Displacement of the step from those of the stages.
@@ -452,7 +473,7 @@ where
         (self.first_known, self.end_known) = (false, false);
         (self.derivatives, self.factored) = (Derivatives::None, Y::Scalar::zero());
         self.past_h = Y::Scalar::zero();
-        (self.theta, self.eta) = (1.0, 1.0);
+        (self.keep, self.eta) = (false, 1.0);
         self.field.load(system, t, q, p)
     }
 
@@ -463,17 +484,8 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.end_known = false;
         self.solve(system, t, h, scale)?;
-        let error = match (T::ERROR, scale) {
-            (Some(e), Some(scale)) => {
-                self.rate(system, t);
-                self.error(system, t, h, scale, e)
-            }
-            _ => 0.0,
-        };
-        self.finish(h);
-        Ok(error)
+        Ok(self.conclude(system, t, h, scale))
     }
 
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {

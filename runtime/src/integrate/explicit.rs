@@ -76,7 +76,10 @@ impl<R: Real, const S: usize> Weights<R, S> {
         for (stage, weight) in row.into_iter().enumerate() {
             let weight: R = weight.get();
             if weight != R::zero() {
-                out.list[out.n] = (stage, weight);
+                // There is room; a panic path there must not be.
+                if let Some(place) = out.list.get_mut(out.n) {
+                    *place = (stage, weight);
+                }
                 out.n += 1;
             }
         }
@@ -85,7 +88,7 @@ impl<R: Real, const S: usize> Weights<R, S> {
 
     #[inline]
     fn list(&self) -> &[(usize, R)] {
-        &self.list[..self.n]
+        self.list.get(..self.n).unwrap_or(&self.list)
     }
 }
 

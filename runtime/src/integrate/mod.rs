@@ -17,6 +17,7 @@ mod error;
 mod events;
 mod explicit;
 mod field;
+mod fixed;
 mod group;
 #[cfg(test)]
 mod implicit_tests;
@@ -46,6 +47,7 @@ pub use error::StepError;
 pub use events::{Direction, Events, Outcome, Watch};
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
+pub use fixed::FixedIterations;
 pub use newton::{FixedPoint, Iteration, Newton};
 pub use projection::Projection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};

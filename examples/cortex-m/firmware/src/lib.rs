@@ -120,26 +120,27 @@ fn stack_used() -> u32 {
     top as u32 - at as u32
 }
 
-/// Defines `main` for one system.
+/// Defines `main` for one system and method.
 #[macro_export]
 macro_rules! firmware {
-    ($system:ty) => {
+    ($system:ty, $method:path) => {
         /// Called by the reset handler.
         #[no_mangle]
         pub extern "C" fn main() -> ! {
-            $crate::measure(<$system>::new())
+            $crate::measure(<$system>::new(), $method)
         }
     };
 }
 
 /// Runs the scene between two readings of the counter, then prints the final state and the measurements.
-pub fn measure<Y>(mut system: Y) -> !
+pub fn measure<Y, M>(mut system: Y, method: impl Fn(&Y) -> M) -> !
 where
     Y: mbd_runtime::System,
     Y::Scalar: mbd_runtime::Real + Bits,
+    M: mbd_runtime::integrate::Stepper<Y>,
 {
     start_counter();
-    let result = scenes::run(&mut system);
+    let result = scenes::run(&mut system, method);
     let (ticks, wrapped) = read_counter();
     let stack = stack_used();
     let Ok((q, p)) = result else { exit(false) };

@@ -2,4 +2,4 @@
 #![no_std]
 #![no_main]
 
-firmware::firmware!(scenes::DoublePendulumF32);
+firmware::firmware!(scenes::DoublePendulumF32, scenes::rk4);

@@ -2,4 +2,4 @@
 #![no_std]
 #![no_main]
 
-firmware::firmware!(scenes::DoublePendulumF64);
+firmware::firmware!(scenes::DoublePendulumF64, scenes::rk4);

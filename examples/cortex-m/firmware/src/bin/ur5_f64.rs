@@ -2,4 +2,4 @@
 #![no_std]
 #![no_main]
 
-firmware::firmware!(scenes::Ur5F64);
+firmware::firmware!(scenes::Ur5F64, scenes::rk4);
