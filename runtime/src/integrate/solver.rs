@@ -294,8 +294,10 @@ where
             return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
         }
         // A rest that differs from the step by rounding is the step.
-        let last = rest.to_f64() < h * (1.0 + 1e-9) + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
-        let step = if last { rest } else { Y::Scalar::constant(h) };
+        let slack = 1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
+        let over = rest.to_f64() - h;
+        let step = if over < -slack { rest } else { Y::Scalar::constant(h) };
+        let last = over < slack;
         self.method.attempt(system, self.t, step, None)?;
         self.check()?;
         self.wait(step, last.then_some(t_end));
