@@ -223,7 +223,7 @@ fn failed_simulations_write_nothing() {
     );
     bad(
         simulate(&["--v", "1e200,1e200"]),
-        &["the simulation failed", " at t = 0", "--tolerance", "nothing was written"],
+        &["the simulation failed", "from t = 0 s", "`elbow`", "--v", "nothing was written"],
     );
     bad(simulate(&["--q", "1"]), &["--q has 1 numbers, expected 2", "in order: "]);
     bad(simulate(&["--csv", "a", "--svg", "a"]), &["both to be written to `a`"]);

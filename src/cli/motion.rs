@@ -119,7 +119,6 @@ impl Observer {
 
 /// Simulates from coordinates and velocities, and records.
 pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
-    let clock = Instant::now();
     let params = plan.default_params();
     let gravity = match plan.model.gravity {
         // As the fields of generated code start.
@@ -141,11 +140,13 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
     observer.end(0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
+    let clock = Instant::now();
     go(&mut *driver, &mut system, settings, &mut observer).map_err(|e| failure(plan, settings, &e))?;
+    let total = clock.elapsed().as_secs_f64();
     let mut record = observer.record;
     record.statistics = driver.statistics();
     (record.spent.rates, record.spent.derivatives) = system.seconds();
-    record.spent.total = clock.elapsed().as_secs_f64();
+    record.spent.total = total;
     Ok(record)
 }
 
@@ -209,6 +210,9 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
             format!(
                 "the step was {h} s: lower --step, or leave it out for steps by the error{before}; nothing was written"
             )
+        }
+        (StepError::NotFinite { .. }, Step::Adaptive(_)) => {
+            format!("the state is singular there, or too large for doubles: look at --q and --v{before}; nothing was written")
         }
         (_, Step::Adaptive(_)) => {
             format!("raise --tolerance, or look at the mechanism near that time{before}; nothing was written")

@@ -5,29 +5,44 @@ use std::time::{Duration, Instant};
 use multibody::runtime::system::Group;
 use multibody::runtime::{Blocks, Differentiable, Interpreter, System};
 
-/// Calls that are all timed; of later ones every so many. Reading the clock costs a tenth of a small mechanism's rates.
-const FIRST: u64 = 64;
-const EVERY: u64 = 16;
+/// Most samples that are kept. Reading the clock costs a tenth of a small mechanism's rates.
+const MOST: usize = 512;
 
-/// Time that calls of one kind take.
-#[derive(Clone, Copy, Debug, Default)]
+/// Time that calls of one kind take. They do the same every time: what counts is the middle one of some samples, so that an
+/// interruption by other programs is not taken for work.
 struct Sampled {
     calls: u64,
-    seconds: f64,
+    /// Every so many calls one is timed.
+    every: u64,
+    seconds: Vec<f64>,
 }
 
 impl Sampled {
+    fn new() -> Self {
+        Sampled { calls: 0, every: 1, seconds: Vec::with_capacity(MOST) }
+    }
+
     fn time<R>(&mut self, clock: f64, f: impl FnOnce() -> R) -> R {
         self.calls += 1;
-        let weight = match self.calls {
-            n if n <= FIRST => 1.0,
-            n if n % EVERY == 0 => EVERY as f64,
-            _ => return f(),
-        };
+        if self.calls % self.every != 0 {
+            return f();
+        }
         let start = Instant::now();
         let result = f();
-        self.seconds += weight * (start.elapsed().as_secs_f64() - clock).max(0.0);
+        self.seconds.push((start.elapsed().as_secs_f64() - clock).max(0.0));
+        if self.seconds.len() == MOST {
+            // Every other one stays, of the next every other one comes.
+            let mut odd = false;
+            self.seconds.retain(|_| std::mem::replace(&mut odd, !odd));
+            self.every *= 2;
+        }
         result
+    }
+
+    fn total(&self) -> f64 {
+        let mut seconds = self.seconds.clone();
+        seconds.sort_by(f64::total_cmp);
+        self.calls as f64 * seconds.get(seconds.len() / 2).copied().unwrap_or(0.0)
     }
 }
 
@@ -48,12 +63,12 @@ impl Timed {
     pub fn new(inner: Interpreter<f64>) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
-        Timed { inner, output: false, clock, rates: Default::default(), derivatives: Sampled::default() }
+        Timed { inner, output: false, clock, rates: [Sampled::new(), Sampled::new()], derivatives: Sampled::new() }
     }
 
     /// Time taken in steps by the rates and by their derivatives, s, as sampled.
     pub fn seconds(&self) -> (f64, f64) {
-        (self.rates[0].seconds, self.derivatives.seconds)
+        (self.rates[0].total(), self.derivatives.total())
     }
 }
 
