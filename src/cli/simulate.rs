@@ -17,8 +17,8 @@ use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::{source, Failure, Outcome};
 
-/// Method and tolerance unless the user says otherwise: of the adaptive ones, with the rates of this program's own scenes, the
-/// smallest error for the work at all tolerances between 1e-6 and 1e-12.
+/// Method and tolerance unless the user says otherwise. Of double and spherical pendulum, UR5 and Panda the error at the end
+/// was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
 const METHOD: &str = "verner9";
 const TOLERANCE: f64 = 1e-9;
 /// Rows of the table unless the user says otherwise.
