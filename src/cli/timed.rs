@@ -32,8 +32,11 @@ impl Sampled {
         self.seconds.push((start.elapsed().as_secs_f64() - clock).max(0.0));
         if self.seconds.len() == MOST {
             // Every other one stays, of the next every other one comes.
-            let mut odd = false;
-            self.seconds.retain(|_| std::mem::replace(&mut odd, !odd));
+            let mut stays = false;
+            self.seconds.retain(|_| {
+                stays = !stays;
+                stays
+            });
             self.every *= 2;
         }
         result
