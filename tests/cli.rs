@@ -132,29 +132,84 @@ fn failures_leave_files_alone() {
     assert_eq!(read(&folder, "old.rs"), "as it was");
 }
 
+/// Columns of a table: names, then rows of numbers.
+fn columns(table: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = table.lines();
+    let names: Vec<String> = lines.next().expect("names").split(',').map(String::from).collect();
+    let rows = lines.map(|l| l.split(',').map(|x| x.parse().expect("a number")).collect());
+    let rows: Vec<Vec<f64>> = rows.collect();
+    assert!(rows.iter().all(|r| r.len() == names.len()));
+    (names, rows)
+}
+
 #[test]
 fn simulates() {
     let folder = folder("simulate");
     let model = format!("{ROOT}/models/double_pendulum.toml");
-    let output = good(run_in(&folder, &["simulate", &model, "--time", "2", "--every", "100"]));
+    let output = good(run_in(&folder, &["simulate", &model, "--time", "2", "--every", "0.1"]));
     assert_eq!(files(&folder), ["double_pendulum.csv", "double_pendulum.svg"]);
-    let table = read(&folder, "double_pendulum.csv");
-    let rows: Vec<Vec<&str>> = table.lines().map(|l| l.split(',').collect()).collect();
-    assert_eq!(rows.len(), 2 + 2000 / 100);
-    assert_eq!(rows[0].len(), 1 + 2 + 2 + 2 + 3);
-    assert!(rows.iter().all(|r| r.len() == rows[0].len()));
-    let energy = |row: &Vec<&str>| row.last().expect("a column").parse::<f64>().expect("a number");
-    let (first, last) = (energy(&rows[1]), energy(&rows[rows.len() - 1]));
-    // Fourth order with a step of 1 ms: far below.
-    assert!((first - last).abs() < 1e-6, "{first} and {last}");
+    let (names, rows) = columns(&read(&folder, "double_pendulum.csv"));
+    assert_eq!((names.len(), rows.len()), (1 + 2 + 2 + 2 + 3, 21));
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row[0] - 0.1 * k as f64).abs() < 1e-12, "{}", row[0]);
+        let (energy, start) = (row[row.len() - 1], rows[0][row.len() - 1]);
+        // The tolerance is 1e-9, the energy a few J.
+        assert!((energy - start).abs() < 1e-7, "{energy} {start}");
+    }
     let picture = read(&folder, "double_pendulum.svg");
     assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
     assert!(picture.contains("time [s]") && picture.contains("angle [rad]"));
-    assert!(out(&output).contains("energy error") && out(&output).contains("double_pendulum.svg"), "{}", out(&output));
+    for text in ["by verner9", "tolerance 1e-9", "energy error", "work: ", "rejected", "time: ", "rates", "(21 rows)"] {
+        assert!(out(&output).contains(text), "{text}:\n{}", out(&output));
+    }
     let start =
         ["simulate", &model, "--q", "0.1,-0.2", "--v", "-1,0", "--time", "0.01", "--csv", "a.csv", "--svg", "a.svg"];
     good(run_in(&folder, &start));
     assert!(read(&folder, "a.csv").lines().nth(1).expect("a row").starts_with("0,0.1,-0.2,-1,"));
+    // Ten seconds, a thousand rows and that of the start.
+    good(run_in(&folder, &["simulate", &model]));
+    let (_, rows) = columns(&read(&folder, "double_pendulum.csv"));
+    assert_eq!((rows.len(), rows[1000][0]), (1001, 10.0));
+}
+
+#[test]
+fn simulates_by_any_method() {
+    let folder = folder("simulate_methods");
+    let ball = format!("{ROOT}/models/spherical_pendulum.toml");
+    let run = |more: &[&str]| {
+        let arguments =
+            [&["simulate", &ball, "--time", "1", "--rows", "7", "--csv", "a.csv", "--svg", "a.svg"], more].concat();
+        let output = good(run_in(&folder, &arguments));
+        (columns(&read(&folder, "a.csv")).1, out(&output).to_string())
+    };
+    let (reference, _) = run(&["--tolerance", "1e-12"]);
+    assert_eq!(reference.len(), 8);
+    let apart = |rows: &[Vec<f64>]| {
+        let pairs = rows.iter().flatten().zip(reference.iter().flatten());
+        pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
+    };
+    for method in multibody::runtime::integrate::catalogue::entries() {
+        let low =
+            ["euler", "midpoint", "semi-implicit-euler", "backward-euler", "implicit-midpoint"].contains(&method.name);
+        let (rows, text) = run(&["--method", method.name, "--step", "0.002"]);
+        println!("{}: {:.1e}", method.name, apart(&rows));
+        // Of order one and two: a step of 2 ms, rates of some tens.
+        assert!(apart(&rows) < if low { 1.0 } else { 1e-5 }, "{}: {:e}", method.name, apart(&rows));
+        assert!(text.contains(&format!("by {} ({}), steps of 0.002 s", method.name, method.title)), "{text}");
+        assert!(text.contains("work: 500 steps, 0 more rejected"), "{text}");
+        if method.adaptive {
+            let (rows, text) = run(&["--method", method.name, "--tolerance", "1e-8"]);
+            assert!(apart(&rows) < 1e-5, "{}: {:e}", method.name, apart(&rows));
+            assert!(text.contains("tolerance 1e-8"), "{text}");
+        } else {
+            let arguments = ["simulate", &ball, "--method", method.name];
+            bad(run_in(&folder, &arguments), &["estimates no error", "give --step"]);
+        }
+    }
+    let (rows, text) = run(&["--partial"]);
+    assert!(apart(&rows) < 1e-6 && text.contains("tolerance of coordinates 1e-9"), "{text}");
+    // With a step and nothing else, as it has always been.
+    assert!(run(&["--step", "0.01"]).1.contains("by rk4"));
 }
 
 #[test]
@@ -164,13 +219,31 @@ fn failed_simulations_write_nothing() {
     let simulate = |more: &[&str]| run_in(&folder, &[&["simulate", &model], more].concat());
     bad(
         simulate(&["--v", "1e8,1e8", "--step", "1"]),
-        &["the simulation failed", "is not finite after the step from t = "],
+        &["the simulation failed", "is not finite in the step from t = ", "lower --step", "nothing was written"],
+    );
+    bad(
+        simulate(&["--v", "1e200,1e200"]),
+        &["the simulation failed", "from t = 0 s", "`elbow`", "--v", "nothing was written"],
     );
     bad(simulate(&["--q", "1"]), &["--q has 1 numbers, expected 2", "in order: "]);
     bad(simulate(&["--csv", "a", "--svg", "a"]), &["both to be written to `a`"]);
     bad(simulate(&["--step", "1e-12"]), &["steps are too many"]);
-    assert_eq!(simulate(&["--time", "-1"]).status.code(), Some(2));
-    assert_eq!(simulate(&["--q", "nan,0"]).status.code(), Some(2));
+    bad(simulate(&["--every", "1e-12"]), &["rows are too many"]);
+    // Known before the work begins, and neither of the two is written.
+    bad(simulate(&["--time", "1e9", "--svg", "none/a.svg"]), &["cannot write `none/a.svg`"]);
+    bad(simulate(&["--time", "1e9", "--csv", "."]), &["cannot write `.`"]);
+    for wrong in [
+        &["--time", "-1"][..],
+        &["--q", "nan,0"],
+        &["--method", "rk5"],
+        &["--tolerance", "0"],
+        &["--step", "0.1", "--tolerance", "1e-6"],
+        &["--rows", "0"],
+        &["--rows", "5", "--every", "1"],
+    ] {
+        assert_eq!(simulate(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+    assert!(err(&simulate(&["--method", "dop"])).contains("dop853"));
     assert!(files(&folder).is_empty(), "{:?}", files(&folder));
 }
 

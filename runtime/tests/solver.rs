@@ -342,8 +342,10 @@ fn dense_output_has_its_order() {
         let (coarse, fine) = (error(h), error(0.5 * h));
         let found = (coarse / fine).log2();
         println!("{name}: {found:.2} ({coarse:.1e}, {fine:.1e})");
-        // Of steps that are not yet small, at a place where derivatives change fast.
-        assert!((found - f64::from(expected)).abs() < 0.5, "{name}: {found}, expected {expected}");
+        // Of steps that are not yet small the last bit is uncertain; and where the weights leave little of the leading term,
+        // the next one shows.
+        let least = f64::from(expected) - 0.5;
+        assert!((least..least + 1.5).contains(&found), "{name}: {found}, expected {expected}");
         assert!(fine > 1e-13, "{name}: round-off");
     }
     // A cubic where there is nothing better.

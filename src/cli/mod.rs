@@ -8,12 +8,14 @@ mod count;
 mod eval;
 mod explain;
 mod generate;
+mod motion;
 mod output;
 mod plot;
 mod rivals;
 mod simulate;
 mod source;
 mod stale;
+mod timed;
 mod tour;
 
 use std::io::Write;

@@ -13,26 +13,47 @@ pub fn note(text: Arguments) {
 
 /// Writes a file by way of a temporary one beside it, so that it is whole or as it was.
 pub fn write_file(path: &Path, content: &str) -> Outcome {
-    let failure = |e: std::io::Error| {
-        Failure::new(
-            format!("cannot write `{}`: {e}", path.display()),
-            "check that the directory exists and that you may write to it",
-        )
-    };
-    // A link keeps being one; a pipe or terminal cannot be renamed onto.
-    let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    if target.is_dir() {
+    write_files(&[(path, content)])
+}
+
+/// Writes files that belong together: none is replaced before all are written.
+pub fn write_files(files: &[(&Path, &str)]) -> Outcome {
+    let mut written: Vec<(PathBuf, PathBuf, &Path)> = Vec::new();
+    let result = files.iter().try_for_each(|(path, content)| {
+        writable(path)?;
+        // A link keeps being one; a pipe or terminal cannot be renamed onto.
+        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        if target.exists() && !target.is_file() {
+            return std::fs::write(&target, content).map_err(|e| failure(path, &e));
+        }
+        let temporary = temporary(&target);
+        written.push((temporary.clone(), target, path));
+        std::fs::write(&temporary, content).map_err(|e| failure(path, &e))
+    });
+    let result = result.and_then(|()| {
+        let mut all = written.iter();
+        all.try_for_each(|(from, to, path)| std::fs::rename(from, to).map_err(|e| failure(path, &e)))
+    });
+    if result.is_err() {
+        written.iter().for_each(|(temporary, ..)| drop(std::fs::remove_file(temporary)));
+    }
+    result
+}
+
+/// Looks whether a file could be written, before the work for it is done.
+pub fn writable(path: &Path) -> Outcome {
+    if path.is_dir() {
         return Err(Failure::new(format!("cannot write `{}`: it is a directory", path.display()), "name a file in it"));
     }
-    if target.exists() && !target.is_file() {
-        return std::fs::write(&target, content).map_err(failure);
-    }
-    let temporary = temporary(&target);
-    let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, &target));
-    written.map_err(|e| {
-        let _ = std::fs::remove_file(&temporary);
-        failure(e)
-    })
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::metadata(parent).map(drop).map_err(|e| failure(path, &e))
+}
+
+fn failure(path: &Path, e: &std::io::Error) -> Failure {
+    Failure::new(
+        format!("cannot write `{}`: {e}", path.display()),
+        "check that the directory exists and that you may write to it",
+    )
 }
 
 fn temporary(target: &Path) -> PathBuf {

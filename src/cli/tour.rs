@@ -8,11 +8,12 @@ use std::time::Instant;
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::codegen::{Group, Options};
-use multibody::runtime::integrate::{Rk4, Stepper};
+use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;
 
+use super::motion::{simulate, Record, Settings};
 use super::output::{note, write_file};
-use super::simulate::{default_start, panels, simulate, title, Record};
+use super::simulate::{default_start, panels, title};
 use super::{count, plot, Failure, Outcome};
 
 #[path = "../../generated/ur5.rs"]
@@ -67,7 +68,7 @@ pub fn run(out: &mut dyn Write) -> Outcome {
     let record = ten_seconds(&plan, &mut generated, out)?;
     out.flush()?;
     speed(&states, &mut generated, &mut interpreter, out)?;
-    let picture = plot::svg(&title(&plan, TIME, STEPS), &panels(&plan, &record));
+    let picture = plot::svg(&title(&plan, &settings()), &panels(&plan, &record));
     let picture = picture.map_err(|e| Failure::new(format!("cannot draw the plot: {e}"), "report this as a bug"))?;
     write_file(Path::new(PLOT), &picture)?;
     writeln!(out, "\n6. Joint angles and energy over time: {PLOT}, in the current directory")?;
@@ -151,6 +152,11 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
     Ok(numbers)
 }
 
+/// How the interpreter simulates what the generated code does.
+fn settings() -> Settings<'static> {
+    Settings { method: "rk4", step: Step::Fixed(TIME / STEPS as f64), time: TIME, every: TIME / 1000.0 }
+}
+
 /// Simulates with the generated code and with the interpreter.
 fn ten_seconds(plan: &Plan, generated: &mut Ur5, out: &mut dyn Write) -> Outcome<Record> {
     let failed = |e| Failure::new(format!("the simulation failed: {e}"), "report this as a bug");
@@ -166,16 +172,20 @@ fn ten_seconds(plan: &Plan, generated: &mut Ur5, out: &mut dyn Write) -> Outcome
         rk4.step(generated, k as f64 * h, h, &mut q, &mut p).map_err(failed)?;
     }
     let ours = clock.elapsed().as_secs_f64();
-    let record = simulate(plan, (start, velocity.to_vec()), TIME, STEPS, STEPS / 1000)?;
+    let record = simulate(plan, (start, velocity.to_vec()), &settings())?;
     let same = record.q.last().is_some_and(|end| end[..] == q) && record.p.last().is_some_and(|end| end[..] == p);
     if !same {
         return Err(Failure::new("the two simulations end in different states", "report this as a bug"));
     }
-    let worst = record.errors().into_iter().fold(0.0_f64, |m, e| m.max(e.abs()));
     writeln!(out, "4. Ten seconds of falling freely, {STEPS} Runge-Kutta steps of {h} s:")?;
     writeln!(out, "   generated code: {:.1} ms, {:.0} times faster than time itself", ours * 1e3, TIME / ours)?;
     writeln!(out, "   the interpreter ends in the same state, bit for bit")?;
-    writeln!(out, "   energy error: at most {worst:.1e} of the largest kinetic energy, {:.1} J\n", record.scale())?;
+    writeln!(
+        out,
+        "   energy error: at most {:.1e} of the largest kinetic energy, {:.1} J\n",
+        record.ends.worst(),
+        record.ends.scale
+    )?;
     Ok(record)
 }
 

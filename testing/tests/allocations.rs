@@ -2,8 +2,11 @@
 
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::integrate::{Rk4, Stepper};
+use mbd_runtime::integrate::{
+    Direction, Events, Outcome, Rk4, Solver, Step, Stepper, Tolerances, Tsit5, Verner9, Watch,
+};
 use mbd_runtime::sweep::{Derivatives, FrameState};
+use mbd_runtime::Interpreter;
 use mbd_testing::random::{random_model, Knobs};
 use mbd_testing::state::random_state;
 
@@ -51,5 +54,52 @@ fn nothing_is_allocated_after_construction() {
         assert_eq!(all.count_total, 0, "seed {seed}: {all:?}");
         assert_eq!((rank, step), (Ok(()), Ok(())), "seed {seed}");
         assert!(energy.0.is_finite() && energy.1.is_finite(), "seed {seed}");
+    }
+}
+
+/// The first velocity's momentum back where it was, and a time.
+struct Back(f64, u32);
+
+impl Events<Interpreter<f64>, 2> for Back {
+    fn watches(&self) -> [Watch; 2] {
+        [false, true].map(|terminal| Watch { direction: Direction::Both, terminal })
+    }
+    fn values(&mut self, _: &mut Interpreter<f64>, t: f64, _: &Vec<f64>, p: &Vec<f64>) -> [f64; 2] {
+        [p[0] - self.0, t - 0.02]
+    }
+    fn happened(&mut self, _: &mut Interpreter<f64>, _: usize, _: f64, _: &Vec<f64>, _: &Vec<f64>) {
+        self.1 += 1;
+    }
+}
+
+#[test]
+fn nor_do_runs_with_events_allocate() {
+    fn run<M: Stepper<Interpreter<f64>>>(seed: u64, method: impl Fn(&Interpreter<f64>) -> M) {
+        let knobs = Knobs { bodies: (3, 4), armature: 0.5, ..Knobs::default() };
+        let plan = Plan::new(&random_model(seed, &knobs), Default::default());
+        let s = random_state(&plan, seed);
+        let mut i = s.interpreter(&plan);
+        let mut p = vec![0.0; s.v.len()];
+        i.momenta(&s.q, &s.v, &mut p);
+        let method = method(&i);
+        let step = Step::Adaptive(Tolerances::new(1e-7));
+        let mut solver = Solver::new(&mut i, method, step, 0.0, &s.q, &p).expect("a start");
+        let mut back = Back(p[0], 0);
+        let (mut first, mut second) = (Ok(Outcome::End), Ok(()));
+        let all = measure(|| {
+            first = solver.run_events(&mut i, 1.0, &mut back);
+            second = solver.run(&mut i, 0.03);
+        });
+        assert_eq!(all.count_total, 0, "seed {seed}: {all:?}");
+        assert!(
+            matches!(first, Ok(Outcome::Event { index: 1, time }) if (time - 0.02).abs() < 1e-15),
+            "{seed} {first:?}"
+        );
+        assert_eq!(second, Ok(()), "seed {seed}");
+        assert!(back.1 > 0 && solver.time() == 0.03, "seed {seed}");
+    }
+    for seed in 0..20 {
+        run(seed, Tsit5::new);
+        run(seed, Verner9::new);
     }
 }

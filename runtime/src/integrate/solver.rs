@@ -1,87 +1,11 @@
 //! Drives a method over a time: error control, dense output, statistics.
 
 use super::chart::Point;
+use super::control::{Control, Limits, Step, Tolerance, Tolerances};
 use super::stepper::{norm, Statistics, Stepper};
 use super::{Projection, StepError};
 use crate::system::{Energetic, Real, System};
 use crate::Scalar;
-
-/// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero nothing is controlled.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
-    /// In the unit of the component.
-    pub absolute: f64,
-    /// Relative to its size.
-    pub relative: f64,
-}
-
-/// Allowed errors of a step, by group of components.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerances {
-    /// Coordinates, rad and m.
-    pub coordinates: Tolerance,
-    /// Rotations by quaternions: tangent vector, rad.
-    pub rotations: f64,
-    /// Momenta. The size of a momentum counts as at least a thousandth of the largest one.
-    pub momenta: Tolerance,
-    /// Which errors the step is chosen by.
-    pub control: Control,
-}
-
-/// Which errors the step is chosen by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Control {
-    /// Those of coordinates and momenta.
-    Full,
-    /// Those of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway, and where
-    /// they have small fast parts this saves steps.
-    Coordinates,
-}
-
-impl Tolerances {
-    /// One number for all: rad and m for coordinates and rotations, relative to the size for momenta.
-    pub const fn new(tolerance: f64) -> Self {
-        Tolerances {
-            coordinates: Tolerance { absolute: tolerance, relative: 0.0 },
-            rotations: tolerance,
-            momenta: Tolerance { absolute: 0.0, relative: tolerance },
-            control: Control::Full,
-        }
-    }
-
-    /// The same, with steps chosen by the errors of coordinates alone.
-    pub const fn coordinates_only(self) -> Self {
-        Tolerances { control: Control::Coordinates, ..self }
-    }
-}
-
-/// How the size of steps is found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step {
-    /// Always this many seconds, but for the last one before the end.
-    Fixed(f64),
-    /// By the error.
-    Adaptive(Tolerances),
-}
-
-/// Bounds of the work.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Smallest step, s; zero: where the time would no longer change.
-    pub min_step: f64,
-    /// Largest step, s.
-    pub max_step: f64,
-    /// First step, s; zero: chosen from the rates.
-    pub first_step: f64,
-    /// Steps of one call, rejected ones included.
-    pub steps: u64,
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Limits { min_step: 0.0, max_step: f64::INFINITY, first_step: 0.0, steps: u64::MAX }
-    }
-}
 
 /// Share of the step that the error would allow which is taken.
 const SAFETY: f64 = 0.9;
@@ -294,8 +218,10 @@ where
             return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
         }
         // A rest that differs from the step by rounding is the step.
-        let last = rest.to_f64() < h * (1.0 + 1e-9) + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
-        let step = if last { rest } else { Y::Scalar::constant(h) };
+        let slack = 1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
+        let over = rest.to_f64() - h;
+        let step = if over < -slack { rest } else { Y::Scalar::constant(h) };
+        let last = over < slack;
         self.method.attempt(system, self.t, step, None)?;
         self.check()?;
         self.wait(step, last.then_some(t_end));

@@ -10,7 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
-use values::{camel_case, finite, outputs, positive, rust_path, snap, vector};
+use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
 
@@ -420,13 +420,17 @@ pub enum Quantity {
 #[derive(Args)]
 #[command(
     after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints stay where they are, dampers and springs of the
-model act. The method is the classical Runge-Kutta method of order 4 with a fixed step.
+model act.
+
+Steps are chosen by their error (--tolerance) with Verner's method of order 9, unless --method says otherwise; with --step
+they are all the same, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
+equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
 floating joints neutral; every velocity 0.1 (rad/s or m/s).
 
-Without dampers the energy must stay what it is: its change is the error of the simulation, and is printed relative to the
-largest kinetic energy met."
+Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
+largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."
 )]
 pub struct SimulateArgs {
     #[command(flatten)]
@@ -434,9 +438,18 @@ pub struct SimulateArgs {
     /// Length of the simulation, s
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
     pub time: f64,
-    /// Step, s; shortened if the time is no multiple of it
-    #[arg(long, value_name = "S", default_value_t = 1e-3, value_parser = positive)]
-    pub step: f64,
+    /// Method [default: verner9, with --step rk4]
+    #[arg(long, value_name = "NAME", value_parser = methods())]
+    pub method: Option<String>,
+    /// Error that a step may have, rad or m; of momenta relative to their size [default: 1e-9]
+    #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "step")]
+    pub tolerance: Option<f64>,
+    /// Choose steps by the errors of the coordinates alone, not of the momenta
+    #[arg(long, conflicts_with = "step")]
+    pub partial: bool,
+    /// Step, s, always the same; shortened if the time is no multiple of it
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub step: Option<f64>,
     /// Initial coordinates, with commas between
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub q: Option<Vec<f64>>,
@@ -455,9 +468,12 @@ pub struct SimulateArgs {
     /// Plot to write [default: NAME.svg in the current directory]
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
-    /// Steps from one row of the table to the next [default: as few as give at most 1000 rows]
+    /// Rows of the table after that of the start, at equal times [default: 1000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub every: Option<u64>,
+    pub rows: Option<u64>,
+    /// Time from one row of the table to the next, s
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
+    pub every: Option<f64>,
 }
 
 /// `mbd explain`.

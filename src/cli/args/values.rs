@@ -1,7 +1,9 @@
 //! Values of arguments, read and refused.
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use multibody::codegen::import::words;
 use multibody::codegen::Group;
+use multibody::runtime::integrate::catalogue;
 
 use super::{OutputList, DEFAULT_RUNTIME};
 
@@ -23,6 +25,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
     } else {
         Err("the number must be positive".to_string())
     }
+}
+
+/// The name of a method.
+pub fn methods() -> PossibleValuesParser {
+    PossibleValuesParser::new(catalogue::entries().map(|e| PossibleValue::new(e.name).help(e.title)))
 }
 
 /// A small angle: beyond some degrees, snapping would change the mechanism.

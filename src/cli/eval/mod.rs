@@ -11,8 +11,8 @@ use multibody::runtime::Interpreter;
 use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
+use super::motion::rank_failure;
 use super::output::{note, write_file};
-use super::simulate::rank_failure;
 use super::{source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;

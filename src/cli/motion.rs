@@ -1,0 +1,259 @@
+//! A motion: steps through the interpreter, and what is recorded of them.
+
+use std::io::{IsTerminal, Write as _};
+use std::time::{Duration, Instant};
+
+use multibody::codegen::model::Gravity;
+use multibody::codegen::plan::Plan;
+use multibody::runtime::integrate::catalogue::{self, Drive, Start};
+use multibody::runtime::integrate::{Statistics, Step, StepError};
+use multibody::runtime::interp::RankLoss;
+use multibody::runtime::Interpreter;
+
+use super::timed::Timed;
+use super::{Failure, Outcome};
+
+/// How to simulate.
+pub struct Settings<'a> {
+    /// Name in the catalogue.
+    pub method: &'a str,
+    /// Its steps.
+    pub step: Step,
+    /// Length, s.
+    pub time: f64,
+    /// Time from one row to the next, s; the last one is at the end.
+    pub every: f64,
+}
+
+/// What was recorded.
+#[derive(Default)]
+pub struct Record {
+    /// Times, s.
+    pub t: Vec<f64>,
+    /// Coordinates, a list for each time.
+    pub q: Vec<Vec<f64>>,
+    /// Velocities.
+    pub v: Vec<Vec<f64>>,
+    /// Momenta.
+    pub p: Vec<Vec<f64>>,
+    /// Kinetic and potential energy, J.
+    pub energy: Vec<(f64, f64)>,
+    /// Energy where steps end: the method's own error, without that of dense output.
+    pub ends: Ends,
+    /// Work done.
+    pub statistics: Statistics,
+    /// Where the time went.
+    pub spent: Spent,
+}
+
+/// Energy at the ends of steps.
+#[derive(Default)]
+pub struct Ends {
+    /// Times, s: of the first step that ends at a row or behind it.
+    pub t: Vec<f64>,
+    /// Change of the energy since the start, J.
+    pub change: Vec<f64>,
+    /// Largest change at any step, J.
+    worst: f64,
+    /// Largest kinetic energy, J.
+    pub scale: f64,
+}
+
+/// Where the time went, s.
+#[derive(Clone, Copy, Default)]
+pub struct Spent {
+    /// All of it.
+    pub total: f64,
+    /// Rates, for steps.
+    pub rates: f64,
+    /// Their derivatives.
+    pub derivatives: f64,
+    /// Dense output, energies, rows.
+    pub output: f64,
+}
+
+impl Ends {
+    fn relative(&self, x: f64) -> f64 {
+        x / if self.scale > 0.0 { self.scale } else { 1.0 }
+    }
+
+    /// Largest change of the energy, relative to the largest kinetic energy.
+    pub fn worst(&self) -> f64 {
+        self.relative(self.worst)
+    }
+
+    /// Changes relative to the largest kinetic energy.
+    pub fn changes(&self) -> Vec<f64> {
+        self.change.iter().map(|x| self.relative(*x)).collect()
+    }
+}
+
+/// What looks at states.
+struct Observer {
+    interpreter: Interpreter<f64>,
+    record: Record,
+    start: f64,
+}
+
+impl Observer {
+    fn row(&mut self, t: f64, q: &[f64], p: &[f64]) {
+        let mut v = vec![0.0; p.len()];
+        self.interpreter.velocities(q, p, &mut v);
+        self.record.energy.push(self.interpreter.energy(q, p));
+        self.record.t.push(t);
+        self.record.v.push(v);
+        self.record.q.push(q.to_vec());
+        self.record.p.push(p.to_vec());
+    }
+
+    fn end(&mut self, t: f64, q: &[f64], p: &[f64], kept: bool) {
+        let (kinetic, potential) = self.interpreter.energy(q, p);
+        let (change, ends) = (kinetic + potential - self.start, &mut self.record.ends);
+        (ends.scale, ends.worst) = (ends.scale.max(kinetic), ends.worst.max(change.abs()));
+        if kept {
+            ends.t.push(t);
+            ends.change.push(change);
+        }
+    }
+}
+
+/// Simulates from coordinates and velocities, and records.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
+    let params = plan.default_params();
+    let gravity = match plan.model.gravity {
+        // As the fields of generated code start.
+        Gravity::Input => [0.0, 0.0, -9.81],
+        Gravity::Constant(_) => plan.gravity(&params),
+    };
+    let mut interpreter = Interpreter::new(plan.tree(&params), gravity);
+    interpreter.check_rank(&q).map_err(|e| rank_failure(plan, &e))?;
+    let mut p = vec![0.0; plan.dims.nv];
+    interpreter.momenta(&q, &v, &mut p);
+    let (kinetic, potential) = interpreter.energy(&q, &p);
+    let mut observer =
+        Observer { interpreter: interpreter.clone(), record: Record::default(), start: kinetic + potential };
+    let mut system = Timed::new(interpreter);
+    let start = Start { q: &q, p: &p, step: settings.step, compensated: false };
+    let made = catalogue::any(settings.method, &mut system, &start);
+    let made =
+        made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
+    let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
+    observer.end(0.0, &q, &p, true);
+    observer.row(0.0, &q, &p);
+    let clock = Instant::now();
+    go(&mut *driver, &mut system, settings, &mut observer).map_err(|e| failure(plan, settings, &e))?;
+    let total = clock.elapsed().as_secs_f64();
+    let mut record = observer.record;
+    record.statistics = driver.statistics();
+    (record.spent.rates, record.spent.derivatives) = system.seconds();
+    record.spent.total = total;
+    Ok(record)
+}
+
+/// Steps to the end.
+fn go(
+    driver: &mut dyn Drive<Timed>,
+    system: &mut Timed,
+    settings: &Settings,
+    observer: &mut Observer,
+) -> Result<(), StepError> {
+    let (time, every) = (settings.time, settings.every);
+    let rows = (time / every * (1.0 - 1e-12)).ceil().max(1.0) as u64;
+    let at = |row: u64| if row < rows { row as f64 * every } else { time };
+    let (mut row, mut progress) = (1, Progress::new(time));
+    let (mut q, mut p) = (observer.record.q[0].clone(), observer.record.p[0].clone());
+    while driver.time() < time {
+        driver.advance(system, time).inspect_err(|_| progress.clear())?;
+        let clock = Instant::now();
+        system.output = true;
+        let ((start, h), end) = (driver.last_step(), driver.time());
+        // Within rounding of the end it is the end.
+        let near = end - 1e-9 * h;
+        let kept = row <= rows && at(row) <= end.max(near);
+        while row <= rows && at(row) < near {
+            driver.dense(system, (at(row) - start) / h, &mut q, &mut p);
+            observer.row(at(row), &q, &p);
+            row += 1;
+        }
+        driver.state(system, &mut q, &mut p);
+        observer.end(end, &q, &p, kept);
+        if row <= rows && at(row) <= end + 1e-9 * h {
+            observer.row(at(row), &q, &p);
+            row += 1;
+        }
+        system.output = false;
+        observer.record.spent.output += clock.elapsed().as_secs_f64();
+        progress.show(end);
+    }
+    progress.clear();
+    Ok(())
+}
+
+/// A run that did not reach its end: what happened when, and what to do.
+fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
+    let names = plan.velocity_names();
+    let what = match *e {
+        StepError::NotFinite { index, .. } if index < 2 * names.len() => {
+            let kind = if index < names.len() { "coordinate" } else { "momentum" };
+            format!("the simulation failed: {e} (it is the {kind} of `{}`)", names[index % names.len()])
+        }
+        _ => format!("the simulation failed: {e}"),
+    };
+    let time = e.time();
+    let before = match time > 0.0 {
+        true => format!("; --time {} shows what came before", 0.999 * time),
+        false => String::new(),
+    };
+    let help = match (e, settings.step) {
+        (StepError::NoEstimate { .. }, _) => "give --step, in s: for example --step 0.001".to_string(),
+        (_, Step::Fixed(h)) => {
+            format!(
+                "the step was {h} s: lower --step, or leave it out for steps by the error{before}; nothing was written"
+            )
+        }
+        (StepError::NotFinite { .. }, Step::Adaptive(_)) => {
+            format!("the state is singular there, or too large for doubles: look at --q and --v{before}; nothing was written")
+        }
+        (_, Step::Adaptive(_)) => {
+            format!("raise --tolerance, or look at the mechanism near that time{before}; nothing was written")
+        }
+    };
+    Failure::new(what, help)
+}
+
+/// A mechanism that cannot move by its own laws.
+pub fn rank_failure(plan: &Plan, e: &RankLoss) -> Failure {
+    let name = plan.velocity_names().get(e.velocity).cloned().unwrap_or_default();
+    Failure::new(
+        format!("the mass matrix is singular: freedom `{name}` moves an inertia of {:e}", e.inertia),
+        "give the bodies behind this joint mass and inertia, or the joint an armature",
+    )
+}
+
+/// A line on a terminal that tells how far a long run is.
+struct Progress {
+    time: f64,
+    next: Instant,
+    shown: bool,
+}
+
+impl Progress {
+    fn new(time: f64) -> Self {
+        Progress { time, next: Instant::now() + Duration::from_secs(1), shown: false }
+    }
+
+    fn show(&mut self, t: f64) {
+        if Instant::now() < self.next || !std::io::stderr().is_terminal() {
+            return;
+        }
+        self.next = Instant::now() + Duration::from_millis(250);
+        self.shown = true;
+        let _ = write!(std::io::stderr(), "\rt = {t:.3} of {} s", self.time);
+    }
+
+    fn clear(&mut self) {
+        if std::mem::take(&mut self.shown) {
+            let _ = write!(std::io::stderr(), "\r\x1b[K");
+        }
+    }
+}
