@@ -81,6 +81,13 @@ where
         Weights::new(&places[..=count], self.used, theta)
     }
 
+    /// Integral up to `theta` of the polynomial through the past rates and that at the end; to `work`.
+    fn polynomial(&mut self, h: Y::Scalar, theta: Y::Scalar) {
+        let weights = self.weights(h, theta).corrector;
+        self.core.history.combine(&weights[..=self.used], &self.core.end, &mut self.work);
+        self.work.scale(h);
+    }
+
     /// Errors of the last attempt at the orders around its own: by how much one rate more changes the integral.
     fn estimate(&mut self, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
         let k = self.used;
@@ -135,7 +142,7 @@ where
         self.estimate(&weights, h, scale);
         let [lower, error, _] = self.errors;
         // Not a number is too large as well.
-        if !(error <= 1.0) {
+        if error > 1.0 || error.is_nan() {
             self.starting = false;
             self.order = if k > 1 && lower <= error { k - 1 } else { k };
         }
@@ -167,9 +174,13 @@ where
 
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.core.end_rate(system, t, h);
-        let weights = self.weights(h, theta).corrector;
-        self.core.history.combine(&weights[..=self.used], &self.core.end, out);
-        out.scale(h);
+        self.polynomial(h, Y::Scalar::one());
+        out.copy_from(&self.core.delta);
+        // The step was made with the rate at the prediction: what that differs by is spread over the step.
+        out.add(-Y::Scalar::one(), &self.work);
+        out.scale(theta);
+        self.polynomial(h, theta);
+        out.add(Y::Scalar::one(), &self.work);
     }
 
     of_core!();

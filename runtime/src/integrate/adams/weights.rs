@@ -36,11 +36,16 @@ pub(super) struct Weights<S> {
 
 impl<S: Scalar> Weights<S> {
     /// For `k` past rates, 1 to 13, at `places[1..]`, and the end of the step at `end`; time in any unit, from the start of the
-    /// step. The change at `m = k + 1` is found if there is a place more.
+    /// step. The change at `m = k + 1` is found if there is
+    /// one place more; there are no others.
     pub fn new(places: &[S], k: usize, end: S) -> Self {
         let zero = [S::zero(); NODES];
         let mut out = Weights { predictor: zero, corrector: zero, changes: [zero; 3] };
-        let basis = inverses(&places[..=k]);
+        // By the basis of one node more, where it is wanted, that of the others.
+        let (all, mut basis) = (inverses(places), [S::zero(); NODES]);
+        for j in 0..=k {
+            basis[j] = places[k + 1..].iter().fold(all[j], |all, next| all * (places[j] - *next));
+        }
         let products = Products::new(places, k, end);
         let mut right = [S::one(); POINTS];
         for j in (1..=k).rev() {
@@ -61,9 +66,9 @@ impl<S: Scalar> Weights<S> {
             out.changes[1][j] = now * basis[j];
         }
         if places.len() > k + 1 {
-            let (next, basis) = (products.all(k + 1, places[0]), inverses(&places[..=k + 1]));
+            let next = products.all(k + 1, places[0]);
             for j in 0..=k + 1 {
-                out.changes[2][j] = next * basis[j];
+                out.changes[2][j] = next * all[j];
             }
         }
         out
@@ -107,13 +112,18 @@ impl<S: Scalar> Products<S> {
 /// `1 / Π (zⱼ − zᵢ)` over the other places.
 fn inverses<S: Scalar>(places: &[S]) -> [S; NODES] {
     let mut products = [S::one(); NODES];
-    for (i, a) in places.iter().enumerate() {
-        for (j, b) in places.iter().enumerate().skip(i + 1) {
-            products[i] = products[i] * (*a - *b);
-            products[j] = products[j] * (*b - *a);
+    let n = places.len().min(NODES);
+    for i in 0..n {
+        for j in i + 1..n {
+            let apart = places[i] - places[j];
+            products[i] = products[i] * apart;
+            products[j] = -(products[j] * apart);
         }
     }
-    products.map(|x| S::one() / x)
+    for x in &mut products[..n] {
+        *x = S::one() / *x;
+    }
+    products
 }
 
 #[cfg(test)]
