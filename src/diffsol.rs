@@ -30,7 +30,7 @@
 use std::cell::RefCell;
 
 use ::diffsol::{
-    DiffsolError, NalgebraLU, NalgebraMat, OdeBuilder, OdeEquations, OdeSolverMethod, OdeSolverStopReason,
+    DiffsolError, NalgebraLU, NalgebraMat, OdeBuilder, OdeEquations, OdeSolverMethod, OdeSolverStopReason, Vector,
 };
 
 use crate::runtime::integrate::Statistics;
@@ -190,7 +190,7 @@ where
             let reason = method.step().map_err(stopped(self.t))?;
             steps += 1;
             let state = method.state();
-            let y = ::diffsol::VectorHost::as_slice(state.y);
+            let y = state.y.clone_as_vec();
             if let Some(index) = y.iter().position(|x| !x.is_finite()) {
                 return Err(Failure::NotFinite { time: self.t, index });
             }

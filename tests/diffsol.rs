@@ -125,7 +125,7 @@ fn tumbling_body() {
         child = "body"
     "#;
     let scene = Scene::new(text, &[0.0, 0.0, 1.0, 0.5, -0.5, 0.1, 0.7], &[0.3, 0.0, 0.5, 0.1, 4.0, 0.2], 1.0);
-    assert!(scene.run(Diffsol::default()).is_ok());
+    scene.check("tumbling body", &ALL, FACTOR);
 }
 
 #[test]

@@ -8,7 +8,8 @@ use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Composition, Doubled, Euler, Midpoint, Rk4, SemiImplicitEuler, StepDoubling, Stepper, Symmetric, Verner9,
+    Composition, Doubled, Euler, Gauss6, ImplicitMidpoint, Midpoint, Radau5, Rk4, Rodas5P, SemiImplicitEuler,
+    StepDoubling, Stepper, Symmetric, Verner9,
 };
 use mbd_runtime::spatial::{add3, cross, quaternion_matrix, Vec3};
 use mbd_runtime::sweep::FrameState;
@@ -29,6 +30,10 @@ fn methods(i: &Interpreter<f64>) -> Vec<(&'static str, Any)> {
         ("RK4 doubled, extrapolated", Box::new(StepDoubling::extrapolated(i, Rk4::new(i)))),
         ("doubled phase space", Box::new(Doubled::new(i, 10.0))),
         ("Suzuki 4", Box::new(composed)),
+        ("implicit midpoint", Box::new(ImplicitMidpoint::new(i))),
+        ("Gauss 6", Box::new(Gauss6::new(i))),
+        ("Radau 5", Box::new(Radau5::new(i))),
+        ("Rodas5P", Box::new(Rodas5P::new(i))),
         ("Verner 9", Box::new(Verner9::new(i))),
     ]
 }
