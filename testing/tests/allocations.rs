@@ -3,7 +3,8 @@
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Direction, Events, Outcome, Rk4, Solver, Step, Stepper, Tolerances, Tsit5, Verner9, Watch,
+    Direction, Events, Gauss12, ImplicitMidpoint, Outcome, Radau5, Rk4, Rodas5P, Solver, Step, StepError, Stepper,
+    Tolerances, Tsit5, Verner9, Watch,
 };
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::Interpreter;
@@ -101,5 +102,34 @@ fn nor_do_runs_with_events_allocate() {
     for seed in 0..20 {
         run(seed, Tsit5::new);
         run(seed, Verner9::new);
+    }
+}
+
+/// Two steps; how much is allocated in the second. In the first the interpreter makes room for derivatives.
+fn second_step<M: Stepper<Interpreter<f64>>>(i: &mut Interpreter<f64>, mut method: M, q: &[f64], p: &[f64]) -> u64 {
+    let (mut q, mut p) = (q.to_vec(), p.to_vec());
+    let mut step = |result: &mut Result<(), StepError>| *result = method.step(i, 0.0, 1e-4, &mut q, &mut p);
+    let (mut first, mut second) = (Ok(()), Ok(()));
+    step(&mut first);
+    let count = measure(|| step(&mut second)).count_total;
+    assert_eq!((first, second), (Ok(()), Ok(())));
+    count
+}
+
+#[test]
+fn implicit_steps_allocate_nothing() {
+    for seed in 0..40 {
+        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let s = random_state(&plan, seed);
+        let mut i = s.interpreter(&plan);
+        let mut p = vec![0.0; plan.dims.nv];
+        i.momenta(&s.q, &s.v, &mut p);
+        let counts = [
+            second_step(&mut i.clone(), ImplicitMidpoint::new(&i).with_iterations(2), &s.q, &p),
+            second_step(&mut i.clone(), Gauss12::compensated(&i), &s.q, &p),
+            second_step(&mut i.clone(), Radau5::new(&i), &s.q, &p),
+            second_step(&mut i.clone(), Rodas5P::new(&i), &s.q, &p),
+        ];
+        assert_eq!(counts, [0; 4], "seed {seed}");
     }
 }

@@ -1,8 +1,9 @@
 //! Implicit methods at constant cost.
 
 use super::chart::Point;
-use super::collocation::{Collocation, Formula};
+use super::collocation::Collocation;
 use super::field::Field;
+use super::formulas::Formula;
 use super::newton::Iteration;
 use super::stepper::{Statistics, Stepper};
 use super::StepError;
