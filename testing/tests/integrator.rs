@@ -5,8 +5,9 @@
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Composition, Dop853, Doubled, Euler, Gauss12, Gauss4, Gauss6, ImplicitMidpoint, Midpoint,
-    Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper, Symmetric, Tsit5, Verner9,
+    Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Composition, Dop853, Doubled, Euler, Gauss12, Gauss4, Gauss6,
+    ImplicitMidpoint, Midpoint, Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper,
+    Symmetric, Tsit5, Verner9,
 };
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{AccelerationForm, Energetic, Interpreter, Real, Scalar, System};
