@@ -3,8 +3,8 @@
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Direction, Events, Gauss12, ImplicitMidpoint, Outcome, Radau5, Rk4, Rodas5P, Solver, Step, StepError, Stepper,
-    Tolerances, Tsit5, Verner9, Watch,
+    Ab6, Abm12, Direction, Events, Gauss12, ImplicitMidpoint, Outcome, Projection, Radau5, Rk4, Rodas5P, Solver, Step,
+    StepError, Stepper, Tolerances, Tsit5, VariableAdams, Verner9, Watch,
 };
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::Interpreter;
@@ -131,5 +131,32 @@ fn implicit_steps_allocate_nothing() {
             second_step(&mut i.clone(), Rodas5P::new(&i), &s.q, &p),
         ];
         assert_eq!(counts, [0; 4], "seed {seed}");
+    }
+}
+
+/// A start, steps with a history, changes of the order.
+#[test]
+fn multistep_methods_allocate_nothing() {
+    for seed in 0..20 {
+        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let s = random_state(&plan, seed);
+        let mut i = s.interpreter(&plan);
+        let (mut q, mut p) = (s.q.clone(), vec![0.0; plan.dims.nv]);
+        i.momenta(&s.q, &s.v, &mut p);
+        let (mut ab, mut abm, variable) = (Ab6::compensated(&i), Abm12::new(&i), VariableAdams::new(&i));
+        let mut projection = Projection::new(&mut i, &q, &p, 1);
+        let step = Step::Adaptive(Tolerances::new(1e-4));
+        let mut solver = Solver::new(&mut i, variable, step, 0.0, &q, &p).expect("a start");
+        let mut results = Ok(());
+        let all = measure(|| {
+            for _ in 0..20 {
+                let ab = projection.step(&mut ab, &mut i, 0.0, 1e-6, &mut q, &mut p);
+                let abm = abm.step(&mut i, 0.0, 1e-6, &mut q, &mut p);
+                results = results.and(ab).and(abm).and(solver.advance(&mut i, 1.0));
+            }
+            solver.dense(&mut i, 0.5, &mut q, &mut p);
+        });
+        assert_eq!(all.count_total, 0, "seed {seed}: {all:?}");
+        assert_eq!(results, Ok(()), "seed {seed}");
     }
 }

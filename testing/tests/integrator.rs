@@ -5,8 +5,9 @@
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    BackwardEuler, CashKarp, Composition, Dop853, Doubled, Euler, Gauss12, Gauss4, Gauss6, ImplicitMidpoint, Midpoint,
-    Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper, Symmetric, Tsit5, Verner9,
+    Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Composition, Dop853, Doubled, Euler, Gauss12, Gauss4, Gauss6,
+    ImplicitMidpoint, Midpoint, Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper,
+    Symmetric, Tsit5, Verner9,
 };
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{AccelerationForm, Energetic, Interpreter, Real, Scalar, System};
@@ -74,6 +75,11 @@ fn methods<S: Real + 'static>() -> Vec<Row<Interpreter<S>>> {
         row("Radau 5", 5, 1.0, |i| Box::new(Radau5::new(i))),
         // Its coefficients are doubles: smaller errors than this are theirs.
         row("Rodas5P", 5, 4.0, |i| Box::new(Rodas5P::new(i))),
+        row("Adams-Bashforth 4", 4, 0.25, |i| Box::new(Ab4::new(i))),
+        row("Adams-Bashforth 6", 6, 0.25, |i| Box::new(Ab6::new(i))),
+        row("Adams-Bashforth-Moulton 4", 4, 0.5, |i| Box::new(Abm4::new(i))),
+        row("Adams-Bashforth-Moulton 6", 6, 0.25, |i| Box::new(Abm6::new(i))),
+        row("Adams-Bashforth-Moulton 8", 8, 0.25, |i| Box::new(Abm8::new(i))),
         row("RK4 doubled", 4, 2.0, |i| Box::new(StepDoubling::new(i, Rk4::new(i)))),
         row("RK4 doubled, extrapolated", 5, 1.0, |i| Box::new(StepDoubling::extrapolated(i, Rk4::new(i)))),
         row("midpoint doubled, extrapolated", 3, 1.0, |i| Box::new(StepDoubling::extrapolated(i, Midpoint::new(i)))),

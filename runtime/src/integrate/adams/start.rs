@@ -72,8 +72,9 @@ where
     fn extrapolate(&mut self, row: usize) {
         let [_, new] = &mut self.points;
         for k in 0..row {
-            let ratio = (row + 1) as f64 / (row - k) as f64;
-            let factor = Y::Scalar::one() / Y::Scalar::constant(ratio * ratio - 1.0);
+            // 1 / (n² / m² − 1), of integers: exact but for the division, in any precision.
+            let (n2, m2) = (((row + 1) * (row + 1)) as f64, ((row - k) * (row - k)) as f64);
+            let factor = Y::Scalar::constant(m2) / Y::Scalar::constant(n2 - m2);
             let old = &mut self.columns[k];
             for (new, old) in new.parts_mut().into_iter().zip(old.parts_mut()) {
                 for (new, old) in new.iter_mut().zip(old) {

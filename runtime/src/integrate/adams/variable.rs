@@ -23,9 +23,11 @@ const GROW: f64 = 2.0;
 /// Adams-Bashforth-Moulton with variable steps and orders: predictor of order 1 to 12, corrector of one more, two
 /// evaluations of the rates a step.
 ///
-/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, and a restart at every jump. Its
-/// own work is some ten times that of a Runge-Kutta stage, so it is for mechanisms whose rates cost more than that. Made for
-/// error control: with steps of a fixed size the order rises from one, whose error stays; take [`Adams`](super::Adams) then.
+/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, some half of those of Verner's
+/// pair of order 9 for the same tolerance, and a restart at every jump. Its own work at order 12 is some 700 multiplications and
+/// 130 for every coordinate a step, so it saves time where the rates cost more than that. With tolerances looser than 1e-3 it may
+/// gain energy without end in violent motion: take a Runge-Kutta method there. Made for error control: with steps of a fixed
+/// size the order rises from one, whose error stays; take [`Adams`](super::Adams) then.
 ///
 /// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters 5 to 7:
 /// the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every step from the
