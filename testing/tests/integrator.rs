@@ -193,8 +193,10 @@ fn check<S: Real>(scene: &str, name: &str, expected: f64, runs: [Vec<S>; 3], wro
     let [a, b, c] = runs;
     let (order, error) = ((off(&a, &b) / off(&b, &c)).log2(), off(&b, &c));
     println!("{scene}: {name}: order {order:.3}, error {error:.1e}");
-    // Errors of the next order are still there, the more the higher the order.
-    let near = (order - expected).abs() < 0.06 * (expected + 1.0);
+    // Errors of the next order are still there, the more the higher the order; where the leading ones happen to be small, they
+    // are all there is.
+    let margin = 0.06 * (expected + 1.0);
+    let near = order > expected - margin && order < expected + 1.0 + margin;
     if !near {
         wrong.push(format!("{scene}: {name}: order {order} instead of {expected}"));
     }
@@ -223,7 +225,8 @@ fn high_orders() {
     for scene in scenes() {
         for row in methods() {
             if row.order >= 5.0 {
-                let runs = [1.0, 2.0, 4.0].map(|k| scene.run_wide(&row, 0.0625, row.coarse * scene.h / k));
+                let h = row.coarse * scene.h;
+                let runs = [1.0, 2.0, 4.0].map(|k| scene.run_wide(&row, (16.0 * h).min(0.0625), h / k));
                 check(scene.name, row.name, row.at(&scene.wide), runs, &mut wrong);
             }
         }
