@@ -70,6 +70,8 @@ pub struct Spent {
     pub derivatives: f64,
     /// Dense output, energies, rows.
     pub output: f64,
+    /// Looking at the clock.
+    pub clock: f64,
 }
 
 impl Ends {
@@ -145,7 +147,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let total = clock.elapsed().as_secs_f64();
     let mut record = observer.record;
     record.statistics = driver.statistics();
-    (record.spent.rates, record.spent.derivatives) = system.seconds();
+    [record.spent.rates, record.spent.derivatives, record.spent.clock] = system.seconds();
     record.spent.total = total;
     Ok(record)
 }

@@ -128,9 +128,9 @@ fn work(s: &Statistics) -> String {
 
 /// Where the time went.
 fn spent(time: f64, spent: &Spent) -> String {
-    let Spent { total, rates, derivatives, output } = *spent;
+    let Spent { total, rates, derivatives, output, clock } = *spent;
     let share = |x: f64| format!("{:.0} %", 100.0 * (x / total).clamp(0.0, 1.0));
-    let method = (total - rates - derivatives - output).max(0.0);
+    let method = (total - rates - derivatives - output - clock).max(0.0);
     let derivatives = match derivatives > 0.0 {
         true => format!(", their derivatives {}", share(derivatives)),
         false => String::new(),

@@ -5,47 +5,20 @@ use std::time::{Duration, Instant};
 use multibody::runtime::system::Group;
 use multibody::runtime::{Blocks, Differentiable, Interpreter, System};
 
-/// Most samples that are kept. Reading the clock costs a tenth of a small mechanism's rates.
-const MOST: usize = 512;
-
-/// Time that calls of one kind take. They do the same every time: what counts is the middle one of some samples, so that an
-/// interruption by other programs is not taken for work.
-struct Sampled {
+/// Time that calls of one kind take.
+#[derive(Clone, Copy, Debug, Default)]
+struct Clocked {
     calls: u64,
-    /// Every so many calls one is timed.
-    every: u64,
-    seconds: Vec<f64>,
+    seconds: f64,
 }
 
-impl Sampled {
-    fn new() -> Self {
-        Sampled { calls: 0, every: 1, seconds: Vec::with_capacity(MOST) }
-    }
-
-    fn time<R>(&mut self, clock: f64, f: impl FnOnce() -> R) -> R {
-        self.calls += 1;
-        if self.calls % self.every != 0 {
-            return f();
-        }
+impl Clocked {
+    fn time<R>(&mut self, f: impl FnOnce() -> R) -> R {
         let start = Instant::now();
         let result = f();
-        self.seconds.push((start.elapsed().as_secs_f64() - clock).max(0.0));
-        if self.seconds.len() == MOST {
-            // Every other one stays, of the next every other one comes.
-            let mut stays = false;
-            self.seconds.retain(|_| {
-                stays = !stays;
-                stays
-            });
-            self.every *= 2;
-        }
+        self.seconds += start.elapsed().as_secs_f64();
+        self.calls += 1;
         result
-    }
-
-    fn total(&self) -> f64 {
-        let mut seconds = self.seconds.clone();
-        seconds.sort_by(f64::total_cmp);
-        self.calls as f64 * seconds.get(seconds.len() / 2).copied().unwrap_or(0.0)
     }
 }
 
@@ -57,8 +30,8 @@ pub struct Timed {
     /// What reading the clock takes, s.
     clock: f64,
     /// For steps and for output.
-    rates: [Sampled; 2],
-    derivatives: Sampled,
+    rates: [Clocked; 2],
+    derivatives: Clocked,
 }
 
 impl Timed {
@@ -66,12 +39,15 @@ impl Timed {
     pub fn new(inner: Interpreter<f64>) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
-        Timed { inner, output: false, clock, rates: [Sampled::new(), Sampled::new()], derivatives: Sampled::new() }
+        Timed { inner, output: false, clock, rates: Default::default(), derivatives: Clocked::default() }
     }
 
-    /// Time taken in steps by the rates and by their derivatives, s, as sampled.
-    pub fn seconds(&self) -> (f64, f64) {
-        (self.rates[0].total(), self.derivatives.total())
+    /// Time taken in steps, s: by the rates, by their derivatives, and by looking at the clock around them.
+    pub fn seconds(&self) -> [f64; 3] {
+        let kinds = [self.rates[0], self.derivatives];
+        // Of the two readings about a call one lies within what is measured.
+        let [rates, derivatives] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
+        [rates, derivatives, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
     }
 }
 
@@ -90,8 +66,8 @@ impl System for Timed {
         self.inner.groups()
     }
     fn state_rates(&mut self, t: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
-        let Timed { inner, rates, clock, output, .. } = self;
-        rates[usize::from(*output)].time(*clock, || inner.state_rates(t, q, p, qd, pd));
+        let Timed { inner, rates, output, .. } = self;
+        rates[usize::from(*output)].time(|| inner.state_rates(t, q, p, qd, pd));
     }
     fn coordinate_rates(&self, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>) {
         self.inner.coordinate_rates(q, v, qd);
@@ -113,8 +89,8 @@ impl Differentiable for Timed {
         pd: &mut Vec<f64>,
         blocks: Blocks<'_, Vec<Vec<f64>>>,
     ) {
-        let Timed { inner, derivatives, clock, .. } = self;
-        derivatives.time(*clock, || inner.rate_derivatives(t, q, p, v, pd, blocks));
+        let Timed { inner, derivatives, .. } = self;
+        derivatives.time(|| inner.rate_derivatives(t, q, p, v, pd, blocks));
     }
     fn depends_on_time(&self) -> bool {
         self.inner.depends_on_time()
