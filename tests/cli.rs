@@ -173,6 +173,24 @@ fn simulates() {
 }
 
 #[test]
+fn simulates_on_the_energy_of_the_start() {
+    let folder = folder("simulate_project");
+    let model = format!("{ROOT}/models/double_pendulum.toml");
+    let energies = |more: &[&str]| -> Vec<f64> {
+        let arguments = [&["simulate", &model, "--time", "5", "--rows", "50", "--step", "0.01"], more].concat();
+        good(run_in(&folder, &arguments));
+        let (_, rows) = columns(&read(&folder, "double_pendulum.csv"));
+        rows.iter().map(|row| row[row.len() - 1]).collect()
+    };
+    let drift = |energies: &[f64]| energies.iter().map(|e| (e - energies[0]).abs()).fold(0.0, f64::max);
+    let (free, kept) = (drift(&energies(&[])), drift(&energies(&["--project"])));
+    // Rows stand where steps end. Energies are some tens of joules: their rounding.
+    assert!(kept < 1e-13 && free > 1e3 * kept, "{kept:e} {free:e}");
+    let damped = format!("{ROOT}/models/chain100.toml");
+    bad(run_in(&folder, &["simulate", &damped, "--project"]), &["dampers", "--no-damping"]);
+}
+
+#[test]
 fn simulates_by_any_method() {
     let folder = folder("simulate_methods");
     let ball = format!("{ROOT}/models/spherical_pendulum.toml");

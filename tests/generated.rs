@@ -65,7 +65,7 @@ macro_rules! check {
             assert_eq!((plan.dims.nq, plan.dims.nv), (NQ, NV));
             assert_eq!(plan.coordinate_names(), <$type>::COORDINATES);
             assert_eq!(plan.velocity_names(), <$type>::VELOCITIES);
-            assert_eq!(System::quaternions(&system), System::quaternions(&interpreter));
+            assert_eq!(System::groups(&system), System::groups(&interpreter));
             assert_eq!(System::neutral(&system).to_vec(), System::neutral(&interpreter));
             let mut random = Random(0x9e37_79b9_7f4a_7c15);
             for state in 0..STATES {

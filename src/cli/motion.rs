@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::integrate::catalogue::{self, Drive, Start};
-use multibody::runtime::integrate::{Statistics, Step, StepError};
+use multibody::runtime::integrate::{Projection, Statistics, Step, StepError};
 use multibody::runtime::interp::RankLoss;
 use multibody::runtime::Interpreter;
 
@@ -23,6 +23,8 @@ pub struct Settings<'a> {
     pub time: f64,
     /// Time from one row to the next, s; the last one is at the end.
     pub every: f64,
+    /// Whether steps are put back on the energy of the start.
+    pub project: bool,
 }
 
 /// What was recorded.
@@ -140,10 +142,11 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let made =
         made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
     let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
+    let mut projection = settings.project.then(|| Projection::new(&mut system, &q, &p, 1));
     observer.end(0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
     let clock = Instant::now();
-    go(&mut *driver, &mut system, settings, &mut observer).map_err(|e| failure(plan, settings, &e))?;
+    go(&mut *driver, &mut system, settings, &mut projection, &mut observer).map_err(|e| failure(plan, settings, &e))?;
     let total = clock.elapsed().as_secs_f64();
     let mut record = observer.record;
     record.statistics = driver.statistics();
@@ -157,6 +160,7 @@ fn go(
     driver: &mut dyn Drive<Timed>,
     system: &mut Timed,
     settings: &Settings,
+    projection: &mut Option<Projection<Timed>>,
     observer: &mut Observer,
 ) -> Result<(), StepError> {
     let (time, every) = (settings.time, settings.every);
@@ -166,6 +170,9 @@ fn go(
     let (mut q, mut p) = (observer.record.q[0].clone(), observer.record.p[0].clone());
     while driver.time() < time {
         driver.advance(system, time).inspect_err(|_| progress.clear())?;
+        if let Some(projection) = projection {
+            driver.project(system, projection);
+        }
         let clock = Instant::now();
         system.output = true;
         let ((start, h), end) = (driver.last_step(), driver.time());

@@ -41,6 +41,12 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if plan.dims.drive_v > 0 {
         note(format_args!("{}: notice: prescribed joints are held at zero", path.display()));
     }
+    if args.project && damped && !args.no_damping {
+        return Err(Failure::new(
+            "--project keeps the energy, but the model has dampers, which take it out",
+            "leave them out with --no-damping, or leave --project out",
+        ));
+    }
     let settings = settings(args)?;
     let (q, v) = start(&plan, args)?;
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
@@ -95,7 +101,7 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             "raise --every or lower --rows",
         ));
     }
-    Ok(Settings { method, step, time: args.time, every })
+    Ok(Settings { method, step, time: args.time, every, project: args.project })
 }
 
 /// Title of the plot, and what is told first.

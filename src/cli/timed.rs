@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use multibody::runtime::system::Group;
-use multibody::runtime::{Blocks, Differentiable, Interpreter, System};
+use multibody::runtime::{Blocks, Differentiable, Energetic, Interpreter, System};
 
 /// Time that calls of one kind take.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,6 +48,12 @@ impl Timed {
         // Of the two readings about a call one lies within what is measured.
         let [rates, derivatives] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
         [rates, derivatives, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
+    }
+}
+
+impl Energetic for Timed {
+    fn state_energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
+        self.inner.energy(q, p)
     }
 }
 

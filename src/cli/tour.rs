@@ -154,7 +154,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
 
 /// How the interpreter simulates what the generated code does.
 fn settings() -> Settings<'static> {
-    Settings { method: "rk4", step: Step::Fixed(TIME / STEPS as f64), time: TIME, every: TIME / 1000.0 }
+    Settings { method: "rk4", step: Step::Fixed(TIME / STEPS as f64), time: TIME, every: TIME / 1000.0, project: false }
 }
 
 /// Simulates with the generated code and with the interpreter.

@@ -67,7 +67,7 @@ fn rotor() -> (Interpreter<f64>, Vec<f64>, Vec<f64>) {
     let (model, findings) = read("rotor.toml", text);
     let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
     let mut i: Interpreter<f64> = plan.interpreter(&[]);
-    let q = vec![0.1, -0.5, 0.5, 0.7];
+    let q = [0.1, -0.5, 0.5, 0.7];
     let length = q.iter().map(|x: &f64| x * x).sum::<f64>().sqrt();
     let q: Vec<f64> = q.iter().map(|x| x / length).collect();
     let mut p = vec![0.0; 3];

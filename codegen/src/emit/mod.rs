@@ -18,12 +18,15 @@ use statements::{Body, Head};
 pub use layout::joint_word;
 pub use names::{identifier, quantity};
 
+/// Writes one implementation of a trait.
+type Writer = fn(&mut String, &Plan, &Options);
+
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
 pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {
     let mut out = String::new();
     let has = |x: Group| groups.iter().any(|g| g.group == x);
     let rates = has(Group::Rates);
-    let traits: [(bool, fn(&mut String, &Plan, &Options)); 4] = [
+    let traits: [(bool, Writer); 4] = [
         (has(Group::Momenta), traits::conjugate),
         (has(Group::Energy), traits::energetic),
         (has(Group::Accelerations), traits::accelerated),

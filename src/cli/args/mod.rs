@@ -447,6 +447,10 @@ pub struct SimulateArgs {
     /// Choose steps by the errors of the coordinates alone, not of the momenta
     #[arg(long, conflicts_with = "step")]
     pub partial: bool,
+    /// Put every step back on the energy of the start; for motion that neither gains nor loses any. The error of the motion
+    /// hardly changes
+    #[arg(long)]
+    pub project: bool,
     /// Step, s, always the same; shortened if the time is no multiple of it
     #[arg(long, value_name = "S", value_parser = positive)]
     pub step: Option<f64>,
