@@ -11,7 +11,7 @@ pub struct Line {
     pub name: String,
     /// In order.
     pub points: Vec<(f64, f64)>,
-    /// Drawn thinner, without marks: what others are compared with.
+    /// Dashed, without marks: what others are compared with.
     pub thin: bool,
 }
 
@@ -59,9 +59,13 @@ impl Figure {
         let unit = SCALE as i32;
         for (k, line) in self.lines[0].iter().enumerate() {
             let y = 24 * unit + (k as i32) * 16 * unit;
-            let width = if line.thin { SCALE } else { 2 * SCALE };
-            legend.draw(&PathElement::new([(4 * unit, y), (26 * unit, y)], colour(k).stroke_width(width)))?;
-            if !line.thin {
+            let style = colour(k).stroke_width(2 * SCALE);
+            if line.thin {
+                for from in [4, 15] {
+                    legend.draw(&PathElement::new([(from * unit, y), ((from + 8) * unit, y)], style))?;
+                }
+            } else {
+                legend.draw(&PathElement::new([(4 * unit, y), (26 * unit, y)], style))?;
                 legend.draw(&Circle::new((15 * unit, y), 3 * unit, colour(k).filled()))?;
             }
             legend.draw(&Text::new(line.name.clone(), (32 * unit, y - 6 * unit), style.clone()))?;
@@ -88,7 +92,10 @@ fn chart(area: &Area, x: &str, y: &str, lines: &[Line]) -> Drawn {
         .x_label_area_size(38 * SCALE)
         .y_label_area_size(66 * SCALE)
         .build_cartesian_2d(xs.log_scale(), ys.log_scale())?;
-    let power = |v: &f64| format!("1e{:.0}", v.log10());
+    let power = |v: &f64| match v.log10().round() {
+        0.0 => "1".to_string(),
+        power => format!("1e{power}"),
+    };
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -104,9 +111,12 @@ fn chart(area: &Area, x: &str, y: &str, lines: &[Line]) -> Drawn {
         .axis_desc_style(("sans-serif", 13 * SCALE))
         .draw()?;
     for (k, line) in lines.iter().enumerate() {
-        let width = if line.thin { SCALE } else { 2 * SCALE };
-        chart.draw_series(LineSeries::new(line.points.iter().copied(), colour(k).stroke_width(width)))?;
-        if !line.thin {
+        let points = line.points.iter().copied();
+        if line.thin {
+            let style = colour(k).stroke_width(2 * SCALE);
+            chart.draw_series(DashedLineSeries::new(points, 6 * SCALE, 4 * SCALE, style))?;
+        } else {
+            chart.draw_series(LineSeries::new(points, colour(k).stroke_width(2 * SCALE)))?;
             let mark = |p: &(f64, f64)| Circle::new(*p, 3 * SCALE, colour(k).filled());
             chart.draw_series(line.points.iter().map(mark))?;
         }

@@ -27,7 +27,7 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Outcome {
         Bench::WorkPrecision(args) => work_precision(args, out),
         Bench::Longrun(args) => longrun(args, out),
         Bench::Stress(args) => {
-            let rows = stress::rows(&chosen(&args.choice)?);
+            let rows = stress::rows(&chosen(&args.choice)?, &args.choice.methods);
             Ok(write!(out, "{}", tables::stress(&rows))?)
         }
         Bench::Report(args) => report::write(args, out),

@@ -33,7 +33,7 @@ pub fn write(args: &ReportArgs, out: &mut dyn Write) -> Outcome {
     for scene in LONG.iter().filter_map(|name| scenes::by_name(name)) {
         runs += &tables::long(&scene, &long::scene(&scene, &long::methods(&[]), args.steps));
     }
-    let stress = tables::stress(&stress::rows(&scenes::all()));
+    let stress = tables::stress(&stress::rows(&scenes::all(), &[]));
     let text = TEXT
         .replace("{{ratios}}", &tables::ratios(&all))
         .replace("{{work}}", &work)

@@ -26,16 +26,19 @@ pub struct Row {
 /// Tolerance of adaptive methods; others take the scene's step.
 const TOLERANCE: f64 = 1e-8;
 
-/// Runs of scenes whose interpreter takes longer than this are left to generated code, as freedoms.
+/// Scenes of more freedoms are run by the adaptive explicit methods only: others would take hours.
 const LARGE: usize = 200;
 
 /// All scenes with all methods, interpreted, in f64 and f32, and the models that are refused.
-pub fn rows(scenes: &[Scene]) -> Vec<Row> {
+pub fn rows(scenes: &[Scene], methods: &[String]) -> Vec<Row> {
     let mut rows = Vec::new();
     for scene in scenes {
         let reference = reference(scene).map(|r| r.q);
         note(format_args!("{}: stress", scene.name));
         for entry in catalogue::entries() {
+            if !methods.is_empty() && !methods.iter().any(|m| m == entry.name) {
+                continue;
+            }
             if scene.v.len() > LARGE && (entry.implicit || !entry.adaptive) {
                 continue;
             }

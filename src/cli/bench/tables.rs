@@ -119,7 +119,7 @@ const LINES: [(&str, &str); 16] = [
     ("pinocchio", "dop853"),
     ("mujoco", "rk4"),
     ("mujoco", "implicitfast"),
-    ("drake", "rk3"),
+    ("drake", "runge_kutta3"),
 ];
 
 /// Figure of one scene.
