@@ -8,10 +8,13 @@ use command::{bad, folder, good, out, read, run, run_in};
 #[test]
 fn work_against_error() {
     let folder = folder("bench_work");
-    let choice = ["--scenes", "double_pendulum", "--methods", "rk4,verner9,radau5", "--figures", ".", "--samples", "a.jsonl"];
+    let choice =
+        ["--scenes", "double_pendulum", "--methods", "rk4,verner9,radau5", "--figures", ".", "--samples", "a.jsonl"];
     let output = good(run_in(&folder, &[&["bench", "work-precision"], &choice[..]].concat()));
     let text = out(&output);
-    for line in ["generated: rk4", "generated: verner9", "generated, f32: rk4", "interpreted: verner9", "accelerations: rk4"] {
+    for line in
+        ["generated: rk4", "generated: verner9", "generated, f32: rk4", "interpreted: verner9", "accelerations: rk4"]
+    {
         assert!(text.contains(line), "{line}:\n{text}");
     }
     assert!(read(&folder, "double_pendulum.svg").starts_with("<svg"));
@@ -28,7 +31,8 @@ fn work_against_error() {
 
 #[test]
 fn long_runs() {
-    let output = good(run(&["bench", "longrun", "--scenes", "double_pendulum", "--methods", "verner9", "--steps", "5000"]));
+    let output =
+        good(run(&["bench", "longrun", "--scenes", "double_pendulum", "--methods", "verner9", "--steps", "5000"]));
     let row = |name: &str| -> Vec<f64> {
         let line = out(&output).lines().find(|l| l.starts_with(&format!("| {name} "))).expect("a row");
         line.split('|').filter_map(|cell| cell.trim().parse().ok()).collect()

@@ -59,13 +59,13 @@ impl Figure {
         let unit = SCALE as i32;
         for (k, line) in self.lines[0].iter().enumerate() {
             let y = 24 * unit + (k as i32) * 16 * unit;
-            let style = colour(k).stroke_width(2 * SCALE);
+            let stroke = colour(k).stroke_width(2 * SCALE);
             if line.thin {
                 for from in [4, 15] {
-                    legend.draw(&PathElement::new([(from * unit, y), ((from + 8) * unit, y)], style))?;
+                    legend.draw(&PathElement::new([(from * unit, y), ((from + 8) * unit, y)], stroke))?;
                 }
             } else {
-                legend.draw(&PathElement::new([(4 * unit, y), (26 * unit, y)], style))?;
+                legend.draw(&PathElement::new([(4 * unit, y), (26 * unit, y)], stroke))?;
                 legend.draw(&Circle::new((15 * unit, y), 3 * unit, colour(k).filled()))?;
             }
             legend.draw(&Text::new(line.name.clone(), (32 * unit, y - 6 * unit), style.clone()))?;

@@ -90,6 +90,11 @@ pub fn generated(scene: &Scene) -> (Erased<f64>, bool) {
     }
 }
 
+/// Generated code of a scene in f32, or the interpreter where there is none.
+pub fn single(scene: &Scene) -> Erased<f32> {
+    visit_f32(scene.name, Boxed(scene)).unwrap_or_else(|| Erased::interpreted(scene))
+}
+
 /// Scenes of at most so many freedoms have a reference in double-double numbers.
 const WIDE: usize = 14;
 
@@ -122,7 +127,17 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
 }
 
 /// Time after which a series of ever finer runs ends, s.
-const LONGEST: f64 = 0.6;
+const LONGEST: f64 = 0.15;
+/// Implicit methods factor dense matrices: more freedoms than this are not for them.
+const DENSE: usize = 20;
+/// With more freedoms than this only some methods are run, one run takes seconds.
+const LARGE: usize = 200;
+
+/// Whether a method is run on a scene at all.
+pub fn fits(scene: &Scene, method: &Entry) -> bool {
+    let n = scene.v.len();
+    (n <= DENSE || !method.implicit) && (n <= LARGE || ["dop853", "verner9", "adams"].contains(&method.name))
+}
 
 /// One method at all its settings.
 fn series<Y>(
@@ -178,8 +193,9 @@ pub fn scene(scene: &Scene, variants: &[Variant], methods: &[String]) -> (Option
     let Some(reference) = reference(scene) else { return (None, Vec::new()) };
     let mut samples = Vec::new();
     for &variant in variants {
-        let chosen =
-            |e: &&'static Entry| variant.runs(e) && (methods.is_empty() || methods.iter().any(|m| m == e.name));
+        let chosen = |e: &&'static Entry| {
+            variant.runs(e) && fits(scene, e) && (methods.is_empty() || methods.iter().any(|m| m == e.name))
+        };
         for entry in catalogue::entries().filter(chosen) {
             note(format_args!("{}: {}, {}", scene.name, variant.name(), entry.name));
             samples.extend(one(scene, &reference, variant, entry));
