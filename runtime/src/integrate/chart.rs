@@ -232,18 +232,18 @@ where
         }
     }
 
-    /// State at a displacement.
+    /// State at a displacement. Where sums are compensated, what was carried over is part of it.
     #[inline]
     pub fn state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         let (base, x) = (self.q.as_ref(), point.x.as_ref());
+        let (cx, cp) = self.carry.as_ref().map_or((None, None), |c| (Some(c.x.as_ref()), Some(c.p.as_ref())));
         let q = q.as_mut();
+        displaced(self.p.as_ref(), point.p.as_ref(), cp, p.as_mut());
         if system.groups().is_empty() {
-            displaced(base, x, q);
-            return displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
+            return displaced(base, x, cx, q);
         }
-        displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
         for (at, v, n, group) in Stretches::new(system.groups(), base.len(), x.len()) {
-            displaced(&base[at..at + n], &x[v..v + n], &mut q[at..at + n]);
+            displaced(&base[at..at + n], &x[v..v + n], cx.map(|c| &c[v..v + n]), &mut q[at..at + n]);
             if let Some(group) = group {
                 group.displace(base, x, q);
                 group.inward(q, group.shift(x), p.as_mut());
@@ -365,11 +365,13 @@ fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) 
     }
 }
 
-/// `out = base + x`.
+/// `out = base + (x + carry)`.
 #[inline(always)]
-fn displaced<S: Scalar>(base: &[S], x: &[S], out: &mut [S]) {
-    for (out, (base, x)) in out.iter_mut().zip(base.iter().zip(x)) {
-        *out = *base + *x;
+fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S]) {
+    let pairs = out.iter_mut().zip(base.iter().zip(x));
+    match carry {
+        None => pairs.for_each(|(out, (base, x))| *out = *base + *x),
+        Some(carry) => pairs.zip(carry).for_each(|((out, (base, x)), carry)| *out = *base + (*x + *carry)),
     }
 }
 
