@@ -11,6 +11,7 @@
 //! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
 //! the exponential: its inverse differential is a polynomial.
 
+use super::constant::Constant;
 use super::group::normalise;
 use super::StepError;
 use crate::system::{Group, Real, System};
@@ -69,7 +70,7 @@ impl<Y: System> Point<Y> {
 
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
-    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Y::Scalar)], k: &[Self]) {
+    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
         combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
         combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
     }
@@ -88,12 +89,13 @@ impl<Y: System> Point<Y> {
 /// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
 /// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
-fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: impl Fn(usize) -> &'a [S]) {
+fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
     let whole = out.len() - out.len() % 4;
     let mut chunks = out.chunks_exact_mut(4);
     for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
         let mut sum = [S::zero(); 4];
         for &(j, w) in weights {
+            let w: S = w.get();
             let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
             for l in 0..4 {
                 sum[l] = sum[l] + w * k[l];
@@ -104,7 +106,7 @@ fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: i
         }
     }
     for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
-        let term = |j: usize, w: S| k(j).get(at).map_or(S::zero(), |k| w * *k);
+        let term = |j: usize, w: Constant| k(j).get(at).map_or(S::zero(), |k| w.get::<S>() * *k);
         *out = h * weights.iter().fold(S::zero(), |sum, &(j, w)| sum + term(j, w));
     }
 }
