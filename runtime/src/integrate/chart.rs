@@ -89,11 +89,18 @@ impl<Y: System> Point<Y> {
 /// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
 /// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
-fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
+fn combine<'a, S: Scalar + 'a>(
+    out: &mut [S],
+    h: S,
+    weights: &[(usize, Constant)],
+    k: impl Fn(usize) -> &'a [S],
+) {
+    // Minus zero and a first term are that term, which the compiler knows; plus zero would be added.
+    let nothing = -S::zero();
     let whole = out.len() - out.len() % 4;
     let mut chunks = out.chunks_exact_mut(4);
     for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
-        let mut sum = [S::zero(); 4];
+        let mut sum = [nothing; 4];
         for &(j, w) in weights {
             let w: S = w.get();
             let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
@@ -106,8 +113,8 @@ fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)
         }
     }
     for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
-        let term = |j: usize, w: Constant| k(j).get(at).map_or(S::zero(), |k| w.get::<S>() * *k);
-        *out = h * weights.iter().fold(S::zero(), |sum, &(j, w)| sum + term(j, w));
+        let term = |j: usize, w: Constant| k(j).get(at).map_or(nothing, |k| w.get::<S>() * *k);
+        *out = h * weights.iter().fold(nothing, |sum, &(j, w)| sum + term(j, w));
     }
 }
 
@@ -253,18 +260,17 @@ where
         }
     }
 
-    /// Rates of the displacement from those of the state `(q, p)` it leads to.
+    /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its momenta.
     #[inline]
     pub fn rates(
         &self,
         system: &Y,
         point: &Point<Y>,
         (q, p): (&Y::Coordinates, &Y::Momenta),
-        (qd, pd): (&Y::Coordinates, &Y::Momenta),
+        qd: &Y::Coordinates,
         out: &mut Point<Y>,
     ) {
         let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
-        out.p.as_mut().copy_from_slice(pd.as_ref());
         if system.groups().is_empty() {
             return xd.copy_from_slice(qd_);
         }
