@@ -89,12 +89,7 @@ impl<Y: System> Point<Y> {
 /// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
 /// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
-fn combine<'a, S: Scalar + 'a>(
-    out: &mut [S],
-    h: S,
-    weights: &[(usize, Constant)],
-    k: impl Fn(usize) -> &'a [S],
-) {
+fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
     // Minus zero and a first term are that term, which the compiler knows; plus zero would be added.
     let nothing = -S::zero();
     let whole = out.len() - out.len() % 4;
