@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds every scene for a Cortex-M, runs it in QEMU, runs its twin on the host, and compares the final states bit for
-# bit. Looks in each image for panics, allocation and (single precision) double-precision arithmetic in software.
+# Builds every scene for a Cortex-M, runs it in QEMU, runs its twin on the host, and compares final states and energies bit
+# for bit. Looks in each image for panics, allocation and (single precision) double-precision arithmetic in software.
 #
 #   ./run.sh            all scenes
 #   ./run.sh SCENE ...  some of them
@@ -79,13 +79,14 @@ value() {
     echo $((16#$(sed -n "s/^$1 //p")))
 }
 
-# within_limits SCENE BYTES STACK INSTRUCTIONS: adds to `over` what is above the limits of limits.txt.
+# within_limits SCENE BYTES STACK INSTRUCTIONS EVALUATIONS [ERROR]: adds to `over` what is above the limits of limits.txt.
 over=""
 within_limits() {
     local limits what value at=0
+    local names=("image bytes" "stack bytes" "instructions/step" evaluations "hundred millionths of energy error")
     read -ra limits <<< "$(sed -n "s/^$1 //p" limits.txt)"
-    [ ${#limits[@]} -eq 3 ] || fail "limits.txt has no line for $1"
-    for what in "image bytes" "stack bytes" "instructions/step"; do
+    [ ${#limits[@]} -eq $(($# - 1)) ] || fail "limits.txt has no line for $1 with $(($# - 1)) numbers"
+    for what in "${names[@]:0:$(($# - 1))}"; do
         value=${*:$((at + 2)):1}
         [ "$value" -le "${limits[$at]}" ] || over+="$1: $value $what, limit ${limits[$at]}"$'\n'
         at=$((at + 1))
@@ -105,21 +106,29 @@ for scene in "${scenes[@]}"; do
         boards="mps2-an386 mps2-an500"
     fi
     # The run is short: any profile of the host must give the same bits.
-    host=$(cargo run --locked --quiet --package twin -- "$scene")
+    host=$(cargo run --locked --quiet --package twin -- "$scene" 2> "$log") || fail "$scene on the host: $(cat "$log")"
     for board in $boards; do
         out=$(emulate "$board" "$image") || fail "$scene on $board: the run failed: $out"
-        state=$(grep '^state ' <<< "$out") || fail "$scene on $board: no state was printed: $out"
-        [ "$state" = "$host" ] ||
-            fail "$scene on $board: not the host's bits:"$'\n'"$(diff <(echo "$state") <(echo "$host"))"
+        state=$(grep -E '^(state|energy) ' <<< "$out") || fail "$scene on $board: no state was printed: $out"
+        twin=$(grep -E '^(state|energy) ' <<< "$host") || fail "$scene: the host printed no state: $host"
+        [ "$state" = "$twin" ] ||
+            fail "$scene on $board: not the host's bits:"$'\n'"$(diff <(echo "$state") <(echo "$twin"))"
         # At 25 MHz and one instruction a nanosecond a tick is 40 instructions.
         bytes=$(value image <<< "$out") stack=$(value stack <<< "$out")
         instructions=$(($(value ticks <<< "$out") * 40 / $(value steps <<< "$out")))
-        table+=$(printf '%-22s %-11s %11d %11d %17d' "$scene" "$board" "$bytes" "$stack" "$instructions")$'\n'
-        within_limits "$scene" "$bytes" "$stack" "$instructions"
+        evaluations=$(value evaluations <<< "$out")
+        error=() shown=""
+        if grep -q '^error ' <<< "$host"; then
+            error=("$(value error <<< "$host")") shown="$(value error <<< "$host")e-8"
+        fi
+        table+=$(printf '%-28s %-10s %11d %11d %17d %11d %12s' "$scene" "$board" "$bytes" "$stack" "$instructions" \
+            "$evaluations" "$shown")$'\n'
+        within_limits "$scene" "$bytes" "$stack" "$instructions" "$evaluations" "${error[@]}"
     done
 done
 
-printf '%-22s %-11s %11s %11s %17s\n' scene board 'image bytes' 'stack bytes' instructions/step
+printf '%-28s %-10s %11s %11s %17s %11s %12s\n' scene board 'image bytes' 'stack bytes' instructions/step evaluations \
+    'energy error'
 printf '%s' "$table"
-echo "every final state has the host's bits; no panic, no allocator"
+echo "every final state and energy has the host's bits; no panic, no allocator"
 [ -z "$over" ] || fail "over the limits of limits.txt:"$'\n'"$over"

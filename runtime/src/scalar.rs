@@ -1,5 +1,6 @@
 //! The numbers a sweep may be run with.
 
+use crate::integrate::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A field with sine, cosine and square root, and nothing else: no comparison and no way out to `f64`, so a sweep
@@ -9,6 +10,11 @@ pub trait Scalar:
 {
     /// A constant, rounded to the precision of the type.
     fn constant(x: f64) -> Self;
+    /// A constant of more digits than a double has, rounded to the precision of the type.
+    #[inline]
+    fn rounded(x: Constant) -> Self {
+        Self::constant(x.hi()) + Self::constant(x.lo())
+    }
     /// Sine and cosine of an angle in radians.
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
@@ -30,6 +36,10 @@ impl Scalar for f64 {
         x
     }
     #[inline]
+    fn rounded(x: Constant) -> Self {
+        x.hi()
+    }
+    #[inline]
     fn sin_cos(self) -> (Self, Self) {
         crate::trig::sincos_f64(self)
     }
@@ -47,6 +57,10 @@ impl Scalar for f32 {
     #[inline]
     fn constant(x: f64) -> Self {
         x as f32
+    }
+    #[inline]
+    fn rounded(x: Constant) -> Self {
+        x.single()
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {

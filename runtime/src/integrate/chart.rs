@@ -11,6 +11,7 @@
 //! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
 //! the exponential: its inverse differential is a polynomial.
 
+use super::constant::Constant;
 use super::group::normalise;
 use super::StepError;
 use crate::system::{Group, Real, System};
@@ -69,7 +70,7 @@ impl<Y: System> Point<Y> {
 
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
-    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Y::Scalar)], k: &[Self]) {
+    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
         combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
         combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
     }
@@ -88,12 +89,15 @@ impl<Y: System> Point<Y> {
 /// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
 /// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
-fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: impl Fn(usize) -> &'a [S]) {
+fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
+    // Minus zero and a first term are that term, which the compiler knows; plus zero would be added.
+    let nothing = -S::zero();
     let whole = out.len() - out.len() % 4;
     let mut chunks = out.chunks_exact_mut(4);
     for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
-        let mut sum = [S::zero(); 4];
+        let mut sum = [nothing; 4];
         for &(j, w) in weights {
+            let w: S = w.get();
             let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
             for l in 0..4 {
                 sum[l] = sum[l] + w * k[l];
@@ -104,8 +108,8 @@ fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, S)], k: i
         }
     }
     for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
-        let term = |j: usize, w: S| k(j).get(at).map_or(S::zero(), |k| w * *k);
-        *out = h * weights.iter().fold(S::zero(), |sum, &(j, w)| sum + term(j, w));
+        let term = |j: usize, w: Constant| k(j).get(at).map_or(nothing, |k| w.get::<S>() * *k);
+        *out = h * weights.iter().fold(nothing, |sum, &(j, w)| sum + term(j, w));
     }
 }
 
@@ -232,18 +236,18 @@ where
         }
     }
 
-    /// State at a displacement.
+    /// State at a displacement. Where sums are compensated, what was carried over is part of it.
     #[inline]
     pub fn state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         let (base, x) = (self.q.as_ref(), point.x.as_ref());
+        let (cx, cp) = self.carry.as_ref().map_or((None, None), |c| (Some(c.x.as_ref()), Some(c.p.as_ref())));
         let q = q.as_mut();
+        displaced(self.p.as_ref(), point.p.as_ref(), cp, p.as_mut());
         if system.groups().is_empty() {
-            displaced(base, x, q);
-            return displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
+            return displaced(base, x, cx, q);
         }
-        displaced(self.p.as_ref(), point.p.as_ref(), p.as_mut());
         for (at, v, n, group) in Stretches::new(system.groups(), base.len(), x.len()) {
-            displaced(&base[at..at + n], &x[v..v + n], &mut q[at..at + n]);
+            displaced(&base[at..at + n], &x[v..v + n], cx.map(|c| &c[v..v + n]), &mut q[at..at + n]);
             if let Some(group) = group {
                 group.displace(base, x, q);
                 group.inward(q, group.shift(x), p.as_mut());
@@ -251,18 +255,17 @@ where
         }
     }
 
-    /// Rates of the displacement from those of the state `(q, p)` it leads to.
+    /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its momenta.
     #[inline]
     pub fn rates(
         &self,
         system: &Y,
         point: &Point<Y>,
         (q, p): (&Y::Coordinates, &Y::Momenta),
-        (qd, pd): (&Y::Coordinates, &Y::Momenta),
+        qd: &Y::Coordinates,
         out: &mut Point<Y>,
     ) {
         let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
-        out.p.as_mut().copy_from_slice(pd.as_ref());
         if system.groups().is_empty() {
             return xd.copy_from_slice(qd_);
         }
@@ -365,11 +368,13 @@ fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) 
     }
 }
 
-/// `out = base + x`.
+/// `out = base + (x + carry)`.
 #[inline(always)]
-fn displaced<S: Scalar>(base: &[S], x: &[S], out: &mut [S]) {
-    for (out, (base, x)) in out.iter_mut().zip(base.iter().zip(x)) {
-        *out = *base + *x;
+fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S]) {
+    let pairs = out.iter_mut().zip(base.iter().zip(x));
+    match carry {
+        None => pairs.for_each(|(out, (base, x))| *out = *base + *x),
+        Some(carry) => pairs.zip(carry).for_each(|((out, (base, x)), carry)| *out = *base + (*x + *carry)),
     }
 }
 

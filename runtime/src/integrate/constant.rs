@@ -7,22 +7,40 @@ use crate::Scalar;
 pub struct Constant {
     hi: f64,
     lo: f64,
+    /// `hi` in single precision: small processors convert in software only.
+    single: f32,
 }
 
 impl Constant {
     /// Zero.
-    pub const ZERO: Constant = Constant { hi: 0.0, lo: 0.0 };
+    pub const ZERO: Constant = Constant::pair(0.0, 0.0);
+
+    const fn pair(hi: f64, lo: f64) -> Constant {
+        Constant { hi, lo, single: hi as f32 }
+    }
 
     /// In a type of numbers, rounded once: for `f64` the nearest double.
     #[inline]
     pub fn get<S: Scalar>(self) -> S {
-        S::constant(self.hi) + S::constant(self.lo)
+        S::rounded(self)
     }
 
     /// Whether it is zero: a term that need not be added.
     #[inline]
     pub const fn is_zero(self) -> bool {
         self.hi == 0.0
+    }
+
+    /// The nearest number of single precision.
+    #[inline]
+    pub const fn single(self) -> f32 {
+        self.single
+    }
+
+    /// What the nearest double leaves.
+    #[inline]
+    pub const fn lo(self) -> f64 {
+        self.lo
     }
 
     /// The nearest double.
@@ -35,29 +53,29 @@ impl Constant {
     const fn sum(a: f64, b: f64) -> Constant {
         let hi = a + b;
         let part = hi - a;
-        Constant { hi, lo: (a - (hi - part)) + (b - part) }
+        Constant::pair(hi, (a - (hi - part)) + (b - part))
     }
 
     /// `a b`, exact (Dekker; constants are far from overflow).
     const fn product(a: f64, b: f64) -> Constant {
         let hi = a * b;
         let ((ah, al), (bh, bl)) = (halves(a), halves(b));
-        Constant { hi, lo: ((ah * bh - hi) + ah * bl + al * bh) + al * bl }
+        Constant::pair(hi, ((ah * bh - hi) + ah * bl + al * bh) + al * bl)
     }
 
-    const fn times(self, b: f64) -> Constant {
+    pub(crate) const fn times(self, b: f64) -> Constant {
         let p = Constant::product(self.hi, b);
         Constant::sum(p.hi, p.lo + self.lo * b)
     }
 
-    const fn minus(self, other: Constant) -> Constant {
+    pub(crate) const fn minus(self, other: Constant) -> Constant {
         let (h, l) = (Constant::sum(self.hi, -other.hi), Constant::sum(self.lo, -other.lo));
         let s = Constant::sum(h.hi, h.lo + l.hi);
         Constant::sum(s.hi, s.lo + l.lo)
     }
 
     /// Long division: three digits of 53 bits each, the last one for rounding.
-    const fn over(self, other: Constant) -> Constant {
+    pub(crate) const fn over(self, other: Constant) -> Constant {
         let first = self.hi / other.hi;
         let rest = self.minus(other.times(first));
         let second = rest.hi / other.hi;
@@ -67,14 +85,14 @@ impl Constant {
     }
 
     /// An integer below 2¹²⁷: to 106 bits.
-    const fn integer(n: u128) -> Constant {
+    pub(crate) const fn integer(n: u128) -> Constant {
         let hi = n as f64;
         Constant::sum(hi, (n as i128 - hi as i128) as f64)
     }
 
     const fn negated_if(self, negative: bool) -> Constant {
         match negative {
-            true => Constant { hi: -self.hi, lo: -self.lo },
+            true => Constant::pair(-self.hi, -self.lo),
             false => self,
         }
     }
@@ -213,7 +231,7 @@ const fn scaled(m: u128, e: i32) -> Constant {
 
 /// Powers of ten. Up to 10²² they are doubles, up to 10⁴⁴ exact in two.
 const fn ten_to(e: i32) -> Constant {
-    let (mut power, mut left) = (Constant { hi: 1.0, lo: 0.0 }, e);
+    let (mut power, mut left) = (Constant::pair(1.0, 0.0), e);
     while left > 0 {
         let step = if left > 22 { 22 } else { left };
         power = power.times(10_u128.pow(step as u32) as f64);

@@ -12,6 +12,9 @@ use crate::system::{Real, System};
 pub trait Method<const S: usize, const X: usize> {
     /// Its coefficients.
     const TABLEAU: &'static Tableau<S>;
+    /// Those that are not zero, row by row. Made by the compiler: nothing of it lies in memory that is written, and where a
+    /// loop over few stages is unrolled, weights become operands.
+    const WEIGHTS: &'static Rows<S> = &Rows::new(Self::TABLEAU);
 }
 
 macro_rules! methods {
@@ -46,10 +49,6 @@ methods! {
 pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     field: Field<Y>,
     statistics: Statistics,
-    // As numbers of the system: read for every stage.
-    a: [Weights<Y::Scalar, S>; S],
-    b: Weights<Y::Scalar, S>,
-    c: [Y::Scalar; S],
     k: [Point<Y>; S],
     delta: Point<Y>,
     /// A stage's displacement; an estimate of the error.
@@ -63,31 +62,56 @@ pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     method: core::marker::PhantomData<T>,
 }
 
+/// The weights of a [`Tableau`] that are not zero.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<const S: usize> {
+    a: [Weights<S>; S],
+    b: Weights<S>,
+    /// Of the error estimates, of which there are two at most.
+    error: [Weights<S>; 2],
+}
+
+impl<const S: usize> Rows<S> {
+    const fn new(tableau: &Tableau<S>) -> Self {
+        let none = Weights::new(&[Constant::ZERO; S]);
+        let mut rows = Rows { a: [none; S], b: Weights::new(&tableau.b), error: [none; 2] };
+        let mut i = 0;
+        while i < S {
+            rows.a[i] = Weights::new(&tableau.a[i]);
+            i += 1;
+        }
+        let mut i = 0;
+        while i < tableau.error.len() {
+            rows.error[i] = Weights::new(&tableau.error[i]);
+            i += 1;
+        }
+        rows
+    }
+}
+
 /// Weights that are not zero, with the stages they belong to.
 #[derive(Clone, Copy, Debug)]
-struct Weights<R, const S: usize> {
-    list: [(usize, R); S],
+struct Weights<const S: usize> {
+    list: [(usize, Constant); S],
     n: usize,
 }
 
-impl<R: Real, const S: usize> Weights<R, S> {
-    fn new(row: [Constant; S]) -> Self {
-        let mut out = Weights { list: [(0, R::zero()); S], n: 0 };
-        for (stage, weight) in row.into_iter().enumerate() {
-            let weight: R = weight.get();
-            if weight != R::zero() {
-                // There is room; a panic path there must not be.
-                if let Some(place) = out.list.get_mut(out.n) {
-                    *place = (stage, weight);
-                }
+impl<const S: usize> Weights<S> {
+    const fn new(row: &[Constant; S]) -> Self {
+        let mut out = Weights { list: [(0, Constant::ZERO); S], n: 0 };
+        let mut stage = 0;
+        while stage < S {
+            if !row[stage].is_zero() {
+                out.list[out.n] = (stage, row[stage]);
                 out.n += 1;
             }
+            stage += 1;
         }
         out
     }
 
     #[inline]
-    fn list(&self) -> &[(usize, R)] {
+    fn list(&self) -> &[(usize, Constant)] {
         self.list.get(..self.n).unwrap_or(&self.list)
     }
 }
@@ -110,14 +134,10 @@ where
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
-        let tableau = T::TABLEAU;
         let point = || Point::zero(system);
         Explicit {
             field: Field::new(system, compensated),
             statistics: Statistics::default(),
-            a: tableau.a.map(Weights::new),
-            b: Weights::new(tableau.b),
-            c: tableau.c.map(|x| x.get()),
             k: core::array::from_fn(|_| point()),
             delta: point(),
             stage: point(),
@@ -133,8 +153,8 @@ where
     /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq. 10.17).
     fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
-        for (norm_, weights) in norms.iter_mut().zip(T::TABLEAU.error) {
-            self.stage.combine(h, Weights::new(*weights).list(), &self.k);
+        for (norm_, weights) in norms.iter_mut().zip(&T::WEIGHTS.error).take(T::TABLEAU.error.len()) {
+            self.stage.combine(h, weights.list(), &self.k);
             *norm_ = norm(&self.stage, scale);
         }
         match T::TABLEAU.error.len() {
@@ -209,10 +229,10 @@ where
         let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
         for i in 1..stages {
             let (known, rest) = self.k.split_at_mut(i);
-            self.stage.combine(h, self.a[i].list(), known);
-            self.field.rates(system, t + self.c[i] * h, &self.stage, &mut rest[0]);
+            self.stage.combine(h, T::WEIGHTS.a[i].list(), known);
+            self.field.rates(system, t + T::TABLEAU.c[i].get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
         }
-        self.delta.combine(h, self.b.list(), &self.k);
+        self.delta.combine(h, T::WEIGHTS.b.list(), &self.k);
         (self.end_known, self.extra_known) = (false, false);
         if T::TABLEAU.fsal && stages == S {
             self.end.copy_from(&self.k[S - 1]);

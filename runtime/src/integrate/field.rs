@@ -8,11 +8,10 @@ use crate::system::{Real, System};
 #[derive(Clone, Debug)]
 pub struct Field<Y: System> {
     pub(super) chart: Chart<Y>,
-    /// State of the last evaluation, and its rates.
+    /// State of the last evaluation, and the rates of its coordinates.
     pub(super) q: Y::Coordinates,
     pub(super) p: Y::Momenta,
     qd: Y::Coordinates,
-    pd: Y::Momenta,
     /// Whether the state was given by the last [`Field::store`].
     pub(super) stored: bool,
     evaluations: u64,
@@ -27,7 +26,7 @@ where
     pub fn new(system: &Y, compensated: bool) -> Self {
         let (q, p) = (system.neutral(), system.rest());
         let chart = Chart::new(system, compensated);
-        Field { chart, qd: q.clone(), q, pd: p.clone(), p, stored: false, evaluations: 0 }
+        Field { chart, qd: q.clone(), q, p, stored: false, evaluations: 0 }
     }
 
     /// Evaluations of the rates so far.
@@ -85,8 +84,10 @@ where
     #[inline]
     pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
-        self.evaluate(system, t);
-        self.local(system, point, out);
+        system.state_rates(t, &self.q, &self.p, &mut self.qd, &mut out.p);
+        self.stored = false;
+        self.evaluations += 1;
+        self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);
     }
 
     /// The coordinates' part of [`Field::rates`] where what stands at the place of momenta are velocities: `q̇ = N(q) v`, which
@@ -95,18 +96,6 @@ where
         self.chart.state(system, point, &mut self.q, &mut self.p);
         system.coordinate_rates(&self.q, &self.p, &mut self.qd);
         self.stored = false;
-        self.local(system, point, out);
-    }
-
-    fn evaluate(&mut self, system: &mut Y, t: Y::Scalar) {
-        system.state_rates(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
-        self.stored = false;
-        self.evaluations += 1;
-    }
-
-    /// The last rates that were evaluated, as rates of the displacement `point`. After [`Field::advance`] to the state of the
-    /// last evaluation they are those of no displacement from the new one, and need no further evaluation.
-    pub fn local(&self, system: &Y, point: &Point<Y>, out: &mut Point<Y>) {
-        self.chart.rates(system, point, (&self.q, &self.p), (&self.qd, &self.pd), out);
+        self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);
     }
 }

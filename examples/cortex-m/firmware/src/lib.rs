@@ -4,7 +4,7 @@
 #![no_std]
 
 use core::arch::{asm, global_asm};
-use scenes::{Bits, STEPS};
+use scenes::{Bits, End, Unusable};
 
 // The vector table (stack top, then handlers; every fault goes to one) and the reset handler. In assembly because it has
 // to come before the first instruction that uses a float register, and before anything lies on the stack it paints.
@@ -120,37 +120,40 @@ fn stack_used() -> u32 {
     top as u32 - at as u32
 }
 
-/// Defines `main` for one system and method.
+/// Defines `main` for one system and run.
 #[macro_export]
 macro_rules! firmware {
-    ($system:ty, $method:path) => {
+    ($system:ty, $run:path) => {
         /// Called by the reset handler.
         #[no_mangle]
         pub extern "C" fn main() -> ! {
-            $crate::measure(<$system>::new(), $method)
+            $crate::measure(<$system>::new(), $run)
         }
     };
 }
 
-/// Runs the scene between two readings of the counter, then prints the final state and the measurements.
-pub fn measure<Y, M>(mut system: Y, method: impl Fn(&Y) -> M) -> !
+/// Runs the scene between two readings of the counter, then prints where it ended and the measurements.
+pub fn measure<Y>(mut system: Y, run: impl Fn(&mut Y) -> Result<End<Y>, Unusable>) -> !
 where
     Y: mbd_runtime::System,
     Y::Scalar: mbd_runtime::Real + Bits,
-    M: mbd_runtime::integrate::Stepper<Y>,
 {
     start_counter();
-    let result = scenes::run(&mut system, method);
+    let result = run(&mut system);
     let (ticks, wrapped) = read_counter();
     let stack = stack_used();
-    let Ok((q, p)) = result else { exit(false) };
-    for x in q.as_ref().iter().chain(p.as_ref()) {
+    let Ok(end) = result else { exit(false) };
+    for x in end.q.as_ref().iter().chain(end.p.as_ref()) {
         print_line("state", x.bits());
+    }
+    for x in end.energy.iter().flatten() {
+        print_line("energy", x.bits());
     }
     print_line("image", (&raw const _image_end) as u32 as u64);
     print_line("stack", stack.into());
     print_line("ticks", ticks.into());
-    print_line("steps", STEPS.into());
+    print_line("steps", end.steps.into());
+    print_line("evaluations", end.evaluations);
     exit(!wrapped)
 }
 

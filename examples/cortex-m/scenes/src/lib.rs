@@ -1,8 +1,8 @@
-//! What the firmware and its host twin both run: generated dynamics, 1000 steps of 1 ms.
+//! What the firmware and its host twin both run: generated dynamics in steps of 1 ms.
 #![no_std]
 
-use mbd_runtime::integrate::{FixedIterations, ImplicitMidpoint, Rk4, Stepper};
-use mbd_runtime::{Differentiable, Real, Scalar, System};
+use mbd_runtime::integrate::{Ab6, ImplicitMidpoint, Rk4, Stepper};
+use mbd_runtime::{Differentiable, Energetic, Real, Scalar, System};
 
 mbd_macros::mbd_model! {
     path = "../../../models/double_pendulum.toml",
@@ -29,56 +29,145 @@ mbd_macros::mbd_model! {
     outputs = [rates, momenta, energy]
 }
 
-/// Number of steps.
+/// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
+/// Number of steps of the run of a minute, and after how many of them the energy is looked at.
+pub const MINUTE: (u32, u32) = (60_000, 100);
 
-/// Coordinates and momenta of a system.
-pub type State<Y> = (<Y as System>::Coordinates, <Y as System>::Momenta);
+/// Where a run ended, and what it took.
+pub struct End<Y: System> {
+    /// Coordinates.
+    pub q: Y::Coordinates,
+    /// Momenta.
+    pub p: Y::Momenta,
+    /// Of the run of a minute, in J, as the system itself finds them: energy at the start, its largest change, largest
+    /// kinetic energy.
+    pub energy: Option<[Y::Scalar; 3]>,
+    /// Steps.
+    pub steps: u32,
+    /// Evaluations of the dynamics.
+    pub evaluations: u64,
+}
+
+/// The number of the step after which the state is unusable. (The integrator's own error holds the time as a double:
+/// passing it on would bring a conversion in software into the single-precision image.)
+#[derive(Debug)]
+pub struct Unusable(pub u32);
 
 /// The method of Runge and Kutta of order 4: four evaluations of the dynamics a step.
-pub fn rk4<Y>(system: &Y) -> Rk4<Y>
+///
+/// # Errors
+/// [`Unusable`].
+pub fn rk4<Y>(system: &mut Y) -> Result<End<Y>, Unusable>
 where
     Y: System,
     Y::Scalar: Real,
 {
-    Rk4::new(system)
+    let method = Rk4::new(system);
+    short(system, method)
 }
 
 /// The implicit midpoint rule with two iterations: the derivatives of the dynamics once, their matrix factored once, and two
 /// evaluations of the dynamics a step.
-pub fn midpoint<Y>(system: &Y) -> FixedIterations<ImplicitMidpoint<Y>>
+///
+/// # Errors
+/// [`Unusable`].
+pub fn midpoint<Y>(system: &mut Y) -> Result<End<Y>, Unusable>
 where
     Y: Differentiable,
     Y::Scalar: Real,
 {
-    ImplicitMidpoint::new(system).with_iterations(2)
+    let method = ImplicitMidpoint::new(system).with_iterations(2);
+    short(system, method)
 }
 
-/// Runs a system for [`STEPS`] steps of 1 ms from rest, each joint 0.2 rad further out than the one before.
+/// A minute by Adams and Bashforth's method of order 6 with compensated sums, from rest at ±0.3 rad in turn: one evaluation of
+/// the dynamics a step, and some more in the first five.
 ///
 /// # Errors
-/// The number of the step after which the state is unusable. (The integrator's own error holds the time as a double:
-/// passing it on would bring a conversion in software into the single-precision image.)
-pub fn run<Y, M>(system: &mut Y, method: impl Fn(&Y) -> M) -> Result<State<Y>, u32>
+/// [`Unusable`].
+pub fn minute<Y>(system: &mut Y) -> Result<End<Y>, Unusable>
+where
+    Y: Energetic,
+    Y::Scalar: Real,
+{
+    watched_minute(system, |_, _| ())
+}
+
+/// The same, with a look at every state from the start on.
+///
+/// # Errors
+/// [`Unusable`].
+pub fn watched_minute<Y>(
+    system: &mut Y,
+    mut watch: impl FnMut(&Y::Coordinates, &Y::Momenta),
+) -> Result<End<Y>, Unusable>
+where
+    Y: Energetic,
+    Y::Scalar: Real,
+{
+    let mut q = system.neutral();
+    let mut start = Y::Scalar::constant(0.3);
+    for q in q.as_mut() {
+        *q = start;
+        start = -start;
+    }
+    let p = system.rest();
+    watch(&q, &p);
+    let (kinetic, potential) = system.state_energy(&q, &p);
+    let start = kinetic + potential;
+    let (mut change, mut largest) = (Y::Scalar::zero(), kinetic);
+    let method = Ab6::compensated(system);
+    let end = run(system, method, MINUTE.0, (q, p), |system, step, q, p| {
+        watch(q, p);
+        if step % MINUTE.1 == 0 {
+            let (kinetic, potential) = system.state_energy(q, p);
+            let off = ((potential - start) + kinetic).abs();
+            change = if off > change { off } else { change };
+            largest = if kinetic > largest { kinetic } else { largest };
+        }
+    })?;
+    Ok(End { energy: Some([start, change, largest]), ..end })
+}
+
+/// [`STEPS`] steps from rest, each joint 0.2 rad further out than the one before.
+fn short<Y, M>(system: &mut Y, method: M) -> Result<End<Y>, Unusable>
 where
     Y: System,
     Y::Scalar: Real,
     M: Stepper<Y>,
 {
-    let (mut q, mut p) = (system.neutral(), system.rest());
+    let mut q = system.neutral();
     let mut start = Y::Scalar::constant(0.3);
     for q in q.as_mut() {
         *q = start;
         start = start + Y::Scalar::constant(0.2);
     }
+    let p = system.rest();
+    run(system, method, STEPS, (q, p), |_, _, _, _| ())
+}
+
+/// Steps of 1 ms, each followed by a call with its number, from 1 on, and the new state.
+fn run<Y, M>(
+    system: &mut Y,
+    mut method: M,
+    steps: u32,
+    (mut q, mut p): (Y::Coordinates, Y::Momenta),
+    mut after: impl FnMut(&mut Y, u32, &Y::Coordinates, &Y::Momenta),
+) -> Result<End<Y>, Unusable>
+where
+    Y: System,
+    Y::Scalar: Real,
+    M: Stepper<Y>,
+{
     let h = Y::Scalar::constant(1.0e-3);
-    let mut integrator = method(system);
     let mut t = Y::Scalar::zero();
-    for step in 0..STEPS {
-        integrator.step(system, t, h, &mut q, &mut p).map_err(|_| step)?;
+    for step in 1..=steps {
+        method.step(system, t, h, &mut q, &mut p).map_err(|_| Unusable(step))?;
         t = t + h;
+        after(system, step, &q, &p);
     }
-    Ok((q, p))
+    Ok(End { q, p, energy: None, steps, evaluations: method.statistics().evaluations })
 }
 
 /// A number's bits, for a comparison that cannot be talked round.
@@ -99,8 +188,7 @@ impl Bits for f64 {
     }
 }
 
-/// Calls `$what!(name, path of the type, path of the function that makes the method)` for every scene: one firmware image
-/// each.
+/// Calls `$what!(name, path of the type, path of the run)` for every scene: one firmware image each.
 #[macro_export]
 macro_rules! each_scene {
     ($what:ident) => {
@@ -110,5 +198,6 @@ macro_rules! each_scene {
         $what!(ur5_f32, $crate::Ur5F32, $crate::rk4);
         $what!(ur5_f64, $crate::Ur5F64, $crate::rk4);
         $what!(ur5_midpoint_f32, $crate::Ur5F32, $crate::midpoint);
+        $what!(ur5_minute_f32, $crate::Ur5F32, $crate::minute);
     };
 }

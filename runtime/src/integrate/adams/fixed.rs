@@ -2,8 +2,9 @@
 
 use super::shared::{of_core, Core};
 use super::start::Extrapolation;
-use super::weights::{Weights, NODES};
+use super::weights::{equal_steps, NODES};
 use crate::integrate::chart::Point;
+use crate::integrate::constant::Constant;
 use crate::integrate::field::Field;
 use crate::integrate::stepper::{hermite, Statistics, Stepper};
 use crate::integrate::StepError;
@@ -58,6 +59,8 @@ where
         assert!(K >= 1 && K <= 12, "Adams methods have orders 1 to 12 here");
         K as u32
     };
+    const PREDICTOR: [Constant; NODES] = equal_steps(K, true);
+    const CORRECTOR: [Constant; NODES] = equal_steps(K, false);
 
     /// Room for the history of one system.
     pub fn new(system: &Y) -> Self {
@@ -71,17 +74,10 @@ where
     }
 
     fn with_sums(system: &Y, compensated: bool) -> Self {
-        let one = Y::Scalar::one();
-        let places: [Y::Scalar; NODES] = core::array::from_fn(|j| Y::Scalar::constant(1.0 - j as f64));
-        let mut corrector = [Y::Scalar::zero(); NODES];
-        corrector[0] = one;
-        if Self::ORDER > 1 {
-            corrector = Weights::new(&places[..K], K - 1, one).corrector;
-        }
         Adams {
             core: Core::new(system, compensated),
-            predictor: Weights::new(&places[..=K], K, one).predictor,
-            corrector,
+            predictor: Self::PREDICTOR.map(Constant::get),
+            corrector: Self::CORRECTOR.map(Constant::get),
             spacing: Y::Scalar::zero(),
             start: Extrapolation::new(system),
         }

@@ -37,12 +37,7 @@ where
     }
 
     fn slot(&self, j: usize) -> usize {
-        let slot = self.head + j;
-        if slot < N {
-            slot
-        } else {
-            slot - N
-        }
+        (self.head + j) % N
     }
 
     /// Rate `j`, 0 the newest.
@@ -57,7 +52,7 @@ where
 
     /// Room for a rate newer than all, at the chart's state or at a displacement that is reached in `ahead` s.
     pub fn push(&mut self, place: Option<(&Point<Y>, Y::Scalar)>) -> &mut Point<Y> {
-        self.head = if self.head == 0 { N - 1 } else { self.head - 1 };
+        self.head = (self.head + N - 1) % N;
         self.len = (self.len + 1).min(N);
         match place {
             None => {
@@ -88,20 +83,19 @@ where
     pub fn combine(&self, weights: &[Y::Scalar], new: &Point<Y>, out: &mut Point<Y>) {
         let rate = |j: usize| if j == 0 { new } else { self.rate(j - 1) };
         out.clear();
-        let mut j = 0;
-        while j + 4 <= weights.len() {
+        let fours = weights.chunks_exact(4);
+        for (w, j) in fours.clone().zip((0..).step_by(4)) {
             // Four at once: less to load and store.
-            let (w, rates) = ([0, 1, 2, 3].map(|i| weights[j + i]), [0, 1, 2, 3].map(|i| rate(j + i).parts()));
+            let rates = [0, 1, 2, 3].map(|i| rate(j + i).parts());
             for (part, out) in out.parts_mut().into_iter().enumerate() {
                 let [a, b, c, d] = rates.map(|rate| &rate[part][..out.len()]);
                 for i in 0..out.len() {
                     out[i] = out[i] + ((w[0] * a[i] + w[1] * b[i]) + (w[2] * c[i] + w[3] * d[i]));
                 }
             }
-            j += 4;
         }
-        for j in j..weights.len() {
-            out.add(weights[j], rate(j));
+        for (w, j) in fours.remainder().iter().zip(weights.len() / 4 * 4..) {
+            out.add(*w, rate(j));
         }
     }
 }

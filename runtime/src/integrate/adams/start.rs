@@ -3,7 +3,6 @@
 use crate::integrate::chart::Point;
 use crate::integrate::field::Field;
 use crate::system::{Real, System};
-use crate::Scalar;
 
 /// Columns at most: order 12.
 const COLUMNS: usize = 6;
@@ -56,13 +55,13 @@ where
         n: usize,
         start: &Point<Y>,
     ) {
-        let part = h / Y::Scalar::constant(n as f64);
+        let part = h / Y::Scalar::from_index(n);
         let [before, now] = &mut self.points;
         before.clear();
         now.clear();
         now.add(part, start);
         for m in 1..n {
-            field.rates(system, t + part * Y::Scalar::constant(m as f64), now, &mut self.rate);
+            field.rates(system, t + part * Y::Scalar::from_index(m), now, &mut self.rate);
             before.add(part + part, &self.rate);
             core::mem::swap(before, now);
         }
@@ -71,11 +70,10 @@ where
     /// Aitken and Neville: row `row` of the table takes the place of the one before.
     fn extrapolate(&mut self, row: usize) {
         let [_, new] = &mut self.points;
-        for k in 0..row {
+        for (k, old) in self.columns.iter_mut().enumerate().take(row) {
             // 1 / (n² / m² − 1), of integers: exact but for the division, in any precision.
-            let (n2, m2) = (((row + 1) * (row + 1)) as f64, ((row - k) * (row - k)) as f64);
-            let factor = Y::Scalar::constant(m2) / Y::Scalar::constant(n2 - m2);
-            let old = &mut self.columns[k];
+            let (n2, m2) = ((row + 1) * (row + 1), (row - k) * (row - k));
+            let factor = Y::Scalar::from_index(m2) / Y::Scalar::from_index(n2 - m2);
             for (new, old) in new.parts_mut().into_iter().zip(old.parts_mut()) {
                 for (new, old) in new.iter_mut().zip(old) {
                     let change = factor * (*new - *old);

@@ -75,6 +75,38 @@ impl<S: Scalar> Weights<S> {
     }
 }
 
+/// Weights of order `k`, 1 to 12, for steps of one size, exact but for the last bits: of the rate at the end, then of the past
+/// ones from the newest on. `explicit` ones have no weight for the rate at the end.
+///
+/// Of backward differences: `γ₀ = 1`, `γₘ = e − Σ γₘ₋ᵢ / (i + 1)` with `e` 1 or 0, and weight j is `(−1)ʲ Σ C(m, j) γₘ` over m
+/// from j to k − 1 (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, III.1, eqs. 1.4 to 1.9).
+pub(super) const fn equal_steps(k: usize, explicit: bool) -> [Constant; NODES] {
+    let mut weights = [Constant::ZERO; NODES];
+    let mut differences = [Constant::integer(1); NODES];
+    let mut m = 0;
+    while m < k {
+        if m > 0 {
+            differences[m] = Constant::integer(explicit as u128);
+            let mut i = 1;
+            while i <= m {
+                let part = differences[m - i].over(Constant::integer(i as u128 + 1));
+                differences[m] = differences[m].minus(part);
+                i += 1;
+            }
+        }
+        // Minus or plus C(m, j), by Pascal's rule along the row.
+        let (mut j, mut binomial) = (0, -1.0);
+        while j <= m {
+            let at = j + explicit as usize;
+            weights[at] = weights[at].minus(differences[m].times(binomial));
+            binomial = -binomial * (m - j) as f64 / (j + 1) as f64;
+            j += 1;
+        }
+        m += 1;
+    }
+    weights
+}
+
 /// Products `Π (s − zᵢ)` from 1 on, at the points of the quadrature, times its weights.
 struct Products<S> {
     at: [S; POINTS],
@@ -188,6 +220,31 @@ mod tests {
                 }
             }
             places.iter_mut().skip(1).for_each(|x| *x *= 1.9);
+        }
+    }
+
+    #[test]
+    fn equal_steps_are_a_special_case() {
+        let places: [f64; NODES] = core::array::from_fn(|j| 1.0 - j as f64);
+        for k in 1..=12 {
+            let (explicit, implicit) = (equal_steps(k, true), equal_steps(k, false));
+            let w = Weights::new(&places[..=k], k, 1.0);
+            let less = Weights::new(&places[..k.max(2)], k.max(2) - 1, 1.0).corrector;
+            for j in 0..NODES {
+                // As in `moments`; weights of order 12 are sums of numbers up to a hundred times as large.
+                let near = |a: f64, b: f64| (a - b).abs() <= 100.0 * f64::EPSILON * b.abs();
+                assert!(near(w.predictor[j], explicit[j].hi()), "{k} {j}: {} {}", w.predictor[j], explicit[j].hi());
+                if k > 1 {
+                    assert!(near(less[j], implicit[j].hi()), "{k} {j}: {} {}", less[j], implicit[j].hi());
+                }
+            }
+        }
+        // Known ones: Hairer, Nørsett, Wanner, eqs. 1.5 and 1.9.
+        for (j, n) in [55.0, -59.0, 37.0, -9.0].into_iter().enumerate() {
+            assert_eq!(equal_steps(4, true)[j + 1].hi(), n / 24.0);
+        }
+        for (j, n) in [9.0, 19.0, -5.0, 1.0].into_iter().enumerate() {
+            assert_eq!(equal_steps(4, false)[j].hi(), n / 24.0);
         }
     }
 }
