@@ -236,7 +236,7 @@ pub(super) static SCENES: [Entry; 22] = [
         title: "planar chain of 1,000, no friction",
         model: Source::Made(|name| chain(name, 1000, 0.0)),
         start: rest,
-        t_end: 0.5,
+        t_end: 0.1,
         rk4_step: 0.001,
         conservative: true,
         expect: Expect::Runs,

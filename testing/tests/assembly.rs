@@ -106,7 +106,9 @@ fn lanes_are_vectors() {
     let file = folder.join("arms.rs");
     std::fs::write(&file, text).expect("the source");
     let library = format!("mbd_runtime={}", folder.join("libmbd_runtime.rlib").display());
-    rustc(&["--emit", "asm", "-C", "codegen-units=1", "--extern", &library, "--crate-name", "arms"], &file, &folder);
+    let here = folder.display().to_string();
+    let emit = ["--emit", "asm", "-C", "codegen-units=1", "-L", &here, "--extern", &library, "--crate-name", "arms"];
+    rustc(&emit, &file, &folder);
     let assembly = std::fs::read_to_string(folder.join("arms.s")).expect("the assembly");
     for (word, packed, single) in [("6double", "pd", "sd"), ("6single", "ps", "ss")] {
         let bodies = functions(&assembly, &["9processor5fused", word]);

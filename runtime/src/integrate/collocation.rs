@@ -41,7 +41,7 @@ enum Derivatives {
     New,
 }
 
-/// Any collocation method; take one by its name, [`Radau5`] for example.
+/// Any collocation method; take one by its name, [`Radau5`](super::Radau5) for example.
 #[derive(Clone, Debug)]
 pub struct Collocation<Y: System, T, I, const S: usize> {
     field: Field<Y>,

@@ -118,7 +118,7 @@ fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) ->
     let rk4 = 4.0 / scene.rk4_step;
     let adaptive = catalogue::entry(method)?.adaptive;
     let mut work = |setting: f64, t_end: f64| -> Option<f64> {
-        let run = long(scene, system, method, step(method, setting, false), false, t_end)?;
+        let run = long(scene, system, method, step(method, setting), false, t_end)?;
         run.failure.is_none().then(|| run.evaluations as f64 / t_end / rk4)
     };
     let short = (t_end / 1000.0).max(scene.t_end);
@@ -167,7 +167,7 @@ pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
         let Some(setting) = setting else { continue };
         for project in [false, true] {
             note(format_args!("{}: {method}{}", scene.name, if project { ", projected" } else { "" }));
-            let step = step(method, setting, false);
+            let step = step(method, setting);
             let Some(run) = long(scene, &mut system, method, step, project, t_end) else { continue };
             if method == "rk4" && !project {
                 rk4_seconds = run.seconds;

@@ -51,10 +51,9 @@ pub const MOST: u64 = 20_000_000;
 pub type Maker<'m, Y> = dyn for<'a, 'b> Fn(&'a mut Y, &'b Start<'b, Y>) -> Made<'static, Y> + 'm;
 
 /// Step of a method at a setting.
-pub fn step(method: &str, setting: f64, partial: bool) -> Step {
+pub fn step(method: &str, setting: f64) -> Step {
     match catalogue::entry(method).is_some_and(|e| e.adaptive) {
         false => Step::Fixed(setting),
-        true if partial => Step::Adaptive(Tolerances::new(setting).coordinates_only()),
         true => Step::Adaptive(Tolerances::new(setting)),
     }
 }

@@ -67,7 +67,7 @@ fn one<S: Real + 'static>(
     numbers: &str,
 ) -> Row {
     let setting = if entry.adaptive { tolerance } else { scene.rk4_step };
-    let result = go(scene, system, entry.name, step(entry.name, setting, false), reference);
+    let result = go(scene, system, entry.name, step(entry.name, setting), reference);
     let setting = format!("{setting:.0e}, {numbers}");
     Row { scene: scene.name.into(), method: entry.name.into(), setting, result }
 }

@@ -125,9 +125,18 @@ const LINES: [(&str, &str); 16] = [
 /// Figure of one scene.
 pub fn figure(measured: &Measured) -> Option<Figure> {
     let all = series(&measured.samples);
+    let (code, interpreted) = (all.iter().any(|s| s.name == Variant::Hamilton.name()), Variant::Interpreted.name());
     let chosen: Vec<&Series> = LINES
         .iter()
-        .filter_map(|(name, method)| all.iter().find(|s| s.name == *name && s.method.eq_ignore_ascii_case(method)))
+        // Scenes without generated code show the interpreter's lines in their place.
+        .filter_map(|(name, method)| {
+            let place = match *name {
+                name if code => name,
+                "generated" => interpreted,
+                _ => return None,
+            };
+            all.iter().find(|s| s.name == place && s.method.eq_ignore_ascii_case(method))
+        })
         .filter(|s| s.samples.len() > 1)
         .collect();
     if chosen.is_empty() {
@@ -139,7 +148,7 @@ pub fn figure(measured: &Measured) -> Option<Figure> {
             Line {
                 name: format!("{}: {}", s.name, s.method),
                 points: points.filter(|p| p.0 < 10.0).collect(),
-                thin: s.name != Variant::Hamilton.name(),
+                thin: code && s.name != Variant::Hamilton.name(),
             }
         };
         chosen.iter().map(line).collect()

@@ -37,12 +37,14 @@ impl Variant {
         }
     }
 
-    /// Whether a method is run in it: all in the first, and of the explicit ones a choice in the others.
-    fn runs(self, method: &Entry) -> bool {
+    /// Whether a method is run in it: all with generated code, with the interpreter where there is none, and of the explicit
+    /// ones a choice in the others.
+    fn runs(self, method: &Entry, code: bool) -> bool {
         let few = ["rk4", "dop853", "verner9"];
         match self {
-            Variant::Hamilton => true,
-            Variant::Acceleration | Variant::Interpreted => few.contains(&method.name),
+            Variant::Hamilton => code,
+            Variant::Interpreted => !code || few.contains(&method.name),
+            Variant::Acceleration => code && few.contains(&method.name),
             Variant::Single => !method.implicit && method.name != "verner9",
         }
     }
@@ -80,13 +82,11 @@ impl<S: Real + 'static> VisitDifferentiable<S> for Derived<S> {
 
 /// Generated code of a scene, or the interpreter where there is none.
 pub fn generated(scene: &Scene) -> (Erased<f64>, bool) {
-    match visit_f64(scene.name, Boxed(scene)) {
+    let plain = || visit_f64(scene.name, Boxed(scene));
+    let smooth = plain().and_then(|plain| visit_differentiable_f64(scene.name, Derived(plain)));
+    match smooth.or_else(plain) {
+        Some(system) => (system, true),
         None => (Erased::interpreted(scene), false),
-        Some(plain) => {
-            let (again, _) = (visit_f64(scene.name, Boxed(scene)), ());
-            let smooth = visit_differentiable_f64(scene.name, Derived(plain));
-            (smooth.or(again).unwrap_or_else(|| Erased::interpreted(scene)), true)
-        }
     }
 }
 
@@ -100,9 +100,11 @@ const WIDE: usize = 14;
 
 /// A state at the end that is right to far more digits than what is compared with it, where that can be had in seconds.
 pub fn reference(scene: &Scene) -> Option<Reference> {
+    // The largest would take minutes for digits that nobody asks for.
+    let (tight, other) = if scene.v.len() > HUGE { (1e-8, "adams") } else { (1e-14, "dop853") };
     let solve = |system: &mut Erased<f64>, method: &str| -> Option<Vec<f64>> {
         let (q, p) = scene.start(system);
-        let start = Start { q: &q, p: &p, step: step(method, 1e-14, false), compensated: true };
+        let start = Start { q: &q, p: &p, step: step(method, tight), compensated: true };
         let make: &Maker<Erased<f64>> = &|s, start| catalogue::explicit(method, s, start);
         let run = run(system, make, &start, scene.t_end)?.ok()?;
         run.failure.is_none().then_some(run.q)
@@ -113,7 +115,7 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
         let mut system = scene.interpreter::<Wide>();
         let (q, p) = scene.start(&mut system);
         let end = |tolerance: f64, system: &mut multibody::runtime::Interpreter<Wide>| {
-            let start = Start { q: &q, p: &p, step: step("verner9", tolerance, false), compensated: false };
+            let start = Start { q: &q, p: &p, step: step("verner9", tolerance), compensated: false };
             let make: &Maker<multibody::runtime::Interpreter<Wide>> =
                 &|s, start| catalogue::explicit("verner9", s, start);
             let run = run(system, make, &start, scene.t_end)?.ok()?;
@@ -122,21 +124,27 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
         let (coarse, fine) = (end(1e-16, &mut system)?, end(1e-18, &mut system)?);
         return Some(Reference { error: end_error(&coarse, &fine), q: fine, how: "double-double, Verner 9, 1e-18" });
     }
-    let other = solve(&mut system, "dop853")?;
-    Some(Reference { error: end_error(&quick, &other), q: quick, how: "f64, Verner 9 and DOP853, 1e-14" })
+    let other = solve(&mut system, other)?;
+    let how = if tight > 1e-14 { "f64, Verner 9 and Adams, 1e-8" } else { "f64, Verner 9 and DOP853, 1e-14" };
+    Some(Reference { error: end_error(&quick, &other), q: quick, how })
 }
 
 /// Time after which a series of ever finer runs ends, s.
 const LONGEST: f64 = 0.15;
-/// Implicit methods factor dense matrices: more freedoms than this are not for them.
-const DENSE: usize = 20;
-/// With more freedoms than this only some methods are run, one run takes seconds.
-const LARGE: usize = 200;
+/// With more freedoms than this only some methods are run: implicit ones factor dense matrices, others take minutes.
+const LARGE: usize = 20;
+/// Which these are.
+const CHOICE: [&str; 6] = ["rk4", "tsit5", "dop853", "verner9", "ab6", "adams"];
+/// With more freedoms than this a run takes seconds: two methods.
+const HUGE: usize = 200;
 
 /// Whether a method is run on a scene at all.
 pub fn fits(scene: &Scene, method: &Entry) -> bool {
-    let n = scene.v.len();
-    (n <= DENSE || !method.implicit) && (n <= LARGE || ["dop853", "verner9", "adams"].contains(&method.name))
+    match scene.v.len() {
+        0..=LARGE => true,
+        n if n <= HUGE => CHOICE.contains(&method.name),
+        _ => ["verner9", "adams"].contains(&method.name),
+    }
 }
 
 /// One method at all its settings.
@@ -160,7 +168,7 @@ where
     };
     let mut samples: Vec<Sample> = Vec::new();
     for setting in settings {
-        let start = Start { q: state.0, p: state.1, step: step(method.name, setting, false), compensated: single };
+        let start = Start { q: state.0, p: state.1, step: step(method.name, setting), compensated: single };
         let sample = Sample {
             tool: "multibody".into(),
             variant: variant.name().into(),
@@ -192,9 +200,10 @@ pub fn scene(scene: &Scene, variants: &[Variant], methods: &[String]) -> (Option
     note(format_args!("{}: reference", scene.name));
     let Some(reference) = reference(scene) else { return (None, Vec::new()) };
     let mut samples = Vec::new();
+    let (_, code) = generated(scene);
     for &variant in variants {
         let chosen = |e: &&'static Entry| {
-            variant.runs(e) && fits(scene, e) && (methods.is_empty() || methods.iter().any(|m| m == e.name))
+            variant.runs(e, code) && fits(scene, e) && (methods.is_empty() || methods.iter().any(|m| m == e.name))
         };
         for entry in catalogue::entries().filter(chosen) {
             note(format_args!("{}: {}, {}", scene.name, variant.name(), entry.name));
@@ -208,23 +217,16 @@ fn one(scene: &Scene, reference: &Reference, variant: Variant, entry: &Entry) ->
     let with = (variant, entry);
     match variant {
         Variant::Hamilton | Variant::Interpreted => {
-            let (mut system, code) = match variant {
-                Variant::Hamilton => generated(scene),
-                _ => (Erased::interpreted(scene), true),
+            let mut system = match variant {
+                Variant::Hamilton => generated(scene).0,
+                _ => Erased::interpreted(scene),
             };
-            if !code {
-                return Vec::new();
-            }
             let (q, p) = scene.start(&mut system);
             let make: &Maker<Erased<f64>> = &|s, start| catalogue::any(entry.name, s, start);
             series(&mut system, make, scene, (&q, &p), reference, with)
         }
         Variant::Acceleration => {
-            let (inner, code) = generated(scene);
-            if !code {
-                return Vec::new();
-            }
-            let mut system = AccelerationForm::new(inner);
+            let mut system = AccelerationForm::new(generated(scene).0);
             let (q, v) = (scene.q.clone(), scene.v.clone());
             let make: &Maker<AccelerationForm<Erased<f64>>> = &|s, start| catalogue::explicit(entry.name, s, start);
             series(&mut system, make, scene, (&q, &v), reference, with)
