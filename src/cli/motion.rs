@@ -142,7 +142,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let made =
         made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
     let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
-    let mut projection = settings.project.then(|| Projection::new(&mut system, &q, &p, 1));
+    let mut projection = settings.project.then(|| Projection::new(&mut system, &q, &p, 3));
     observer.end(0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
     let clock = Instant::now();

@@ -85,7 +85,7 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     let mut driver = catalogue::any(method, system, &start)?.ok()?;
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = total(system.state_energy(&q, &p));
-    let mut projection = Projection::new(system, &q, &p, 1);
+    let mut projection = Projection::new(system, &q, &p, 3);
     let (mut energy, mut failure) = (0.0_f64, None);
     let clock = Instant::now();
     let mut looking = 0.0;
@@ -176,7 +176,7 @@ pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
                 let (mut q, mut p) = scene.start(&mut system);
                 let start = Start { q: &q, p: &p, step, compensated: true };
                 let mut driver = catalogue::any(method, &mut system, &start)?.ok()?;
-                let mut projection = Projection::new(&mut system, &q, &p, 1);
+                let mut projection = Projection::new(&mut system, &q, &p, 3);
                 while driver.time() < scene.t_end {
                     driver.advance(&mut system, scene.t_end).ok()?;
                     if project {
