@@ -83,7 +83,7 @@ pub(super) static SCENES: [Entry; 22] = [
         model: Source::Made(|_| chain("chain10", 10, 0.0)),
         start: |m| {
             let (mut q, v) = rest(m);
-            q[0] = 0.6 - std::f64::consts::FRAC_PI_2;
+            q[0] = 0.5 - std::f64::consts::FRAC_PI_2;
             (q, v)
         },
         t_end: 2.0,

@@ -281,8 +281,9 @@ where
             if self.eta * change <= 1.0 || change == 0.0 {
                 return Ok(());
             }
-            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell.
-            let noise = if grown > 2 { libm::pow(Y::Scalar::epsilon(), 0.3) } else { 1.0 / STUCK };
+            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell. On an
+            // ill-conditioned mechanism it is far above that of the numbers.
+            let noise = libm::pow(Y::Scalar::epsilon(), 0.3);
             if scale.is_none() && grown > 0 && noise * FLOOR * change <= 1.0 {
                 return Ok(());
             }
