@@ -28,8 +28,8 @@ pub struct Row {
 const TOLERANCE: f64 = 1e-8;
 /// The same in single precision.
 const SINGLE: f64 = 1e-4;
-/// Steps after which a run is given up, which it says.
-const STEPS: u64 = 500_000;
+/// Steps times freedoms after which a run is given up, which it says.
+const STEPS: u64 = 5_000_000;
 
 /// All scenes with all methods, or those of a list, in f64 and f32, and the models that are refused.
 pub fn rows(scenes: &[Scene], methods: &[String]) -> Vec<Row> {
@@ -86,7 +86,7 @@ fn go<S: Real + 'static>(
     let start = Start { q: &q, p: &p, step, compensated: true };
     let made = catalogue::any(method, system, &start).ok_or("no such method")?;
     let mut driver = made.map_err(|e| e.to_string())?;
-    driver.limits().steps = STEPS;
+    driver.limits().steps = STEPS / scene.v.len() as u64;
     driver.run(system, S::constant(scene.t_end)).map_err(|e| e.to_string())?;
     let (mut q, mut p) = (q.clone(), p.clone());
     driver.state(system, &mut q, &mut p);
