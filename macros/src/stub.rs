@@ -91,9 +91,23 @@ pub fn source(options: &Options) -> String {
             type Momenta = {array};
             fn neutral(&self) -> {array} {{ [0.0; {LENGTH}] }}
             fn rest(&self) -> {array} {{ [0.0; {LENGTH}] }}
-            fn quaternions(&self) -> &[usize] {{ &[] }}
+            fn groups(&self) -> &[{rt}::system::Group] {{ &[] }}
             fn state_rates(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
             fn coordinate_rates(&self, _q: &{array}, _v: &{array}, _qd: &mut {array}) {{}}
+        }}
+        impl {rt}::Energetic for {name} {{
+            fn state_energy(&mut self, _q: &{array}, _p: &{array}) -> ({t}, {t}) {{ (0.0, 0.0) }}
+        }}
+        impl {rt}::Conjugate for {name} {{
+            fn state_momenta(&mut self, _q: &{array}, _v: &{array}, _p: &mut {array}) {{}}
+        }}
+        impl {rt}::Accelerated for {name} {{
+            fn state_accelerations(&mut self, _q: &{array}, _v: &{array}, _a: &mut {array}) {{}}
+        }}
+        impl {rt}::Differentiable for {name} {{
+            type Square = [{array}; {LENGTH}];
+            fn square(&self) -> [{array}; {LENGTH}] {{ [[0.0; {LENGTH}]; {LENGTH}] }}
+            fn rate_derivatives(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _v: &mut {array}, _pd: &mut {array}, _d: {rt}::Blocks<'_, [{array}; {LENGTH}]>) {{}}
         }}"
     )
 }
