@@ -73,6 +73,8 @@ struct Long {
     evaluations: u64,
     seconds: f64,
     energy: f64,
+    /// Coordinates at the end.
+    q: Vec<f64>,
     failure: Option<String>,
 }
 
@@ -109,7 +111,8 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
         }
     }
     let seconds = clock.elapsed().as_secs_f64() - looking;
-    Some(Long { evaluations: driver.statistics().evaluations, seconds, energy, failure })
+    driver.state(system, &mut q, &mut p);
+    Some(Long { evaluations: driver.statistics().evaluations, seconds, energy, q, failure })
 }
 
 /// The setting at which a method needs as many evaluations as RK4 at its step: by bisection on a short run, then corrected
@@ -173,18 +176,8 @@ pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
                 rk4_seconds = run.seconds;
             }
             let short = reference.as_ref().and_then(|reference| {
-                let (mut q, mut p) = scene.start(&mut system);
-                let start = Start { q: &q, p: &p, step, compensated: true };
-                let mut driver = catalogue::any(method, &mut system, &start)?.ok()?;
-                let mut projection = Projection::new(&mut system, &q, &p, 3);
-                while driver.time() < scene.t_end {
-                    driver.advance(&mut system, scene.t_end).ok()?;
-                    if project {
-                        driver.project(&mut system, &mut projection);
-                    }
-                }
-                driver.state(&system, &mut q, &mut p);
-                Some(end_error(&q, &reference.q))
+                let run = long(scene, &mut system, method, step, project, scene.t_end)?;
+                run.failure.is_none().then(|| end_error(&run.q, &reference.q))
             });
             rows.push(Row {
                 scene: scene.name.into(),

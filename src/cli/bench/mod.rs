@@ -96,7 +96,7 @@ fn read_rivals(path: Option<&Path>) -> Outcome<Vec<Sample>> {
 fn work_precision(args: &WorkArgs, out: &mut dyn Write) -> Outcome {
     let scenes = chosen(&args.choice)?;
     let rivals = read_rivals(args.rivals.as_deref())?;
-    let mut lines = String::new();
+    let (mut lines, mut all) = (String::new(), Vec::new());
     for scene in scenes {
         let measured = measured(scene, &args.choice.methods, &rivals);
         write!(out, "{}", tables::work(&measured))?;
@@ -108,6 +108,10 @@ fn work_precision(args: &WorkArgs, out: &mut dyn Write) -> Outcome {
         if let Some(directory) = &args.figures {
             write_figure(&measured, directory)?;
         }
+        all.push(measured);
+    }
+    if !rivals.is_empty() {
+        write!(out, "### Our time divided by the rivals'\n\n{}", tables::ratios(&all))?;
     }
     match &args.samples {
         Some(path) => write_file(path, &lines),
