@@ -234,6 +234,148 @@ pub enum Gravity {
     Input,
 }
 
+/// A frame that a constraint acts at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mount {
+    /// Body index, `None` for the ground.
+    pub body: Option<usize>,
+    /// Pose in the body frame.
+    pub placement: Placement,
+}
+
+/// What a loop holds together, first frame and second frame. Axes stand in the axes of both frames, any length but zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoopKind {
+    /// As a pin would: leaves one turn.
+    Pin {
+        /// Axis of rotation.
+        axis: [f64; 3],
+    },
+    /// Leaves one slide.
+    Slider {
+        /// Direction of sliding.
+        axis: [f64; 3],
+    },
+    /// Leaves a slide and a turn about one axis.
+    Cylindrical {
+        /// The axis.
+        axis: [f64; 3],
+    },
+    /// Leaves a screw.
+    Helical {
+        /// The axis.
+        axis: [f64; 3],
+        /// Metres per radian.
+        pitch: Value,
+    },
+    /// Leaves turns about `axes[0]`, fixed in the first frame, and `axes[1]`, fixed in the second; at right angles.
+    Universal {
+        /// Both axes.
+        axes: [[f64; 3]; 2],
+    },
+    /// Leaves two slides and a turn about the normal.
+    Planar {
+        /// Normal of the plane.
+        normal: [f64; 3],
+    },
+    /// Leaves all rotations: the origins coincide.
+    Spherical,
+    /// Leaves nothing.
+    Fixed,
+    /// The origins stay at a distance: a massless rod with spherical ends.
+    Distance {
+        /// Length, m.
+        length: Value,
+    },
+    /// The second origin stays on the line through the first along the axis of the first frame.
+    PointOnLine {
+        /// Direction in the first frame.
+        axis: [f64; 3],
+    },
+    /// The second origin stays in the plane through the first, normal to a direction of the first frame.
+    PointOnPlane {
+        /// Direction in the first frame.
+        normal: [f64; 3],
+    },
+    /// The second origin stays on a cylinder about an axis of the first frame.
+    PointOnCylinder {
+        /// Direction in the first frame.
+        axis: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// A thin disc about the second frame's origin rolls on a plane of the first frame without slip.
+    RollingDisc {
+        /// Normal of the plane in the first frame, towards the disc.
+        normal: [f64; 3],
+        /// Axis of the disc in the second frame.
+        axis: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// A ball about the second frame's origin rolls on a plane of the first frame without slip.
+    RollingBall {
+        /// Normal of the plane in the first frame, towards the ball.
+        normal: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// The second origin does not move along a direction fixed in the second frame.
+    KnifeEdge {
+        /// Direction across the edge.
+        axis: [f64; 3],
+    },
+    /// `row · [velocity; angular velocity] = 0` for the motion of the second frame relative to the first, in the axes and
+    /// at the origin of the second.
+    Pfaffian {
+        /// Coefficients.
+        row: [Value; 6],
+    },
+}
+
+/// What a constraint binds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConstraintKind {
+    /// Two bodies.
+    Loop {
+        /// How.
+        kind: LoopKind,
+        /// First frame.
+        first: Mount,
+        /// Second frame.
+        second: Mount,
+    },
+    /// Joints of one freedom: `Σ ratio · q = offset`.
+    Coupling {
+        /// Joint index and ratio; every joint once, free, not a mimic.
+        terms: Vec<(usize, Value)>,
+        /// Offset.
+        offset: Value,
+    },
+}
+
+/// A constraint beside the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// Name, unique among the constraints.
+    pub name: String,
+    /// What it binds.
+    pub kind: ConstraintKind,
+    /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s; zero: not at all.
+    pub decay: Value,
+}
+
+/// Where the closing of loops begins: coordinates of one joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Start {
+    /// Joint index, free.
+    pub joint: usize,
+    /// Its coordinates.
+    pub q: Vec<f64>,
+    /// Whether they stay as they are when loops are closed.
+    pub held: bool,
+}
+
 /// A checked tree: `joints` is depth first, every body is the child of exactly one joint, parents come first, mimic chains end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
@@ -251,4 +393,8 @@ pub struct Model {
     pub frames: Vec<Frame>,
     /// External wrenches.
     pub wrenches: Vec<Wrench>,
+    /// Loops and couplings, in file order.
+    pub constraints: Vec<Constraint>,
+    /// Coordinates to begin with, where they are not neutral.
+    pub starts: Vec<Start>,
 }

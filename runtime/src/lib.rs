@@ -40,4 +40,4 @@ pub use dual::Dual;
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, RankLoss};
 pub use scalar::Scalar;
-pub use system::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Real, System};
+pub use system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic, Real, System};

@@ -210,3 +210,64 @@ pub struct Blocks<'a, M> {
     /// `∂ṗ/∂p`.
     pub dpd_dp: &'a mut M,
 }
+
+/// One scalar constraint of a [`Constrained`] system: a row of `Φ v = b`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Index of the loop or coupling it belongs to, in the order of the description.
+    pub constraint: usize,
+    /// Whether it is the derivative of a condition on positions, which can be closed; others (a knife edge) bind velocities
+    /// alone, and have no residual.
+    pub holonomic: bool,
+    /// Its first entry among all entries of `Φ`.
+    pub first: usize,
+    /// Number of its entries.
+    pub len: usize,
+}
+
+/// A [`System`] with constraints between its joints: closed loops, couplings, rolling.
+///
+/// Its momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7), with multipliers `σ` that grow as `σ̇ = λ`; every
+/// `σ` belongs to the same motion, so that a one-step method may begin each step with `σ = 0` ([`Constrained::settle`]).
+/// Constraints hold in the velocities of every evaluation, to round-off; redundant rows are recognised and left out. `Φ`
+/// is `rows × nv`, one column for each velocity, and the force of the constraints on the joints is `−Φᵀλ`. It is given by the
+/// entries that can be other than zero, row by row.
+pub trait Constrained: System {
+    /// One number for each row.
+    type Rows: Clone + core::fmt::Debug + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
+    /// One number for each entry of `Φ`.
+    type Entries: Clone + core::fmt::Debug + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;
+
+    /// Zero for every row.
+    fn zero_rows(&self) -> Self::Rows;
+    /// Zero for every entry.
+    fn zero_entries(&self) -> Self::Entries;
+    /// The rows.
+    fn rows(&self) -> &[Row];
+    /// Velocity index of every entry of `Φ`.
+    fn entry_columns(&self) -> &[usize];
+    /// Residuals `φ(q)` of the positions (m, rad; zero for rows that are not holonomic) and the entries of `Φ(q)`.
+    fn closure(&mut self, q: &Self::Coordinates, residual: &mut Self::Rows, jacobian: &mut Self::Entries);
+    /// Velocities `v` and multipliers `σ` of a state, and its momenta freed of them: `p := p⁺ − Φᵀσ = M v`, which is the
+    /// mass-orthogonal projection onto `Φ v = b`.
+    fn settle(
+        &mut self,
+        t: Self::Scalar,
+        q: &Self::Coordinates,
+        p: &mut Self::Momenta,
+        v: &mut Self::Momenta,
+        sigma: &mut Self::Rows,
+    );
+    /// One step of Newton's method onto the closed positions, least in the metric of the mass matrix: residuals `φ(q)`,
+    /// displacement `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ` (`nv` numbers, body axes where velocities have them), and the pivots of
+    /// `Φ M⁻¹Φᵀ`, zero for rows that were left out as redundant.
+    fn correction(
+        &mut self,
+        q: &Self::Coordinates,
+        residual: &mut Self::Rows,
+        dq: &mut Self::Momenta,
+        pivots: &mut Self::Rows,
+    );
+    /// Multipliers `λ` at given velocities: forces and moments of the constraints, `Φᵀλ = τ − M v̇ − h`.
+    fn multipliers(&mut self, t: Self::Scalar, q: &Self::Coordinates, v: &Self::Momenta, lambda: &mut Self::Rows);
+}

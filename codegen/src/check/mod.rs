@@ -38,7 +38,8 @@ pub fn check(raw: &RawModel, file: &str, findings: &mut Findings) -> Option<Mode
     // With a broken tree there is no model to go on with.
     let order = order?;
     let joints = assemble(joints, &links, &leaders, &order);
-    let model = Model { name, params, gravity, bodies, joints, frames, wrenches };
+    let model =
+        Model { name, params, gravity, bodies, joints, frames, wrenches, constraints: Vec::new(), starts: Vec::new() };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
     (!findings.has_errors()).then_some(model)

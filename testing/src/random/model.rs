@@ -200,5 +200,15 @@ pub fn random_model(seed: u64, knobs: &Knobs) -> Model {
     }
     let gravity = b.gravity();
     let (frames, wrenches) = (b.frames(n), b.wrenches(n));
-    Model { name: format!("tree{seed}"), params: b.params, gravity, bodies, joints, frames, wrenches }
+    Model {
+        name: format!("tree{seed}"),
+        params: b.params,
+        gravity,
+        bodies,
+        joints,
+        frames,
+        wrenches,
+        constraints: Vec::new(),
+        starts: Vec::new(),
+    }
 }
