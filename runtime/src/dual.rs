@@ -73,6 +73,15 @@ impl<S: Scalar> Scalar for Dual<S> {
         let re = self.re.sqrt();
         Dual::new(re, self.du / (re + re))
     }
+
+    fn reciprocal_above(self, floor: Self) -> Self {
+        let re = self.re.reciprocal_above(floor.re);
+        Dual::new(re, -(re * re * self.du))
+    }
+
+    fn rank_tolerance() -> Self {
+        Dual::new(S::rank_tolerance(), S::zero())
+    }
 }
 
 #[cfg(test)]
@@ -91,6 +100,8 @@ mod tests {
         near(slope(|x| x * x - x, 3.0), 5.0);
         near(slope(|x| c(2.0) / (x + c(1.0)), 3.0), -0.125);
         near(slope(|x| -(x.sqrt()), 4.0), -0.25);
+        near(slope(|x| x.reciprocal_above(c(1.0)), 2.0), -0.25);
+        assert_eq!(slope(|x| x.reciprocal_above(c(1.0)), 0.5), 0.0);
         near(slope(|x| x.sin_cos().0, 0.5), crate::trig::sincos_f64(0.5).1);
         near(slope(|x| x.sin_cos().1, 0.5), -crate::trig::sincos_f64(0.5).0);
     }

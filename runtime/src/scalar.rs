@@ -3,8 +3,9 @@
 use crate::integrate::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A field with sine, cosine and square root, and nothing else: no comparison and no way out to `f64`, so a sweep
-/// written over it cannot branch on a value and every instance performs the same operations in the same order.
+/// A field with sine, cosine, square root and a guarded reciprocal, and nothing else: no comparison and no way out to
+/// `f64`, so a sweep written over it cannot branch on a value and every instance performs the same operations in the same
+/// order.
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -19,6 +20,13 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
+    /// `1 / self` where `self` is above `floor`, and zero elsewhere: the pivot of a row that may be redundant, and is left
+    /// out where too little remains of its diagonal. The floor is not negative. Where `self` is NaN, so is the result.
+    fn reciprocal_above(self, floor: Self) -> Self;
+    /// Part of a row's diagonal below which what is left of it by the rows before it is taken for round-off.
+    fn rank_tolerance() -> Self {
+        Self::constant(1e-10)
+    }
 
     /// Zero.
     fn zero() -> Self {
@@ -51,6 +59,16 @@ impl Scalar for f64 {
         #[cfg(not(feature = "std"))]
         libm::sqrt(self)
     }
+    #[inline]
+    fn reciprocal_above(self, floor: Self) -> Self {
+        // A mask on the quotient, no branch: lanes stay together. NaN is not below the floor.
+        let reciprocal = 1.0 / self;
+        if self <= floor {
+            0.0
+        } else {
+            reciprocal
+        }
+    }
 }
 
 impl Scalar for f32 {
@@ -73,5 +91,36 @@ impl Scalar for f32 {
         return f32::sqrt(self);
         #[cfg(not(feature = "std"))]
         libm::sqrtf(self)
+    }
+    #[inline]
+    fn reciprocal_above(self, floor: Self) -> Self {
+        // A mask on the quotient, no branch: lanes stay together. NaN is not below the floor.
+        let reciprocal = 1.0 / self;
+        if self <= floor {
+            0.0
+        } else {
+            reciprocal
+        }
+    }
+    #[inline]
+    fn rank_tolerance() -> Self {
+        1e-5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reciprocal_above_floor() {
+        assert_eq!(4.0_f64.reciprocal_above(1.0), 0.25);
+        assert_eq!(4.0_f32.reciprocal_above(1.0), 0.25);
+        assert_eq!(1.0_f64.reciprocal_above(1.0), 0.0);
+        assert_eq!(0.0_f64.reciprocal_above(0.0).to_bits(), 0);
+        assert_eq!((-1e-20_f64).reciprocal_above(0.0), 0.0);
+        assert_eq!(f64::INFINITY.reciprocal_above(1.0), 0.0);
+        assert!(f64::NAN.reciprocal_above(1.0).is_nan());
+        assert!(f32::NAN.reciprocal_above(1.0).is_nan());
     }
 }

@@ -70,6 +70,13 @@ impl<const COARSE: bool> Scalar for Wide<COARSE> {
     fn sqrt(self) -> Self {
         Wide(self.0.sqrt())
     }
+    fn reciprocal_above(self, floor: Self) -> Self {
+        if self <= floor {
+            Self::zero()
+        } else {
+            Self::one() / self
+        }
+    }
 }
 
 impl<const COARSE: bool> Real for Wide<COARSE> {

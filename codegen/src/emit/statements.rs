@@ -13,7 +13,7 @@ use super::names::{identifier, quantity};
 use super::ports::{self, Port};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Fma, Label, Op, Operand, Output};
+use crate::symbolic::{Fma, Label, Op, Operand, Output, Pivot};
 use crate::trace::{GroupProgram, InputArray};
 
 /// What every function begins with.
@@ -104,16 +104,21 @@ impl Head<'_> {
             Operand::Const(bits) => literal(f64::from_bits(*bits), self.options.precision),
             Operand::Node(id) => names[id].clone(),
         };
+        let minus = |yes: &bool| if *yes { "-" } else { "" };
         match op {
             Op::Add(a, b) => format!("{} + {}", text(a), text(b)),
             Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
             Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
             Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
             Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
-                let minus = |yes: &bool| if *yes { "-" } else { "" };
                 let (a, b, c) = (text(a), text(b), text(c));
                 let number = self.options.precision.name();
                 format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(minus_product), minus(minus_addend))
+            }
+            Op::ReciprocalAbove(Pivot { value, floor, minus_value, minus_floor }) => {
+                let (value, floor) = (text(value), text(floor));
+                let (rt, v, f) = (&self.options.runtime, minus(minus_value), minus(minus_floor));
+                format!("{rt}::Scalar::reciprocal_above({v}{value}, {f}{floor})")
             }
             Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, names[a]),
             Op::Input(_) | Op::Sin(_) | Op::Cos(_) => unreachable!("written by the caller"),
@@ -186,7 +191,8 @@ impl Angles {
                 _ => {}
             }
             let inner = |o| matches!(o, Operand::Node(k) if involved.contains(&k));
-            if matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..)) || op.operands().any(inner) {
+            let divides = matches!(op, Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_));
+            if divides || matches!(op, Op::Sin(_) | Op::Cos(_)) || op.operands().any(inner) {
                 involved.insert(*id);
             }
         }

@@ -238,6 +238,7 @@ fn value(op: Op, link: &Link<'_>, row: &[f64], values: &BTreeMap<u32, f64>) -> f
         Operand::Node(id) => values[&id],
     };
     let node = |id: u32| values[&id];
+    let signed = |x: f64, minus: bool| if minus { -x } else { x };
     match op {
         Op::Input(k) => match link.inputs[k as usize] {
             LinkInput::Column(c) => row[c],
@@ -248,6 +249,9 @@ fn value(op: Op, link: &Link<'_>, row: &[f64], values: &BTreeMap<u32, f64>) -> f
         Op::Mul(a, b) => of(a) * of(b),
         Op::Div(a, b) => of(a) / of(b),
         Op::Fma(_) => unreachable!("the sweeps make none"),
+        Op::ReciprocalAbove(p) => {
+            Scalar::reciprocal_above(signed(of(p.value), p.minus_value), signed(of(p.floor), p.minus_floor))
+        }
         Op::Sqrt(a) => Scalar::sqrt(node(a)),
         Op::Sin(a) => Scalar::sin_cos(node(a)).0,
         Op::Cos(a) => Scalar::sin_cos(node(a)).1,

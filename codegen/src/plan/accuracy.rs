@@ -82,6 +82,9 @@ impl Scalar for Lanes {
     fn sqrt(self) -> Self {
         Lanes(self.0.map(Scalar::sqrt))
     }
+    fn reciprocal_above(self, floor: Self) -> Self {
+        Lanes(std::array::from_fn(|k| self.0[k].reciprocal_above(floor.0[k])))
+    }
 }
 
 /// Results of a program.

@@ -24,6 +24,9 @@ impl Program {
                 Op::Mul(a, b) => get(a) * get(b),
                 Op::Div(a, b) => get(a) / get(b),
                 Op::Fma(f) => fused(signed(get(f.a), f.minus_product), get(f.b), signed(get(f.c), f.minus_addend)),
+                Op::ReciprocalAbove(p) => {
+                    signed(get(p.value), p.minus_value).reciprocal_above(signed(get(p.floor), p.minus_floor))
+                }
                 Op::Sqrt(a) => values[a as usize].sqrt(),
                 Op::Sin(a) => values[a as usize].sin_cos().0,
                 Op::Cos(a) => values[a as usize].sin_cos().1,

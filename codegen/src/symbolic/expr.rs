@@ -31,6 +31,8 @@ pub enum Op {
     Div(Operand, Operand),
     /// `±a · b ± c`; made by passes, never by sweeps.
     Fma(Fma),
+    /// `1 / ±a` where that is above `±floor`, else zero.
+    ReciprocalAbove(Pivot),
     /// Square root.
     Sqrt(u32),
     /// Sine.
@@ -54,6 +56,19 @@ pub struct Fma {
     pub minus_addend: bool,
 }
 
+/// What is inverted, and where it counts as zero. Signs cannot be taken outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Pivot {
+    /// What is inverted.
+    pub value: Operand,
+    /// What it has to exceed.
+    pub floor: Operand,
+    /// Whether the negative of `value` is meant.
+    pub minus_value: bool,
+    /// Whether the negative of `floor` is meant.
+    pub minus_floor: bool,
+}
+
 impl Op {
     /// The operands, where there are any.
     pub fn operands(&self) -> impl Iterator<Item = Operand> {
@@ -61,6 +76,7 @@ impl Op {
             Op::Input(_) => [None; 3],
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],
             Op::Fma(f) => [Some(f.a), Some(f.b), Some(f.c)],
+            Op::ReciprocalAbove(p) => [Some(p.value), Some(p.floor), None],
             Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => [Some(Operand::Node(a)), None, None],
         };
         all.into_iter().flatten()
@@ -295,6 +311,18 @@ impl Scalar for Expr<'_> {
             Expr::Node { graph, id, neg: false } => graph.node(Op::Sqrt(id), false),
         }
     }
+
+    fn reciprocal_above(self, floor: Self) -> Self {
+        match (self, floor) {
+            // Nothing is above a floor that is not negative.
+            (Expr::Const(0.0), _) => self,
+            (Expr::Const(x), Expr::Const(y)) => Expr::Const(Scalar::reciprocal_above(x, y)),
+            (Expr::Node { graph, .. }, _) | (_, Expr::Node { graph, .. }) => {
+                let ((value, minus_value), (floor, minus_floor)) = (self.split(), floor.split());
+                graph.node(Op::ReciprocalAbove(Pivot { value, floor, minus_value, minus_floor }), false)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -326,6 +354,11 @@ mod tests {
         same(x / -y, -(x / y));
         same(x - c(2.0), -(c(2.0) - x));
         same(c(2.0) * c(3.0), c(6.0));
+        same(c(4.0).reciprocal_above(c(1.0)), c(0.25));
+        same(c(0.0).reciprocal_above(c(0.0)), c(0.0));
+        same(c(0.0).reciprocal_above(x), c(0.0));
+        // The sign of what is inverted decides.
+        assert_ne!((-x).reciprocal_above(y).split(), (-(x.reciprocal_above(y))).split());
         same((-x).sin_cos().0, -(x.sin_cos().0));
         same((-x).sin_cos().1, x.sin_cos().1);
         // What is not exact stays as it is written.

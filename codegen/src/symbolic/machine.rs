@@ -8,7 +8,9 @@ pub fn latency(op: &Op) -> u32 {
         Op::Input(_) => 0,
         Op::Add(..) | Op::Sub(..) => SUM,
         Op::Mul(..) | Op::Fma(_) => PRODUCT,
-        Op::Div(..) => 13,
+        Op::Div(..) => DIVISION,
+        // A division, and a mask.
+        Op::ReciprocalAbove(_) => DIVISION + 1,
         Op::Sqrt(_) => 15,
         Op::Sin(_) | Op::Cos(_) => SINE,
     }
@@ -18,6 +20,8 @@ pub fn latency(op: &Op) -> u32 {
 pub const SUM: u32 = 3;
 /// Latency of a product, fused with a sum or not.
 pub const PRODUCT: u32 = 4;
+/// Latency of a division.
+const DIVISION: u32 = 13;
 /// Latency of a sine with its cosine.
 pub const SINE: u32 = 40;
 
@@ -60,7 +64,7 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
         Op::Input(_) => (Pipe::None, 0),
         Op::Add(..) | Op::Sub(..) => (Pipe::Add, 1),
         Op::Mul(..) | Op::Fma(_) => (Pipe::Multiply, 1),
-        Op::Div(..) => (Pipe::Multiply, 5),
+        Op::Div(..) | Op::ReciprocalAbove(_) => (Pipe::Multiply, 5),
         Op::Sqrt(_) => (Pipe::Multiply, 7),
         // Half of a pair: about thirty products for both.
         Op::Sin(_) | Op::Cos(_) => (Pipe::Multiply, 15),

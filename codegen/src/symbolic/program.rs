@@ -22,7 +22,7 @@ pub struct Counts {
     pub additions: usize,
     /// Multiplications.
     pub multiplications: usize,
-    /// Divisions.
+    /// Divisions, guarded reciprocals among them.
     pub divisions: usize,
     /// Square roots.
     pub roots: usize,
@@ -52,7 +52,7 @@ impl Counts {
             Op::Input(_) => {}
             Op::Add(..) | Op::Sub(..) => self.additions += 1,
             Op::Mul(..) => self.multiplications += 1,
-            Op::Div(..) => self.divisions += 1,
+            Op::Div(..) | Op::ReciprocalAbove(_) => self.divisions += 1,
             Op::Fma(_) => {
                 self.additions += 1;
                 self.multiplications += 1;

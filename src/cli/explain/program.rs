@@ -61,6 +61,11 @@ pub fn statements(plan: &Plan, group: &GroupProgram, out: &mut dyn Write) -> Out
                 let (p, s) = (if f.minus_product { "-" } else { "" }, if f.minus_addend { '-' } else { '+' });
                 format!("{p}{} * {} {s} {}", operand(&f.a), operand(&f.b), operand(&f.c))
             }
+            Op::ReciprocalAbove(p) => {
+                let minus = |minus: bool| if minus { "-" } else { "" };
+                let (value, floor) = (operand(&p.value), operand(&p.floor));
+                format!("1 / {}{value} above {}{floor}", minus(p.minus_value), minus(p.minus_floor))
+            }
             Op::Sqrt(a) => format!("sqrt({})", name(*a)),
             Op::Sin(a) => format!("sin({})", name(*a)),
             Op::Cos(a) => format!("cos({})", name(*a)),

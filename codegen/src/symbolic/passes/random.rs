@@ -76,7 +76,10 @@ pub fn real_program(seed: u64, operations: usize) -> Program {
     let mut pool: Vec<Expr> = (0..INPUTS).map(|k| graph.input(k).sin_cos().1 + Expr::Const(2.0)).collect();
     while pool.len() < operations {
         let (a, b) = (pool[rng.below(pool.len())], pool[pool.len() - 1 - rng.below(pool.len().min(9))]);
-        let made = match rng.below(6) {
+        let made = match rng.below(8) {
+            // Kept and dropped pivots: all values are positive, and the floor is well below or well above.
+            6 => (a * b).reciprocal_above(Expr::Const(0.1) * a * b) + Expr::Const(1.0),
+            7 => (b - a - b).reciprocal_above(b) + a,
             0 => a / b + Expr::Const(1.0),
             1 => (a * b).sqrt(),
             2 => Expr::Const(0.25) * (a * a + b * b) / (a + b),

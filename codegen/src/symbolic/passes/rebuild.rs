@@ -38,17 +38,21 @@ impl<'g> Rebuilt<'g> {
     /// The same operation on the new operands, by the exact rules.
     pub fn copy(&self, op: Op) -> Expr<'g> {
         let node = |id| self.get(Operand::Node(id));
+        let signed = |x: Expr<'g>, minus: bool| if minus { -x } else { x };
         match op {
             Op::Input(k) => self.graph.input(k as usize),
             Op::Add(a, b) => self.get(a) + self.get(b),
             Op::Sub(a, b) => self.get(a) - self.get(b),
             Op::Mul(a, b) => self.get(a) * self.get(b),
             Op::Div(a, b) => self.get(a) / self.get(b),
+            Op::ReciprocalAbove(p) => {
+                let floor = signed(self.get(p.floor), p.minus_floor);
+                signed(self.get(p.value), p.minus_value).reciprocal_above(floor)
+            }
             Op::Sqrt(a) => node(a).sqrt(),
             Op::Sin(a) => node(a).sin_cos().0,
             Op::Cos(a) => node(a).sin_cos().1,
             Op::Fma(f) => {
-                let signed = |x: Expr<'g>, minus: bool| if minus { -x } else { x };
                 let (a, c) = (signed(self.get(f.a), f.minus_product), signed(self.get(f.c), f.minus_addend));
                 self.graph.fma(a, self.get(f.b), c)
             }

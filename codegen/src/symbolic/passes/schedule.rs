@@ -45,6 +45,10 @@ fn renumber(program: &Program, order: &[u32]) -> Program {
                 (f.a, f.b, f.c) = (o(f.a), o(f.b), o(f.c));
                 Op::Fma(f)
             }
+            Op::ReciprocalAbove(mut p) => {
+                (p.value, p.floor) = (o(p.value), o(p.floor));
+                Op::ReciprocalAbove(p)
+            }
             Op::Sqrt(a) => Op::Sqrt(id(a)),
             Op::Sin(a) => Op::Sin(id(a)),
             Op::Cos(a) => Op::Cos(id(a)),
