@@ -334,6 +334,8 @@ pub enum LoopKind {
 }
 
 /// What a constraint binds.
+// A model has few of them, and they are read as they stand.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConstraintKind {
     /// Two bodies.

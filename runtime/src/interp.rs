@@ -6,7 +6,8 @@ use alloc::vec::Vec;
 
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
-use crate::system::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Group, GroupKind, Real, System};
+use crate::system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic};
+use crate::system::{Group, GroupKind, Real, Row, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -58,6 +59,8 @@ pub struct Interpreter<S> {
     pub inputs: InputValues<S>,
     v: Vec<S>,
     groups: Vec<Group>,
+    rows: Vec<Row>,
+    entry_columns: Vec<usize>,
     neutral: Vec<S>,
     /// Made when [`Differentiable::rate_derivatives`] is first called.
     derivatives: Option<Box<Derivatives<S>>>,
@@ -104,6 +107,8 @@ impl<S: Scalar> Interpreter<S> {
         Interpreter {
             work: Workspace::new(&tree),
             v: vec![o; dims.nv],
+            rows: tree.rows(),
+            entry_columns: tree.entry_columns(),
             tree,
             physical,
             inputs,
@@ -245,15 +250,19 @@ impl<S: Real> Interpreter<S> {
     /// [`RankLoss`] for the first freedom, outboard first, without inertia.
     pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.articulate(q, &self.inputs.drive_q, &mut self.work.poses);
-        sweeps.factor(&self.work.poses, &self.work.first, &mut self.work.factor);
+        sweeps.prepare(q, &self.inputs.view(), &mut self.work);
         let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.shared) {
             (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
             _ => None,
         });
         let own = own.flat_map(|(v, freedoms)| freedoms.enumerate().map(move |(k, f)| (v + k, f)));
         let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));
-        let shared = self.tree.shared.iter().zip(&self.work.factor.shared).map(|(&v, pivot)| (v, pivot.rho));
+        let shared = self
+            .tree
+            .shared
+            .iter()
+            .zip(&self.work.factor.shared)
+            .filter_map(|(s, pivot)| Some((s.velocity()?, pivot.rho)));
         // A zero pivot spoils those inboard of it: it is the one to name.
         let mut spoiled = None;
         for (velocity, rho) in own.chain(shared) {
@@ -321,6 +330,48 @@ impl<S: Scalar + core::fmt::Debug> Conjugate for Interpreter<S> {
 impl<S: Scalar + core::fmt::Debug> Accelerated for Interpreter<S> {
     fn state_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
         self.accelerations(q, v, a);
+    }
+}
+
+impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
+    type Rows = Vec<S>;
+    type Entries = Vec<S>;
+
+    fn zero_rows(&self) -> Vec<S> {
+        vec![S::zero(); self.rows.len()]
+    }
+
+    fn zero_entries(&self) -> Vec<S> {
+        vec![S::zero(); self.entry_columns.len()]
+    }
+
+    fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    fn entry_columns(&self) -> &[usize] {
+        &self.entry_columns
+    }
+
+    fn closure(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.closure(q, &self.inputs.view(), &mut self.work, residual, jacobian);
+    }
+
+    fn settle(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        self.v.copy_from_slice(p);
+        sweeps.settle(q, &self.v, &self.inputs.view(), &mut self.work, v, p, sigma);
+    }
+
+    fn correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.correction(q, &self.inputs.view(), &mut self.work, residual, dq, pivots);
+    }
+
+    fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
+        let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
+        sweeps.multipliers(q, v, &self.inputs.view(), &mut self.work, &mut self.v, lambda);
     }
 }
 

@@ -224,6 +224,125 @@ pub struct TreeWrench<S> {
     pub path: Vec<usize>,
 }
 
+/// What a column that stays open while the backward sweep goes on inward stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shared {
+    /// A coordinate, by its velocity index: shared by several joints, or solved at another node.
+    Velocity(usize),
+    /// The multiplier of a constraint, by its row.
+    Row(usize),
+}
+
+impl Shared {
+    /// The velocity index of a coordinate.
+    pub fn velocity(self) -> Option<usize> {
+        match self {
+            Shared::Velocity(v) => Some(v),
+            Shared::Row(_) => None,
+        }
+    }
+}
+
+/// What two frames on bodies may not do to one another. `z` and so on are axes of the frames, `first` and `second`; rows stand in
+/// the axes and at the origin of the second one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Closure<S> {
+    /// Leaves a turn about z.
+    Pin,
+    /// Leaves a slide along z.
+    Slider,
+    /// Leaves both.
+    Cylindrical,
+    /// Leaves a screw about z.
+    Helical {
+        /// Metres per radian.
+        pitch: S,
+    },
+    /// Leaves turns about x of the first and y of the second frame.
+    Universal,
+    /// Leaves slides along x and y and a turn about z.
+    Planar,
+    /// Leaves all rotations.
+    Spherical,
+    /// Leaves nothing.
+    Fixed,
+    /// Keeps the origins at a distance.
+    Distance {
+        /// Length, m.
+        length: S,
+    },
+    /// Keeps the second origin on z of the first frame.
+    PointOnLine,
+    /// Keeps the second origin in the plane across z of the first frame.
+    PointOnPlane,
+    /// Keeps the second origin on a cylinder about z of the first frame.
+    PointOnCylinder {
+        /// Radius, m.
+        radius: S,
+    },
+    /// A thin disc across z of the second frame, about its origin, rolls on the plane across z of the first.
+    RollingDisc {
+        /// Radius, m.
+        radius: S,
+    },
+    /// A ball about the second origin rolls on the plane across z of the first frame.
+    RollingBall {
+        /// Radius, m.
+        radius: S,
+    },
+    /// No velocity of the second origin along z of the second frame.
+    KnifeEdge,
+    /// One linear condition on the relative motion.
+    Pfaffian {
+        /// Coefficients of linear and angular velocity.
+        row: [S; 6],
+    },
+}
+
+/// A constraint between two frames on bodies.
+#[derive(Clone, Debug)]
+pub struct Cut<S> {
+    /// What it binds.
+    pub closure: Closure<S>,
+    /// First frame, `A`.
+    pub a: TreeFrame<S>,
+    /// Second frame, `B`.
+    pub b: TreeFrame<S>,
+    /// Nodes from the innermost common one, which is left out, to that of the first frame.
+    pub path_a: Vec<usize>,
+    /// The same for the second frame.
+    pub path_b: Vec<usize>,
+}
+
+/// What a constraint binds.
+#[derive(Clone, Debug)]
+pub enum Bond<S> {
+    /// Two frames.
+    Cut(Cut<S>),
+    /// Freedoms of single-freedom nodes: `Σ ratio q = offset`.
+    Coupling {
+        /// Node and ratio.
+        terms: Vec<(usize, S)>,
+        /// Offset, rad or m.
+        offset: S,
+    },
+}
+
+/// Rows of `Φ v = b` that belong together.
+#[derive(Clone, Debug)]
+pub struct Constraint<S> {
+    /// What it binds.
+    pub bond: Bond<S>,
+    /// Its place among [`Tree::shared`], one for each row.
+    pub slots: Vec<usize>,
+    /// Its first row among all.
+    pub first: usize,
+    /// Velocities that it binds, in ascending order.
+    pub velocities: Vec<usize>,
+    /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s.
+    pub decay: Option<S>,
+}
+
 /// A mechanism. `S` is the scalar of its constants and of everything computed from them.
 #[derive(Clone, Debug)]
 pub struct Tree<S> {
@@ -231,14 +350,18 @@ pub struct Tree<S> {
     pub nodes: Vec<Node<S>>,
     /// Number of coordinates, velocities, prescribed positions, prescribed rates.
     pub dims: Dims,
-    /// Velocity index of each coordinate shared by several nodes.
-    pub shared: Vec<usize>,
-    /// Shared coordinates whose members meet only at the ground.
+    /// Coordinates shared by several nodes, and multipliers of constraints.
+    pub shared: Vec<Shared>,
+    /// Those of them whose members meet only at the ground.
     pub solve_at_ground: Vec<usize>,
     /// First moment of bodies that regrouping has moved to the ground, kg m.
     pub ground_moment: Vec3<S>,
     /// External wrenches.
     pub wrenches: Vec<TreeWrench<S>>,
+    /// Loops and couplings.
+    pub constraints: Vec<Constraint<S>>,
+    /// Part of the diagonal of `Φ M⁻¹Φᵀ` below which what is left of a row counts as redundant.
+    pub tolerance: S,
     /// Frames of interest: first that of every joint's child body, in joint order, then the others.
     pub frames: Vec<TreeFrame<S>>,
     /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
@@ -262,6 +385,8 @@ pub struct Dims {
     pub drive_v: usize,
     /// External wrenches.
     pub wrenches: usize,
+    /// Rows of constraints.
+    pub rows: usize,
 }
 
 impl<S: Scalar> Tree<S> {

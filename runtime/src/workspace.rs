@@ -1,5 +1,6 @@
 //! Everything a sweep computes, one slot for each node or freedom, with its symbol in `algorithm` notation.
 
+use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -128,6 +129,48 @@ pub struct Factor<S> {
     pub cross: Vec<S>,
     /// The same for shared coordinates with one another.
     pub shared_cross: Vec<S>,
+    /// Diagonal of `Φ M⁻¹Φᵀ` of every multiplier, before other multipliers are taken out of it; with the nodes of one
+    /// constraint's cycle as far as they are done.
+    pub whole: Vec<S>,
+    /// For every row of a constraint, those that are open when it is eliminated and meet it: all others are independent.
+    pub later: Vec<Vec<usize>>,
+}
+
+/// One row of a constraint.
+#[derive(Clone, Copy, Debug)]
+pub struct RowState<S> {
+    /// `E_c` at the second frame, in its axes.
+    pub e: Force<S>,
+    /// What it is at the node of the first frame, with its sign.
+    pub at_a: Force<S>,
+    /// What it is at the node of the second frame.
+    pub at_b: Force<S>,
+    /// Residual of the position, m or rad; zero where there is none.
+    pub residual: S,
+}
+
+/// Constraints at the configuration.
+#[derive(Clone, Debug)]
+pub struct Constraints<S> {
+    /// Relative pose of each constraint's frames.
+    pub relative: Vec<Relative<S>>,
+    /// Rows.
+    pub rows: Vec<RowState<S>>,
+    /// `b`, velocity level, or what takes its place among accelerations.
+    pub rhs: Vec<S>,
+    /// Multipliers, row by row: `σ` or `λ`.
+    pub multipliers: Vec<S>,
+    /// Moment and force along the freedoms from within the loops, one for each velocity.
+    pub pull: Vec<S>,
+}
+
+/// Pose of a frame `A` in a frame `B`.
+#[derive(Clone, Copy, Debug)]
+pub struct Relative<S> {
+    /// Components in `A` to components in `B`.
+    pub turn: Mat3<S>,
+    /// From the origin of `A` to that of `B`, in axes of `B`, m.
+    pub d: Vec3<S>,
 }
 
 /// Rates (or accelerations) and what leads to them.
@@ -192,6 +235,8 @@ pub struct Workspace<S> {
     pub velocity: Solution<S>,
     /// Acceleration level.
     pub acceleration: Solution<S>,
+    /// Loops and couplings.
+    pub constraints: Constraints<S>,
     /// Gravity and wrenches.
     pub loads: Loads<S>,
     /// Body momenta, accumulated momenta or seeds, one for each node.
@@ -246,6 +291,18 @@ impl<S: Scalar> Workspace<S> {
                 gram: vec![o; g * g],
                 cross: vec![o; f * g],
                 shared_cross: vec![o; g * g],
+                whole: vec![o; g],
+                later: later(tree),
+            },
+            constraints: Constraints {
+                relative: vec![Relative { turn: [[o; 3]; 3], d: [o; 3] }; tree.constraints.len()],
+                rows: vec![
+                    RowState { e: Force::zero(), at_a: Force::zero(), at_b: Force::zero(), residual: o };
+                    tree.dims.rows
+                ],
+                rhs: vec![o; tree.dims.rows],
+                multipliers: vec![o; tree.dims.rows],
+                pull: vec![o; tree.dims.nv],
             },
             velocity: solution.clone(),
             acceleration: solution,
@@ -271,4 +328,29 @@ impl<S: Scalar> Workspace<S> {
             position: vec![[o; 3]; n],
         }
     }
+}
+
+/// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it then.
+fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
+    let mut meets = vec![BTreeSet::new(); tree.shared.len()];
+    let mut join = |all: &[usize]| {
+        for &g in all {
+            meets[g].extend(all.iter().copied().filter(|&h| h != g));
+        }
+    };
+    let mut order = Vec::new();
+    for node in tree.nodes.iter().rev() {
+        let open = node.solve_after.iter().chain(&node.open).chain(&node.ends);
+        join(&open.chain(&node.shared).copied().collect::<Vec<_>>());
+        order.extend(node.solve_before.iter().chain(&node.solve_after).copied());
+    }
+    order.extend(&tree.solve_at_ground);
+    for &g in &order {
+        let rest: Vec<usize> = meets[g].iter().copied().collect();
+        for &h in &rest {
+            meets[h].remove(&g);
+            meets[h].extend(rest.iter().copied().filter(|&k| k != h));
+        }
+    }
+    meets.into_iter().map(|set| set.into_iter().collect()).collect()
 }

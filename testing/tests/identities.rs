@@ -255,7 +255,7 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
         let mut w = Workspace::new(&tree);
         let sweeps = Sweeps { tree: &tree, trace: &() };
         sweeps.articulate(&s.q, &s.drive[0], &mut w.poses);
-        sweeps.factor(&w.poses, &w.first, &mut w.factor);
+        sweeps.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
         for (i, node) in tree.nodes.iter().enumerate() {
             if node.shared.is_some() || matches!(node.source, Source::Drive { .. }) {
                 continue;

@@ -37,5 +37,6 @@ pub fn quantity(q: Quantity) -> (&'static str, &'static str) {
         Quantity::Effort => ("effort", "joint force"),
         Quantity::Jacobian => ("jac", "Jacobian"),
         Quantity::Derivative => ("deriv", "derivatives of the rates"),
+        Quantity::Constraint => ("loop", "loops and couplings"),
     }
 }

@@ -95,6 +95,8 @@ impl<'g> Link<'g> {
             solve_at_ground: Vec::new(),
             ground_moment: [zero; 3],
             wrenches: Vec::new(),
+            constraints: Vec::new(),
+            tolerance: Expr::rank_tolerance(),
             frames: Vec::new(),
             joint_nodes: Vec::new(),
             accelerations: None,

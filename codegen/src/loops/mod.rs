@@ -193,5 +193,8 @@ pub fn looped(plan: &Plan, group: Group, options: &Options) -> Option<LoopProgra
         Loops::Always => LEAST_ALWAYS,
     };
     stage::passes(group)?;
+    if !plan.constraints.is_empty() {
+        return None;
+    }
     build::build(plan, group, options, least)
 }

@@ -69,7 +69,7 @@ impl<'g> Stage<'g> {
                 sweeps.articulate_node(i, &given.q, &given.drive[0], &mut w.poses);
             }
         }
-        let load = Load::velocities(&given.second, &u);
+        let load = Load::velocities(&given.second, &u, &[]);
         match (self.group, pass) {
             (Group::Momenta, 1) => sweeps.momentum_begin(w),
             (Group::Momenta | Group::InverseDynamics | Group::Bias, _) | (Group::Accelerations, 0) => {}
@@ -78,11 +78,11 @@ impl<'g> Stage<'g> {
                     *f = *f + *tau;
                 }
                 sweeps.factor_begin(&w.poses, &mut w.factor);
-                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
                 sweeps.remainder_begin(&load, &mut w.acceleration);
             }
             (Group::Accelerations, _) => {
-                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
                 sweeps.motion_ground(&w.factor, &load, &mut w.acceleration);
             }
             (_, 0) => {
@@ -137,7 +137,7 @@ impl<'g> Stage<'g> {
             sweeps.newton_wrench_node(i, w);
             return sweeps.joint_load_node(i, w);
         }
-        let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+        let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
         if pass == 1 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
             sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
@@ -150,7 +150,7 @@ impl<'g> Stage<'g> {
     fn velocity_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
-        let load = Load::velocities(&given.second, &u);
+        let load = Load::velocities(&given.second, &u, &[]);
         if pass == 0 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
             sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
@@ -183,13 +183,13 @@ impl<'g> Stage<'g> {
             (Group::Momenta | Group::InverseDynamics | Group::Bias, _) => {}
             (Group::Accelerations, 1) => {
                 sweeps.factor_ground(&mut w.factor);
-                let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+                let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
                 sweeps.remainder_ground(&w.factor, &load, &mut w.acceleration);
             }
             (Group::Accelerations, _) => {}
             (_, 0) => {
                 sweeps.factor_ground(&mut w.factor);
-                sweeps.remainder_ground(&w.factor, &Load::velocities(&given.second, &u), &mut w.velocity);
+                sweeps.remainder_ground(&w.factor, &Load::velocities(&given.second, &u, &[]), &mut w.velocity);
             }
             _ => {}
         }

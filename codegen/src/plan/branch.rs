@@ -36,6 +36,8 @@ impl Plan {
         }
         plan.dims.wrenches = plan.wrenches.len();
         plan.joint_nodes.clear();
+        plan.constraints.clear();
+        plan.dims.rows = 0;
         (plan, numbers)
     }
 

@@ -9,7 +9,7 @@
 //! its rounding errors are not much larger than those of one joint at a time.
 
 use mbd_runtime::sweep::Quantity;
-use mbd_runtime::tree::Source;
+use mbd_runtime::tree::{Shared, Source};
 
 use super::accuracy::{Judge, LIMIT};
 use super::{NodeKind, Plan, PlanNode, PlanOptions, PoseStep};
@@ -561,7 +561,7 @@ fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
 fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
     let Source::State { v, .. } = plan.nodes[i].source else { return None };
     let g = plan.shared.len();
-    plan.shared.push(v);
+    plan.shared.push(Shared::Velocity(v));
     plan.nodes[i].shared = Some(g);
     plan.nodes[i].deferred = true;
     Some(g)

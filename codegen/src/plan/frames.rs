@@ -7,7 +7,7 @@
 use mbd_runtime::spatial::Vec3;
 use mbd_runtime::tree::Source;
 
-use super::elements::Elements;
+use super::elements::{Carried, Elements};
 use super::instantiate::body_inertia;
 use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
@@ -22,10 +22,12 @@ pub struct Framed {
     pub frames: Vec<PlanFrame>,
     /// Last node of each moving joint.
     pub joint_nodes: Vec<usize>,
+    /// Frames of the loops, two for each.
+    pub mounts: Vec<Option<[PlanFrame; 2]>>,
 }
 
 /// Chooses frames and expresses every body in them.
-pub fn choose(model: &Model, elements: &Elements, slots: &[Slot]) -> Framed {
+pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Option<[Carried; 2]>]) -> Framed {
     let weights = weights(elements);
     let mut nodes: Vec<PlanNode> = Vec::new();
     // Element frame in the node frame.
@@ -53,7 +55,9 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot]) -> Framed {
     add_inertias(model, elements, &inside, &mut nodes);
     let joint_nodes: Vec<usize> = (0..nodes.len()).filter(|&k| elements.list[k].last).collect();
     let frames = named_frames(model, elements, &inside, &joint_nodes);
-    Framed { nodes, frames, joint_nodes }
+    let mounts = mounts.iter().map(|m| m.as_ref().map(|m| m.each_ref().map(|c| carried_frame("", c, &inside))));
+    let mounts = mounts.collect();
+    Framed { nodes, frames, joint_nodes, mounts }
 }
 
 /// Number of elements in every subtree.
@@ -298,16 +302,19 @@ fn all_steps_exact(t: &Rigid) -> Vec<PoseStep> {
     steps
 }
 
+/// A frame on an element in the node's frame.
+fn carried_frame(name: &str, (node, pose): &Carried, inside: &[Rigid]) -> PlanFrame {
+    let mut steps = node.map_or(Vec::new(), |k| all_steps_exact(&inside[k]));
+    steps.extend(pose);
+    if let Some(t) = constant(&steps) {
+        steps = all_steps_exact(&t);
+    }
+    PlanFrame { name: name.to_string(), node: *node, pose: steps }
+}
+
 /// Frames of the joints' children first, then all other bodies, then the model's frames.
 fn named_frames(model: &Model, elements: &Elements, inside: &[Rigid], joint_nodes: &[usize]) -> Vec<PlanFrame> {
-    let frame = |name: &str, (node, pose): &(Option<usize>, Vec<PoseStep>)| {
-        let mut steps = node.map_or(Vec::new(), |k| all_steps_exact(&inside[k]));
-        steps.extend(pose);
-        if let Some(t) = constant(&steps) {
-            steps = all_steps_exact(&t);
-        }
-        PlanFrame { name: name.to_string(), node: *node, pose: steps }
-    };
+    let frame = |name: &str, carried: &Carried| carried_frame(name, carried, inside);
     let children: Vec<usize> = joint_nodes.iter().map(|&k| model.joints[elements.list[k].joint.0].child).collect();
     let others = (0..model.bodies.len()).filter(|b| !children.contains(b));
     let bodies = children.iter().copied().chain(others).map(|b| frame(&model.bodies[b].name, &elements.bodies[b]));

@@ -15,7 +15,7 @@ pub(super) fn value<S: Scalar>(v: Value, params: &[S]) -> S {
     }
 }
 
-fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<Step<S>> {
+pub(super) fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<Step<S>> {
     pose.iter()
         .map(|step| match *step {
             PoseStep::Turn { axis, c, s } => Step::Turn { axis, c: S::constant(c), s: S::constant(s) },
@@ -80,6 +80,8 @@ impl Plan {
             solve_at_ground: self.solve_at_ground.clone(),
             ground_moment: [S::zero(); 3],
             wrenches: wrenches.collect(),
+            constraints: self.constraints.iter().map(|c| c.instantiate(params)).collect(),
+            tolerance: S::rank_tolerance(),
             joint_nodes: self.joint_nodes.clone(),
             matrix_depth: self.matrix_depth,
             accelerations: self.accelerations.as_ref().map(|other| Box::new(other.tree(params))),

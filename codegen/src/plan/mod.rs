@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod branch;
+mod constraints;
 mod elements;
 mod forms;
 mod frames;
@@ -13,11 +14,12 @@ mod rigid;
 mod shared;
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Source, WrenchAxes};
+use mbd_runtime::tree::{Dims, Shared, Source, WrenchAxes};
 
 use crate::model::{Gravity, JointKind, Model, Motion, Param, Value};
 use crate::options::Loops;
 
+pub use constraints::{PlanBond, PlanConstraint};
 pub use forms::{Candidate, Forms};
 pub use rigid::Rigid;
 
@@ -93,6 +95,17 @@ pub enum NodeKind {
     Spherical,
     /// Any motion.
     Floating,
+}
+
+impl NodeKind {
+    /// Number of velocities.
+    pub fn nv(self) -> usize {
+        match self {
+            NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_) => 1,
+            NodeKind::Planar | NodeKind::Spherical => 3,
+            NodeKind::Floating => 6,
+        }
+    }
 }
 
 /// A joint of the tree and the bodies that move with it.
@@ -175,8 +188,8 @@ pub struct Plan {
     pub nodes: Vec<PlanNode>,
     /// Dimensions.
     pub dims: Dims,
-    /// Velocity index of each shared coordinate.
-    pub shared: Vec<usize>,
+    /// Shared coordinates, and rows of constraints.
+    pub shared: Vec<Shared>,
     /// Shared coordinates solved at the ground.
     pub solve_at_ground: Vec<usize>,
     /// Frames of the moving joints' child bodies, in joint order, then those of all other bodies and frames.
@@ -187,6 +200,8 @@ pub struct Plan {
     pub slots: Vec<Slot>,
     /// Frame index and axes of each wrench.
     pub wrenches: Vec<(usize, WrenchAxes)>,
+    /// Loops and couplings.
+    pub constraints: Vec<PlanConstraint>,
     /// Elimination forms that were tried, branch by branch.
     pub candidates: Vec<Candidate>,
     /// What was changed on the way.
@@ -203,7 +218,8 @@ impl Plan {
         let mut notices = Vec::new();
         let elements = elements::elements(model, options, &mut notices);
         let (dims, slots) = slots(model);
-        let framed = frames::choose(model, &elements, &slots);
+        let mounts = constraints::mounts(model, &elements, options.snap);
+        let framed = frames::choose(model, &elements, &slots, &mounts);
         let mut plan = Plan {
             model: model.clone(),
             nodes: framed.nodes,
@@ -214,6 +230,7 @@ impl Plan {
             joint_nodes: framed.joint_nodes,
             slots,
             wrenches: Vec::new(),
+            constraints: Vec::new(),
             candidates: Vec::new(),
             notices,
             matrix_depth: 0,
@@ -232,6 +249,7 @@ impl Plan {
             })
             .collect();
         shared::share(&mut plan);
+        constraints::constrain(&mut plan, framed.mounts);
         forms::lay_out(&mut plan, options);
         if options.forms != Forms::Single {
             forms::choose(&mut plan, options);

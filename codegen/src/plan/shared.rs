@@ -1,6 +1,6 @@
 //! Coordinates shared by several joints: where their columns are open, and where they are solved.
 
-use mbd_runtime::tree::Source;
+use mbd_runtime::tree::{Shared, Source};
 
 use super::Plan;
 use crate::model::Motion;
@@ -19,7 +19,7 @@ pub fn share(plan: &mut Plan) {
             continue;
         }
         let g = plan.shared.len();
-        plan.shared.push(v);
+        plan.shared.push(Shared::Velocity(v));
         for &i in &members {
             plan.nodes[i].shared = Some(g);
         }
@@ -28,7 +28,7 @@ pub fn share(plan: &mut Plan) {
 }
 
 /// Ancestors of node `i`, itself first, then outward to the ground.
-fn ancestors(plan: &Plan, i: usize) -> Vec<usize> {
+pub(super) fn ancestors(plan: &Plan, i: usize) -> Vec<usize> {
     std::iter::successors(Some(i), |&i| plan.nodes[i].parent).collect()
 }
 

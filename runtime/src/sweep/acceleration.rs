@@ -14,9 +14,9 @@ use crate::Scalar;
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Accelerations from velocities: `(q, v, τ) → v̇`.
     pub fn accelerations(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S]) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.factor(&w.poses, &w.first, &mut w.factor);
+        self.prepare(q, u, w);
         self.newton(v, Accelerations::Chosen, u, w);
+        self.row_accelerations(v, u, w);
         self.wrench_loads(u, w);
         self.newton_wrenches(w);
         w.generalized.fill(S::zero());
@@ -27,7 +27,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             *f = *f + *tau;
         }
         w.drive.fill(S::zero());
-        let load = Load::accelerations(&w.generalized, &w.drive, &w.force);
+        let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &w.constraints.rhs);
         self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
         self.collect_rates(&w.acceleration, &w.first, a);
         for i in 0..self.tree.nodes.len() {

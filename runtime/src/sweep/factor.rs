@@ -3,14 +3,15 @@
 
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{Freedom, Source};
-use crate::workspace::{Factor, Pivot, Poses};
+use crate::tree::{Freedom, Shared, Source};
+use crate::workspace::{Factor, Pivot, Poses, RowState};
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `M*`, `U`, `Mj`, `M'` of every node (4.48, 4.44).
-    pub fn factor(&self, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
+    pub fn factor(&self, poses: &Poses<S>, first: &[usize], rows: &[RowState<S>], f: &mut Factor<S>) {
         self.factor_begin(poses, f);
+        self.seed_columns(rows, f);
         for i in (0..self.tree.nodes.len()).rev() {
             self.factor_node(i, poses, first, f);
         }
@@ -22,10 +23,31 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for i in 0..self.tree.nodes.len() {
             f.m[i] = self.inertia(poses, i).articulated();
         }
-        f.columns.fill(Force::zero());
-        f.gram.fill(S::zero());
+        self.clear_open(f);
         for i in 0..self.tree.nodes.len() {
             self.screws_node(i, poses, f);
+        }
+    }
+
+    /// Columns and inertias of what stays open: only where they are read, so that many small loops cost as much as they are.
+    fn clear_open(&self, f: &mut Factor<S>) {
+        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        f.whole.fill(S::zero());
+        for (i, node) in self.tree.nodes.iter().enumerate() {
+            for g in Self::open_before(node, 0).chain(node.shared) {
+                f.columns[g * n + i] = Force::zero();
+            }
+        }
+        for (g, shared) in self.tree.shared.iter().enumerate() {
+            f.gram[g * ng + g] = S::zero();
+            let clear = |h: usize, gram: &mut [S]| {
+                gram[g * ng + h] = S::zero();
+                gram[h * ng + g] = S::zero();
+            };
+            match shared {
+                Shared::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
+                Shared::Row(_) => f.later[g].iter().for_each(|&h| clear(h, &mut f.gram)),
+            }
         }
     }
 
@@ -102,7 +124,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let armature = node.passive[k].armature;
         let u = column(&e, m); // U = M* E
         for h in Self::open_after(node, 0) {
-            f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]);
+            f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
         }
         if let Some(g) = node.shared {
             let a = node.ratio;
@@ -126,6 +148,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for h in Self::open_after(node, 0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
+            f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             for h2 in Self::open_after(node, 0) {
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
             }
@@ -133,8 +156,26 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         f.pivots[freedom] = pivot;
     }
 
-    /// Eliminates shared coordinate `g` at node `i` (`None`: the ground), `open` being those that stay open.
+    /// Eliminates shared coordinate or row `g` at node `i` (`None`: the ground), `open` being those that stay open.
     fn solve_shared(
+        &self,
+        g: usize,
+        i: Option<usize>,
+        open: impl Iterator<Item = usize> + Clone,
+        m: &mut ArticulatedInertia<S>,
+        f: &mut Factor<S>,
+    ) {
+        match self.tree.shared[g] {
+            Shared::Velocity(_) => self.solve_open(g, i, open, m, f),
+            Shared::Row(_) => {
+                let later = core::mem::take(&mut f.later[g]);
+                self.solve_open(g, i, later.iter().copied(), m, f);
+                f.later[g] = later;
+            }
+        }
+    }
+
+    fn solve_open(
         &self,
         g: usize,
         i: Option<usize>,
@@ -144,7 +185,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
         let u = i.map_or(Force::zero(), |i| f.columns[g * n + i]);
-        let rho = S::one() / f.gram[g * ng + g];
+        let rho = match self.tree.shared[g] {
+            Shared::Velocity(_) => S::one() / f.gram[g * ng + g],
+            Shared::Row(r) => self.row_pivot(g, r, f),
+        };
         let k = u.times(rho);
         for a in 0..6 {
             for b in a..6 {
@@ -156,6 +200,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         for h in open.clone() {
             let c = f.shared_cross[g * ng + h];
+            if let Shared::Velocity(_) = self.tree.shared[g] {
+                f.whole[h] = f.whole[h] + c * (rho * c);
+            }
             if let Some(i) = i {
                 f.columns[h * n + i] = f.columns[h * n + i].minus(&k.times(c));
             }

@@ -11,6 +11,8 @@
 
 mod acceleration;
 mod articulate;
+mod closure;
+mod constraint;
 mod derivatives;
 mod factor;
 mod inverse;
@@ -70,6 +72,8 @@ pub enum Quantity {
     Jacobian,
     /// Derivatives of the rates.
     Derivative,
+    /// Loops and couplings.
+    Constraint,
 }
 
 /// Is told where the sweep stands. `()` listens to nothing.
@@ -197,8 +201,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Velocities from momenta.
     pub fn velocities(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.factor(&w.poses, &w.first, &mut w.factor);
+        self.prepare(q, u, w);
         self.solve_velocities(p, u, w);
         self.collect_rates(&w.velocity, &w.first, v);
     }
@@ -217,6 +220,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.velocities(q, p, u, w, v);
         self.coordinate_rates(q, v, qd);
         self.loads(u, w);
+        self.constraint_pull(w);
         self.gather_momenta(p, w);
         self.momentum_rates(u, w, pd);
     }

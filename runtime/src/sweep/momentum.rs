@@ -1,7 +1,7 @@
 //! Momenta from velocities, and kinetic energy.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::tree::Source;
+use crate::tree::{Shared, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -51,8 +51,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Kinetic energy from twice the sum of all nodes: shared coordinates, and the half.
     pub fn kinetic_end(&self, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
-        for (g, &v) in self.tree.shared.iter().enumerate() {
-            twice = twice + p[v] * w.velocity.shared_rate[g];
+        for (g, shared) in self.tree.shared.iter().enumerate() {
+            twice = match *shared {
+                Shared::Velocity(v) => twice + p[v] * w.velocity.shared_rate[g],
+                // Of p⁺ᵀv the part σᵀb is no energy.
+                Shared::Row(r) => twice - w.constraints.rhs[r] * w.velocity.shared_rate[g],
+            };
         }
         S::constant(0.5) * twice
     }

@@ -17,6 +17,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (pd, tau) in pd.iter_mut().zip(u.tau) {
             *pd = *pd + *tau;
         }
+        for (pd, pull) in pd.iter_mut().zip(&w.constraints.pull) {
+            *pd = *pd + *pull;
+        }
     }
 
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
@@ -26,6 +29,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
+        self.add_seeds(w);
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Momentum);

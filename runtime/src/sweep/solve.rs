@@ -6,7 +6,7 @@
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{Freedom, Source};
+use crate::tree::{Freedom, Shared, Source};
 use crate::workspace::{Factor, Poses, Solution, Workspace};
 use crate::Scalar;
 
@@ -19,19 +19,21 @@ pub struct Load<'a, S> {
     pub drive: &'a [S],
     /// `D` of every body by itself.
     pub seeds: Option<&'a [Force<S>]>,
+    /// For each row of the constraints: what their motion is to be.
+    pub rows: &'a [S],
     /// What the motion is, for the listener.
     pub what: Quantity,
 }
 
 impl<'a, S: Scalar> Load<'a, S> {
-    /// Velocity level: momenta `p` and prescribed rates.
-    pub fn velocities(p: &'a [S], u: &Inputs<'a, S>) -> Self {
-        Load { p, drive: u.drive_v, seeds: None, what: Quantity::Velocity }
+    /// Velocity level: momenta `p`, prescribed rates, and `b` of the constraints.
+    pub fn velocities(p: &'a [S], u: &Inputs<'a, S>, rows: &'a [S]) -> Self {
+        Load { p, drive: u.drive_v, seeds: None, rows, what: Quantity::Velocity }
     }
 
-    /// Acceleration level: joint forces `p`, prescribed accelerations and `D` of every body.
-    pub fn accelerations(p: &'a [S], drive: &'a [S], seeds: &'a [Force<S>]) -> Self {
-        Load { p, drive, seeds: Some(seeds), what: Quantity::Acceleration }
+    /// Acceleration level: joint forces `p`, prescribed accelerations, `D` of every body, and what the constraints lack.
+    pub fn accelerations(p: &'a [S], drive: &'a [S], seeds: &'a [Force<S>], rows: &'a [S]) -> Self {
+        Load { p, drive, seeds: Some(seeds), rows, what: Quantity::Acceleration }
     }
 }
 
@@ -153,9 +155,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         open: impl Iterator<Item = usize>,
     ) -> S {
         let ng = self.tree.shared.len();
-        let e = (load.p[self.tree.shared[g]] - sol.shared_rate[g]) * f.shared[g].rho;
-        for h in open {
-            sol.shared_rate[h] = sol.shared_rate[h] + f.shared_cross[g * ng + h] * e;
+        let given = match self.tree.shared[g] {
+            Shared::Velocity(v) => load.p[v],
+            Shared::Row(r) => load.rows[r],
+        };
+        let e = (given - sol.shared_rate[g]) * f.shared[g].rho;
+        let mut add = |h: usize| sol.shared_rate[h] = sol.shared_rate[h] + f.shared_cross[g * ng + h] * e;
+        match self.tree.shared[g] {
+            Shared::Velocity(_) => open.for_each(add),
+            Shared::Row(_) => f.later[g].iter().for_each(|&h| add(h)),
         }
         sol.shared_e[g] = e;
         e
@@ -234,13 +242,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ng = self.tree.shared.len();
         let pivot = &f.shared[g];
         let rate = sol.shared_e[g] - pivot.k.dot(omega);
-        sol.shared_rate[g] =
-            open.fold(rate, |rate, h| rate - pivot.rho * f.shared_cross[g * ng + h] * sol.shared_rate[h]);
+        let less = |rate: S, h: usize| rate - pivot.rho * f.shared_cross[g * ng + h] * sol.shared_rate[h];
+        sol.shared_rate[g] = match self.tree.shared[g] {
+            Shared::Velocity(_) => open.fold(rate, less),
+            Shared::Row(_) => f.later[g].iter().copied().fold(rate, less),
+        };
     }
 
     /// Velocity level: `p → Ω, v`.
     pub(super) fn solve_velocities(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        self.solve(&w.poses, &w.first, &w.factor, &Load::velocities(p, u), &mut w.velocity);
+        let load = Load::velocities(p, u, &w.constraints.rhs);
+        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
     }
 
     /// Wrench (or momentum) that node `i` receives from its parent, in the node frame: `M'Ω̂ + D'` (4.43).
@@ -278,8 +290,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 v[at..at + nv].copy_from_slice(&sol.rate[first[i]..first[i] + nv]);
             }
         }
-        for (g, &at) in self.tree.shared.iter().enumerate() {
-            v[at] = sol.shared_rate[g];
+        for (g, shared) in self.tree.shared.iter().enumerate() {
+            if let Shared::Velocity(at) = *shared {
+                v[at] = sol.shared_rate[g];
+            }
         }
     }
 }

@@ -1,0 +1,260 @@
+//! Loops and couplings of the model on the nodes of the plan.
+
+use std::collections::BTreeSet;
+
+use mbd_runtime::spatial::Axis;
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Shared, Source, TreeFrame};
+use mbd_runtime::Scalar;
+
+use super::elements::{Carried, Elements};
+use super::instantiate::{steps, value};
+use super::placement::{direction, placement};
+use super::shared::ancestors;
+use super::{Plan, PlanFrame, PoseStep, Rigid};
+use crate::model::{ConstraintKind, LoopKind, Model, Mount, Value};
+
+/// What a constraint binds, on nodes.
+#[derive(Clone, Debug)]
+pub enum PlanBond {
+    /// Two frames.
+    Cut {
+        /// What it binds.
+        kind: LoopKind,
+        /// First and second frame, axes along z, or along x and y for a universal joint. The ground, if it is one of them
+        /// and the kind looks the same from both sides, is the second: rows stand in its axes, which do not move.
+        frames: Box<[PlanFrame; 2]>,
+        /// Nodes from the innermost common one, which is left out, to those of the frames.
+        paths: [Vec<usize>; 2],
+    },
+    /// Freedoms of nodes, with ratios.
+    Coupling {
+        /// Node and ratio.
+        terms: Vec<(usize, Value)>,
+        /// Offset.
+        offset: Value,
+    },
+}
+
+/// A constraint.
+#[derive(Clone, Debug)]
+pub struct PlanConstraint {
+    /// Name.
+    pub name: String,
+    /// What it binds.
+    pub bond: PlanBond,
+    /// Its place among [`Plan::shared`], one for each row.
+    pub slots: Vec<usize>,
+    /// Its first row.
+    pub first: usize,
+    /// Velocities that it binds, in ascending order.
+    pub velocities: Vec<usize>,
+    /// See [`mbd_runtime::tree::Constraint`].
+    pub decay: Value,
+}
+
+/// Frames of loops: carrier and pose with the axes where the rows want them.
+pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carried; 2]>> {
+    let carried = |mount: &Mount, turn: Option<PoseStep>| {
+        let (carrier, mut pose) = mount.body.map_or((None, Vec::new()), |b| elements.bodies[b].clone());
+        pose.extend(placement(&mount.placement, snap, &mut |_| {}));
+        pose.extend(turn);
+        (carrier, pose)
+    };
+    let each = model.constraints.iter().map(|c| match &c.kind {
+        ConstraintKind::Loop { kind, first, second } => {
+            let [a, b] = turns(kind, snap);
+            Some([carried(first, a), carried(second, b)])
+        }
+        ConstraintKind::Coupling { .. } => None,
+    });
+    each.collect()
+}
+
+/// Turns of the two frames that put their axes where the rows want them.
+fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
+    let to = |axis: [f64; 3]| Rigid::align_z(direction(axis, snap, &mut |_| {}));
+    let z = |axis: [f64; 3]| {
+        let turn = to(axis);
+        (turn.rot != Rigid::IDENTITY.rot).then_some(PoseStep::Rotate(turn.rot))
+    };
+    let quarter = |axis, s| PoseStep::Turn { axis, c: 0.0, s };
+    let after = |axis: [f64; 3], step: PoseStep| {
+        super::placement::constant(&[PoseStep::Rotate(to(axis).rot), step]).map(|pose| PoseStep::Rotate(pose.rot))
+    };
+    match *kind {
+        LoopKind::Pin { axis }
+        | LoopKind::Slider { axis }
+        | LoopKind::Cylindrical { axis }
+        | LoopKind::Helical { axis, .. }
+        | LoopKind::Planar { normal: axis } => [z(axis), z(axis)],
+        LoopKind::Universal { axes: [x, y] } => [after(x, quarter(Axis::Y, -1.0)), after(y, quarter(Axis::X, 1.0))],
+        LoopKind::PointOnLine { axis }
+        | LoopKind::PointOnPlane { normal: axis }
+        | LoopKind::PointOnCylinder { axis, .. }
+        | LoopKind::RollingBall { normal: axis, .. } => [z(axis), None],
+        LoopKind::RollingDisc { normal, axis, .. } => [z(normal), z(axis)],
+        LoopKind::KnifeEdge { axis } => [None, z(axis)],
+        LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => [None, None],
+    }
+}
+
+/// Whether the rows of a kind look the same from both frames.
+fn symmetric(kind: &LoopKind) -> bool {
+    matches!(
+        kind,
+        LoopKind::Pin { .. }
+            | LoopKind::Slider { .. }
+            | LoopKind::Cylindrical { .. }
+            | LoopKind::Helical { .. }
+            | LoopKind::Planar { .. }
+            | LoopKind::Spherical
+            | LoopKind::Fixed
+            | LoopKind::Distance { .. }
+    )
+}
+
+/// Puts the model's constraints on the nodes, after [`super::shared::share`]. `frames` are those of [`mounts`].
+pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
+    let constraints = plan.model.constraints.clone();
+    for (constraint, frames) in constraints.into_iter().zip(frames) {
+        let (bond, members) = match (constraint.kind, frames) {
+            (ConstraintKind::Loop { kind, .. }, Some(mut frames)) => {
+                if frames[0].node.is_none() && symmetric(&kind) || frames[1].node.is_none() {
+                    frames.sort_by_key(|f| f.node.is_none());
+                }
+                let ways = frames.each_ref().map(|f| f.node.map_or(Vec::new(), |i| ancestors(plan, i)));
+                let [a, b] = &ways;
+                let inward = |own: &[usize], other: &[usize]| {
+                    own.iter().copied().take_while(|i| !other.contains(i)).collect::<Vec<_>>()
+                };
+                let paths = [inward(a, b), inward(b, a)].map(|mut path| {
+                    path.reverse();
+                    path
+                });
+                let members: Vec<Option<usize>> = frames.iter().map(|f| f.node).collect();
+                (PlanBond::Cut { kind, frames: Box::new(frames), paths }, members)
+            }
+            (ConstraintKind::Coupling { terms, offset }, _) => {
+                let node = |joint: usize| plan.nodes.iter().position(|n| n.joint.0 == joint);
+                let terms: Vec<(usize, Value)> =
+                    terms.into_iter().filter_map(|(joint, ratio)| Some((node(joint)?, ratio))).collect();
+                let members = terms.iter().map(|(i, _)| Some(*i)).collect();
+                (PlanBond::Coupling { terms, offset }, members)
+            }
+            (ConstraintKind::Loop { .. }, None) => continue,
+        };
+        let count = match &bond {
+            PlanBond::Cut { kind, .. } => closure::<f64>(kind, &[]).rows(),
+            PlanBond::Coupling { .. } => 1,
+        };
+        let first = plan.dims.rows;
+        plan.dims.rows += count;
+        let slots: Vec<usize> = (0..count).map(|k| plan.shared.len() + k).collect();
+        plan.shared.extend((first..first + count).map(Shared::Row));
+        open(plan, &slots, &bond, &members);
+        let velocities = velocities(plan, &cycle(&bond));
+        let decay = constraint.decay;
+        plan.constraints.push(PlanConstraint { name: constraint.name, bond, slots, first, velocities, decay });
+    }
+}
+
+/// Nodes whose freedoms a constraint binds.
+fn cycle(bond: &PlanBond) -> Vec<usize> {
+    match bond {
+        PlanBond::Cut { paths, .. } => paths.concat(),
+        PlanBond::Coupling { terms, .. } => terms.iter().map(|(i, _)| *i).collect(),
+    }
+}
+
+/// Velocities of nodes, in ascending order.
+fn velocities(plan: &Plan, nodes: &[usize]) -> Vec<usize> {
+    let each = nodes.iter().map(|&i| &plan.nodes[i]).filter_map(|node| match node.source {
+        Source::State { v, .. } => Some(v..v + node.kind.nv()),
+        Source::Drive { .. } => None,
+    });
+    let all: BTreeSet<usize> = each.flatten().collect();
+    all.into_iter().collect()
+}
+
+/// Marks the nodes where the columns of the rows `slots` are open, and where they are solved: where all paths have met, and all
+/// coordinates shared by several joints of the cycle have been solved.
+fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usize>]) {
+    let ways: Vec<Vec<usize>> = members.iter().map(|i| i.map_or(Vec::new(), |i| ancestors(plan, i))).collect();
+    let cycle = cycle(bond);
+    let shared: Vec<usize> = cycle.iter().filter_map(|&i| plan.nodes[i].shared).collect();
+    let solved = |i: usize| {
+        let node = &plan.nodes[i];
+        shared.iter().filter(|g| node.solve_before.contains(g) || node.solve_after.contains(g)).count()
+    };
+    let at_ground = shared.iter().any(|g| plan.solve_at_ground.contains(g));
+    let longest = ways.iter().max_by_key(|way| way.len()).cloned().unwrap_or_default();
+    // A member that is its own base, as that of a coupling, is eliminated before the row.
+    let base = longest.iter().copied().find(|i| {
+        let met = ways.iter().all(|way| way.contains(i));
+        let inboard = |k: usize| ancestors(plan, *i).iter().skip(1).any(|&a| a == k);
+        met && !at_ground && !(0..plan.nodes.len()).any(|k| inboard(k) && solved(k) > 0)
+    });
+    let opened: Vec<usize> = ways.iter().flatten().copied().collect();
+    let outboard = |i: usize| base.is_none_or(|b| i != b && ancestors(plan, i).contains(&b));
+    let opened: Vec<usize> = opened.into_iter().filter(|&i| outboard(i)).collect();
+    for i in opened {
+        for g in slots {
+            if !plan.nodes[i].open.contains(g) {
+                plan.nodes[i].open.push(*g);
+            }
+        }
+    }
+    let Some(base) = base else {
+        plan.solve_at_ground.extend(slots);
+        return;
+    };
+    let after = cycle.contains(&base) || plan.nodes[base].solve_after.iter().any(|g| shared.contains(g));
+    let node = &mut plan.nodes[base];
+    if after { &mut node.solve_after } else { &mut node.solve_before }.extend(slots);
+}
+
+/// A kind of loop as the sweeps know it.
+fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
+    let of = |v: Value| match v {
+        Value::Const(x) => S::constant(x),
+        // The number of rows is asked for without parameters.
+        Value::Param(k) => params.get(k).copied().unwrap_or(S::one()),
+    };
+    match *kind {
+        LoopKind::Pin { .. } => Closure::Pin,
+        LoopKind::Slider { .. } => Closure::Slider,
+        LoopKind::Cylindrical { .. } => Closure::Cylindrical,
+        LoopKind::Helical { pitch, .. } => Closure::Helical { pitch: of(pitch) },
+        LoopKind::Universal { .. } => Closure::Universal,
+        LoopKind::Planar { .. } => Closure::Planar,
+        LoopKind::Spherical => Closure::Spherical,
+        LoopKind::Fixed => Closure::Fixed,
+        LoopKind::Distance { length } => Closure::Distance { length: of(length) },
+        LoopKind::PointOnLine { .. } => Closure::PointOnLine,
+        LoopKind::PointOnPlane { .. } => Closure::PointOnPlane,
+        LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius: of(radius) },
+        LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius: of(radius) },
+        LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius: of(radius) },
+        LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
+        LoopKind::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
+    }
+}
+
+impl PlanConstraint {
+    /// The constraint over any scalar.
+    pub(super) fn instantiate<S: Scalar>(&self, params: &[S]) -> Constraint<S> {
+        let bond = match &self.bond {
+            PlanBond::Cut { kind, frames, paths: [path_a, path_b] } => {
+                let [a, b] = frames.each_ref().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) });
+                let closure = closure(kind, params);
+                Bond::Cut(Cut { closure, a, b, path_a: path_a.clone(), path_b: path_b.clone() })
+            }
+            PlanBond::Coupling { terms, offset } => Bond::Coupling {
+                terms: terms.iter().map(|(i, ratio)| (*i, value(*ratio, params))).collect(),
+                offset: value(*offset, params),
+            },
+        };
+        let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
+        Constraint { bond, slots: self.slots.clone(), first: self.first, velocities: self.velocities.clone(), decay }
+    }
+}

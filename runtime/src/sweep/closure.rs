@@ -1,0 +1,230 @@
+//! Rows of the constraints between two frames: directions, residuals, and how both change with time.
+//!
+//! The frames are `A` and `B`; components are those of `B`, moments are about its origin. `turn` takes components in `A` to
+//! components in `B`, `d` goes from the origin of `A` to that of `B`. A row is a wrench `E` on `B` with
+//! `Eᵀ Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
+
+use crate::spatial::{add3, cross, dot3, scale3, Force, Motion, Vec3};
+use crate::tree::Closure;
+use crate::workspace::Relative;
+use crate::{Dual, Scalar};
+
+/// A unit force (components 0–2) or moment (3–5).
+fn unit<S: Scalar>(k: usize) -> Force<S> {
+    let mut f = Force::zero();
+    *f.get_mut(k) = S::one();
+    f
+}
+
+/// A force along `n` at the point `r`.
+fn at_point<S: Scalar>(n: Vec3<S>, r: Vec3<S>) -> Force<S> {
+    Force { lin: n, ang: cross(r, n) }
+}
+
+impl<S: Scalar> Relative<S> {
+    /// Axis `k` of `A`.
+    fn axis(&self, k: usize) -> Vec3<S> {
+        [self.turn[0][k], self.turn[1][k], self.turn[2][k]]
+    }
+
+    /// Motion of `A` at the origin of `B`, in its components.
+    pub(super) fn motion(&self, a: &Motion<S>) -> Motion<S> {
+        let ang = self.turned(a.ang);
+        Motion { lin: add3(self.turned(a.lin), cross(ang, self.d)), ang }
+    }
+
+    /// A vector with components in `A`.
+    pub(super) fn turned(&self, x: Vec3<S>) -> Vec3<S> {
+        core::array::from_fn(|i| dot3(self.turn[i], x))
+    }
+
+    /// A wrench on `B` as one at `A`, in its components.
+    pub(super) fn force(&self, f: &Force<S>) -> Force<S> {
+        let back = |x: Vec3<S>| core::array::from_fn(|k| dot3(self.axis(k), x));
+        Force { lin: back(f.lin), ang: back(add3(f.ang, cross(self.d, f.lin))) }
+    }
+
+    /// With its derivative where `B` moves by `rel` against `A`, both in components of `B`.
+    pub(super) fn moving(&self, rel: &Motion<S>) -> Relative<Dual<S>> {
+        let mut out =
+            Relative { turn: self.turn.map(|row| row.map(|x| Dual::new(x, S::zero()))), d: [Dual::zero(); 3] };
+        for k in 0..3 {
+            let rate = cross(self.axis(k), rel.ang);
+            (0..3).for_each(|i| out.turn[i][k].du = rate[i]);
+        }
+        let rate = add3(rel.lin, cross(self.d, rel.ang));
+        out.d = core::array::from_fn(|i| Dual::new(self.d[i], rate[i]));
+        out
+    }
+}
+
+impl<S: Scalar> Closure<S> {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        match self {
+            Closure::Fixed => 6,
+            Closure::Pin | Closure::Slider | Closure::Helical { .. } => 5,
+            Closure::Cylindrical | Closure::Universal => 4,
+            Closure::Planar | Closure::Spherical | Closure::RollingDisc { .. } | Closure::RollingBall { .. } => 3,
+            Closure::PointOnLine => 2,
+            Closure::Distance { .. }
+            | Closure::PointOnPlane
+            | Closure::PointOnCylinder { .. }
+            | Closure::KnifeEdge
+            | Closure::Pfaffian { .. } => 1,
+        }
+    }
+
+    /// Whether row `k` is the derivative of a condition on positions.
+    pub fn holonomic(&self, k: usize) -> bool {
+        match self {
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => k == 0,
+            Closure::KnifeEdge | Closure::Pfaffian { .. } => false,
+            _ => true,
+        }
+    }
+
+    /// Whether the rows are constants.
+    fn constant(&self) -> bool {
+        !matches!(
+            self,
+            Closure::Universal
+                | Closure::Distance { .. }
+                | Closure::PointOnLine
+                | Closure::PointOnPlane
+                | Closure::PointOnCylinder { .. }
+                | Closure::RollingDisc { .. }
+                | Closure::RollingBall { .. }
+        )
+    }
+
+    /// Rows that are constants, by components.
+    fn components(&self) -> &'static [usize] {
+        match self {
+            Closure::Pin => &[0, 1, 2, 3, 4],
+            Closure::Slider => &[0, 1, 3, 4, 5],
+            Closure::Cylindrical | Closure::Helical { .. } => &[0, 1, 3, 4],
+            Closure::Planar => &[2, 3, 4],
+            Closure::Spherical | Closure::Universal => &[0, 1, 2],
+            Closure::Fixed => &[0, 1, 2, 3, 4, 5],
+            _ => &[],
+        }
+    }
+
+    /// The same over numbers with derivatives.
+    fn dual(&self) -> Closure<Dual<S>> {
+        let of = |x: &S| Dual::new(*x, S::zero());
+        match self {
+            Closure::Pin => Closure::Pin,
+            Closure::Slider => Closure::Slider,
+            Closure::Cylindrical => Closure::Cylindrical,
+            Closure::Helical { pitch } => Closure::Helical { pitch: of(pitch) },
+            Closure::Universal => Closure::Universal,
+            Closure::Planar => Closure::Planar,
+            Closure::Spherical => Closure::Spherical,
+            Closure::Fixed => Closure::Fixed,
+            Closure::Distance { length } => Closure::Distance { length: of(length) },
+            Closure::PointOnLine => Closure::PointOnLine,
+            Closure::PointOnPlane => Closure::PointOnPlane,
+            Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(radius) },
+            Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
+            Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
+            Closure::KnifeEdge => Closure::KnifeEdge,
+            Closure::Pfaffian { row } => Closure::Pfaffian { row: row.each_ref().map(of) },
+        }
+    }
+
+    /// `E_c`, one for each row.
+    pub(super) fn directions(&self, at: &Relative<S>) -> [Force<S>; 6] {
+        let mut rows = [Force::zero(); 6];
+        for (row, &k) in rows.iter_mut().zip(self.components()) {
+            *row = unit(k);
+        }
+        let force = |n: Vec3<S>| Force { lin: n, ang: [S::zero(); 3] };
+        match self {
+            Closure::Helical { pitch } => {
+                rows[4] = unit(2);
+                rows[4].ang[2] = -*pitch;
+            }
+            Closure::Universal => {
+                let x = at.axis(0);
+                rows[3].ang = [x[2], S::zero(), -x[0]];
+            }
+            Closure::Distance { length } => rows[0] = force(scale3(S::one() / *length, at.d)),
+            Closure::PointOnLine => (rows[0], rows[1]) = (force(at.axis(0)), force(at.axis(1))),
+            Closure::PointOnPlane => rows[0] = force(at.axis(2)),
+            Closure::PointOnCylinder { radius } => {
+                rows[0] = force(scale3(S::one() / *radius, self.across(at)));
+            }
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => {
+                let contact = self.contact(at);
+                for (row, k) in rows.iter_mut().zip([2, 0, 1]) {
+                    *row = at_point(at.axis(k), contact);
+                }
+            }
+            Closure::KnifeEdge => rows[0] = unit(2),
+            Closure::Pfaffian { row: [fx, fy, fz, mx, my, mz] } => {
+                rows[0] = Force { lin: [*fx, *fy, *fz], ang: [*mx, *my, *mz] };
+            }
+            _ => {}
+        }
+        rows
+    }
+
+    /// `d` without its part along z of `A`.
+    fn across(&self, at: &Relative<S>) -> Vec3<S> {
+        let z = at.axis(2);
+        add3(at.d, scale3(-dot3(z, at.d), z))
+    }
+
+    /// Where what rolls touches the plane, from the origin of `B`.
+    fn contact(&self, at: &Relative<S>) -> Vec3<S> {
+        let n = at.axis(2);
+        match self {
+            Closure::RollingBall { radius } => scale3(-*radius, n),
+            Closure::RollingDisc { radius } => {
+                let s = (n[0] * n[0] + n[1] * n[1]).sqrt();
+                let down = -(*radius / s);
+                [down * n[0], down * n[1], S::zero()]
+            }
+            _ => [S::zero(); 3],
+        }
+    }
+
+    /// Residuals of the positions; their rates are `EᵀΩ_rel`, at least where they are zero.
+    pub(super) fn residuals(&self, at: &Relative<S>) -> [S; 6] {
+        let half = S::constant(0.5);
+        let [x, z, d] = [at.axis(0), at.axis(2), at.d];
+        let small = [d[0], d[1], d[2], z[1], -z[0], -x[1]];
+        let mut out = [S::zero(); 6];
+        for (out, &k) in out.iter_mut().zip(self.components()) {
+            *out = small[k];
+        }
+        match self {
+            Closure::Helical { pitch } => {
+                let (s, c) = (d[2] / *pitch).sin_cos();
+                out[4] = *pitch * (s * x[0] + c * x[1]);
+            }
+            Closure::Universal => out[3] = x[1],
+            Closure::Distance { length } => out[0] = half * (dot3(d, d) / *length - *length),
+            Closure::PointOnLine => (out[0], out[1]) = (dot3(x, d), dot3(at.axis(1), d)),
+            Closure::PointOnPlane => out[0] = dot3(z, d),
+            Closure::PointOnCylinder { radius } => {
+                let across = self.across(at);
+                out[0] = half * (dot3(across, across) / *radius - *radius);
+            }
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => out[0] = dot3(z, add3(d, self.contact(at))),
+            _ => {}
+        }
+        out
+    }
+
+    /// Rates of the components of `E_c` where `B` moves by `rel` against `A`; zero where they are constants.
+    pub(super) fn direction_rates(&self, at: &Relative<S>, rel: &Motion<S>) -> [Force<S>; 6] {
+        if self.constant() {
+            return [Force::zero(); 6];
+        }
+        let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
+        self.dual().directions(&at.moving(rel)).map(rate)
+    }
+}

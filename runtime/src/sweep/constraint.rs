@@ -1,0 +1,429 @@
+//! Loops, couplings, rolling: multipliers `σ` of the constraints as further unknowns of the sweeps.
+//!
+//! Momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). A multiplier's column `D^σ` starts as the wrench of its row at the
+//! two bodies that it binds, stays open through the backward sweep like that of a shared coordinate, and is eliminated where
+//! its bodies' paths have met: `M v + Φᵀσ = p⁺`, `Φ v = b` is one symmetric system, and this is its elimination in the order of
+//! the tree. Where the paths have met the columns are no longer zero, although the wrenches cancel there: so they cannot
+//! stop there before they are eliminated.
+
+use super::newton::ClassicMotion;
+use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::spatial::{add3, cross, Force, Mat3, Motion, Vec3};
+use crate::system::Row;
+use crate::tree::{Bond, Constraint, Cut, Shared, Source, Tree, TreeFrame};
+use crate::workspace::{Factor, Poses, Relative, Workspace};
+use crate::Scalar;
+use alloc::vec::Vec;
+
+impl<S: Scalar> Constraint<S> {
+    /// Whether row `k` is the derivative of a condition on positions.
+    fn holonomic(&self, k: usize) -> bool {
+        match &self.bond {
+            Bond::Cut(cut) => cut.closure.holonomic(k),
+            Bond::Coupling { .. } => true,
+        }
+    }
+
+    /// Its rows.
+    fn range(&self) -> core::ops::Range<usize> {
+        self.first..self.first + self.slots.len()
+    }
+}
+
+impl<S: Scalar> Tree<S> {
+    /// The constraint that a row belongs to.
+    fn constraint_of(&self, row: usize) -> &Constraint<S> {
+        let at = self.constraints.partition_point(|c| c.first + c.slots.len() <= row);
+        &self.constraints[at]
+    }
+
+    /// Rows of the constraints, and where their entries of `Φ` stand.
+    pub fn rows(&self) -> Vec<Row> {
+        let mut rows = Vec::new();
+        let mut first = 0;
+        for (index, constraint) in self.constraints.iter().enumerate() {
+            let len = constraint.velocities.len();
+            for k in 0..constraint.slots.len() {
+                rows.push(Row { constraint: index, holonomic: constraint.holonomic(k), first, len });
+                first += len;
+            }
+        }
+        rows
+    }
+
+    /// Velocity index of every entry of `Φ`.
+    pub fn entry_columns(&self) -> Vec<usize> {
+        let rows = self.constraints.iter().flat_map(|c| c.slots.iter().map(move |_| c));
+        rows.flat_map(|c| c.velocities.iter().copied()).collect()
+    }
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Poses, rows of the constraints, articulated inertia.
+    pub(crate) fn prepare(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+        self.place_rows(q, u, w);
+        self.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
+    }
+
+    /// Poses and rows of the constraints; `b` of each from its decay.
+    fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+        self.articulate(q, u.drive_q, &mut w.poses);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            self.trace.at(None, Quantity::Constraint);
+            match &constraint.bond {
+                Bond::Cut(cut) => self.cut_rows(index, constraint, cut, w),
+                Bond::Coupling { terms, offset } => {
+                    let sum = terms.iter().map(|(i, ratio)| *ratio * w.poses.coordinate(*i, 0));
+                    w.constraints.rows[constraint.first].residual = sum.fold(-*offset, |sum, x| sum + x);
+                }
+            }
+            for r in constraint.range() {
+                let decay = constraint.decay.filter(|_| constraint.holonomic(r - constraint.first));
+                w.constraints.rhs[r] = decay.map_or(S::zero(), |rate| -(rate * w.constraints.rows[r].residual));
+            }
+        }
+    }
+
+    /// Rows of a cut, in its second frame and at the nodes.
+    fn cut_rows(&self, index: usize, constraint: &Constraint<S>, cut: &Cut<S>, w: &mut Workspace<S>) {
+        let at = self.relative(cut, &w.poses);
+        let (directions, residuals) = (cut.closure.directions(&at), cut.closure.residuals(&at));
+        w.constraints.relative[index] = at;
+        for (k, r) in constraint.range().enumerate() {
+            let row = &mut w.constraints.rows[r];
+            (row.e, row.residual) = (directions[k], residuals[k]);
+            (row.at_a, row.at_b) = self.at_nodes(cut, &at, &directions[k], &w.poses);
+        }
+    }
+
+    /// Pose of the first frame in the second, by way of the innermost common node.
+    fn relative(&self, cut: &Cut<S>, poses: &Poses<S>) -> Relative<S> {
+        let pose = |path: &[usize], frame: &TreeFrame<S>| {
+            let (o, one) = (S::zero(), S::one());
+            let (mut rot, mut pos): (Mat3<S>, Vec3<S>) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
+            path.iter().flat_map(|&i| self.steps(poses, i)).for_each(|step| step.pose(&mut rot, &mut pos));
+            self.on_body(poses, frame).for_each(|step| step.pose(&mut rot, &mut pos));
+            (rot, pos)
+        };
+        let ((ra, pa), (rb, pb)) = (pose(&cut.path_a, &cut.a), pose(&cut.path_b, &cut.b));
+        let way: Vec3<S> = core::array::from_fn(|k| pb[k] - pa[k]);
+        let along = |k: usize, x: Vec3<S>| rb[0][k] * x[0] + rb[1][k] * x[1] + rb[2][k] * x[2];
+        let turn = core::array::from_fn(|i| core::array::from_fn(|k| along(i, [ra[0][k], ra[1][k], ra[2][k]])));
+        Relative { turn, d: core::array::from_fn(|i| along(i, way)) }
+    }
+
+    /// A wrench on the second frame and its opposite on the first, at their nodes.
+    fn at_nodes(&self, cut: &Cut<S>, at: &Relative<S>, f: &Force<S>, poses: &Poses<S>) -> (Force<S>, Force<S>) {
+        let a = at.force(f).times(-S::one());
+        let node = |frame: &TreeFrame<S>, f: Force<S>| self.on_body(poses, frame).rev().fold(f, |f, s| s.force(&f));
+        (node(&cut.a, a), node(&cut.b, *f))
+    }
+
+    /// Columns `D^σ` where they begin.
+    pub fn seed_columns(&self, rows: &[crate::workspace::RowState<S>], f: &mut Factor<S>) {
+        let n = self.tree.nodes.len();
+        for constraint in &self.tree.constraints {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            for (r, &g) in constraint.range().zip(&constraint.slots) {
+                for (node, seed) in [(cut.a.node, rows[r].at_a), (cut.b.node, rows[r].at_b)] {
+                    if let Some(i) = node {
+                        f.columns[g * n + i] = f.columns[g * n + i].plus(&seed);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Ratio with which the freedom of node `i` enters the coupling of shared `g`; zero for all else.
+    pub(super) fn coupled(&self, i: usize, g: usize) -> S {
+        let Shared::Row(r) = self.tree.shared[g] else { return S::zero() };
+        match &self.tree.constraint_of(r).bond {
+            Bond::Coupling { terms, .. } => terms.iter().find(|(node, _)| *node == i).map_or(S::zero(), |(_, a)| *a),
+            Bond::Cut(_) => S::zero(),
+        }
+    }
+
+    /// Pivot of row `r`, the shared `g`: negative, or zero where what is left of the row's diagonal is too little of what it
+    /// was, or of what those of its constraint are together. The first says that it follows from rows before it, the second
+    /// that its bodies cannot move along it.
+    pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
+        let ng = self.tree.shared.len();
+        let tolerance = self.tree.tolerance;
+        let all = self.tree.constraint_of(r).slots.iter().fold(S::zero(), |sum, &h| sum + f.whole[h]);
+        let floor = tolerance * (f.whole[g] + tolerance * all);
+        -(-f.gram[g * ng + g]).reciprocal_above(floor)
+    }
+
+    /// Multipliers out of a solution, in [`crate::workspace::Constraints::multipliers`].
+    fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
+        for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
+            out[r] = solved[g];
+        }
+    }
+
+    /// Calls `visit` with every velocity that a constraint binds and what a wrench `f` on its second frame, the opposite on
+    /// its first, is along it.
+    fn along_loop(&self, cut: &Cut<S>, ends: (Force<S>, Force<S>), poses: &Poses<S>, mut visit: impl FnMut(usize, S)) {
+        for (path, f) in [(&cut.path_a, ends.0), (&cut.path_b, ends.1)] {
+            let mut f = f;
+            for &i in path.iter().rev() {
+                let node = &self.tree.nodes[i];
+                if let Source::State { v, .. } = node.source {
+                    (0..node.kind.nv()).for_each(|k| visit(v + k, node.ratio * node.kind.axis(k).dot(&f)));
+                }
+                f = self.force_out(poses, i, &f);
+            }
+        }
+    }
+
+    /// `Eᵀ` of the wrenches that constraints put on the bodies of their loops as their directions turn,
+    /// `E_c° σ = (Ė_c + Ω_C × E_c) σ`, in [`crate::workspace::Constraints::pull`]; after the velocities.
+    pub(super) fn constraint_pull(&self, w: &mut Workspace<S>) {
+        if self.tree.constraints.is_empty() {
+            return;
+        }
+        self.collect_multipliers(&w.velocity.shared_rate, &mut w.constraints.multipliers);
+        w.constraints.pull.fill(S::zero());
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            self.trace.at(None, Quantity::Constraint);
+            let at = w.constraints.relative[index];
+            let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
+            let rates = cut.closure.direction_rates(&at, &less(&b, &at.motion(&a)));
+            let mut total = Force::zero();
+            let mut own = Force::zero();
+            for (k, r) in constraint.range().enumerate() {
+                let sigma = w.constraints.multipliers[r];
+                own = own.plus(&w.constraints.rows[r].e.times(sigma));
+                total = total.plus(&rates[k].times(sigma));
+            }
+            if cut.b.node.is_some() {
+                total = total.plus(&b.cross_force(&own));
+            }
+            let ends = self.at_nodes(cut, &at, &total, &w.poses);
+            let pull = &mut w.constraints.pull;
+            self.along_loop(cut, ends, &w.poses, |v, f| pull[v] = pull[v] + f);
+        }
+    }
+
+    /// `D^σ σ` where it begins, added to the momenta of bodies in [`Workspace::force`].
+    pub(super) fn add_seeds(&self, w: &mut Workspace<S>) {
+        for constraint in &self.tree.constraints {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            for r in constraint.range() {
+                let (row, sigma) = (&w.constraints.rows[r], w.constraints.multipliers[r]);
+                for (node, seed) in [(cut.a.node, row.at_a), (cut.b.node, row.at_b)] {
+                    if let Some(i) = node {
+                        w.force[i] = w.force[i].plus(&seed.times(sigma));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Motion of a frame in its own axes, after a velocity sweep.
+    fn frame_motion(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> Motion<S> {
+        let outer = frame.node.map_or(Motion::zero(), |i| w.velocity.omega[i]);
+        self.on_body(&w.poses, frame).fold(outer, |m, step| step.motion(&m))
+    }
+
+    /// `Φᵀ` times multipliers, added to `p`.
+    fn add_multipliers(&self, multipliers: &[S], w: &Workspace<S>, p: &mut [S]) {
+        for constraint in &self.tree.constraints {
+            self.trace.at(None, Quantity::Constraint);
+            match &constraint.bond {
+                Bond::Coupling { terms, .. } => {
+                    for (i, ratio) in terms {
+                        if let Source::State { v, .. } = self.tree.nodes[*i].source {
+                            p[v] = p[v] + *ratio * multipliers[constraint.first];
+                        }
+                    }
+                }
+                Bond::Cut(cut) => {
+                    let sum = |of: fn(&crate::workspace::RowState<S>) -> Force<S>| {
+                        let rows = constraint.range();
+                        let each = rows.map(|r| of(&w.constraints.rows[r]).times(multipliers[r]));
+                        each.fold(Force::zero(), |sum, f| sum.plus(&f))
+                    };
+                    let ends = (sum(|row| row.at_a), sum(|row| row.at_b));
+                    self.along_loop(cut, ends, &w.poses, |v, f| p[v] = p[v] + f);
+                }
+            }
+        }
+    }
+
+    /// Residuals `φ(q)` of the positions and the entries of `Φ`, placed as [`Tree::entry_columns`] says.
+    pub fn closure(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, phi: &mut [S], entries: &mut [S]) {
+        self.place_rows(q, u, w);
+        self.residuals(w, phi);
+        entries.fill(S::zero());
+        let mut first = 0;
+        for constraint in &self.tree.constraints {
+            let bound = &constraint.velocities;
+            self.trace.at(None, Quantity::Constraint);
+            for r in constraint.range() {
+                let entries = &mut entries[first..first + bound.len()];
+                let mut put = |v: usize, x: S| {
+                    if let Ok(at) = bound.binary_search(&v) {
+                        entries[at] = entries[at] + x;
+                    }
+                };
+                match &constraint.bond {
+                    Bond::Cut(cut) => {
+                        let row = &w.constraints.rows[r];
+                        self.along_loop(cut, (row.at_a, row.at_b), &w.poses, put);
+                    }
+                    Bond::Coupling { terms, .. } => {
+                        for (i, ratio) in terms {
+                            if let Source::State { v, .. } = self.tree.nodes[*i].source {
+                                put(v, *ratio);
+                            }
+                        }
+                    }
+                }
+                first += bound.len();
+            }
+        }
+    }
+
+    /// Residuals of the positions.
+    fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
+        for (phi, row) in phi.iter_mut().zip(&w.constraints.rows) {
+            *phi = row.residual;
+        }
+    }
+
+    /// Velocities and multipliers `σ` of a state, and momenta freed of them: `M v = p⁺ − Φᵀσ`.
+    pub fn settle(
+        &self,
+        q: &[S],
+        p: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        v: &mut [S],
+        freed: &mut [S],
+        sigma: &mut [S],
+    ) {
+        self.velocities(q, p, u, w, v);
+        self.collect_multipliers(&w.velocity.shared_rate, sigma);
+        for (x, sigma) in w.constraints.multipliers.iter_mut().zip(&*sigma) {
+            *x = -*sigma;
+        }
+        freed.copy_from_slice(p);
+        self.add_multipliers(&w.constraints.multipliers, w, freed);
+    }
+
+    /// Newton's step onto the closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`, with the residuals
+    /// `φ` and the pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
+    pub fn correction(
+        &self,
+        q: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        phi: &mut [S],
+        dq: &mut [S],
+        pivots: &mut [S],
+    ) {
+        self.prepare(q, u, w);
+        self.residuals(w, phi);
+        for (b, phi) in w.constraints.rhs.iter_mut().zip(&*phi) {
+            *b = -*phi;
+        }
+        w.generalized.fill(S::zero());
+        w.drive.fill(S::zero());
+        let load = super::Load {
+            p: &w.generalized,
+            drive: &w.drive,
+            seeds: None,
+            rows: &w.constraints.rhs,
+            what: Quantity::Constraint,
+        };
+        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+        self.collect_rates(&w.velocity, &w.first, dq);
+        let ng = self.tree.shared.len();
+        for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
+            // Zero where the pivot was not taken: x · (ρ x).
+            let x = w.factor.gram[g * ng + g];
+            pivots[r] = x * (w.factor.shared[g].rho * -x);
+        }
+    }
+
+    /// Multipliers `λ` at given velocities.
+    pub fn multipliers(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S], lambda: &mut [S]) {
+        self.accelerations(q, v, u, w, a);
+        self.collect_multipliers(&w.acceleration.shared_rate, lambda);
+    }
+
+    /// What the accelerations of a reference motion leave to be done by the rows, in
+    /// [`crate::workspace::Constraints::rhs`]: the negative of `Eᵀ dΩ_rel/dt + ĖᵀΩ_rel`, and Baumgarte's terms. After
+    /// [`Sweeps::newton`].
+    pub(super) fn row_accelerations(&self, v: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+        if self.tree.constraints.is_empty() {
+            return;
+        }
+        self.velocity_kinematics(v, u.drive_v, w);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            self.trace.at(None, Quantity::Constraint);
+            match &constraint.bond {
+                Bond::Cut(cut) => self.cut_accelerations(index, constraint, cut, u, w),
+                Bond::Coupling { terms, .. } => {
+                    let sum = |of: &[S]| terms.iter().fold(S::zero(), |sum, (i, ratio)| sum + *ratio * of[w.first[*i]]);
+                    let (rate, rate2) = (sum(&w.velocity.rate), sum(&w.newton.reference));
+                    self.put_acceleration(constraint, 0, rate, rate2, w);
+                }
+            }
+        }
+    }
+
+    fn put_acceleration(&self, constraint: &Constraint<S>, k: usize, rate: S, rate2: S, w: &mut Workspace<S>) {
+        let r = constraint.first + k;
+        let held = match constraint.decay {
+            Some(decay) if constraint.holonomic(k) => {
+                (decay + decay) * rate + decay * decay * w.constraints.rows[r].residual
+            }
+            _ => S::zero(),
+        };
+        w.constraints.rhs[r] = -(rate2 + held);
+    }
+
+    fn cut_accelerations(
+        &self,
+        index: usize,
+        constraint: &Constraint<S>,
+        cut: &Cut<S>,
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+    ) {
+        let at = w.constraints.relative[index];
+        let [va, vb] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
+        let [aa, ab] = [&cut.a, &cut.b].map(|frame| {
+            let mut m = match frame.node {
+                Some(i) => ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] },
+                None => ClassicMotion { spin: [S::zero(); 3], alpha: [S::zero(); 3], accel: u.gravity.map(|g| -g) },
+            };
+            self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
+            m
+        });
+        let rel = less(&vb, &at.motion(&va));
+        let rates = cut.closure.direction_rates(&at, &rel);
+        // Derivatives of the components of Ω_rel, from accelerations of the origins as vectors.
+        let (spin, alpha) = (at.turned(va.ang), at.turned(aa.alpha));
+        let carried = add3(cross(alpha, at.d), cross(spin, add3(rel.lin, cross(spin, at.d))));
+        let a_origin = add3(at.turned(aa.accel), carried);
+        let along = cross(vb.ang, rel.lin);
+        let lin: Vec3<S> = core::array::from_fn(|k| ab.accel[k] - a_origin[k] - along[k]);
+        let gyro = cross(vb.ang, spin);
+        let ang: Vec3<S> = core::array::from_fn(|k| ab.alpha[k] - alpha[k] + gyro[k]);
+        let change = Motion { lin, ang };
+        for k in 0..constraint.slots.len() {
+            let e = w.constraints.rows[constraint.first + k].e;
+            self.put_acceleration(constraint, k, e.dot(&rel), e.dot(&change) + rates[k].dot(&rel), w);
+        }
+    }
+}
+
+/// Difference of two motions.
+fn less<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
+    let minus = |a: Vec3<S>, b: Vec3<S>| core::array::from_fn(|k| a[k] - b[k]);
+    Motion { lin: minus(a.lin, b.lin), ang: minus(a.ang, b.ang) }
+}
