@@ -334,6 +334,8 @@ pub enum LoopKind {
 }
 
 /// What a constraint binds.
+// A model has few of them: boxes would save nothing worth their noise in every match.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConstraintKind {
     /// Two bodies.

@@ -29,6 +29,8 @@ const JOINT: &[&str] = &[
     "armature",
     "motion",
     "mimic",
+    "start",
+    "held",
 ];
 const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 const WRENCH: &[&str] = &["name", "body", "frame"];
@@ -118,7 +120,7 @@ const TYPES: [(&str, JointType); 9] = [
 ];
 
 /// What the types are called elsewhere.
-const ALIASES: [(&str, &str); 16] = [
+pub(super) const ALIASES: [(&str, &str); 16] = [
     ("hinge", "pin"),
     ("revolute", "pin"),
     ("continuous", "pin"),
@@ -170,6 +172,14 @@ fn units(kind: Option<JointType>) -> &'static [Unit] {
     }
 }
 
+/// Units for degrees in `start`, where `rest` has `units`: quaternions are no angles.
+fn start_units(kind: Option<JointType>, units: &'static [Unit]) -> &'static [Unit] {
+    match kind {
+        Some(JointType::Spherical | JointType::Floating) => &[Unit::Plain],
+        _ => units,
+    }
+}
+
 pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(JOINT, "a joint", findings);
     let name = table.required_text("name", findings);
@@ -185,6 +195,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let stiffness = freedoms("stiffness", &[Unit::Plain]);
     let rest = freedoms("rest", units);
     let armature = freedoms("armature", &[Unit::Plain]);
+    let start = freedoms("start", start_units(kind.as_ref().map(|k| k.value), units));
     let motion = match table.choice("motion", &["free", "prescribed"], findings) {
         Some(choice) if choice.value == 1 => RawMotion::Prescribed(choice.span),
         _ => RawMotion::Free,
@@ -201,6 +212,8 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         armature,
         motion,
         mimic: mimic(&table, units, findings),
+        start,
+        held: table.flag("held", findings),
         ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
     if name.is_some() {
@@ -222,7 +235,7 @@ pub(super) fn frame(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let name = table.required_text("name", findings);
     let body = table.required_text("body", findings);
     let placement = placement(&table, findings);
-    if let (Some(name), Some(body)) = (name, body) {
+    if let Some(name) = name {
         raw.frames.push(RawFrame { name, body, placement });
     }
 }
