@@ -4,7 +4,7 @@ use super::decay;
 use super::joints::{coordinates, type_name};
 use super::names::Names;
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{RawCoupling, RawModel, RawMotion};
+use crate::import::raw::{RawCoupling, RawModel, RawMotion, RawNumber};
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::quote;
 use crate::model::{Constraint, ConstraintKind, Value};
@@ -51,7 +51,7 @@ fn joints(
     findings: &mut Findings,
 ) -> Option<Vec<usize>> {
     if list.value.len() < 2 {
-        let message = format!("{what} of {} joint{}", list.value.len(), plural(list.value.len()));
+        let message = format!("{what} has {} joint{}", list.value.len(), plural(list.value.len()));
         findings.error(list.span, message, "name at least two joints; a joint that never moves is `fixed`");
         return None;
     }
@@ -87,7 +87,7 @@ fn can_be_coupled(name: &Spanned<String>, joint: usize, model: &RawModel, what: 
     false
 }
 
-fn ratio(raw: &crate::import::raw::RawNumber, what: &str, numbers: &mut Numbers) -> Value {
+fn ratio(raw: &RawNumber, what: &str, numbers: &mut Numbers) -> Value {
     let value = numbers.value(raw, Quantity::Plain, &format!("{what}: `ratios`"));
     if numbers.at_default(value) == 0.0 {
         let by_default = if value.constant().is_none() { ", the default of its parameter," } else { "" };

@@ -13,7 +13,9 @@ pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
     let mut starts = Vec::new();
     for (index, joint) in raw.joints.iter().enumerate() {
         let what = format!("joint {}", quote(&joint.name.value));
-        idle(joint, &what, numbers.findings);
+        if idle(joint, &what, numbers.findings) {
+            continue;
+        }
         let held = joint.held.as_ref().is_some_and(|h| h.value);
         if let (Some(at), true, true) = (&joint.held, held, raw.constraints.is_empty()) {
             let message = format!("{what}: `held` has no effect where there are no loops");
@@ -40,11 +42,12 @@ pub(super) fn placed(mut starts: Vec<Start>, place: &[usize]) -> Vec<Start> {
     starts
 }
 
-/// Reports a start of coordinates that are not free.
-fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) {
+/// Reports a start of coordinates that are not free, and says whether there was one.
+fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
     let start = joint.start.as_ref().map(|s| ("start", span_of(s)));
     let held = joint.held.as_ref().map(|h| ("held", h.span));
-    let mut refuse = |key: &str, span: Span| {
+    let mut found = false;
+    for (key, span) in start.into_iter().chain(held) {
         let (why, help) = if let Some(mimic) = &joint.mimic {
             let leader = quote(&mimic.leader.value);
             (format!("`{key}` on a joint that follows {leader}"), format!("move it to {leader}"))
@@ -54,13 +57,12 @@ fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) {
         } else if joint.kind.as_ref().is_some_and(|k| k.value == JointType::Fixed) {
             (format!("a fixed joint has no `{key}`"), "remove it, or change the type of the joint".into())
         } else {
-            return;
+            continue;
         };
         findings.error(span, format!("{what}: {why}"), help);
-    };
-    for (key, span) in start.into_iter().chain(held) {
-        refuse(key, span);
+        found = true;
     }
+    found
 }
 
 /// Coordinates at zero: no rotation where they end in a quaternion.

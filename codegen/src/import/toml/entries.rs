@@ -1,8 +1,8 @@
 //! `[[body]]`, `[[joint]]`, `[[frame]]` and `[[wrench]]`.
 
 use super::super::raw::{
-    JointType, RawBody, RawFrame, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation,
-    RawValue, RawWrench,
+    JointType, RawBody, RawFrame, RawFreedoms, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement,
+    RawRotation, RawValue, RawWrench,
 };
 use super::super::source::{Findings, Spanned};
 use super::super::words::{did_you_mean, quote};
@@ -172,12 +172,18 @@ fn units(kind: Option<JointType>) -> &'static [Unit] {
     }
 }
 
-/// Units for degrees in `start`, where `rest` has `units`: quaternions are no angles.
-fn start_units(kind: Option<JointType>, units: &'static [Unit]) -> &'static [Unit] {
-    match kind {
-        Some(JointType::Spherical | JointType::Floating) => &[Unit::Plain],
-        _ => units,
+/// Coordinates to begin with; `units` are those of the coordinates where they have any.
+fn start(table: &Table, kind: Option<JointType>, units: &[Unit], findings: &mut Findings) -> Option<RawFreedoms> {
+    let value = table.raw("start")?;
+    let quaternion = matches!(kind, Some(JointType::Spherical | JointType::Floating));
+    if quaternion && matches!(value.get_ref(), DeValue::Table(t) if t.contains_key("deg")) {
+        let message = format!("{}`start` ends in a quaternion, which has no degrees", table.prefix());
+        let help = "write the unit quaternion in the order x, y, z, w: no rotation is `0, 0, 0, 1`";
+        findings.error(value.span().into(), message, help);
+        return None;
     }
+    let units = if quaternion { &[Unit::Plain] } else { units };
+    numbers::freedoms(value, units, &format!("{}`start`", table.prefix()), findings)
 }
 
 pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
@@ -195,11 +201,11 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let stiffness = freedoms("stiffness", &[Unit::Plain]);
     let rest = freedoms("rest", units);
     let armature = freedoms("armature", &[Unit::Plain]);
-    let start = freedoms("start", start_units(kind.as_ref().map(|k| k.value), units));
     let motion = match table.choice("motion", &["free", "prescribed"], findings) {
         Some(choice) if choice.value == 1 => RawMotion::Prescribed(choice.span),
         _ => RawMotion::Free,
     };
+    let start = start(&table, kind.as_ref().map(|k| k.value), units, findings);
     let joint = RawJoint {
         parent: table.text("parent", findings),
         placement: placement(&table, findings),

@@ -195,7 +195,7 @@ pub(super) fn direction(value: &Toml<DeValue>, what: &str, findings: &mut Findin
                 findings.error(
                     x.span,
                     message,
-                    "write constants, and turn the joint by `rotate` with a parameter as its angle",
+                    "write constants, and turn the joint or frame by `rotate` with a parameter as its angle",
                 );
                 fine = false;
             }
