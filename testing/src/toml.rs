@@ -1,5 +1,7 @@
 //! Models written in the TOML format: to show a failing case, and to hold the reader against.
 
+mod constraints;
+
 use std::fmt::Write;
 
 use mbd_codegen::model::{Gravity, Joint, JointKind, Model, Motion, Placement, Rotation, Value, WrenchAxes};
@@ -55,6 +57,7 @@ pub fn to_toml_in(model: &Model, order: Order) -> String {
     }
     for j in w.order(order) {
         w.joint(&mut out, &model.joints[j]);
+        w.start(&mut out, j);
     }
     for frame in &model.frames {
         out.push_str("\n[[frame]]\n");
@@ -70,6 +73,7 @@ pub fn to_toml_in(model: &Model, order: Order) -> String {
             line(&mut out, "frame", quoted("world"));
         }
     }
+    w.constraints(&mut out);
     out
 }
 

@@ -8,7 +8,7 @@ use crate::import::words::{list, quote};
 use crate::model::{Joint, JointKind, Motion, Value};
 
 /// A type as it is written.
-fn type_name(kind: JointType) -> &'static str {
+pub(super) fn type_name(kind: JointType) -> &'static str {
     match kind {
         JointType::Pin => "pin",
         JointType::Slider => "slider",
@@ -23,7 +23,7 @@ fn type_name(kind: JointType) -> &'static str {
 }
 
 /// What each coordinate measures; empty where coordinates have no axes of their own.
-fn coordinates(kind: JointType) -> &'static [Quantity] {
+pub(super) fn coordinates(kind: JointType) -> &'static [Quantity] {
     use Quantity::{Angle, Length};
     match kind {
         JointType::Pin | JointType::Helical => &[Angle],
@@ -152,7 +152,7 @@ fn superfluous(raw: &RawJoint, kind: JointType, what: &str, findings: &mut Findi
     }
 }
 
-fn span_of(f: &RawFreedoms) -> Span {
+pub(super) fn span_of(f: &RawFreedoms) -> Span {
     match f {
         RawFreedoms::All(x) => x.span,
         RawFreedoms::Each(list) => list.span,
@@ -260,7 +260,7 @@ pub(super) fn leaders(raw: &RawModel, names: &Names, findings: &mut Findings) ->
     for j in &raw.joints {
         let what = format!("joint {}", quote(&j.name.value));
         let leader = j.mimic.as_ref().and_then(|m| {
-            let leader = names.joint(&m.leader, &what, findings)?;
+            let leader = names.joint(&m.leader, "leader ", &what, findings)?;
             let kind = raw.joints[leader].kind.as_ref().map(|k| k.value);
             if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
                 let message = format!("{what}: leader {} is a {} joint", quote(&m.leader.value), type_name(kind));

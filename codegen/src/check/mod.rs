@@ -1,19 +1,22 @@
 //! From a model as read to a checked one: names, tree, physics. The same for every format.
 
 mod bodies;
+mod couplings;
 mod joints;
+mod loops;
 mod massless;
 mod names;
 mod numbers;
+mod starts;
 mod symmetric;
 mod tree;
 
 use self::names::Names;
 use self::numbers::{Numbers, Quantity};
-use crate::import::raw::{RawGravity, RawModel, RawValue};
+use crate::import::raw::{RawConstraint, RawGravity, RawModel, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::model::{Frame, Gravity, Joint, Model, Param, Value, Wrench};
+use crate::model::{Constraint, ConstraintKind, Frame, Gravity, Joint, Model, Param, Value, Wrench};
 
 /// Checks `raw`; a model only where no error was found, neither here nor before. `file` is the path or name of the source, from which the
 /// model takes its name if it states none.
@@ -29,6 +32,8 @@ pub fn check(raw: &RawModel, file: &str, findings: &mut Findings) -> Option<Mode
     let leaders = joints::leaders(raw, &names, numbers.findings);
     let frames = frames(raw, &names, &mut numbers);
     let wrenches = wrenches(raw, &names, numbers.findings);
+    let constraints = constraints(raw, &names, &frames, &mut numbers);
+    let starts = starts::starts(raw, &mut numbers);
     let links = tree::links(raw, &names, numbers.findings);
     let order = tree::order(raw, &names, &links, numbers.findings);
     bodies::inertias(raw, &bodies, &mut numbers);
@@ -37,20 +42,34 @@ pub fn check(raw: &RawModel, file: &str, findings: &mut Findings) -> Option<Mode
     numbers.report_unused();
     // With a broken tree there is no model to go on with.
     let order = order?;
-    let joints = assemble(joints, &links, &leaders, &order);
-    let model =
-        Model { name, params, gravity, bodies, joints, frames, wrenches, constraints: Vec::new(), starts: Vec::new() };
+    let place = inverse(&order);
+    let joints = assemble(joints, &links, &leaders, &order, &place);
+    loops::rigid(raw, &constraints, &joints, &bodies, findings);
+    let constraints = constraints.into_iter().flatten().map(|c| placed(c, &place)).collect();
+    let starts = starts::placed(starts, &place);
+    let model = Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, starts };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
     (!findings.has_errors()).then_some(model)
 }
 
-/// Puts the joints in their final order, with indices instead of names.
-fn assemble(joints: Vec<Joint>, links: &[tree::Link], leaders: &[Option<usize>], order: &[usize]) -> Vec<Joint> {
-    let mut place = vec![0; joints.len()];
+/// Final index of each joint of the file.
+fn inverse(order: &[usize]) -> Vec<usize> {
+    let mut place = vec![0; order.len()];
     for (k, &j) in order.iter().enumerate() {
         place[j] = k;
     }
+    place
+}
+
+/// Puts the joints in their final order, with indices instead of names.
+fn assemble(
+    joints: Vec<Joint>,
+    links: &[tree::Link],
+    leaders: &[Option<usize>],
+    order: &[usize],
+    place: &[usize],
+) -> Vec<Joint> {
     let finished = order.iter().map(|&j| {
         let mut joint = joints[j].clone();
         joint.parent = links[j].parent.unwrap_or(None);
@@ -82,10 +101,39 @@ fn gravity(raw: &RawModel, numbers: &mut Numbers) -> Gravity {
 fn frames(raw: &RawModel, names: &Names, numbers: &mut Numbers) -> Vec<Frame> {
     let one = |f: &crate::import::raw::RawFrame| {
         let what = format!("frame {}", quote(&f.name.value));
-        let body = names.body(&f.body, "", &what, numbers.findings).unwrap_or(None);
+        let body = f.body.as_ref().and_then(|b| names.body(b, "", &what, numbers.findings)).unwrap_or(None);
         Frame { name: f.name.value.clone(), body, placement: numbers.placement(&f.placement, &what) }
     };
     raw.frames.iter().map(one).collect()
+}
+
+/// Loops and couplings, with joints by their index in the file; `None` for what was reported.
+fn constraints(raw: &RawModel, names: &Names, frames: &[Frame], numbers: &mut Numbers) -> Vec<Option<Constraint>> {
+    let one = |c: &RawConstraint| match c {
+        RawConstraint::Loop(l) => loops::constraint(l, raw, names, frames, numbers),
+        RawConstraint::Coupling(c) => couplings::constraint(c, raw, names, numbers),
+    };
+    raw.constraints.iter().map(one).collect()
+}
+
+/// Rate of decay, which only brakes.
+fn decay(raw: &Option<RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
+    let decay = numbers.or_zero(raw, Quantity::Plain, &format!("{what}: `decay`"));
+    if let (Some(at), true) = (raw, numbers.at_default(decay) < 0.0) {
+        let help = "write how fast they decay, in 1/s: 0, or about a tenth of the number of steps in a second";
+        numbers.findings.error(at.span, format!("{what}: with a negative `decay` errors of the positions grow"), help);
+    }
+    decay
+}
+
+/// With final joint indices.
+fn placed(mut constraint: Constraint, place: &[usize]) -> Constraint {
+    if let ConstraintKind::Coupling { terms, .. } = &mut constraint.kind {
+        for (joint, _) in terms {
+            *joint = place[*joint];
+        }
+    }
+    constraint
 }
 
 fn wrenches(raw: &RawModel, names: &Names, findings: &mut Findings) -> Vec<Wrench> {

@@ -65,11 +65,21 @@ fn usable(name: &str) -> bool {
     name.chars().any(|c| c.is_ascii_alphanumeric()) && !name.contains(hidden)
 }
 
+/// What the end of a loop is named after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// A body, `None` for the ground.
+    Body(Option<usize>),
+    /// A named frame, by index.
+    Frame(usize),
+}
+
 /// Where the bodies are.
 pub(super) struct Names<'r> {
     raw: &'r RawModel,
     bodies: HashMap<&'r str, usize>,
     joints: HashMap<&'r str, usize>,
+    frames: HashMap<&'r str, usize>,
 }
 
 impl<'r> Names<'r> {
@@ -81,12 +91,16 @@ impl<'r> Names<'r> {
         unique(raw.joints.iter().map(|j| ("joint", &j.name)), findings);
         unique(raw.params.iter().map(|p| ("parameter", &p.name)), findings);
         unique(raw.wrenches.iter().map(|w| ("wrench", w.name.as_ref().unwrap_or(&w.body))), findings);
-        let mut names = Names { raw, bodies: HashMap::new(), joints: HashMap::new() };
+        unique(raw.constraints.iter().map(|c| (c.kind(), c.name())), findings);
+        let mut names = Names { raw, bodies: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
         for (k, b) in raw.bodies.iter().enumerate() {
             names.bodies.entry(&b.name.value).or_insert(k);
         }
         for (k, j) in raw.joints.iter().enumerate() {
             names.joints.entry(&j.name.value).or_insert(k);
+        }
+        for (k, f) in raw.frames.iter().enumerate() {
+            names.frames.entry(&f.name.value).or_insert(k);
         }
         names
     }
@@ -95,6 +109,11 @@ impl<'r> Names<'r> {
     pub(super) fn is_first(&self, body: usize) -> bool {
         let name = self.raw.bodies[body].name.value.as_str();
         name != GROUND && self.bodies.get(name) == Some(&body)
+    }
+
+    /// Whether something can be fixed to what is called so: a body or the ground.
+    pub(super) fn is_known(&self, name: &str) -> bool {
+        name == GROUND || self.bodies.contains_key(name)
     }
 
     /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` (empty, or with a space behind) and `what` as in
@@ -124,13 +143,36 @@ impl<'r> Names<'r> {
         found.map(Some)
     }
 
-    /// The joint called so.
-    pub(super) fn joint(&self, name: &Spanned<String>, what: &str, findings: &mut Findings) -> Option<usize> {
+    /// Where a constraint acts: on a body, a frame or the ground.
+    pub(super) fn end(&self, name: &Spanned<String>, what: &str, findings: &mut Findings) -> Option<End> {
+        let key = name.value.as_str();
+        if key == GROUND {
+            return Some(End::Body(None));
+        }
+        let body = self.bodies.get(key).map(|b| End::Body(Some(*b)));
+        let found = body.or_else(|| self.frames.get(key).map(|f| End::Frame(*f)));
+        if found.is_none() && !self.raw.incomplete {
+            let bodies = || self.raw.bodies.iter().map(|b| b.name.value.as_str());
+            let all = || bodies().chain(self.raw.frames.iter().map(|f| f.name.value.as_str()));
+            let help = did_you_mean(key, all().chain([GROUND]), || format!("bodies and frames are {}", list(all())));
+            findings.error(name.span, format!("{what}: {} is neither a body nor a frame", quote(key)), help);
+        }
+        found
+    }
+
+    /// The joint called so; `role` and `what` as for bodies.
+    pub(super) fn joint(
+        &self,
+        name: &Spanned<String>,
+        role: &str,
+        what: &str,
+        findings: &mut Findings,
+    ) -> Option<usize> {
         let found = self.joints.get(name.value.as_str()).copied();
         if found.is_none() && !self.raw.incomplete {
             let all = || self.raw.joints.iter().map(|j| j.name.value.as_str());
             let help = did_you_mean(&name.value, all(), || format!("the joints are {}", list(all())));
-            findings.error(name.span, format!("{what}: leader {} is not a joint", quote(&name.value)), help);
+            findings.error(name.span, format!("{what}: {role}{} is not a joint", quote(&name.value)), help);
         }
         found
     }

@@ -76,8 +76,10 @@ fn carriers(raw: &RawModel, names: &Names, links: &[Link], findings: &mut Findin
                     quote(&name.value),
                     quote(&raw.joints[first].name.value)
                 );
-                let help = "a body hangs on one joint: remove one of the two; a loop is closed by a constraint between frames, \
-                            not by a joint";
+                let help = match raw.lenient {
+                    true => "a body hangs on one joint: remove one of the two; closed loops need a TOML model, which has `[[loop]]`",
+                    false => "a body hangs on one joint: remove one of the two; to close a loop make it a `[[loop]]`",
+                };
                 findings.error(name.span, message, help);
             }
         }

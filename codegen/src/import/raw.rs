@@ -158,6 +158,10 @@ pub struct RawJoint {
     pub motion: RawMotion,
     /// Coupling to another joint.
     pub mimic: Option<RawMimic>,
+    /// Coordinates that the closing of loops begins with.
+    pub start: Option<RawFreedoms>,
+    /// Whether they stay as they are when loops are closed.
+    pub held: Option<Spanned<bool>>,
 }
 
 impl RawJoint {
@@ -179,6 +183,8 @@ impl RawJoint {
             unbounded: false,
             motion: RawMotion::Free,
             mimic: None,
+            start: None,
+            held: None,
         }
     }
 }
@@ -188,10 +194,143 @@ impl RawJoint {
 pub struct RawFrame {
     /// Name.
     pub name: Spanned<String>,
-    /// Body, or `ground`.
-    pub body: Spanned<String>,
+    /// Body, or `ground`; `None` where it was reported already.
+    pub body: Option<Spanned<String>>,
     /// Pose in the body frame.
     pub placement: RawPlacement,
+}
+
+/// What a loop holds together, without its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LoopType {
+    /// As a pin would.
+    Pin,
+    /// As a slider would.
+    Slider,
+    /// A slide and a turn about one axis are left.
+    Cylindrical,
+    /// A screw is left.
+    Helical,
+    /// Two turns are left.
+    Universal,
+    /// Two slides and a turn are left.
+    Planar,
+    /// All rotations are left.
+    Spherical,
+    /// Nothing is left.
+    Fixed,
+    /// A rod with spherical ends.
+    Distance,
+    /// Point on a line.
+    PointOnLine,
+    /// Point in a plane.
+    PointOnPlane,
+    /// Point on a cylinder.
+    PointOnCylinder,
+    /// A thin disc on a plane, without slip.
+    RollingDisc,
+    /// A ball on a plane, without slip.
+    RollingBall,
+    /// No motion across an edge.
+    KnifeEdge,
+    /// Any row that is linear in the velocities.
+    Pfaffian,
+}
+
+impl LoopType {
+    /// Every type and what it is called.
+    pub const ALL: [(&'static str, LoopType); 16] = [
+        ("pin", LoopType::Pin),
+        ("slider", LoopType::Slider),
+        ("cylindrical", LoopType::Cylindrical),
+        ("helical", LoopType::Helical),
+        ("universal", LoopType::Universal),
+        ("planar", LoopType::Planar),
+        ("spherical", LoopType::Spherical),
+        ("fixed", LoopType::Fixed),
+        ("distance", LoopType::Distance),
+        ("point_on_line", LoopType::PointOnLine),
+        ("point_on_plane", LoopType::PointOnPlane),
+        ("point_on_cylinder", LoopType::PointOnCylinder),
+        ("rolling_disc", LoopType::RollingDisc),
+        ("rolling_ball", LoopType::RollingBall),
+        ("knife_edge", LoopType::KnifeEdge),
+        ("pfaffian", LoopType::Pfaffian),
+    ];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        Self::ALL[self as usize].0
+    }
+}
+
+/// A loop. Entries the type has no use for, and missing ones, are reported by the checks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawLoop {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Type; `None` where it was reported already.
+    pub kind: Option<Spanned<LoopType>>,
+    /// Bodies, frames or `ground`; `None` where it was reported already.
+    pub between: Option<[Spanned<String>; 2]>,
+    /// Axis; z, or x for a universal loop, where `None`.
+    pub axis: Option<Spanned<[f64; 3]>>,
+    /// Second axis of a universal loop; y where `None`.
+    pub axis2: Option<Spanned<[f64; 3]>>,
+    /// Normal of a plane; z where `None`.
+    pub normal: Option<Spanned<[f64; 3]>>,
+    /// Pitch, m/rad.
+    pub pitch: Option<RawNumber>,
+    /// Length, m.
+    pub length: Option<RawNumber>,
+    /// Radius, m.
+    pub radius: Option<RawNumber>,
+    /// Coefficients of velocity and angular velocity.
+    pub row: Option<Spanned<[RawNumber; 6]>>,
+    /// Rate at which errors of the positions decay, 1/s; 0 where `None`.
+    pub decay: Option<RawNumber>,
+}
+
+/// A linear equation between the coordinates of joints.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawCoupling {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Names of the joints; `None` where it was reported already.
+    pub joints: Option<Spanned<Vec<Spanned<String>>>>,
+    /// Factor of each; `None` where it was reported already.
+    pub ratios: Option<Spanned<Vec<RawNumber>>>,
+    /// What the sum is; 0 where `None`.
+    pub offset: Option<RawNumber>,
+    /// Rate at which errors of the positions decay, 1/s; 0 where `None`.
+    pub decay: Option<RawNumber>,
+}
+
+/// A constraint beside the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RawConstraint {
+    /// Between two frames.
+    Loop(Box<RawLoop>),
+    /// Between joints.
+    Coupling(RawCoupling),
+}
+
+impl RawConstraint {
+    /// What it is called in messages.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            RawConstraint::Loop(_) => "loop",
+            RawConstraint::Coupling(_) => "coupling",
+        }
+    }
+
+    /// Name.
+    pub fn name(&self) -> &Spanned<String> {
+        match self {
+            RawConstraint::Loop(l) => &l.name,
+            RawConstraint::Coupling(c) => &c.name,
+        }
+    }
 }
 
 /// An external wrench.
@@ -231,6 +370,8 @@ pub struct RawModel {
     pub frames: Vec<RawFrame>,
     /// Wrenches, in file order.
     pub wrenches: Vec<RawWrench>,
+    /// Loops and couplings, in file order.
+    pub constraints: Vec<RawConstraint>,
     /// A body or joint had to be left out and was reported: unknown names and loose bodies are then no news.
     pub incomplete: bool,
     /// The file was written for other programs: what nature forbids but the equations survive is then a warning, and the model's
@@ -249,6 +390,7 @@ impl RawModel {
             joints: Vec::new(),
             frames: Vec::new(),
             wrenches: Vec::new(),
+            constraints: Vec::new(),
             incomplete: false,
             lenient: false,
         }

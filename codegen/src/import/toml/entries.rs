@@ -1,8 +1,8 @@
 //! `[[body]]`, `[[joint]]`, `[[frame]]` and `[[wrench]]`.
 
 use super::super::raw::{
-    JointType, RawBody, RawFrame, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation,
-    RawValue, RawWrench,
+    JointType, RawBody, RawFrame, RawFreedoms, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement,
+    RawRotation, RawValue, RawWrench,
 };
 use super::super::source::{Findings, Spanned};
 use super::super::words::{did_you_mean, quote};
@@ -29,6 +29,8 @@ const JOINT: &[&str] = &[
     "armature",
     "motion",
     "mimic",
+    "start",
+    "held",
 ];
 const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 const WRENCH: &[&str] = &["name", "body", "frame"];
@@ -118,7 +120,7 @@ const TYPES: [(&str, JointType); 9] = [
 ];
 
 /// What the types are called elsewhere.
-const ALIASES: [(&str, &str); 16] = [
+pub(super) const ALIASES: [(&str, &str); 16] = [
     ("hinge", "pin"),
     ("revolute", "pin"),
     ("continuous", "pin"),
@@ -170,6 +172,20 @@ fn units(kind: Option<JointType>) -> &'static [Unit] {
     }
 }
 
+/// Coordinates to begin with; `units` are those of the coordinates where they have any.
+fn start(table: &Table, kind: Option<JointType>, units: &[Unit], findings: &mut Findings) -> Option<RawFreedoms> {
+    let value = table.raw("start")?;
+    let quaternion = matches!(kind, Some(JointType::Spherical | JointType::Floating));
+    if quaternion && matches!(value.get_ref(), DeValue::Table(t) if t.contains_key("deg")) {
+        let message = format!("{}`start` ends in a quaternion, which has no degrees", table.prefix());
+        let help = "write the unit quaternion in the order x, y, z, w: no rotation is `0, 0, 0, 1`";
+        findings.error(value.span().into(), message, help);
+        return None;
+    }
+    let units = if quaternion { &[Unit::Plain] } else { units };
+    numbers::freedoms(value, units, &format!("{}`start`", table.prefix()), findings)
+}
+
 pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(JOINT, "a joint", findings);
     let name = table.required_text("name", findings);
@@ -189,6 +205,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         Some(choice) if choice.value == 1 => RawMotion::Prescribed(choice.span),
         _ => RawMotion::Free,
     };
+    let start = start(&table, kind.as_ref().map(|k| k.value), units, findings);
     let joint = RawJoint {
         parent: table.text("parent", findings),
         placement: placement(&table, findings),
@@ -201,6 +218,8 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         armature,
         motion,
         mimic: mimic(&table, units, findings),
+        start,
+        held: table.flag("held", findings),
         ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
     if name.is_some() {
@@ -222,7 +241,7 @@ pub(super) fn frame(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let name = table.required_text("name", findings);
     let body = table.required_text("body", findings);
     let placement = placement(&table, findings);
-    if let (Some(name), Some(body)) = (name, body) {
+    if let Some(name) = name {
         raw.frames.push(RawFrame { name, body, placement });
     }
 }

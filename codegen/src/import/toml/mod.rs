@@ -1,5 +1,6 @@
 //! The TOML model format (docs/model-format.md). Here: the document and its top level.
 
+mod constraints;
 mod entries;
 mod numbers;
 mod table;
@@ -15,7 +16,7 @@ use crate::check::check;
 use crate::diag::Diagnostics;
 use crate::model::Model;
 
-const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench"];
+const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling"];
 
 /// Reads and checks a model. `file` is named in the findings and gives the model its name if the text does not.
 /// All findings of the text come back at once, in its order; a model only if none of them is an error.
@@ -75,6 +76,7 @@ pub fn read_raw(text: &str, findings: &mut Findings) -> Option<RawModel> {
     for table in top.tables("wrench", findings) {
         entries::wrench(table, &mut raw, findings);
     }
+    constraints::all(&top, &mut raw, findings);
     Some(raw)
 }
 
@@ -120,7 +122,7 @@ fn syntax_error(text: &str, error: &Error, findings: &mut Findings) {
         _ if comma => ("a comma inside a number".into(), "write the decimals after a point, as in `1.5`"),
         m if m.starts_with("duplicate key") => (
             format!("key {culprit} is given twice"),
-            "keep one; the lists of bodies, joints, frames and wrenches have double brackets, like `[[body]]`",
+            "keep one; the lists of bodies, joints, frames, wrenches and loops have double brackets, like `[[body]]`",
         ),
         m if m.starts_with("string values must be quoted") => (
             format!("{culprit} is neither a number nor quoted text"),

@@ -113,7 +113,12 @@ fn integer(i: &DeInteger) -> Option<f64> {
 }
 
 /// A list of numbers, each on its own or, for angles, `{ deg = [..] }` as a whole. `None` if it is no list (reported).
-fn numbers(value: &Toml<DeValue>, units: &[Unit], what: &str, findings: &mut Findings) -> Option<Vec<RawNumber>> {
+pub(super) fn numbers(
+    value: &Toml<DeValue>,
+    units: &[Unit],
+    what: &str,
+    findings: &mut Findings,
+) -> Option<Vec<RawNumber>> {
     let unit_of = |k: usize| units.get(k).or(units.last()).copied().unwrap_or(Unit::Plain);
     let span: Span = value.span().into();
     match value.get_ref() {
@@ -190,7 +195,7 @@ pub(super) fn direction(value: &Toml<DeValue>, what: &str, findings: &mut Findin
                 findings.error(
                     x.span,
                     message,
-                    "write constants, and turn the joint by `rotate` with a parameter as its angle",
+                    "write constants, and turn the joint or frame by `rotate` with a parameter as its angle",
                 );
                 fine = false;
             }

@@ -118,6 +118,42 @@ impl<'t> Table<'t> {
         found.map(|k| Spanned::new(k, text.span))
     }
 
+    /// A list of texts, if the key is there and one; `example` is what to write.
+    pub(super) fn texts(
+        &self,
+        key: &str,
+        example: &str,
+        findings: &mut Findings,
+    ) -> Option<Spanned<Vec<Spanned<String>>>> {
+        let (span, value) = self.get(key)?;
+        let DeValue::Array(items) = value else {
+            self.wrong_type(key, "a list of names", example, findings);
+            return None;
+        };
+        let mut texts = Vec::new();
+        for (k, item) in items.iter().enumerate() {
+            if let DeValue::String(s) = item.get_ref() {
+                texts.push(Spanned::new(s.to_string(), item.span()));
+            } else {
+                let what = format!("item {} is {}", k + 1, type_name(item.get_ref()));
+                let message = format!("{}`{key}` must be a list of names, but {what}", self.prefix());
+                findings.error(item.span().into(), message, format!("write {example}"));
+            }
+        }
+        (texts.len() == items.len()).then(|| Spanned::new(texts, span))
+    }
+
+    /// Yes or no, if the key is there and such.
+    pub(super) fn flag(&self, key: &str, findings: &mut Findings) -> Option<Spanned<bool>> {
+        match self.get(key)? {
+            (span, DeValue::Boolean(yes)) => Some(Spanned::new(*yes, span)),
+            _ => {
+                self.wrong_type(key, "true or false", &format!("`{key} = true`, without quotes"), findings);
+                None
+            }
+        }
+    }
+
     /// A table under a key.
     pub(super) fn table(&self, key: &str, findings: &mut Findings) -> Option<Table<'t>> {
         match self.get(key)? {

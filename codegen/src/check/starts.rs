@@ -1,0 +1,158 @@
+//! Where the closing of loops begins.
+
+use super::joints::{coordinates, span_of, type_name};
+use super::names::norm;
+use super::numbers::{Numbers, Quantity};
+use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
+use crate::import::source::{Findings, Span};
+use crate::import::words::quote;
+use crate::model::{Start, Value};
+
+/// What is stated, with joints by their index in the file.
+pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
+    let mut starts = Vec::new();
+    for (index, joint) in raw.joints.iter().enumerate() {
+        let what = format!("joint {}", quote(&joint.name.value));
+        if idle(joint, &what, numbers.findings) {
+            continue;
+        }
+        let held = joint.held.as_ref().is_some_and(|h| h.value);
+        if let (Some(at), true, true) = (&joint.held, held, raw.constraints.is_empty()) {
+            let message = format!("{what}: `held` has no effect where there are no loops");
+            numbers.findings.warning(at.span, message, "remove it, or add what closes the loop as a `[[loop]]`");
+        }
+        let Some(kind) = joint.kind.as_ref().map(|k| k.value) else { continue };
+        let q = match &joint.start {
+            Some(start) => coordinates_of(start, kind, &what, numbers),
+            None => neutral(kind),
+        };
+        if joint.start.is_some() || held {
+            starts.push(Start { joint: index, q, held });
+        }
+    }
+    starts
+}
+
+/// With final joint indices, in their order.
+pub(super) fn placed(mut starts: Vec<Start>, place: &[usize]) -> Vec<Start> {
+    for start in &mut starts {
+        start.joint = place[start.joint];
+    }
+    starts.sort_by_key(|s| s.joint);
+    starts
+}
+
+/// Reports a start of coordinates that are not free, and says whether there was one.
+fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
+    let start = joint.start.as_ref().map(|s| ("start", span_of(s)));
+    let held = joint.held.as_ref().map(|h| ("held", h.span));
+    let mut found = false;
+    for (key, span) in start.into_iter().chain(held) {
+        let (why, help) = if let Some(mimic) = &joint.mimic {
+            let leader = quote(&mimic.leader.value);
+            (format!("`{key}` on a joint that follows {leader}"), format!("move it to {leader}"))
+        } else if matches!(joint.motion, RawMotion::Prescribed(_)) {
+            let help = "remove it: the position of a prescribed joint comes with every call";
+            (format!("`{key}` on a joint whose motion is prescribed"), help.into())
+        } else if joint.kind.as_ref().is_some_and(|k| k.value == JointType::Fixed) {
+            (format!("a fixed joint has no `{key}`"), "remove it, or change the type of the joint".into())
+        } else {
+            continue;
+        };
+        findings.error(span, format!("{what}: {why}"), help);
+        found = true;
+    }
+    found
+}
+
+/// Coordinates at zero: no rotation where they end in a quaternion.
+fn neutral(kind: JointType) -> Vec<f64> {
+    let mut q = vec![0.0; quantities(kind).len()];
+    if let (JointType::Spherical | JointType::Floating, Some(w)) = (kind, q.last_mut()) {
+        *w = 1.0;
+    }
+    q
+}
+
+/// What each coordinate measures.
+fn quantities(kind: JointType) -> &'static [Quantity] {
+    use Quantity::{Length, Plain};
+    match kind {
+        JointType::Spherical => &[Plain; 4],
+        JointType::Floating => &[Length, Length, Length, Plain, Plain, Plain, Plain],
+        other => coordinates(other),
+    }
+}
+
+fn coordinates_of(start: &RawFreedoms, kind: JointType, what: &str, numbers: &mut Numbers) -> Vec<f64> {
+    let each: &[RawNumber] = match start {
+        RawFreedoms::All(x) => std::slice::from_ref(x),
+        RawFreedoms::Each(list) => &list.value,
+    };
+    let wanted = quantities(kind);
+    let mut q: Vec<f64> = each
+        .iter()
+        .enumerate()
+        .map(|(k, x)| constant(x, wanted.get(k).copied().unwrap_or(Quantity::Plain), what, numbers))
+        .collect();
+    if q.len() != wanted.len() {
+        // A joint without coordinates is told so already.
+        if !wanted.is_empty() {
+            length(q.len(), wanted.len(), kind, what, span_of(start), numbers.findings);
+        }
+        return neutral(kind);
+    }
+    if matches!(kind, JointType::Spherical | JointType::Floating) {
+        let first = q.len() - 4;
+        unit(&mut q[first..], what, span_of(start), numbers.findings);
+    }
+    q
+}
+
+fn length(got: usize, n: usize, kind: JointType, what: &str, span: Span, findings: &mut Findings) {
+    let plural = |n: usize| if n == 1 { "" } else { "s" };
+    let message = format!(
+        "{what}: `start` has {got} number{}, and a {} joint has {n} coordinate{}",
+        plural(got),
+        type_name(kind),
+        plural(n)
+    );
+    let help = match kind {
+        JointType::Spherical => "write the unit quaternion: `[x, y, z, w]`".into(),
+        JointType::Floating => "write the origin, then the unit quaternion: `[x, y, z, qx, qy, qz, qw]`".into(),
+        _ if n == 1 => "write one number".into(),
+        _ => format!("write {n} numbers, in the order of the coordinates"),
+    };
+    findings.error(span, message, help);
+}
+
+/// A constant; NaN where there is none.
+fn constant(x: &RawNumber, quantity: Quantity, what: &str, numbers: &mut Numbers) -> f64 {
+    if let RawValue::Param(_) = x.value {
+        let message = format!("{what}: `start` cannot depend on a parameter");
+        numbers.findings.error(x.span, message, "write a constant: the model begins there, whatever its parameters");
+        return f64::NAN;
+    }
+    match numbers.value(x, quantity, &format!("{what}: `start`")) {
+        Value::Const(x) => x,
+        Value::Param(_) => f64::NAN,
+    }
+}
+
+/// Scales a quaternion to unit length.
+fn unit(q: &mut [f64], what: &str, span: Span, findings: &mut Findings) {
+    let n = norm([q[0], q[1], q[2]]).hypot(q[3]);
+    let order = "write a unit quaternion in the order x, y, z, w: no rotation is `0, 0, 0, 1`";
+    if n < 1e-9 {
+        findings.error(span, format!("{what}: the quaternion in `start` is zero"), order);
+        return;
+    }
+    if (n - 1.0).abs() > 1e-3 {
+        let message = format!("{what}: the quaternion in `start` has length {}", (n * 1e4).round() / 1e4);
+        findings.warning(span, message, format!("it is scaled to 1; {order}"));
+    }
+    // One of unit length to rounding stays as it is written.
+    if (n - 1.0).abs() > 4.0 * f64::EPSILON {
+        q.iter_mut().for_each(|x| *x /= n);
+    }
+}

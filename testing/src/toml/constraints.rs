@@ -1,0 +1,139 @@
+//! Loops, couplings and starts.
+
+use mbd_codegen::model::{Constraint, ConstraintKind, Joint, JointKind, LoopKind, Mount, Placement, Start, Value};
+
+use super::{line, quoted, Writer};
+
+impl Writer<'_> {
+    /// Every constraint, behind frames for those ends of loops that are neither bodies nor frames of the model.
+    pub(super) fn constraints(&self, out: &mut String) {
+        for constraint in &self.model.constraints {
+            if let ConstraintKind::Loop { first, second, .. } = &constraint.kind {
+                self.missing_frame(out, first, &format!("{} first", constraint.name));
+                self.missing_frame(out, second, &format!("{} second", constraint.name));
+            }
+        }
+        for constraint in &self.model.constraints {
+            self.constraint(out, constraint);
+        }
+    }
+
+    /// What an end is called, if it is a body or a frame of the model.
+    fn end(&self, mount: &Mount) -> Option<&str> {
+        if mount.placement == Placement::IDENTITY {
+            return Some(mount.body.map_or("ground", |b| &self.model.bodies[b].name));
+        }
+        let frames = &self.model.frames;
+        let at = frames.iter().find(|f| f.body == mount.body && f.placement == mount.placement)?;
+        Some(&at.name)
+    }
+
+    fn missing_frame(&self, out: &mut String, mount: &Mount, name: &str) {
+        if self.end(mount).is_none() {
+            out.push_str("\n[[frame]]\n");
+            line(out, "name", quoted(name));
+            line(out, "body", quoted(mount.body.map_or("ground", |b| &self.model.bodies[b].name)));
+            self.placement(out, &mount.placement);
+        }
+    }
+
+    fn constraint(&self, out: &mut String, constraint: &Constraint) {
+        let name = &constraint.name;
+        match &constraint.kind {
+            ConstraintKind::Loop { kind, first, second } => {
+                out.push_str("\n[[loop]]\n");
+                line(out, "name", quoted(name));
+                let end = |mount, which: &str| {
+                    quoted(self.end(mount).map_or(format!("{name} {which}"), str::to_string).as_str())
+                };
+                line(out, "between", format!("[{}, {}]", end(first, "first"), end(second, "second")));
+                self.loop_kind(out, kind);
+            }
+            ConstraintKind::Coupling { terms, offset } => {
+                out.push_str("\n[[coupling]]\n");
+                line(out, "name", quoted(name));
+                let joints: Vec<&Joint> = terms.iter().map(|(j, _)| &self.model.joints[*j]).collect();
+                let names: Vec<String> = joints.iter().map(|j| quoted(&j.name)).collect();
+                line(out, "joints", format!("[{}]", names.join(", ")));
+                let ratios: Vec<Value> = terms.iter().map(|(_, ratio)| *ratio).collect();
+                line(out, "ratios", self.list(&ratios, false));
+                let turns = !joints.iter().any(|j| matches!(j.kind, JointKind::Slider { .. }));
+                if *offset != Value::ZERO {
+                    line(out, "offset", self.number(*offset, turns));
+                }
+            }
+        }
+        self.unless_zero(out, "decay", constraint.decay);
+    }
+
+    fn loop_kind(&self, out: &mut String, kind: &LoopKind) {
+        let name = match kind {
+            LoopKind::Pin { .. } => "pin",
+            LoopKind::Slider { .. } => "slider",
+            LoopKind::Cylindrical { .. } => "cylindrical",
+            LoopKind::Helical { .. } => "helical",
+            LoopKind::Universal { .. } => "universal",
+            LoopKind::Planar { .. } => "planar",
+            LoopKind::Spherical => "spherical",
+            LoopKind::Fixed => "fixed",
+            LoopKind::Distance { .. } => "distance",
+            LoopKind::PointOnLine { .. } => "point_on_line",
+            LoopKind::PointOnPlane { .. } => "point_on_plane",
+            LoopKind::PointOnCylinder { .. } => "point_on_cylinder",
+            LoopKind::RollingDisc { .. } => "rolling_disc",
+            LoopKind::RollingBall { .. } => "rolling_ball",
+            LoopKind::KnifeEdge { .. } => "knife_edge",
+            LoopKind::Pfaffian { .. } => "pfaffian",
+        };
+        line(out, "type", quoted(name));
+        let z = [0.0, 0.0, 1.0];
+        let mut direction = |key: &str, v: &[f64; 3], default: [f64; 3]| {
+            if *v != default {
+                line(out, key, format!("{v:?}"));
+            }
+        };
+        match kind {
+            LoopKind::Universal { axes: [first, second] } => {
+                direction("axis", first, [1.0, 0.0, 0.0]);
+                direction("axis2", second, [0.0, 1.0, 0.0]);
+            }
+            LoopKind::Planar { normal } | LoopKind::PointOnPlane { normal } | LoopKind::RollingBall { normal, .. } => {
+                direction("normal", normal, z);
+            }
+            LoopKind::RollingDisc { normal, axis, .. } => {
+                direction("normal", normal, z);
+                direction("axis", axis, z);
+            }
+            LoopKind::Pin { axis }
+            | LoopKind::Slider { axis }
+            | LoopKind::Cylindrical { axis }
+            | LoopKind::Helical { axis, .. }
+            | LoopKind::PointOnLine { axis }
+            | LoopKind::PointOnCylinder { axis, .. }
+            | LoopKind::KnifeEdge { axis } => direction("axis", axis, z),
+            LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => {}
+        }
+        match kind {
+            LoopKind::Helical { pitch, .. } => line(out, "pitch", self.number(*pitch, false)),
+            LoopKind::Distance { length } => line(out, "length", self.number(*length, false)),
+            LoopKind::PointOnCylinder { radius, .. }
+            | LoopKind::RollingDisc { radius, .. }
+            | LoopKind::RollingBall { radius, .. } => line(out, "radius", self.number(*radius, false)),
+            LoopKind::Pfaffian { row } => line(out, "row", self.list(row, false)),
+            _ => {}
+        }
+    }
+
+    /// Start of a joint, if it has one.
+    pub(super) fn start(&self, out: &mut String, joint: usize) {
+        let Some(Start { q, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
+        let turns = matches!(self.model.joints[joint].kind, JointKind::Pin { .. } | JointKind::Helical { .. });
+        match q[..] {
+            [x] => line(out, "start", self.number(Value::Const(x), turns)),
+            _ => line(out, "start", format!("{q:?}")),
+        }
+        if *held {
+            line(out, "held", "true".to_string());
+        }
+    }
+}
