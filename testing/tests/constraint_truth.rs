@@ -1,10 +1,9 @@
 //! The reference for constraints held against itself: definitions of positions against those of velocities, momenta against
 //! accelerations. What it says about the sweeps is in `constraints.rs`.
 
-use mbd_codegen::model::ConstraintKind;
 use mbd_runtime::System;
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
-use mbd_testing::random::{Knobs, Rng};
+use mbd_testing::random::Rng;
 
 mod dense;
 
@@ -88,36 +87,12 @@ fn velocities_along_the_motion_have_the_accelerations() {
     assert!(met > 30 && redundant > 5);
 }
 
-/// Serial chains with one loop to the ground, as section 5.3.3 wants them: nothing hangs on their joints but drives of force.
-fn chain(seed: u64) -> LoopSystem {
-    let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
-    let kinds = if seed % 2 == 0 { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
-    let tree = Knobs { bodies: (3, 6), kinds, ..Knobs::default() };
-    let mut cuts = [0.0; 16];
-    for k in [0, 1, 2, 5, 6, 7, 9, 10] {
-        cuts[k] = 1.0;
-    }
-    let knobs = LoopKnobs { tree, count: (1, 1), ground: 1.0, coupling: 0.0, kinds: cuts, ..LoopKnobs::plain() };
-    (0..)
-        .map(|k| random_loops(seed + 1000 * k, &knobs))
-        .find(serial)
-        .expect("some loop goes from the ground to the tip")
-}
-
-fn serial(s: &LoopSystem) -> bool {
-    let tip = s.model.joints.last().map(|j| j.child);
-    match &s.model.constraints[0].kind {
-        ConstraintKind::Loop { first, second, .. } => first.body.is_none() && second.body == tip,
-        ConstraintKind::Coupling { .. } => false,
-    }
-}
-
 /// The thesis's recursion for minimal coordinates gives what `d/dt (Bᵀ M v)` is, for every choice of dependent joints.
 #[test]
 fn the_thesis_s_recursion_is_right() {
     let (mut worst, mut worst_v, mut met) = (0.0_f64, 0.0_f64, 0);
     for seed in 0..60 {
-        let s = chain(seed);
+        let s = thesis::chain(seed);
         let nv = s.open.dims.nv;
         let links = thesis::Chain::new(&s, &s.state.q);
         let mut rng = Rng::new(seed, 8);

@@ -6,10 +6,10 @@ use mbd_runtime::spatial::cross;
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
 use mbd_runtime::System;
-use mbd_testing::closed::LoopSystem;
+use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
 use mbd_testing::kkt::{across, mounted, unit, Pose};
 use mbd_testing::newton::{body_frames, freedoms, joint_coordinates};
-use mbd_testing::random::rotation_matrix;
+use mbd_testing::random::{rotation_matrix, Knobs};
 use mbd_testing::value;
 
 use super::minimal::least;
@@ -176,6 +176,30 @@ impl Chain {
             total.push((cq * z).transpose());
         }
         total
+    }
+}
+
+/// Serial chains with one loop to the ground, as section 5.3.3 wants them: nothing hangs on their joints but drives of force.
+pub fn chain(seed: u64) -> LoopSystem {
+    let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
+    let kinds = if seed % 2 == 0 { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
+    let tree = Knobs { bodies: (3, 6), kinds, ..Knobs::default() };
+    let mut cuts = [0.0; 16];
+    for k in [0, 1, 2, 5, 6, 7, 9, 10] {
+        cuts[k] = 1.0;
+    }
+    let knobs = LoopKnobs { tree, count: (1, 1), ground: 1.0, coupling: 0.0, kinds: cuts, ..LoopKnobs::plain() };
+    (0..)
+        .map(|k| random_loops(seed + 1000 * k, &knobs))
+        .find(serial)
+        .expect("some loop goes from the ground to the tip")
+}
+
+fn serial(s: &LoopSystem) -> bool {
+    let tip = s.model.joints.last().map(|j| j.child);
+    match &s.model.constraints[0].kind {
+        ConstraintKind::Loop { first, second, .. } => first.body.is_none() && second.body == tip,
+        ConstraintKind::Coupling { .. } => false,
     }
 }
 
