@@ -20,6 +20,9 @@ pub const ZERO: f64 = 1e-6;
 /// And above this they are clearly not.
 pub const CLEAR: f64 = 1e-3;
 
+/// Rows of `Φ L⁻ᵀ` smaller than this beside the largest are rounding.
+const NOTHING: f64 = 1e-12;
+
 /// Mass matrix and constraints of a system in its state.
 pub struct Dense {
     pub m: Matrix,
@@ -65,10 +68,12 @@ impl Dense {
         let (rows, nv) = phi.shape();
         let lower = m.clone().cholesky().expect("M is positive definite").l();
         let mut w = lower.solve_lower_triangular(&phi.transpose()).expect("L is regular").transpose();
-        let lengths = Vector::from_fn(rows, |k, _| w.row(k).norm());
+        // A row that nothing moves along is zero, not what rounding left of it.
+        let largest = (0..rows).map(|k| w.row(k).norm()).fold(0.0, f64::max);
+        let lengths =
+            Vector::from_fn(rows, |k, _| Some(w.row(k).norm()).filter(|l| *l > NOTHING * largest).unwrap_or(0.0));
         for k in 0..rows {
-            let length = if lengths[k] > 0.0 { lengths[k] } else { 1.0 };
-            w.row_mut(k).scale_mut(1.0 / length);
+            w.row_mut(k).scale_mut(if lengths[k] > 0.0 { 1.0 / lengths[k] } else { 0.0 });
         }
         // Padded with zero rows, so that all right singular vectors come out.
         let padded = w.resize_vertically(rows.max(nv), 0.0);
