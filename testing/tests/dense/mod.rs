@@ -84,7 +84,10 @@ impl Dense {
 
     /// Column `k` of the left singular vectors, for the rows of `Φ` as they are.
     fn left(&self, k: usize) -> Vector {
-        Vector::from_fn(self.lengths.len(), |i, _| if self.lengths[i] > 0.0 { self.u[(i, k)] / self.lengths[i] } else { 0.0 })
+        Vector::from_fn(
+            self.lengths.len(),
+            |i, _| if self.lengths[i] > 0.0 { self.u[(i, k)] / self.lengths[i] } else { 0.0 },
+        )
     }
 
     /// What of a right-hand side no velocity can meet, relative to it.
@@ -186,9 +189,8 @@ impl Truth {
     pub fn new(system: &LoopSystem, p: &Vector) -> Truth {
         let dense = Dense::new(system);
         let bare = p - &dense.driven;
-        let unbound = dense.lower.tr_solve_lower_triangular(
-            &dense.lower.solve_lower_triangular(&bare).expect("L is regular"),
-        );
+        let unbound =
+            dense.lower.tr_solve_lower_triangular(&dense.lower.solve_lower_triangular(&bare).expect("L is regular"));
         let start = dense.solve(&bare, &dense.b);
         Truth::at(system, dense, start, unbound.expect("L is regular"))
     }
@@ -209,7 +211,18 @@ impl Truth {
             .lower
             .tr_solve_lower_triangular(&dense.lower.solve_lower_triangular(&f).expect("L is regular"))
             .expect("L is regular");
-        Truth { dense, v, unbound, sigma: start.y, pull: start.force, phi_rate, open_rates, motion, unbound_motion, gamma }
+        Truth {
+            dense,
+            v,
+            unbound,
+            sigma: start.y,
+            pull: start.force,
+            phi_rate,
+            open_rates,
+            motion,
+            unbound_motion,
+            gamma,
+        }
     }
 
     /// `ṗ⁺` but for `Φᵀσ̇`, which is nobody's business: `d/dt (M v) = ṗ − Φᵀλ`, so `d/dt (M v + Φᵀσ) = ṗ + Φ̇ᵀσ + Φᵀ(σ̇ − λ)`.
