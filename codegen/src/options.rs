@@ -172,7 +172,7 @@ impl Group {
 
     /// Whether mechanisms with constraints lack it.
     pub fn of_trees(self) -> bool {
-        matches!(self, Group::Reactions | Group::MomentumDerivatives)
+        self == Group::MomentumDerivatives
     }
 
     /// The group of a name.

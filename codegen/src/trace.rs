@@ -155,15 +155,10 @@ fn has(plan: &Plan, group: Group) -> Result<(), String> {
     if Group::CONSTRAINED.contains(&group) && !constrained {
         return Err(format!("`{name}` is an output of mechanisms with loops or couplings, and `{model}` has none"));
     }
-    match group {
-        Group::MomentumDerivatives if constrained => {
-            Err(format!("`{name}` does not know the loops and couplings of `{model}`: use `derivatives`"))
-        }
-        Group::Reactions if constrained => {
-            Err(format!("`{name}` does not know the loops and couplings of `{model}`: use `multipliers`"))
-        }
-        _ => Ok(()),
+    if group.of_trees() && constrained {
+        return Err(format!("`{name}` does not know the loops and couplings of `{model}`: use `derivatives`"));
     }
+    Ok(())
 }
 
 /// Part of a row's diagonal below which it counts as redundant.

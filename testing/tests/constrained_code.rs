@@ -33,7 +33,14 @@ impl Case {
         let system = random_loops(seed, &LoopKnobs::everything(seed, [3, 4, 6, 8][seed as usize % 4]));
         let mut rng = Rng::new(seed, 8);
         let derivatives = seed.is_multiple_of(4);
-        let mut outputs = vec![Group::Rates, Group::Momenta, Group::Energy, Group::Velocities, Group::Accelerations];
+        let mut outputs = vec![
+            Group::Rates,
+            Group::Momenta,
+            Group::Energy,
+            Group::Velocities,
+            Group::Accelerations,
+            Group::Reactions,
+        ];
         outputs.extend(Group::CONSTRAINED);
         if derivatives {
             outputs.extend([Group::Derivatives, Group::ParameterDerivatives]);
@@ -95,6 +102,9 @@ impl Case {
         self.compare("energy", &run(Group::Energy)["result"], &[kinetic, potential]);
         i.state_accelerations(&s.q, &s.v, &mut v);
         self.compare("accelerations", &run(Group::Accelerations)["a"], &v);
+        let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];
+        i.reactions(&s.q, &s.v, &mut v, &mut wrenches);
+        self.compare("reactions", &run(Group::Reactions)["reactions"], &wrenches.concat());
         let (mut rows, mut entries) = (i.zero_rows(), i.zero_entries());
         i.closure(&s.q, &mut rows, &mut entries);
         let closure = run(Group::Closure);

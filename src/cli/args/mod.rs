@@ -130,7 +130,7 @@ Of models with loops or couplings (they get these beside the defaults):
   settle         (q, p) -> v, momenta freed of multipliers, multipliers sigma
   correction     q -> residuals, Newton's step onto closed positions, its pivots
   multipliers    (q, v) -> forces of the constraints
-such models have no `reactions` and no `momentum_derivatives`.";
+such models have no `momentum_derivatives`.";
 
 /// What code is generated.
 #[derive(Args)]
