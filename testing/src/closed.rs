@@ -3,12 +3,8 @@
 use mbd_codegen::model::{
     Constraint, ConstraintKind, JointKind, LoopKind, Model, Motion, Mount, Param, Placement, Rotation, Value,
 };
-<<<<<<< HEAD
 use mbd_codegen::options::Loops;
 use mbd_codegen::plan::{Forms, Plan, PlanOptions, DEFAULT_SNAP};
-=======
-use mbd_codegen::plan::Plan;
->>>>>>> emitcon
 use mbd_runtime::spatial::{add3, dot3, scale3, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
@@ -115,11 +111,7 @@ fn attempted(seed: u64, attempt: u64, knobs: &LoopKnobs) -> Option<LoopSystem> {
     if knobs.planar {
         flatten(&mut tree, &mut rng);
     }
-<<<<<<< HEAD
     let open = Plan::new(&tree, PLAIN);
-=======
-    let open = Plan::new(&tree, Default::default());
->>>>>>> emitcon
     let mut state = random_state(&open, own);
     let mut frames = vec![FrameState::ground(); open.frames.len()];
     state.interpreter(&open).frames(&state.q, &state.v, &mut frames);
@@ -143,7 +135,6 @@ fn attempted(seed: u64, attempt: u64, knobs: &LoopKnobs) -> Option<LoopSystem> {
     Some(LoopSystem { seed, model, open, state })
 }
 
-<<<<<<< HEAD
 /// One joint after the other: neither the search for a form nor what it finds is part of a reference.
 const PLAIN: PlanOptions = PlanOptions {
     snap: DEFAULT_SNAP,
@@ -153,8 +144,6 @@ const PLAIN: PlanOptions = PlanOptions {
     loops: Loops::Never,
 };
 
-=======
->>>>>>> emitcon
 /// Rows with less left of them than this are dependent on others.
 const RANK: f64 = 1e-7;
 
@@ -282,20 +271,13 @@ impl Closer<'_> {
 
     fn closed_loop(&mut self) -> Option<ConstraintKind> {
         let n = self.model.bodies.len();
-<<<<<<< HEAD
         let kind = self.kind();
-=======
->>>>>>> emitcon
         for _ in 0..20 {
             let ground = self.rng.chance(self.knobs.ground);
             let mut ends = [Some(self.rng.below(n)), if ground { None } else { Some(self.rng.below(n)) }];
             if self.rng.chance(0.5) {
                 ends.swap(0, 1);
             }
-<<<<<<< HEAD
-=======
-            let kind = self.kind();
->>>>>>> emitcon
             let free = self.between(ends[0], ends[1]);
             // In a plane at most three rows count.
             let needed = if self.knobs.planar { rows(&kind).min(3) } else { rows(&kind) };

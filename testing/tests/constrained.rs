@@ -141,7 +141,7 @@ fn interpreter(model: &Model) -> Mechanism {
         Value::Const(x) => x,
         Value::Param(_) => panic!("no parameters"),
     };
-    Interpreter::new(plan.instantiate(&[]), g.map(number))
+    Interpreter::new(plan.tree(&[]), g.map(number))
 }
 
 fn split(text: &str) -> Split<Mechanism, Mechanism> {

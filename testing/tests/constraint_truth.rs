@@ -7,12 +7,8 @@ use mbd_testing::random::Rng;
 
 mod dense;
 
-<<<<<<< HEAD
 use dense::minimal::{choices, full, others, pivot, rates};
 use dense::{rows, thesis, Truth, Vector};
-=======
-use dense::{rows, Truth, Vector};
->>>>>>> emitcon
 
 const SYSTEMS: u64 = 300;
 
@@ -75,21 +71,13 @@ fn velocities_along_the_motion_have_the_accelerations() {
         let rates = truth.momentum_rates();
         let mut qd = vec![0.0; s.state.q.len()];
         s.state.interpreter(&s.open).coordinate_rates(&s.state.q, &truth.v.as_slice().to_vec(), &mut qd);
-<<<<<<< HEAD
         let h = 1e-4;
-=======
-        let h = 1e-5;
->>>>>>> emitcon
         let at = |h: f64| {
             let mut moved = s.clone();
             moved.state.q.iter_mut().zip(&qd).for_each(|(q, qd)| *q += h * qd);
             Truth::new(&moved, &(&p + &rates * h)).v
         };
-<<<<<<< HEAD
         let slope = ((at(h) - at(-h)) * 8.0 - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
-=======
-        let slope = (at(h) - at(-h)) / (2.0 * h);
->>>>>>> emitcon
         let size = truth.motion.x.norm().max(truth.unbound_motion.norm()).max(1.0);
         let error = (slope - &truth.motion.x).norm() / size;
         assert!(error < 1e-5, "seed {seed}: {error:e}");
@@ -98,7 +86,6 @@ fn velocities_along_the_motion_have_the_accelerations() {
     println!("{met} systems, {redundant} with redundant rows: {worst:.1e}");
     assert!(met > 30 && redundant > 5);
 }
-<<<<<<< HEAD
 
 /// The thesis's recursion for minimal coordinates gives what `d/dt (Bᵀ M v)` is, for every choice of dependent joints.
 #[test]
@@ -138,5 +125,3 @@ fn the_thesis_s_recursion_is_right() {
     println!("{met} choices: velocities {worst_v:.1e}, rates {worst:.1e}");
     assert!(met > 100);
 }
-=======
->>>>>>> emitcon
