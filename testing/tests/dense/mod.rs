@@ -8,6 +8,7 @@ use mbd_testing::closed::LoopSystem;
 use mbd_testing::kkt::Rows;
 use nalgebra::{DMatrix, DVector};
 
+pub mod case;
 pub mod minimal;
 pub mod thesis;
 
