@@ -145,12 +145,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Pivot of row `r`, the shared `g`: negative, or zero where what is left of the row's diagonal is too little of what it
     /// was, or of what those of its constraint are together. The first says that it follows from rows before it, the second
-    /// that its bodies cannot move along it.
+    /// that its bodies cannot move along it. Where they can move along none of its rows, all of them are rounding, and small
+    /// beside what a body of 1 kg or 1 kg m² would give, for which the one stands.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.shared.len();
         let tolerance = self.tree.tolerance;
         let all = self.tree.constraint_of(r).slots.iter().fold(S::zero(), |sum, &h| sum + f.whole[h]);
-        let floor = tolerance * (f.whole[g] + tolerance * all);
+        let floor = tolerance * (f.whole[g] + tolerance * (all + S::one()));
         -(-f.gram[g * ng + g]).reciprocal_above(floor)
     }
 
