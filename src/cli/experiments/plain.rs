@@ -1,0 +1,167 @@
+//! Equations on plain numbers and explicit steps of them whose errors can be looked at, number by number.
+//!
+//! The library's solvers weigh all errors into one number; the thesis's tables tell them apart, and count evaluations as
+//! MATLAB's `ode45` does.
+
+use multibody::runtime::integrate::tableau::{Tableau, DORMAND_PRINCE};
+use multibody::runtime::integrate::Constant;
+
+/// `ẏ = f(y)`.
+pub trait Equation {
+    /// Rates of a state.
+    fn rates(&mut self, y: &[f64], rates: &mut [f64]);
+    /// What may be done to a state between two steps: multipliers begin at zero again. Whether anything was done.
+    fn between(&mut self, _y: &mut [f64]) -> bool {
+        false
+    }
+}
+
+/// A run of steps.
+pub struct Walk<'a, const S: usize> {
+    equation: &'a mut dyn Equation,
+    tableau: &'static Tableau<S>,
+    /// The state.
+    pub y: Vec<f64>,
+    k: Vec<Vec<f64>>,
+    first_known: bool,
+    next: Vec<f64>,
+    /// Estimated errors of the last attempt.
+    pub error: Vec<f64>,
+    /// Evaluations so far.
+    pub evaluations: u64,
+    /// Whether the result of lower order is carried on, the one that the error is estimated of.
+    pub lower: bool,
+}
+
+impl<'a, const S: usize> Walk<'a, S> {
+    /// From a state.
+    pub fn new(equation: &'a mut dyn Equation, tableau: &'static Tableau<S>, y: &[f64]) -> Self {
+        let zero = vec![0.0; y.len()];
+        Walk {
+            equation,
+            tableau,
+            y: y.to_vec(),
+            k: vec![zero.clone(); S],
+            first_known: false,
+            next: zero.clone(),
+            error: zero,
+            evaluations: 0,
+            lower: false,
+        }
+    }
+
+    fn stage(&mut self, i: usize) {
+        let (_, rest) = self.k.split_at_mut(i);
+        self.equation.rates(&self.next, &mut rest[0]);
+        self.evaluations += 1;
+    }
+
+    /// Rates at the state.
+    pub fn start(&mut self) -> &[f64] {
+        if !self.first_known {
+            self.next.copy_from_slice(&self.y);
+            self.stage(0);
+            self.first_known = true;
+        }
+        &self.k[0]
+    }
+
+    fn combine(&mut self, h: f64, weights: &[Constant]) {
+        for (n, next) in self.next.iter_mut().enumerate() {
+            let sum: f64 = weights.iter().zip(&self.k).map(|(w, k)| w.get::<f64>() * k[n]).sum();
+            *next = self.y[n] + h * sum;
+        }
+    }
+
+    /// Tries a step of `h` s: the new state and, if the method has any, its estimated errors.
+    pub fn attempt(&mut self, h: f64) -> &[f64] {
+        self.start();
+        let tableau = self.tableau;
+        for i in 1..S {
+            self.combine(h, &tableau.a[i][..i]);
+            self.stage(i);
+        }
+        self.combine(h, &tableau.b);
+        if let Some(row) = tableau.error.first() {
+            for (n, error) in self.error.iter_mut().enumerate() {
+                *error = h * row.iter().zip(&self.k).map(|(w, k)| w.get::<f64>() * k[n]).sum::<f64>();
+            }
+            if self.lower {
+                self.next.iter_mut().zip(&self.error).for_each(|(next, error)| *next -= error);
+            }
+        }
+        &self.next
+    }
+
+    /// Goes where the last attempt led.
+    pub fn accept(&mut self) {
+        std::mem::swap(&mut self.y, &mut self.next);
+        let changed = self.equation.between(&mut self.y);
+        self.first_known = self.tableau.fsal && !changed;
+        if self.first_known {
+            self.k.swap(0, S - 1);
+        }
+    }
+
+    /// Steps of the same size to the end, `each` called after every one of them.
+    pub fn fixed(&mut self, h: f64, end: f64, mut each: impl FnMut(f64, &Self)) {
+        let steps = (end / h).round() as u64;
+        for step in 1..=steps {
+            self.attempt(end / steps as f64);
+            self.accept();
+            each(end * step as f64 / steps as f64, self);
+        }
+    }
+}
+
+/// Largest of numbers relative to the larger of `threshold` and the size of the state.
+fn relative(values: &[f64], sizes: impl Iterator<Item = f64>, threshold: f64) -> f64 {
+    values.iter().zip(sizes).fold(0.0, |worst, (v, size)| (v.abs() / size.max(threshold)).max(worst))
+}
+
+/// What a run with error control gave.
+pub struct Controlled {
+    /// State at the end.
+    pub y: Vec<f64>,
+    /// Evaluations.
+    pub evaluations: u64,
+}
+
+/// A run from time 0 as `ode45` makes it, MATLAB's control of the steps with both tolerances alike: L. F. Shampine, M. W.
+/// Reichelt, The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the step becomes too small.
+pub fn ode45(equation: &mut dyn Equation, start: &[f64], end: f64, tolerance: f64) -> Option<Controlled> {
+    const POWER: f64 = 0.2;
+    // The absolute tolerance over the relative one.
+    let threshold = 1.0;
+    let mut walk = Walk::new(equation, &DORMAND_PRINCE, start);
+    let largest = 0.1 * end;
+    let sizes: Vec<f64> = walk.y.iter().map(|y| y.abs()).collect();
+    let rate = relative(walk.start(), sizes.into_iter(), threshold) / (0.8 * tolerance.powf(POWER));
+    let mut step = if largest * rate > 1.0 { 1.0 / rate } else { largest };
+    let mut t = 0.0_f64;
+    while t < end {
+        let least = 16.0 * f64::EPSILON * t.max(f64::MIN_POSITIVE);
+        step = step.clamp(least, largest);
+        let last = 1.1 * step >= end - t;
+        let mut h = if last { end - t } else { step };
+        let mut failed = false;
+        let error = loop {
+            let next = walk.attempt(h).to_vec();
+            let sizes = next.iter().zip(&walk.y).map(|(a, b)| a.abs().max(b.abs()));
+            let error = h * relative(&walk.error.iter().map(|e| e / h).collect::<Vec<_>>(), sizes, threshold);
+            if error <= tolerance {
+                break error;
+            }
+            if h <= least || !error.is_finite() {
+                return None;
+            }
+            let factor = if failed { 0.5 } else { (0.8 * (tolerance / error).powf(POWER)).max(0.1) };
+            h = (h * factor).max(least);
+            failed = true;
+        };
+        walk.accept();
+        t = if last && !failed { end } else { t + h };
+        step = if failed { h } else { h / (1.25 * (error / tolerance).powf(POWER)).max(0.2) };
+    }
+    Some(Controlled { y: walk.y.clone(), evaluations: walk.evaluations })
+}
