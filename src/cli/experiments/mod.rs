@@ -2,10 +2,13 @@
 //! `docs/experiments.md`.
 
 mod biped;
+mod clock;
 mod forms;
+mod mechanism;
 mod plain;
 #[path = "standin.rs"]
 mod standin;
+mod scaling;
 mod study;
 mod tables;
 mod thesis;
@@ -22,7 +25,7 @@ use super::{Failure, Outcome};
 pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
     match &args.experiment {
         Experiment::Biped(args) => biped::run(args, out),
-        Experiment::Scaling(_) => Ok(()),
+        Experiment::Scaling(args) => scaling::run(args, out),
     }
 }
 

@@ -3,7 +3,7 @@
 //! The library's solvers weigh all errors into one number; the thesis's tables tell them apart, and count evaluations as
 //! MATLAB's `ode45` does.
 
-use multibody::runtime::integrate::tableau::{Tableau, DORMAND_PRINCE};
+use multibody::runtime::integrate::tableau::Tableau;
 use multibody::runtime::integrate::Constant;
 
 /// `ẏ = f(y)`.
@@ -116,7 +116,11 @@ impl<'a, const S: usize> Walk<'a, S> {
 
 /// Largest of numbers relative to the larger of `threshold` and the size of the state.
 fn relative(values: &[f64], sizes: impl Iterator<Item = f64>, threshold: f64) -> f64 {
-    values.iter().zip(sizes).fold(0.0, |worst, (v, size)| (v.abs() / size.max(threshold)).max(worst))
+    values.iter().zip(sizes).fold(0.0, |worst: f64, (v, size)| {
+        let ratio = v.abs() / size.max(threshold);
+        // What is not a number must not be lost.
+        if ratio > worst || ratio.is_nan() { ratio } else { worst }
+    })
 }
 
 /// What a run with error control gave.
@@ -127,16 +131,24 @@ pub struct Controlled {
     pub evaluations: u64,
 }
 
-/// A run from time 0 as `ode45` makes it, MATLAB's control of the steps with both tolerances alike: L. F. Shampine, M. W.
-/// Reichelt, The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the step becomes too small.
-pub fn ode45(equation: &mut dyn Equation, start: &[f64], end: f64, tolerance: f64) -> Option<Controlled> {
+/// A run from time 0 with the steps of MATLAB's `ode45`, absolute and relative tolerance alike: L. F. Shampine, M. W. Reichelt,
+/// The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the step becomes too small.
+///
+/// `ode45` itself has the tableau of Dormand and Prince.
+pub fn controlled<const S: usize>(
+    equation: &mut dyn Equation,
+    tableau: &'static Tableau<S>,
+    start: &[f64],
+    end: f64,
+    tolerance: f64,
+) -> Option<Controlled> {
     const POWER: f64 = 0.2;
     // The absolute tolerance over the relative one.
     let threshold = 1.0;
-    let mut walk = Walk::new(equation, &DORMAND_PRINCE, start);
+    let mut walk = Walk::new(equation, tableau, start);
     let largest = 0.1 * end;
-    let sizes: Vec<f64> = walk.y.iter().map(|y| y.abs()).collect();
-    let rate = relative(walk.start(), sizes.into_iter(), threshold) / (0.8 * tolerance.powf(POWER));
+    let sizes = start.iter().map(|y| y.abs());
+    let rate = relative(walk.start(), sizes, threshold) / (0.8 * tolerance.powf(POWER));
     let mut step = if largest * rate > 1.0 { 1.0 / rate } else { largest };
     let mut t = 0.0_f64;
     while t < end {
@@ -146,9 +158,9 @@ pub fn ode45(equation: &mut dyn Equation, start: &[f64], end: f64, tolerance: f6
         let mut h = if last { end - t } else { step };
         let mut failed = false;
         let error = loop {
-            let next = walk.attempt(h).to_vec();
-            let sizes = next.iter().zip(&walk.y).map(|(a, b)| a.abs().max(b.abs()));
-            let error = h * relative(&walk.error.iter().map(|e| e / h).collect::<Vec<_>>(), sizes, threshold);
+            walk.attempt(h);
+            let sizes = walk.next.iter().zip(&walk.y).map(|(a, b)| a.abs().max(b.abs()));
+            let error = relative(&walk.error, sizes, threshold);
             if error <= tolerance {
                 break error;
             }
@@ -163,5 +175,5 @@ pub fn ode45(equation: &mut dyn Equation, start: &[f64], end: f64, tolerance: f6
         t = if last && !failed { end } else { t + h };
         step = if failed { h } else { h / (1.25 * (error / tolerance).powf(POWER)).max(0.2) };
     }
-    Some(Controlled { y: walk.y.clone(), evaluations: walk.evaluations })
+    Some(Controlled { y: walk.y, evaluations: walk.evaluations })
 }

@@ -1,9 +1,9 @@
 //! The runs behind the tables and figures of the biped.
 
-use multibody::runtime::integrate::tableau::{RK4, RKF45, VERNER9};
+use multibody::runtime::integrate::tableau::{DORMAND_PRINCE, RK4, RKF45, VERNER9};
 
 use super::forms::{Kind, Mechanism, Minimal, Whole};
-use super::plain::{ode45, Controlled, Walk};
+use super::plain::{controlled, Controlled, Walk};
 
 /// End of the motion, s.
 pub const END: f64 = 0.85;
@@ -194,7 +194,7 @@ impl<Y: Mechanism> Study<Y> {
     /// Table 7.2: mean error at the end, evaluations; `None` if the steps became too small.
     pub fn ode45(&mut self, kind: Kind, tolerance: f64, reference: &[f64]) -> Option<(f64, u64)> {
         let y = self.minimal_start();
-        let Controlled { y, evaluations } = ode45(&mut self.minimal(kind), &y, END, tolerance)?;
+        let Controlled { y, evaluations } = controlled(&mut self.minimal(kind), &DORMAND_PRINCE, &y, END, tolerance)?;
         Some((distance(&y, reference), evaluations))
     }
 

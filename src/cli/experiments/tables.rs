@@ -13,11 +13,13 @@ fn pair(ours: f64, theirs: f64) -> String {
     format!("{ours:.1e} ({theirs:.1e})")
 }
 
-fn head(title: &str, columns: &[&str]) -> String {
+/// Head of a table under a title.
+pub fn head(title: &str, columns: &[&str]) -> String {
     format!("### {title}\n\n| {} |\n|{}\n", columns.join(" | "), "---|".repeat(columns.len()))
 }
 
-fn row(text: &mut String, cells: &[String]) {
+/// One row.
+pub fn row(text: &mut String, cells: &[String]) {
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
