@@ -118,7 +118,8 @@ fn draw_chart(area: &Area, x: &str, panel: &Panel) -> Result<(), DrawingAreaErro
     for (k, (_, values)) in panel.lines.iter().enumerate() {
         let last = panel.t.len().saturating_sub(1);
         let points = panel.t.iter().copied().zip(values.iter().copied()).enumerate();
-        let points = points.filter(|(i, (_, y))| (i % stride == 0 || *i == last) && y.is_finite()).map(|(_, point)| point);
+        let points =
+            points.filter(|(i, (_, y))| (i % stride == 0 || *i == last) && y.is_finite()).map(|(_, point)| point);
         chart.draw_series(LineSeries::new(points, colour(k).stroke_width(SCALE)))?;
     }
     Ok(())

@@ -54,8 +54,7 @@ impl Text {
     /// A loop between a place on a body and one on another or the ground, m.
     pub fn close(&mut self, name: &str, kind: &str, ends: [(&str, [f64; 3]); 2]) {
         for (end, (body, place)) in ["a", "b"].iter().zip(ends) {
-            let _ =
-                write!(self.0, "\n[[frame]]\nname = \"{name}_{end}\"\nbody = \"{body}\"\nxyz = {place:?}\n");
+            let _ = write!(self.0, "\n[[frame]]\nname = \"{name}_{end}\"\nbody = \"{body}\"\nxyz = {place:?}\n");
         }
         let _ = write!(
             self.0,

@@ -6,9 +6,11 @@ use clap::{Args, Subcommand};
 
 /// `mbd experiments`.
 #[derive(Args)]
-#[command(after_help = "docs/experiments.md says what is measured and how. The interpreter runs everything; with the generated code that
+#[command(
+    after_help = "docs/experiments.md says what is measured and how. The interpreter runs everything; with the generated code that
 ordinary builds leave out, `scaling` times that too. From a checkout:
-  cargo run --release --features bench -- experiments scaling --out figures")]
+  cargo run --release --features bench -- experiments scaling --out figures"
+)]
 pub struct ExperimentsArgs {
     #[command(subcommand)]
     pub experiment: Experiment,

@@ -2,22 +2,24 @@
 
 use std::io::Write;
 
-use super::forms::{Kind, Mechanism};
+use super::forms::{Closed, Kind};
+use super::mechanism::{self, Mechanism};
 use super::study::{Adaptive, Method, Study, Traces, KINDS};
 use super::{directory, figure, tables, thesis};
 use crate::cli::args::experiments::BipedArgs;
 use crate::cli::output::note;
 use crate::cli::plot::Panel;
-use crate::cli::{Failure, Outcome};
+use crate::cli::Outcome;
 
+const MODEL: &str = include_str!("../../../models/biped.toml");
 /// Steps of the figures, s.
 const STEP: f64 = 1e-3;
 
 /// Runs the study and writes tables and figures.
 pub fn run(args: &BipedArgs, out: &mut dyn Write) -> Outcome {
     directory(args.out.as_deref())?;
-    let (system, near) = system()?;
-    let mut study = Study::new(system, &near);
+    let Mechanism { system, q } = mechanism::read(MODEL)?;
+    let mut study = Study::new(system, &q);
     writeln!(out, "## Biped in double support (thesis 7.3), the thesis's numbers in brackets\n")?;
     let reference = agreement(&mut study, args, out)?;
     tables_of(&mut study, args, &reference, out)?;
@@ -26,7 +28,7 @@ pub fn run(args: &BipedArgs, out: &mut dyn Write) -> Outcome {
 }
 
 /// Every way to the end; the coordinates of the first.
-fn agreement<Y: Mechanism>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome<Vec<f64>> {
+fn agreement<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome<Vec<f64>> {
     note(format_args!("reference"));
     // Errors of order 9 are below round-off long before.
     let h = if args.quick { 1e-3 } else { 2.5e-4 };
@@ -42,19 +44,15 @@ fn agreement<Y: Mechanism>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn
     Ok(first.q)
 }
 
-fn tables_of<Y: Mechanism>(
-    study: &mut Study<Y>,
-    args: &BipedArgs,
-    reference: &[f64],
-    out: &mut dyn Write,
-) -> Outcome {
+fn tables_of<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, reference: &[f64], out: &mut dyn Write) -> Outcome {
     let steps = thesis::FIXED.map(|r| r.0);
-    let steps = if args.quick { &steps[..4] } else { &steps[..] };
+    let steps = if args.quick { &steps[..3] } else { &steps[..] };
     note(format_args!("table 7.1"));
     let rows: Vec<_> = steps.iter().map(|&h| (h, KINDS.map(|kind| study.fixed(kind, h, reference)))).collect();
     write!(out, "{}", tables::fixed(&rows))?;
     note(format_args!("table 7.2"));
     let tolerances = thesis::ODE45.map(|r| r.0);
+    let tolerances = if args.quick { &tolerances[..3] } else { &tolerances[..] };
     let rows: Vec<_> = tolerances.iter().map(|&t| (t, KINDS.map(|kind| study.ode45(kind, t, reference)))).collect();
     write!(out, "{}", tables::ode45(&rows))?;
     note(format_args!("tables 7.3 and 7.4"));
@@ -87,7 +85,7 @@ fn panel(label: &str, names: &[&str], traces: &[&Traces]) -> Panel {
 }
 
 /// Figures 7.9 to 7.13 and what they say in numbers.
-fn motion<Y: Mechanism>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome {
+fn motion<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome {
     note(format_args!("figures 7.9 to 7.13"));
     let [q, v, p] = study.motion(STEP);
     let methods = [
@@ -119,7 +117,7 @@ fn motion<Y: Mechanism>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Wr
 }
 
 /// The long run that is put back on the loop after every step.
-fn projected<Y: Mechanism>(study: &mut Study<Y>, steps: u64, out: &mut dyn Write) -> Outcome {
+fn projected<Y: Closed>(study: &mut Study<Y>, steps: u64, out: &mut dyn Write) -> Outcome {
     let every = (steps / 10).max(1);
     let [after, before, energy] = study.projected(STEP, steps, |step| {
         if step % every == 0 {
@@ -132,21 +130,4 @@ fn projected<Y: Mechanism>(study: &mut Study<Y>, steps: u64, out: &mut dyn Write
          by at most {after:.1e} m ({before:.1e} m before it is put back), the energy strays by {energy:.1e} J."
     )?;
     Ok(())
-}
-
-/// TEMPORARY.
-fn system() -> Outcome<(super::standin::Dense, Vec<f64>)> {
-    use multibody::codegen::import::{load, ImportOptions};
-    use multibody::codegen::plan::{Plan, PlanOptions};
-    use multibody::runtime::Interpreter;
-    let text = include_str!("../../../models/biped.toml");
-    let text: String = text.split("[[loop]]").next().unwrap().lines().filter(|l| !l.starts_with("start") && !l.starts_with("held")).map(|l| format!("{l}\n")).collect();
-    let (model, d) = load("biped.toml", &text, &ImportOptions::default());
-    let model = model.ok_or_else(|| Failure::new(format!("{d}"), "x"))?;
-    let plan = Plan::new(&model, PlanOptions::default());
-    let params = plan.default_params();
-    let g = plan.gravity(&params);
-    let tree = Interpreter::new(plan.tree(&params), g);
-    let s = super::standin::Dense::new(tree, vec![None, Some(0), Some(1), Some(1), Some(3)], 0.25, 4, [0.25, 0.0]);
-    Ok((s, vec![1.7, -0.7, 0.3, -1.986, -0.548]))
 }

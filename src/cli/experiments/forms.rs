@@ -7,7 +7,7 @@ use multibody::runtime::{Accelerated, Conjugate, Constrained, Energetic, System}
 use super::plain::Equation;
 
 /// A mechanism with loops, interpreted.
-pub trait Mechanism:
+pub trait Closed:
     System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>
     + Constrained<Rows = Vec<f64>, Entries = Vec<f64>>
     + Accelerated
@@ -16,7 +16,7 @@ pub trait Mechanism:
 {
 }
 
-impl<Y> Mechanism for Y where
+impl<Y> Closed for Y where
     Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>
         + Constrained<Rows = Vec<f64>, Entries = Vec<f64>>
         + Accelerated
@@ -43,11 +43,11 @@ struct Halves {
 }
 
 impl Halves {
-    fn new<Y: Mechanism>(system: &Y) -> Self {
+    fn new<Y: Closed>(system: &Y) -> Self {
         Halves { q: system.neutral(), p: system.rest(), qd: system.neutral(), pd: system.rest() }
     }
 
-    fn rates<Y: Mechanism>(&mut self, system: &mut Y, kind: Kind) {
+    fn rates<Y: Closed>(&mut self, system: &mut Y, kind: Kind) {
         let Halves { q, p, qd, pd } = self;
         match kind {
             Kind::Momenta => system.state_rates(0.0, q, p, qd, pd),
@@ -67,7 +67,7 @@ pub struct Whole<'a, Y> {
     room: Halves,
 }
 
-impl<'a, Y: Mechanism> Whole<'a, Y> {
+impl<'a, Y: Closed> Whole<'a, Y> {
     /// Of a mechanism.
     pub fn new(system: &'a mut Y, kind: Kind) -> Self {
         let room = Halves::new(system);
@@ -75,7 +75,7 @@ impl<'a, Y: Mechanism> Whole<'a, Y> {
     }
 }
 
-impl<Y: Mechanism> Equation for Whole<'_, Y> {
+impl<Y: Closed> Equation for Whole<'_, Y> {
     fn rates(&mut self, y: &[f64], rates: &mut [f64]) {
         let n = self.room.q.len();
         self.room.q.copy_from_slice(&y[..n]);
@@ -115,7 +115,7 @@ pub struct Minimal<'a, Y> {
     phi: Vec<Vec<f64>>,
 }
 
-impl<'a, Y: Mechanism> Minimal<'a, Y> {
+impl<'a, Y: Closed> Minimal<'a, Y> {
     /// Of a mechanism, near coordinates `q`; the choice of rows stays. The rows left over must follow from them.
     pub fn new(system: &'a mut Y, kind: Kind, independent: &[usize], q: &[f64]) -> Self {
         let mut room = Halves::new(system);
@@ -211,7 +211,7 @@ impl<'a, Y: Mechanism> Minimal<'a, Y> {
     }
 }
 
-impl<Y: Mechanism> Equation for Minimal<'_, Y> {
+impl<Y: Closed> Equation for Minimal<'_, Y> {
     fn rates(&mut self, y: &[f64], rates: &mut [f64]) {
         self.take(y);
         self.room.rates(self.system, self.kind);

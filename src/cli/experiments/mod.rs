@@ -6,8 +6,6 @@ mod clock;
 mod forms;
 mod mechanism;
 mod plain;
-#[path = "standin.rs"]
-mod standin;
 mod scaling;
 mod study;
 mod tables;

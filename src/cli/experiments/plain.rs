@@ -67,10 +67,10 @@ impl<'a, const S: usize> Walk<'a, S> {
     }
 
     fn combine(&mut self, h: f64, weights: &[Constant]) {
-        for (n, next) in self.next.iter_mut().enumerate() {
-            let sum: f64 = weights.iter().zip(&self.k).map(|(w, k)| w.get::<f64>() * k[n]).sum();
-            *next = self.y[n] + h * sum;
-        }
+        // The small terms first: the state is rounded once.
+        self.next.fill(0.0);
+        sum(&mut self.next, h, weights, &self.k);
+        self.next.iter_mut().zip(&self.y).for_each(|(next, y)| *next += y);
     }
 
     /// Tries a step of `h` s: the new state and, if the method has any, its estimated errors.
@@ -83,9 +83,8 @@ impl<'a, const S: usize> Walk<'a, S> {
         }
         self.combine(h, &tableau.b);
         if let Some(row) = tableau.error.first() {
-            for (n, error) in self.error.iter_mut().enumerate() {
-                *error = h * row.iter().zip(&self.k).map(|(w, k)| w.get::<f64>() * k[n]).sum::<f64>();
-            }
+            self.error.fill(0.0);
+            sum(&mut self.error, h, row, &self.k);
             if self.lower {
                 self.next.iter_mut().zip(&self.error).for_each(|(next, error)| *next -= error);
             }
@@ -114,12 +113,24 @@ impl<'a, const S: usize> Walk<'a, S> {
     }
 }
 
+/// Adds `h Σ w k`.
+fn sum(to: &mut [f64], h: f64, weights: &[Constant], rates: &[Vec<f64>]) {
+    for (weight, rates) in weights.iter().zip(rates).filter(|(w, _)| !w.is_zero()) {
+        let weight = h * weight.get::<f64>();
+        to.iter_mut().zip(rates).for_each(|(to, rate)| *to += weight * rate);
+    }
+}
+
 /// Largest of numbers relative to the larger of `threshold` and the size of the state.
 fn relative(values: &[f64], sizes: impl Iterator<Item = f64>, threshold: f64) -> f64 {
     values.iter().zip(sizes).fold(0.0, |worst: f64, (v, size)| {
         let ratio = v.abs() / size.max(threshold);
         // What is not a number must not be lost.
-        if ratio > worst || ratio.is_nan() { ratio } else { worst }
+        if ratio > worst || ratio.is_nan() {
+            ratio
+        } else {
+            worst
+        }
     })
 }
 

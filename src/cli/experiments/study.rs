@@ -2,7 +2,7 @@
 
 use multibody::runtime::integrate::tableau::{DORMAND_PRINCE, RK4, RKF45, VERNER9};
 
-use super::forms::{Kind, Mechanism, Minimal, Whole};
+use super::forms::{Closed, Kind, Minimal, Whole};
 use super::plain::{controlled, Controlled, Walk};
 
 /// End of the motion, s.
@@ -124,7 +124,7 @@ fn distance(y: &[f64], reference: &[f64]) -> f64 {
     mean(INDEPENDENT.iter().zip(y).map(|(&i, y)| y - reference[i]))
 }
 
-impl<Y: Mechanism> Study<Y> {
+impl<Y: Closed> Study<Y> {
     /// A mechanism, closed from coordinates near by.
     pub fn new(mut system: Y, near: &[f64]) -> Self {
         let start: Vec<f64> = INDEPENDENT.iter().map(|&i| near[i]).chain([0.0; 3]).collect();
@@ -323,4 +323,3 @@ impl<const S: usize> Walk<'_, S> {
         self.y
     }
 }
-

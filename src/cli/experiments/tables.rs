@@ -59,7 +59,10 @@ pub fn fixed(rows: &[(f64, [Fixed; 2])]) -> String {
     if let Some((_, [a, b])) = rows.iter().find(|r| r.0 == 1e-3) {
         let [velocities, momenta] = thesis::SECOND_HALF;
         let (velocities, momenta) = (pair(a.truncation[1], velocities), pair(b.truncation[1], momenta));
-        let _ = writeln!(text, "\nWith 1 ms the mean truncation error of the velocities is {velocities}, of the momenta {momenta}.");
+        let _ = writeln!(
+            text,
+            "\nWith 1 ms the mean truncation error of the velocities is {velocities}, of the momenta {momenta}."
+        );
     }
     text + "\n"
 }
@@ -71,7 +74,15 @@ pub type Runs = [Option<(f64, u64)>; 2];
 pub fn ode45(rows: &[(f64, Runs)]) -> String {
     let mut text = head(
         "Table 7.2: `ode45`, absolute and relative tolerance alike",
-        &["tolerance", "end error, accelerations", "Hamilton", "thesis", "evaluations, accelerations", "Hamilton", "saved"],
+        &[
+            "tolerance",
+            "end error, accelerations",
+            "Hamilton",
+            "thesis",
+            "evaluations, accelerations",
+            "Hamilton",
+            "saved",
+        ],
     );
     for (tolerance, runs) in rows {
         let Some((_, end, counts)) = thesis::ODE45.iter().find(|t| t.0 == *tolerance) else { continue };
@@ -83,11 +94,17 @@ pub fn ode45(rows: &[(f64, Runs)]) -> String {
             _ => "–".into(),
         };
         let saved = format!("{ours} ({:.0} %)", saved(counts[0], counts[1]));
-        row(&mut text, &[format!("{tolerance:.0e}"), error(0), error(1), format!("{end:.0e}"), count(0), count(1), saved]);
+        row(
+            &mut text,
+            &[format!("{tolerance:.0e}"), error(0), error(1), format!("{end:.0e}"), count(0), count(1), saved],
+        );
     }
-    let counts: Vec<String> =
-        thesis::ODE15S.iter().map(|(t, [a, b])| format!("{t:.0e} {a} / {b}")).collect();
-    let _ = writeln!(text, "\nThe thesis's ODE15S ({}) is not repeated: no method here counts as it does.\n", counts.join("; "));
+    let counts: Vec<String> = thesis::ODE15S.iter().map(|(t, [a, b])| format!("{t:.0e} {a} / {b}")).collect();
+    let _ = writeln!(
+        text,
+        "\nThe thesis's ODE15S ({}) is not repeated: no method here counts as it does.\n",
+        counts.join("; ")
+    );
     text
 }
 
@@ -95,7 +112,15 @@ pub fn ode45(rows: &[(f64, Runs)]) -> String {
 pub fn control(rows: &[[Adaptive; 2]; 2]) -> String {
     let mut text = head(
         "Table 7.3: Runge-Kutta-Fehlberg with error control, tolerance 1e-6",
-        &["control of", "truncation error of q, accelerations", "Hamilton", "end error, accelerations", "Hamilton", "evaluations, accelerations", "Hamilton"],
+        &[
+            "control of",
+            "truncation error of q, accelerations",
+            "Hamilton",
+            "end error, accelerations",
+            "Hamilton",
+            "evaluations, accelerations",
+            "Hamilton",
+        ],
     );
     for ((name, runs), (truncation, end, counts)) in ["all", "coordinates"].iter().zip(rows).zip(&thesis::CONTROL) {
         let mut cells = vec![name.to_string()];
@@ -109,7 +134,8 @@ pub fn control(rows: &[[Adaptive; 2]; 2]) -> String {
 
 /// Table 7.4, of full control.
 pub fn wins(runs: &[Adaptive; 2]) -> String {
-    let mut text = String::from("### Table 7.4: intervals of 0.01 s in which a number of the state had the largest error\n\n");
+    let mut text =
+        String::from("### Table 7.4: intervals of 0.01 s in which a number of the state had the largest error\n\n");
     for (k, name) in ["accelerations", "Hamilton"].iter().enumerate() {
         let _ = writeln!(text, "| {name} | {} |\n|---|{}", NAMES[k].join(" | "), "---|".repeat(6));
         let cells: Vec<String> =
