@@ -13,6 +13,7 @@ extern crate std;
 #[cfg(feature = "alloc")]
 mod acceleration_form;
 pub mod batch;
+pub mod constrained;
 mod dual;
 pub mod integrate;
 #[cfg(feature = "alloc")]

@@ -324,6 +324,55 @@ where
         Ok(())
     }
 
+    /// Moves coordinates by a displacement in the axes that velocities have, body axes of groups, which is turned into outer
+    /// axes on the way.
+    pub fn displace(system: &Y, dx: &mut Y::Momenta, q: &mut Y::Coordinates) {
+        let (q, x) = (q.as_mut(), dx.as_mut());
+        for group in system.groups() {
+            group.turn_out(q, x);
+        }
+        for (at, v, n, group) in Stretches::new(system.groups(), q.len(), x.len()) {
+            for (q, x) in q.iter_mut().skip(at).zip(x.iter().skip(v)).take(n) {
+                *q = *q + *x;
+            }
+            if let Some(group) = group {
+                group.advance(x, q);
+            }
+        }
+    }
+
+    /// Turns forces on the joints, in the axes that momenta of a state have, into rates of the momenta of a displacement
+    /// `point` that leads to the coordinates `q`.
+    pub fn forces(system: &Y, q: &Y::Coordinates, point: &Point<Y>, forces: &mut Y::Momenta) {
+        for group in system.groups() {
+            group.outward(q.as_ref(), group.shift(point.x.as_ref()), forces.as_mut());
+        }
+    }
+
+    /// Changes a displacement that leads to the state `from` into one that leads to the state `to` close to it.
+    pub fn correct(
+        system: &Y,
+        from: (&Y::Coordinates, &Y::Momenta),
+        to: (&Y::Coordinates, &Y::Momenta),
+        point: &mut Point<Y>,
+    ) {
+        let (q0, p0, q1, p1) = (from.0.as_ref(), from.1.as_ref(), to.0.as_ref(), to.1.as_ref());
+        let (x, p) = (point.x.as_mut(), point.p.as_mut());
+        for (at, v, n, group) in Stretches::new(system.groups(), q0.len(), x.len()) {
+            let positions = group.map_or(0, |group| group.kind.positions());
+            let before = group.map_or([Y::Scalar::zero(); 3], |group| group.shift(x));
+            for k in 0..n {
+                x[v + k] = x[v + k] + (q1[at + k] - q0[at + k]);
+            }
+            for k in v..v + n - positions {
+                p[k] = p[k] + (p1[k] - p0[k]);
+            }
+            if let Some(group) = group {
+                group.correct((q0, p0), (q1, p1), before, (x, p));
+            }
+        }
+    }
+
     /// Appends a displacement from where `total` leads: `total` becomes both, in the chart of its start.
     pub fn compose(system: &Y, step: &Point<Y>, total: &mut Point<Y>) {
         let (x, p) = (total.x.as_mut(), total.p.as_mut());

@@ -1,5 +1,7 @@
 //! What can go wrong in a step.
 
+use crate::constrained::ConstraintError;
+
 /// A step that must not be used.
 ///
 /// Times are those of the start of the step, in s. An adaptive driver keeps the last accepted state; a step function
@@ -64,6 +66,13 @@ pub enum StepError {
         /// Column without a pivot.
         column: usize,
     },
+    /// The constraints do not hold at the end of the step.
+    Constraint {
+        /// Time, s.
+        time: f64,
+        /// What is wrong with them.
+        error: ConstraintError,
+    },
 }
 
 impl StepError {
@@ -76,7 +85,8 @@ impl StepError {
             | StepError::NoEstimate { time }
             | StepError::TooManySteps { time, .. }
             | StepError::NoConvergence { time, .. }
-            | StepError::Singular { time, .. } => time,
+            | StepError::Singular { time, .. }
+            | StepError::Constraint { time, .. } => time,
         }
     }
 }
@@ -103,6 +113,7 @@ impl core::fmt::Display for StepError {
             StepError::Singular { time, step, column } => {
                 write!(f, "the matrix of the implicit step of {step:e} s from t = {time} s is singular in column {column}: change the step")
             }
+            StepError::Constraint { time, error } => write!(f, "in the step from t = {time} s: {error}"),
         }
     }
 }

@@ -292,6 +292,10 @@ where
         }
     }
 
+    fn corrected(&mut self) {
+        self.end_known = false;
+    }
+
     fn statistics(&self) -> Statistics {
         Statistics { evaluations: self.field.evaluations(), ..self.statistics }
     }

@@ -77,6 +77,10 @@ where
         self.method.interpolate(system, t, h, theta, out);
     }
 
+    fn corrected(&mut self) {
+        self.method.corrected();
+    }
+
     fn statistics(&self) -> Statistics {
         self.method.statistics()
     }

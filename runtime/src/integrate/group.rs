@@ -224,7 +224,7 @@ impl Group {
     }
 
     /// Displacement in body axes by which coordinates change from `q` by `dq`, in the limit of small ones.
-    pub(super) fn body<S: Scalar>(&self, q: &[S], dq: &[S], out: &mut [S]) {
+    pub(crate) fn body<S: Scalar>(&self, q: &[S], dq: &[S], out: &mut [S]) {
         let r = self.rotation(q);
         let angular = match self.quaternion() {
             Some(at) => spin(&q[at..at + 4], &dq[at..at + 4]),
@@ -255,6 +255,40 @@ impl Group {
             put(gx, at, angular(back, turn));
         }
         self.join(([S::zero(); 3], [S::zero(); 3]), gp);
+    }
+
+    /// From the axes that velocities have to outer ones.
+    pub(super) fn turn_out<S: Scalar>(&self, q: &[S], x: &mut [S]) {
+        let r = self.rotation(q);
+        let (linear, angular) = self.split(x);
+        self.join((r.vector_back(linear), r.vector_back(angular)), x);
+    }
+
+    /// Changes a displacement from one that leads to the state `from` to one that leads to the state `to`: its rotation and
+    /// its momenta. Its positions are changed already, `before` is what they were.
+    pub(super) fn correct<S: Scalar>(
+        &self,
+        (q0, p0): (&[S], &[S]),
+        (q1, p1): (&[S], &[S]),
+        before: Vec3<S>,
+        (x, p): (&mut [S], &mut [S]),
+    ) {
+        if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
+            let (old, new) = (&q0[at..at + 4], &q1[at..at + 4]);
+            let step = scale3(S::one() / dot4(old, new), spin(old, new));
+            let back = scale3(-S::one(), three(x, phi));
+            put(x, phi, from(step, back));
+        }
+        let (v, n) = (self.v, self.kind.sizes().1);
+        let local = Group { v: 0, ..*self };
+        let (mut old, mut new) = ([S::zero(); 6], [S::zero(); 6]);
+        old[..n].copy_from_slice(&p0[v..v + n]);
+        new[..n].copy_from_slice(&p1[v..v + n]);
+        local.outward(q0, before, &mut old);
+        local.outward(q1, self.shift(x), &mut new);
+        for (p, (new, old)) in p[v..v + n].iter_mut().zip(new.into_iter().zip(old)) {
+            *p = *p + (new - old);
+        }
     }
 
     /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.

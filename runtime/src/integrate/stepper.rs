@@ -88,6 +88,15 @@ where
     /// [`StepError::NotFinite`]; the state has not moved then.
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
 
+    /// The displacement of the last attempt has been changed, and the rate at its end with it: if that was evaluated, it
+    /// does not hold. Nothing to do for methods that keep no such rate.
+    fn corrected(&mut self) {}
+
+    /// Whether rates of past steps are used, so that a state must not jump, however little that means to the motion.
+    fn remembers(&self) -> bool {
+        false
+    }
+
     /// Displacement at `t + θ h` within the last attempt, before it is accepted.
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>);
 

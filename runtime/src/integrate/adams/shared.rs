@@ -92,6 +92,10 @@ where
         Ok(())
     }
 
+    pub fn corrected(&mut self) {
+        self.end_known = false;
+    }
+
     pub fn statistics(&self) -> Statistics {
         Statistics { steps: self.steps, evaluations: self.field.evaluations(), ..Statistics::default() }
     }
@@ -123,6 +127,14 @@ macro_rules! of_core {
 
         fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
             self.core.end_rate(system, t, h)
+        }
+
+        fn corrected(&mut self) {
+            self.core.corrected();
+        }
+
+        fn remembers(&self) -> bool {
+            true
         }
 
         fn statistics(&self) -> Statistics {

@@ -1,0 +1,215 @@
+//! Work at the ends of steps, around any method.
+
+use super::ConstraintError;
+use crate::integrate::{Chart, Field, Point, Statistics, StepError, Stepper};
+use crate::system::{Real, System};
+
+/// What is done to a state where a step ends.
+pub trait Boundary<Y: System> {
+    /// Whether [`Boundary::turn`] does anything.
+    const TURNS: bool = false;
+
+    /// Changes the state at the end of a step that is about to be accepted, or inside of it, by little or by what means nothing
+    /// to the motion. With `remembers` the method holds on to rates of the past, and momenta must not jump.
+    ///
+    /// # Errors
+    /// [`ConstraintError`].
+    fn close(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        remembers: bool,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), ConstraintError>;
+
+    /// Changes the state from which the next step starts, with the system if need be; whether it did. The method begins anew
+    /// then.
+    ///
+    /// # Errors
+    /// [`ConstraintError`].
+    fn turn(
+        &mut self,
+        _system: &mut Y,
+        _t: Y::Scalar,
+        _q: &mut Y::Coordinates,
+        _p: &mut Y::Momenta,
+    ) -> Result<bool, ConstraintError> {
+        Ok(false)
+    }
+}
+
+/// A method `M` with work `B` at the end of every step.
+///
+/// The end of a step is changed before it is accepted, so a [`Solver`](crate::integrate::Solver) never shows another one, and
+/// so is dense output. A rate at the end that the method found for its error estimate does not hold any longer: pairs with a first
+/// stage that is the last one's make one evaluation more.
+#[derive(Clone, Debug)]
+pub struct Bounded<Y: System, M, B> {
+    /// The method.
+    method: M,
+    /// What is done at the ends.
+    pub boundary: B,
+    delta: Point<Y>,
+    end: Point<Y>,
+    end_known: bool,
+    old: (Y::Coordinates, Y::Momenta),
+    new: (Y::Coordinates, Y::Momenta),
+}
+
+impl<Y, M, B> Bounded<Y, M, B>
+where
+    Y: System,
+    Y::Scalar: Real,
+    M: Stepper<Y>,
+    B: Boundary<Y>,
+{
+    /// Around a method.
+    pub fn new(system: &Y, method: M, boundary: B) -> Self {
+        let state = || (system.neutral(), system.rest());
+        Bounded {
+            method,
+            boundary,
+            delta: Point::zero(system),
+            end: Point::zero(system),
+            end_known: false,
+            old: state(),
+            new: state(),
+        }
+    }
+
+    /// The method.
+    pub fn method(&self) -> &M {
+        &self.method
+    }
+
+    /// Changes a displacement that ends at time `t` as the boundary wants it: `other`, or that of the last attempt.
+    fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
+        let Bounded { method, boundary, delta, old, new: (q, p), .. } = self;
+        let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
+        method.parts().0.chart().state(system, point, &mut old.0, &mut old.1);
+        q.as_mut().copy_from_slice(old.0.as_ref());
+        p.as_mut().copy_from_slice(old.1.as_ref());
+        boundary.close(system, t, remembers, q, p)?;
+        Chart::correct(system, (&old.0, &old.1), (q, p), point);
+        Ok(())
+    }
+}
+
+impl<Y, M, B> Stepper<Y> for Bounded<Y, M, B>
+where
+    Y: System,
+    Y::Scalar: Real,
+    M: Stepper<Y>,
+    B: Boundary<Y>,
+{
+    fn order(&self) -> u32 {
+        self.method.order()
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        self.method.error_order()
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        self.end_known = false;
+        self.method.begin(system, t, q, p)
+    }
+
+    fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        self.end_known = false;
+        self.method.resume(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        let error = self.method.attempt(system, t, h, scale)?;
+        let delta = self.method.parts().1;
+        self.delta.copy_from(delta);
+        self.end_known = false;
+        // What will be rejected anyway is left alone.
+        if error <= 1.0 && delta.not_finite().is_none() {
+            let result = self.close(system, t + h, None);
+            result.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
+        }
+        Ok(error)
+    }
+
+    fn advise(&mut self) -> Option<f64> {
+        self.method.advise()
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (self.method.parts().0, &mut self.delta)
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        self.method.start_rate(system, t)
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        if !self.end_known {
+            self.method.parts().0.rates(system, t + h, &self.delta, &mut self.end);
+            self.end_known = true;
+        }
+        &self.end
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        let delta = self.method.parts().1;
+        if delta.parts() != self.delta.parts() {
+            delta.copy_from(&self.delta);
+            self.method.corrected();
+        }
+        self.method.accept(system, t, h)?;
+        self.end_known = false;
+        if B::TURNS {
+            let (q, p) = (&mut self.new.0, &mut self.new.1);
+            self.method.parts().0.store(system, q, p);
+            let turned = self.boundary.turn(system, t + h, q, p);
+            if turned.map_err(|error| StepError::Constraint { time: t.to_f64(), error })? {
+                self.method.begin(system, t + h, q, p)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// That of the method, changed by the boundary; where it cannot be, that of the method.
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        self.method.interpolate(system, t, h, theta, out);
+        // A displacement is changed at last, when nothing can fail any more.
+        let _ = self.close(system, t + theta * h, Some(out));
+    }
+
+    fn corrected(&mut self) {
+        self.end_known = false;
+    }
+
+    fn remembers(&self) -> bool {
+        self.method.remembers()
+    }
+
+    fn statistics(&self) -> Statistics {
+        self.method.statistics()
+    }
+
+    fn step(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), StepError> {
+        self.resume(system, t, q, p)?;
+        self.attempt(system, t, h, None)?;
+        self.accept(system, t, h)?;
+        self.method.parts().0.store(system, q, p);
+        Ok(())
+    }
+}

@@ -1,0 +1,33 @@
+//! Motion of [`Constrained`] systems.
+//!
+//! | variant | momenta | positions | cost at the end of a step |
+//! | --- | --- | --- | --- |
+//! | [`Stabilisation::None`] | `σ` adds up | drift | nothing |
+//! | [`Stabilisation::Settle`] | re-zeroed | drift, by the method's error | one solve |
+//! | [`Stabilisation::Mass`] | re-zeroed | closed | one solve, and one for each iteration and the last look |
+//! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
+//! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
+//!
+//! They are wrapped around any method ([`Bounded`], [`Hold`]).
+
+#[cfg(feature = "alloc")]
+mod basic;
+#[cfg(feature = "alloc")]
+mod blocks;
+mod boundary;
+#[cfg(feature = "alloc")]
+mod close;
+#[cfg(feature = "alloc")]
+mod dense;
+mod error;
+mod hold;
+mod rows;
+
+pub use boundary::{Boundary, Bounded};
+#[cfg(feature = "alloc")]
+pub use close::{close, complete, Closed, Closing};
+pub use error::ConstraintError;
+pub use hold::{Effort, Hold, Stabilisation};
+
+#[cfg(doc)]
+use crate::Constrained;

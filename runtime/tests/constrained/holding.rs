@@ -1,0 +1,210 @@
+//! Stabilisation around every kind of method.
+
+use super::systems::*;
+use mbd_runtime::constrained::{Bounded, ConstraintError, Effort, Hold, Stabilisation};
+use mbd_runtime::integrate::{
+    Abm4, Dop853, Euler, Gauss12Inserted, Rk4, Solver, Step, StepDoubling, StepError, Stepper,
+};
+use mbd_runtime::integrate::{SemiImplicitEuler, Tolerances, Tsit5, VariableAdams, Verner9};
+use mbd_runtime::{Constrained, System};
+
+const ALL: [Stabilisation; 5] = [
+    Stabilisation::None,
+    Stabilisation::Settle,
+    Stabilisation::Mass,
+    Stabilisation::Gradient,
+    Stabilisation::Partition,
+];
+
+type State = (Vec<f64>, Vec<f64>);
+
+fn march<Y, M>(y: &mut Y, method: &mut M, steps: u32, end: f64, (q, p): &State) -> Result<State, StepError>
+where
+    Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+    M: Stepper<Y>,
+{
+    let (h, mut q, mut p) = (end / f64::from(steps), q.clone(), p.clone());
+    for k in 0..steps {
+        method.step(y, f64::from(k) * h, h, &mut q, &mut p)?;
+    }
+    Ok((q, p))
+}
+
+fn held<Y, M>(y: &Y, method: M, policy: Stabilisation) -> Bounded<Y, M, Hold<Y>>
+where
+    Y: Constrained<Scalar = f64>,
+    M: Stepper<Y>,
+{
+    Bounded::new(y, method, Hold::new(y, policy, Effort::default()))
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
+fn double() -> (Closed<Sticks>, State) {
+    (Closed::new(Sticks::double()), (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]))
+}
+
+/// Positions drift by the method's error, and stay where they belong with any of the three projections; momenta carry no `σ`
+/// where they are settled.
+#[test]
+fn drift() {
+    for policy in ALL {
+        let (mut y, start) = double();
+        let method = Rk4::new(&y);
+        let mut method = held(&y, method, policy);
+        let (q, p) = march(&mut y, &mut method, 400, 2.0, &start).unwrap();
+        let (position, velocity) = y.off(&q, &p);
+        let (_, sigma, _) = y.velocities(&q, &p);
+        let sigma = sigma.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let energy = (y.energy(&q, &p) - y.energy(&start.0, &start.1)).abs();
+        println!("{policy:?}: drift {position:.1e}, velocities {velocity:.1e}, σ {sigma:.1e}, energy {energy:.1e}");
+        assert!(velocity < 1e-13, "{policy:?}");
+        assert!(energy < 2e-4, "{policy:?}: {energy}");
+        match policy {
+            Stabilisation::None => assert!(sigma > 1.0 && position > 1e-9),
+            Stabilisation::Settle => assert!(sigma < 1e-13 && position > 1e-9),
+            _ => assert!(sigma < 1e-7 && position < 1e-14, "{policy:?}: {position}"),
+        }
+    }
+}
+
+/// Each method keeps its order: the error falls by `2^order` or nearly when steps are halved.
+#[test]
+fn orders() {
+    fn check<M: Stepper<Closed<Sticks>>>(name: &str, order: i32, steps: u32, make: impl Fn(&Closed<Sticks>) -> M) {
+        for policy in ALL {
+            let (mut y, start) = double();
+            let fine = Verner9::new(&y);
+            let mut fine = held(&y, fine, Stabilisation::Mass);
+            let reference = march(&mut y, &mut fine, 400, 0.5, &start).unwrap();
+            let mut error = |steps| {
+                let mut method = held(&y, make(&y), policy);
+                apart(&march(&mut y, &mut method, steps, 0.5, &start).unwrap().0, &reference.0)
+            };
+            let (coarse, fine) = (error(steps), error(2 * steps));
+            let found = (coarse / fine).log2();
+            println!("{name} {policy:?}: order {found:.2} ({coarse:.1e}, {fine:.1e})");
+            assert!(found > f64::from(order) - 0.4, "{name} {policy:?}: {found}");
+        }
+    }
+    check("euler", 1, 200, |y| Euler::new(y));
+    check("semi-implicit", 1, 200, |y| SemiImplicitEuler::new(y));
+    check("rk4", 4, 25, |y| Rk4::new(y));
+    check("rk4 doubled", 4, 15, |y| StepDoubling::new(y, Rk4::new(y)));
+    check("tsit5", 5, 20, |y| Tsit5::new(y));
+    check("dop853", 8, 5, |y| Dop853::new(y));
+    check("abm4", 4, 100, |y| Abm4::new(y));
+    // Its order, 12, shows only where the error is round-off.
+    check("gauss12", 8, 2, |y| Gauss12Inserted::new(y));
+}
+
+/// Steps by error control, with stages used again, dense output on the way, events' states.
+#[test]
+fn adaptive_steps() {
+    fn check<M: Stepper<Closed<Sticks>>>(name: &str, factor: f64, make: impl Fn(&Closed<Sticks>) -> M) {
+        let (mut y, start) = double();
+        let fine = Verner9::new(&y);
+        let mut fine = held(&y, fine, Stabilisation::Mass);
+        let reference = march(&mut y, &mut fine, 2000, 2.0, &start).unwrap();
+        for policy in ALL {
+            let method = held(&y, make(&y), policy);
+            let step = Step::Adaptive(Tolerances::new(1e-10));
+            let mut solver = Solver::new(&mut y, method, step, 0.0, &start.0, &start.1).unwrap();
+            let (mut q, mut p) = start.clone();
+            let closes = !matches!(policy, Stabilisation::None | Stabilisation::Settle);
+            while solver.time() < 2.0 {
+                solver.advance(&mut y, 2.0).unwrap();
+                solver.dense(&mut y, 0.4, &mut q, &mut p);
+                assert!(!closes || y.off(&q, &p).0 < 1e-13, "{name} {policy:?}: {:?}", y.off(&q, &p));
+                solver.state(&y, &mut q, &mut p);
+                assert!(!closes || y.off(&q, &p).0 < 1e-13, "{name} {policy:?}: {:?}", y.off(&q, &p));
+            }
+            let error = apart(&q, &reference.0);
+            println!("{name} {policy:?}: {error:.1e} {:?}", solver.statistics());
+            assert!(error < factor * 1e-10, "{name} {policy:?}: {error}");
+        }
+    }
+    check("tsit5", 200.0, |y| Tsit5::new(y));
+    check("dop853", 200.0, |y| Dop853::new(y));
+    check("adams", 200.0, |y| VariableAdams::new(y));
+}
+
+/// A redundant row changes nothing.
+#[test]
+fn redundant_rows() {
+    let end = [1, 2].map(|n| {
+        let mut y = Closed::new(Sticks::pendulum(n));
+        let method = Rk4::new(&y);
+        let mut method = held(&y, method, Stabilisation::Mass);
+        march(&mut y, &mut method, 200, 2.0, &(vec![1.0, 0.0], vec![0.0; 2])).unwrap()
+    });
+    assert!(apart(&end[0].0, &end[1].0) < 1e-13 && apart(&end[0].1, &end[1].1) < 1e-13, "{end:?}");
+}
+
+/// A top as a free body with a pin: the quaternion's chart, positions and momenta are moved together.
+#[test]
+fn a_body_on_its_group() {
+    for policy in ALL {
+        let mut y = Closed::new(Top::new());
+        let q = y.model.leaning(0.3);
+        // About its axis, 100 rad/s, and a little about x.
+        let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 100.0];
+        let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
+        y.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+        let start = (q, p);
+        let fine = Dop853::new(&y);
+        let mut fine = held(&y, fine, Stabilisation::Mass);
+        let reference = march(&mut y, &mut fine, 1000, 0.5, &start).unwrap();
+        let mut error = |steps| {
+            let method = Rk4::new(&y);
+            let mut method = held(&y, method, policy);
+            let (q, p) = march(&mut y, &mut method, steps, 0.5, &start).unwrap();
+            let closed = y.off(&q, &p).0;
+            let vertical = y.model.vertical(&q, &p) - y.model.vertical(&start.0, &start.1);
+            println!(
+                "{policy:?} {steps}: {:.1e}, drift {closed:.1e}, vertical {vertical:.1e}",
+                apart(&q, &reference.0)
+            );
+            assert!(matches!(policy, Stabilisation::None | Stabilisation::Settle) || closed < 1e-14);
+            apart(&q, &reference.0)
+        };
+        let found = (error(250) / error(500)).log2();
+        assert!(found > 3.6, "{policy:?}: {found}");
+    }
+}
+
+/// Ten thousand steps of 1 ms: the drift is that of round-off, with two iterations always.
+#[test]
+fn long_drift() {
+    let (mut y, start) = double();
+    let hold = Hold::new(&y, Stabilisation::Mass, Effort::fixed(2));
+    let method = Rk4::new(&y);
+    let mut method = Bounded::new(&y, method, hold);
+    let ((mut q, mut p), mut worst) = (start, 0.0_f64);
+    for k in 0..10_000 {
+        method.step(&mut y, 1e-3 * f64::from(k), 1e-3, &mut q, &mut p).unwrap();
+        worst = worst.max(y.off(&q, &p).0);
+    }
+    assert!(worst < 1e-15, "{worst}");
+    assert_eq!(method.boundary.rank(), (Some(2), 0));
+}
+
+/// A step far beyond what three iterations bring back is refused with its numbers, and the state is as it was.
+#[test]
+fn what_cannot_be_brought_back_is_refused() {
+    let mut y = Closed::new(Sticks::pendulum(1));
+    let method = Euler::new(&y);
+    let mut method = held(&y, method, Stabilisation::Mass);
+    let start = (vec![1.0, 0.0], vec![0.0, -30.0]);
+    let error = march(&mut y, &mut method, 1, 10.0, &start).unwrap_err();
+    let StepError::Constraint { time: 0.0, error: ConstraintError::NotClosed { residual, rank, .. } } = error else {
+        panic!("{error:?}")
+    };
+    // 300 m from the pivot; each iteration halves that.
+    assert!(residual > 100.0 && rank == 1, "{error}");
+    let (mut q, mut p) = start.clone();
+    assert!(method.step(&mut y, 0.0, 10.0, &mut q, &mut p).is_err());
+    assert_eq!((q, p), start);
+}

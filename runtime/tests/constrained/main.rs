@@ -1,0 +1,5 @@
+//! Motion with constraints: closing, staying closed, orders, energy, partitions.
+
+mod closing;
+mod holding;
+mod systems;
