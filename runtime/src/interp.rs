@@ -1,8 +1,12 @@
 //! The interpreter: the sweeps run directly on numbers, for any tree.
 
+mod directions;
+
 use alloc::boxed::Box;
 use alloc::vec;
 use alloc::vec::Vec;
+
+use directions::DualRun;
 
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
@@ -64,6 +68,8 @@ pub struct Interpreter<S> {
     neutral: Vec<S>,
     /// Made when [`Differentiable::rate_derivatives`] is first called.
     derivatives: Option<Box<Derivatives<S>>>,
+    /// The same, for mechanisms with constraints.
+    dual: Option<Box<DualRun<S>>>,
 }
 
 impl<S: Scalar> Interpreter<S> {
@@ -115,6 +121,7 @@ impl<S: Scalar> Interpreter<S> {
             groups,
             neutral,
             derivatives: None,
+            dual: None,
         }
     }
 
@@ -392,6 +399,12 @@ impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
         pd: &mut Vec<S>,
         derivatives: Blocks<'_, Vec<Vec<S>>>,
     ) {
+        if !self.tree.constraints.is_empty() {
+            let mut run = self.dual.take().unwrap_or_else(|| Box::new(DualRun::new(&self.tree)));
+            run.derivatives(&self.inputs, q, p, v, pd, derivatives);
+            self.dual = Some(run);
+            return;
+        }
         let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
         self.derivatives_into(q, p, &mut d);
         v.copy_from_slice(&d.v);

@@ -4,6 +4,8 @@
 //! (universal, cylindrical) are two nodes with a massless body between; all others keep a constant motion subspace `E`
 //! in the node frame, and turn about or slide along its z axis.
 
+mod map;
+
 use alloc::vec::Vec;
 
 use crate::spatial::{Force, Motion, RigidInertia, Step, Vec3};

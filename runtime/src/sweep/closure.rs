@@ -111,29 +111,6 @@ impl<S: Scalar> Closure<S> {
         }
     }
 
-    /// The same over numbers with derivatives.
-    fn dual(&self) -> Closure<Dual<S>> {
-        let of = |x: &S| Dual::new(*x, S::zero());
-        match self {
-            Closure::Pin => Closure::Pin,
-            Closure::Slider => Closure::Slider,
-            Closure::Cylindrical => Closure::Cylindrical,
-            Closure::Helical { pitch } => Closure::Helical { pitch: of(pitch) },
-            Closure::Universal => Closure::Universal,
-            Closure::Planar => Closure::Planar,
-            Closure::Spherical => Closure::Spherical,
-            Closure::Fixed => Closure::Fixed,
-            Closure::Distance { length } => Closure::Distance { length: of(length) },
-            Closure::PointOnLine => Closure::PointOnLine,
-            Closure::PointOnPlane => Closure::PointOnPlane,
-            Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(radius) },
-            Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
-            Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
-            Closure::KnifeEdge => Closure::KnifeEdge,
-            Closure::Pfaffian { row } => Closure::Pfaffian { row: row.each_ref().map(of) },
-        }
-    }
-
     /// `E_c`, one for each row.
     pub(super) fn directions(&self, at: &Relative<S>) -> [Force<S>; 6] {
         let mut rows = [Force::zero(); 6];
@@ -225,6 +202,6 @@ impl<S: Scalar> Closure<S> {
             return [Force::zero(); 6];
         }
         let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
-        self.dual().directions(&at.moving(rel)).map(rate)
+        self.map(&|x| Dual::new(x, S::zero())).directions(&at.moving(rel)).map(rate)
     }
 }

@@ -66,7 +66,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Poses and rows of the constraints; `b` of each from its decay.
-    fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+    pub(super) fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
         self.articulate(q, u.drive_q, &mut w.poses);
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
@@ -155,7 +155,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Multipliers out of a solution, in [`crate::workspace::Constraints::multipliers`].
-    fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
+    pub(super) fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
             out[r] = solved[g];
         }
@@ -206,7 +206,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// `D^σ σ` where it begins, added to the momenta of bodies in [`Workspace::force`].
+    /// Columns of the rows where they begin, times multipliers: momenta `D^σ σ`, or wrenches that bodies need against those of
+    /// the constraints; added to [`Workspace::force`].
     pub(super) fn add_seeds(&self, w: &mut Workspace<S>) {
         for constraint in &self.tree.constraints {
             let Bond::Cut(cut) = &constraint.bond else { continue };
@@ -351,7 +352,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Multipliers `λ` at given velocities.
     pub fn multipliers(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S], lambda: &mut [S]) {
         self.accelerations(q, v, u, w, a);
-        self.collect_multipliers(&w.acceleration.shared_rate, lambda);
+        lambda.copy_from_slice(&w.constraints.multipliers);
     }
 
     /// What the accelerations of a reference motion leave to be done by the rows, in

@@ -22,9 +22,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, at accelerations `a`
-    /// (4.66), on a tree that was not regrouped.
+    /// (4.66), on a tree that was not regrouped. The multipliers `λ` of constraints are those of the last
+    /// [`Sweeps::accelerations`].
     pub fn reactions(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [[S; 6]]) {
-        self.newton_euler(q, v, Accelerations::Given(a), u, w);
+        self.place_rows(q, u, w);
+        self.needed_wrenches(v, Accelerations::Given(a), u, w);
+        self.add_seeds(w);
+        self.wrenches_back(w);
         for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
             self.trace.at(Some(i), Quantity::Reaction);
             let f = self.on_body(&w.poses, &self.tree.frames[k]).fold(w.force[i], |f, step| step.force_back(&f));
@@ -35,9 +39,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Wrench on every node from its parent, in [`Workspace::force`].
     fn newton_euler(&self, q: &[S], v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
         self.articulate(q, u.drive_q, &mut w.poses);
+        self.needed_wrenches(v, a, u, w);
+        self.wrenches_back(w);
+    }
+
+    /// Wrench that every body needs beside the external ones.
+    fn needed_wrenches(&self, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
         self.newton(v, a, u, w);
         self.wrench_loads(u, w);
         self.newton_wrenches(w);
+    }
+
+    fn wrenches_back(&self, w: &mut Workspace<S>) {
         for i in (0..self.tree.nodes.len()).rev() {
             self.wrench_back_node(i, w);
         }

@@ -1,0 +1,142 @@
+//! The same mechanism over other numbers.
+
+use alloc::boxed::Box;
+
+use super::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+use crate::spatial::{RigidInertia, Step};
+use crate::Scalar;
+
+impl<S: Scalar> Tree<S> {
+    /// Every constant taken to another scalar by `of`, zeros and ones to zeros and ones.
+    pub fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Tree<R> {
+        Tree {
+            nodes: self.nodes.iter().map(|node| node.map(of)).collect(),
+            dims: self.dims,
+            shared: self.shared.clone(),
+            solve_at_ground: self.solve_at_ground.clone(),
+            ground_moment: self.ground_moment.map(of),
+            wrenches: self
+                .wrenches
+                .iter()
+                .map(|w| TreeWrench { frame: w.frame.map(of), axes: w.axes, path: w.path.clone() })
+                .collect(),
+            constraints: self.constraints.iter().map(|c| c.map(of)).collect(),
+            tolerance: of(self.tolerance),
+            frames: self.frames.iter().map(|f| f.map(of)).collect(),
+            joint_nodes: self.joint_nodes.clone(),
+            matrix_depth: self.matrix_depth,
+            accelerations: self.accelerations.as_ref().map(|tree| Box::new(tree.map(of))),
+        }
+    }
+}
+
+fn step<S: Scalar, R: Scalar>(step: &Step<S>, of: &impl Fn(S) -> R) -> Step<R> {
+    match *step {
+        Step::Turn { axis, c, s } => Step::Turn { axis, c: of(c), s: of(s) },
+        Step::Shift { axis, r } => Step::Shift { axis, r: of(r) },
+        Step::Rotate(m) => Step::Rotate(m.map(|row| row.map(of))),
+    }
+}
+
+impl<S: Scalar> TreeFrame<S> {
+    fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> TreeFrame<R> {
+        TreeFrame { node: self.node, place: self.place.iter().map(|s| step(s, of)).collect() }
+    }
+}
+
+impl<S: Scalar> Node<S> {
+    fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Node<R> {
+        let inertia = &self.inertia;
+        Node {
+            parent: self.parent,
+            place: self.place.iter().map(|s| step(s, of)).collect(),
+            kind: match self.kind {
+                Kind::Pin => Kind::Pin,
+                Kind::Slider => Kind::Slider,
+                Kind::Helical { pitch } => Kind::Helical { pitch: of(pitch) },
+                Kind::Planar => Kind::Planar,
+                Kind::Spherical => Kind::Spherical,
+                Kind::Floating => Kind::Floating,
+            },
+            source: self.source,
+            ratio: of(self.ratio),
+            offset: of(self.offset),
+            phase: of(self.phase),
+            quarter: self.quarter,
+            slide: of(self.slide),
+            inertia: RigidInertia {
+                mass: of(inertia.mass),
+                moment: inertia.moment.map(of),
+                inertia: inertia.inertia.map(of),
+            },
+            passive: self
+                .passive
+                .iter()
+                .map(|p| Passive {
+                    damping: of(p.damping),
+                    stiffness: of(p.stiffness),
+                    rest: of(p.rest),
+                    armature: of(p.armature),
+                })
+                .collect(),
+            shared: self.shared,
+            deferred: self.deferred,
+            parent_side: self.parent_side,
+            unturned: self.unturned,
+            gather: self.gather,
+            ends: self.ends.clone(),
+            screws: self.screws.clone(),
+            open: self.open.clone(),
+            solve_before: self.solve_before.clone(),
+            solve_after: self.solve_after.clone(),
+        }
+    }
+}
+
+impl<S: Scalar> Constraint<S> {
+    fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Constraint<R> {
+        let bond = match &self.bond {
+            Bond::Cut(cut) => Bond::Cut(Cut {
+                closure: cut.closure.map(of),
+                a: cut.a.map(of),
+                b: cut.b.map(of),
+                path_a: cut.path_a.clone(),
+                path_b: cut.path_b.clone(),
+            }),
+            Bond::Coupling { terms, offset } => {
+                Bond::Coupling { terms: terms.iter().map(|(i, ratio)| (*i, of(*ratio))).collect(), offset: of(*offset) }
+            }
+        };
+        Constraint {
+            bond,
+            slots: self.slots.clone(),
+            first: self.first,
+            velocities: self.velocities.clone(),
+            decay: self.decay.map(of),
+        }
+    }
+}
+
+impl<S: Scalar> Closure<S> {
+    /// The same over other numbers.
+    pub(crate) fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Closure<R> {
+        match self {
+            Closure::Pin => Closure::Pin,
+            Closure::Slider => Closure::Slider,
+            Closure::Cylindrical => Closure::Cylindrical,
+            Closure::Helical { pitch } => Closure::Helical { pitch: of(*pitch) },
+            Closure::Universal => Closure::Universal,
+            Closure::Planar => Closure::Planar,
+            Closure::Spherical => Closure::Spherical,
+            Closure::Fixed => Closure::Fixed,
+            Closure::Distance { length } => Closure::Distance { length: of(*length) },
+            Closure::PointOnLine => Closure::PointOnLine,
+            Closure::PointOnPlane => Closure::PointOnPlane,
+            Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(*radius) },
+            Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(*radius) },
+            Closure::RollingBall { radius } => Closure::RollingBall { radius: of(*radius) },
+            Closure::KnifeEdge => Closure::KnifeEdge,
+            Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
+        }
+    }
+}
