@@ -8,7 +8,9 @@
 //! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
 //! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
 //!
-//! They are wrapped around any method ([`Bounded`], [`Hold`]).
+//! | `Minimal` with `Watch` | gauge `p_dep = 0` | closed at every evaluation | `Φ` and a small LU, three or four times an evaluation |
+//!
+//! They are wrapped around any method ([`Bounded`], [`Hold`]); minimal coordinates are a [`System`](crate::System) of their own.
 
 #[cfg(feature = "alloc")]
 mod basic;
@@ -21,13 +23,21 @@ mod close;
 mod dense;
 mod error;
 mod hold;
+#[cfg(feature = "alloc")]
+mod minimal;
+mod rattle;
 mod rows;
+mod split;
 
 pub use boundary::{Boundary, Bounded};
 #[cfg(feature = "alloc")]
 pub use close::{close, complete, Closed, Closing};
 pub use error::ConstraintError;
 pub use hold::{Effort, Hold, Stabilisation};
+#[cfg(feature = "alloc")]
+pub use minimal::{Minimal, Switch, Watch};
+pub use rattle::Rattle;
+pub use split::{Parted, Split};
 
 #[cfg(doc)]
 use crate::Constrained;

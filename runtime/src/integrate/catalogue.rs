@@ -7,6 +7,7 @@ use super::{BackwardEuler, Gauss12, Gauss12Inserted, Gauss4, Gauss6, ImplicitMid
 use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
 use super::{Composition, Doubled, StepDoubling, Symmetric};
 use super::{Limits, Projection, Solver, Statistics, Step, StepError, Stepper};
+use crate::constrained::{Boundary, Bounded};
 use crate::system::{Differentiable, Energetic, Real, System};
 
 /// What there is to know of a method before it is made.
@@ -119,7 +120,7 @@ where
 
 /// A table of methods, and the function that makes one of them at time zero.
 macro_rules! catalogue {
-    ($(#[$doc:meta])* $list:ident, $make:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
+    ($(#[$doc:meta])* $list:ident, $make:ident, $bounded:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
      { $($name:literal $title:literal $adaptive:literal $method:expr;)* }) => {
         $(#[$doc])*
         pub static $list: &[Entry] = &[
@@ -141,6 +142,24 @@ macro_rules! catalogue {
                 _ => None,
             }
         }
+
+        /// The same with work at the end of every step: [`crate::constrained`].
+        pub fn $bounded<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, boundary: B) -> Made<'a, Y>
+        where
+            Y: $bound + 'a,
+            Y::Scalar: Real,
+            B: Boundary<Y> + 'a,
+        {
+            let $compensated = start.compensated;
+            match name {
+                $($name => {
+                    let method = $method;
+                    let method = Bounded::new($system, method, boundary);
+                    boxed($system, method, start)
+                })*
+                _ => None,
+            }
+        }
     };
 }
 
@@ -157,7 +176,7 @@ macro_rules! sums {
 
 catalogue! {
     /// Methods that need the rates only.
-    EXPLICIT, explicit, System, false, |system, c| {
+    EXPLICIT, explicit, explicit_bounded, System, false, |system, c| {
         "euler" "Euler" false sums!(Euler, system, c);
         "semi-implicit-euler" "semi-implicit Euler" false sums!(SemiImplicitEuler, system, c);
         "midpoint" "explicit midpoint, order 2" false sums!(Midpoint, system, c);
@@ -187,7 +206,7 @@ const BINDING: f64 = 20.0;
 
 catalogue! {
     /// Methods that need derivatives of the rates.
-    IMPLICIT, implicit, Differentiable, true, |system, c| {
+    IMPLICIT, implicit, implicit_bounded, Differentiable, true, |system, c| {
         "backward-euler" "backward Euler" false sums!(BackwardEuler, system, c);
         "implicit-midpoint" "implicit midpoint, order 2" false sums!(ImplicitMidpoint, system, c);
         "implicit-midpoint-6" "implicit midpoint, composed to order 6" false

@@ -75,4 +75,5 @@ pub use projection::Projection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::SemiImplicitEuler;
 pub use solver::Solver;
+pub(crate) use stepper::hermite;
 pub use stepper::{norm, Statistics, Stepper};

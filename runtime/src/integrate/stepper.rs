@@ -126,7 +126,7 @@ where
 }
 
 /// Cubic through both ends and their rates, for [`Stepper::interpolate`].
-pub(super) fn hermite<Y: System>(
+pub(crate) fn hermite<Y: System>(
     h: Y::Scalar,
     theta: Y::Scalar,
     delta: &Point<Y>,

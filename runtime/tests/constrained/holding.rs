@@ -16,9 +16,9 @@ const ALL: [Stabilisation; 5] = [
     Stabilisation::Partition,
 ];
 
-type State = (Vec<f64>, Vec<f64>);
+pub type State = (Vec<f64>, Vec<f64>);
 
-fn march<Y, M>(y: &mut Y, method: &mut M, steps: u32, end: f64, (q, p): &State) -> Result<State, StepError>
+pub fn march<Y, M>(y: &mut Y, method: &mut M, steps: u32, end: f64, (q, p): &State) -> Result<State, StepError>
 where
     Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
     M: Stepper<Y>,
@@ -30,7 +30,7 @@ where
     Ok((q, p))
 }
 
-fn held<Y, M>(y: &Y, method: M, policy: Stabilisation) -> Bounded<Y, M, Hold<Y>>
+pub fn held<Y, M>(y: &Y, method: M, policy: Stabilisation) -> Bounded<Y, M, Hold<Y>>
 where
     Y: Constrained<Scalar = f64>,
     M: Stepper<Y>,
@@ -38,7 +38,7 @@ where
     Bounded::new(y, method, Hold::new(y, policy, Effort::default()))
 }
 
-fn apart(a: &[f64], b: &[f64]) -> f64 {
+pub fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 

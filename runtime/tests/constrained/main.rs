@@ -2,4 +2,6 @@
 
 mod closing;
 mod holding;
+mod minimal;
+mod multipliers;
 mod systems;

@@ -1,0 +1,290 @@
+//! RATTLE for any Hamiltonian.
+
+use super::rows::{add_forces, worst};
+use super::split::Parted;
+use super::ConstraintError;
+use crate::integrate::{hermite, Chart, Field, Point, Statistics, StepError, Stepper};
+use crate::system::Real;
+use crate::Scalar;
+
+/// Iterations of a step.
+const ITERATIONS: u32 = 100;
+
+/// RATTLE (H. C. Andersen, 1983) for Hamiltonians that are not separable (E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical
+/// Integration*, VII.1.4, (1.26)), order 2: positions and velocities meet the constraints at the end of each step, and where
+/// displacements are plain sums the method is symplectic and symmetric, so that the energy does not drift.
+///
+/// `p½ = p₀ + h/2 (ṗ(q₀, p½) − Φ₀ᵀλ)`, `q₁ = q₀ + h/2 (q̇(q₀, p½) + q̇(q₁, p½))` with `φ(q₁) = 0`;
+/// `p₁ = p½ + h/2 (ṗ(q₁, p½) − Φ₁ᵀμ)` with `Φ₁ v₁ = 0`.
+///
+/// `q̇`, `ṗ` are those of the open system, and all of it is solved by inserting: 2 evaluations, a correction of positions and two
+/// sweeps for its multipliers each time. Momenta are `M v` at both ends. Constraints and open system must not depend on time, and
+/// be holonomic for the energy's sake.
+#[derive(Clone, Debug)]
+pub struct Rattle<Y: Parted>
+where
+    Y::Scalar: Real,
+{
+    field: Field<Y>,
+    statistics: Statistics,
+    evaluations: u64,
+    fixed: Option<u32>,
+    delta: Point<Y>,
+    /// Half a step: momenta alone.
+    half: Point<Y>,
+    /// Rates at both ends with these.
+    first: Point<Y>,
+    second: Point<Y>,
+    /// `Φ₀`, `λ`, and what belongs to them.
+    entries: Y::Entries,
+    lambda: Y::Rows,
+    rows: [Y::Rows; 2],
+    start: (Y::Coordinates, Y::Momenta),
+    state: (Y::Coordinates, Y::Momenta),
+    other: Y::Momenta,
+    work: [Y::Momenta; 2],
+    qd: Y::Coordinates,
+    rates: [Point<Y>; 2],
+    known: [bool; 2],
+}
+
+impl<Y> Rattle<Y>
+where
+    Y: Parted,
+    Y::Scalar: Real,
+{
+    /// Room for one system.
+    pub fn new(system: &Y) -> Self {
+        let (point, state) = (|| Point::zero(system), || (system.neutral(), system.rest()));
+        Rattle {
+            field: Field::new(system, false),
+            statistics: Statistics::default(),
+            evaluations: 0,
+            fixed: None,
+            delta: point(),
+            half: point(),
+            first: point(),
+            second: point(),
+            entries: system.zero_entries(),
+            lambda: system.zero_rows(),
+            rows: [system.zero_rows(), system.zero_rows()],
+            start: state(),
+            state: state(),
+            other: system.rest(),
+            work: [system.rest(), system.rest()],
+            qd: system.neutral(),
+            rates: [point(), point()],
+            known: [false; 2],
+        }
+    }
+
+    /// Exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+    #[must_use]
+    pub fn with_iterations(mut self, n: u32) -> Self {
+        self.fixed = Some(n);
+        self
+    }
+
+    /// Multipliers of the first half of the last step: forces and moments of the constraints, N and N m.
+    pub fn lambda(&self) -> &Y::Rows {
+        &self.lambda
+    }
+
+    /// Rates of the open system: at the start with the momenta of half a step, or at the end.
+    fn open(&mut self, system: &mut Y, t: Y::Scalar, end: bool) {
+        let (q, p) = (&mut self.state.0, &mut self.state.1);
+        let (point, out) = if end { (&self.delta, &mut self.second) } else { (&self.half, &mut self.first) };
+        let chart = self.field.chart();
+        chart.state(system, point, q, p);
+        system.open_rates(t, q, p, &mut self.qd, &mut out.p);
+        chart.rates(system, point, (q, p), &self.qd, out);
+        self.evaluations += 1;
+    }
+
+    /// One iteration; how much it changed, relative to the state.
+    fn iterate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<f64, ConstraintError> {
+        let half = Y::Scalar::constant(0.5) * h;
+        // The force at the start, in the chart's axes.
+        let [force, _] = &mut self.work;
+        force.as_mut().fill(Y::Scalar::zero());
+        add_forces(system, &self.entries, &self.lambda, force);
+        self.other.as_mut().copy_from_slice(self.half.p.as_ref());
+        Chart::forces(system, &self.start.0, &self.half, force);
+        self.open(system, t, false);
+        let forces = self.work[0].as_ref();
+        for ((p, rate), force) in self.half.p.as_mut().iter_mut().zip(self.first.p.as_ref()).zip(forces) {
+            *p = half * (*rate - *force);
+        }
+        let mut change = relative(self.half.p.as_ref(), self.other.as_ref(), self.start.1.as_ref());
+        // Both evaluations are at the new momenta.
+        self.open(system, t, false);
+        self.delta.p.as_mut().copy_from_slice(self.half.p.as_ref());
+        self.open(system, t + h, true);
+        self.other.as_mut().copy_from_slice(self.delta.x.as_ref());
+        let rates = self.first.x.as_ref().iter().zip(self.second.x.as_ref());
+        for (x, (first, second)) in self.delta.x.as_mut().iter_mut().zip(rates) {
+            *x = half * (*first + *second);
+        }
+        change = change.max(relative(self.delta.x.as_ref(), self.other.as_ref(), self.start.0.as_ref()));
+        self.correct(system, t, h)?;
+        self.statistics.iterations += 1;
+        Ok(change)
+    }
+
+    /// Multipliers that bring the end nearer to where it is closed.
+    fn correct(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), ConstraintError> {
+        let [dq, momenta] = &mut self.work;
+        let [residual, sigma] = &mut self.rows;
+        self.field.chart().state(system, &self.delta, &mut self.state.0, &mut self.state.1);
+        system.correction(&self.state.0, residual, dq, sigma);
+        let (index, size) = worst(dq.as_ref());
+        if !size.is_finite() {
+            return Err(ConstraintError::NotFinite { index });
+        }
+        // δq = h M⁻¹ δp½, and δp½ = −h/2 Φ₀ᵀ δλ.
+        system.momenta(&self.start.0, dq, momenta);
+        system.settle(t, &self.start.0, momenta, dq, sigma);
+        let factor = Y::Scalar::constant(2.0) / (h * h);
+        for (lambda, sigma) in self.lambda.as_mut().iter_mut().zip(sigma.as_ref()) {
+            *lambda = *lambda - factor * *sigma;
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), ConstraintError> {
+        let mut last = f64::INFINITY;
+        let epsilon = Y::Scalar::epsilon();
+        for iteration in 1..=self.fixed.unwrap_or(ITERATIONS) {
+            let change = self.iterate(system, t, h)?;
+            if self.fixed.is_some() {
+                continue;
+            }
+            if !change.is_finite() || (iteration > 4 && change > 1e3) {
+                return Err(ConstraintError::NoConvergence { iterations: iteration, change });
+            }
+            // Round-off, or as near as it comes.
+            if change <= epsilon || (iteration > 3 && change >= last && change <= 64.0 * epsilon) {
+                return Ok(());
+            }
+            last = change;
+        }
+        match self.fixed {
+            Some(_) => Ok(()),
+            None if last <= 1e3 * epsilon => Ok(()),
+            None => Err(ConstraintError::NoConvergence { iterations: ITERATIONS, change: last }),
+        }
+    }
+}
+
+/// The largest change relative to the largest component.
+fn relative<S: Real>(new: &[S], old: &[S], base: &[S]) -> f64 {
+    let size = worst(new).1.to_f64().max(worst(base).1.to_f64());
+    let change = new.iter().zip(old).fold(0.0, |change: f64, (new, old)| {
+        let change_here = (*new - *old).to_f64().abs();
+        if change_here.is_nan() {
+            f64::INFINITY
+        } else {
+            change.max(change_here)
+        }
+    });
+    if change == 0.0 {
+        0.0
+    } else {
+        change / size
+    }
+}
+
+impl<Y> Stepper<Y> for Rattle<Y>
+where
+    Y: Parted,
+    Y::Scalar: Real,
+{
+    fn order(&self) -> u32 {
+        2
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        None
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        self.known = [false; 2];
+        self.field.load(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        _scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        let wrong = |error| StepError::Constraint { time: t.to_f64(), error };
+        self.known[1] = false;
+        self.field.chart().base(system, &mut self.start.0, &mut self.start.1);
+        system.closure(&self.start.0, &mut self.rows[0], &mut self.entries);
+        if !worst(self.lambda.as_ref()).1.is_finite() {
+            self.lambda.as_mut().fill(Y::Scalar::zero());
+        }
+        // From the multipliers of the last step, which change little, and from rest.
+        self.half.clear();
+        self.delta.clear();
+        self.solve(system, t, h).map_err(wrong)?;
+        self.open(system, t + h, true);
+        let half = Y::Scalar::constant(0.5) * h;
+        for (p, rate) in self.delta.p.as_mut().iter_mut().zip(self.second.p.as_ref()) {
+            *p = *p + half * *rate;
+        }
+        // The second multipliers: the projection of momenta at the end.
+        let ((q, p), new) = ((&mut self.state.0, &mut self.state.1), &mut self.other);
+        self.field.chart().state(system, &self.delta, q, p);
+        new.as_mut().copy_from_slice(p.as_ref());
+        let ([v, _], [sigma, _]) = (&mut self.work, &mut self.rows);
+        system.settle(t + h, q, new, v, sigma);
+        Chart::correct(system, (q, p), (q, new), &mut self.delta);
+        Ok(0.0)
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (&mut self.field, &mut self.delta)
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        let [rate, zero] = &mut self.rates;
+        if !self.known[0] {
+            zero.clear();
+            self.field.rates(system, t, zero, rate);
+            self.known = [true, false];
+        }
+        &self.rates[0]
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        if !self.known[1] {
+            self.field.rates(system, t + h, &self.delta, &mut self.rates[1]);
+            self.known[1] = true;
+        }
+        &self.rates[1]
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
+        self.field.advance(system, t, &self.delta)?;
+        self.known = [false; 2];
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        self.start_rate(system, t);
+        self.end_rate(system, t, h);
+        hermite(h, theta, &self.delta, [&self.rates[0], &self.rates[1]], out);
+    }
+
+    fn corrected(&mut self) {
+        self.known[1] = false;
+    }
+
+    fn statistics(&self) -> Statistics {
+        Statistics { evaluations: self.evaluations + self.field.evaluations(), ..self.statistics }
+    }
+}

@@ -1,0 +1,103 @@
+//! Methods with multipliers of their own: RATTLE, Radau IIA of index 2.
+
+use super::holding::{apart, held, march, State};
+use super::systems::*;
+use mbd_runtime::constrained::{Rattle, Split, Stabilisation};
+use mbd_runtime::integrate::{Stepper, Verner9};
+
+fn split<T: Model + Clone>(model: T) -> Split<Open<T>, Closed<T>> {
+    Split { open: Open(model.clone()), closed: Closed::new(model) }
+}
+
+/// Both constraints at the end of every step; order 2, of a separable Hamiltonian and of one that is not; the exact motion is
+/// known of the latter.
+#[test]
+fn rattle_has_order_two() {
+    let mut y = split(Sticks::double());
+    let start = (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]);
+    let mut closed = Closed::new(Sticks::double());
+    let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
+    let reference = march(&mut closed, &mut fine, 1000, 1.0, &start).unwrap();
+    let mut error = |steps| {
+        let mut method = Rattle::new(&y);
+        let end = march(&mut y, &mut method, steps, 1.0, &start).unwrap();
+        println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
+        assert!(y.closed.off(&end.0, &end.1).0 < 1e-14);
+        let sigma = y.closed.velocities(&end.0, &end.1).1;
+        assert!(sigma.iter().all(|s| s.abs() < 1e-13));
+        apart(&end.0, &reference.0)
+    };
+    let errors = [error(200), error(400)];
+    assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
+
+    let mut y = split(Polar);
+    let start: State = (Polar::at(0.7), vec![0.0; 2]);
+    let errors = [100, 200].map(|steps| {
+        let mut method = Rattle::new(&y);
+        let end = march(&mut y, &mut method, steps, 3.0, &start).unwrap();
+        assert!(y.closed.off(&end.0, &end.1).0 < 1e-14);
+        (Polar::place(&end.0) - 0.7 * 6.0_f64.cos()).abs()
+    });
+    assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
+}
+
+/// The energy of 20 000 steps swings and does not drift: the means of the first and the last tenth differ by far less than
+/// it swings. (Runge-Kutta of order 2 would lose all of it.) A step back leads back.
+#[test]
+fn rattle_is_symplectic() {
+    let mut y = split(Polar);
+    let start: State = (Polar::at(0.7), vec![0.0; 2]);
+    let mut method = Rattle::new(&y);
+    let ((mut q, mut p), h, n) = (start.clone(), 0.05, 20_000);
+    let before = y.closed.energy(&q, &p);
+    let mut off = Vec::new();
+    for k in 0..n {
+        method.step(&mut y, f64::from(k) * h, h, &mut q, &mut p).unwrap();
+        off.push(y.closed.energy(&q, &p) - before);
+    }
+    let swing = off.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let drift = mean(&off[off.len() * 9 / 10..]) - mean(&off[..off.len() / 10]);
+    println!("swing {swing:.2e}, drift {drift:.2e}, of {before:.2e} J, {:?}", method.statistics());
+    assert!(swing < 1e-2 * before && drift.abs() < 1e-2 * swing);
+
+    let mut y = split(Sticks::double());
+    let (mut q, mut p) = (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]);
+    let start = q.clone();
+    let mut method = Rattle::new(&y);
+    for k in 0..50 {
+        method.step(&mut y, f64::from(k) * 0.01, 0.01, &mut q, &mut p).unwrap();
+    }
+    for k in 0..50 {
+        method.step(&mut y, 0.5 - f64::from(k) * 0.01, -0.01, &mut q, &mut p).unwrap();
+    }
+    assert!(apart(&q, &start) < 1e-12 && apart(&p, &[0.0; 4]) < 1e-11, "{q:?} {p:?}");
+}
+
+/// Redundant rows, and a body on its group: closed, of order 2.
+#[test]
+fn rattle_elsewhere() {
+    let mut y = split(Sticks::pendulum(2));
+    let start = (vec![1.0, 0.0], vec![0.0; 2]);
+    let mut method = Rattle::new(&y);
+    let end = march(&mut y, &mut method, 200, 2.0, &start).unwrap();
+    assert!(y.closed.off(&end.0, &end.1).0 < 1e-14);
+
+    let mut y = split(Top::new());
+    let q = y.closed.model.leaning(0.3);
+    let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 30.0];
+    let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
+    mbd_runtime::Constrained::settle(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
+    let start = (q, p);
+    let mut closed = Closed::new(Top::new());
+    let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
+    let reference = march(&mut closed, &mut fine, 500, 0.5, &start).unwrap();
+    let errors = [250, 500].map(|steps| {
+        let mut method = Rattle::new(&y);
+        let end = march(&mut y, &mut method, steps, 0.5, &start).unwrap();
+        println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
+        assert!(y.closed.off(&end.0, &end.1).0 < 1e-13);
+        apart(&end.0, &reference.0)
+    });
+    assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
+}
