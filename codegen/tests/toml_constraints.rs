@@ -1,5 +1,6 @@
 //! Loops, couplings and starts of valid TOML models.
 
+use mbd_codegen::import::raw::LoopType;
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Start, Value};
 
@@ -55,6 +56,14 @@ fn every_type_is_read() {
         ("odd", LoopKind::Pfaffian { row: [C(1.0), C(0.0), C(0.0), C(0.0), C(0.0), lead] }),
     ] {
         assert_eq!(parts(&m, name).0, kind, "{name}");
+    }
+}
+
+/// Messages call a type what the file calls it.
+#[test]
+fn types_have_their_names() {
+    for (name, kind) in LoopType::ALL {
+        assert_eq!(kind.name(), name);
     }
 }
 
