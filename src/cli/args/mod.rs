@@ -10,6 +10,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
+use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
@@ -427,7 +428,9 @@ they are all the same, by the classical Runge-Kutta method of order 4 unless --m
 equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
-floating joints neutral; every velocity 0.1 (rad/s or m/s).
+floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
+neutral where it states none; loops are closed from there (from --q, if given), without moving what is `held`, and velocities
+become the nearest that they allow.
 
 Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
 largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."
@@ -478,6 +481,49 @@ pub struct SimulateArgs {
     /// Time from one row of the table to the next, s
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
+    /// How loops are kept closed
+    #[arg(long, value_enum, default_value_t = HoldArg::Mass)]
+    pub hold: HoldArg,
+    /// Picture of the motion to write, an SVG: the mechanism at several instants, the last one darkest
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
+    pub view: Option<[f64; 3]>,
+    /// Bodies or frames whose paths are drawn, with commas between
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
+    pub trace: Vec<String>,
+    /// Number of instants that are drawn
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub strobes: u16,
+}
+
+/// How loops are kept closed; see `multibody::runtime::constrained`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum HoldArg {
+    /// Not at all: multipliers add up in the momenta, positions drift
+    None,
+    /// Momenta are freed of multipliers after every step, positions drift by the error of the method
+    Settle,
+    /// Positions are put back after every step too, least in the metric of the mass matrix
+    Mass,
+    /// The same, by displacements of least norm
+    Gradient,
+    /// The same, by dependent coordinates alone
+    Partition,
+}
+
+impl HoldArg {
+    /// As the runtime takes it.
+    pub fn stabilisation(self) -> Stabilisation {
+        match self {
+            HoldArg::None => Stabilisation::None,
+            HoldArg::Settle => Stabilisation::Settle,
+            HoldArg::Mass => Stabilisation::Mass,
+            HoldArg::Gradient => Stabilisation::Gradient,
+            HoldArg::Partition => Stabilisation::Partition,
+        }
+    }
 }
 
 /// `mbd explain`.

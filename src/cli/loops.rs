@@ -1,0 +1,271 @@
+//! Loops and couplings of a model: closed from its start, and what is said about them.
+
+use std::path::Path;
+
+use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Model};
+use multibody::codegen::plan::Plan;
+use multibody::runtime::constrained::{close, Closed, Closing, ConstraintError};
+use multibody::runtime::system::Row;
+use multibody::runtime::tree::Source;
+use multibody::runtime::{Constrained, Interpreter, System};
+
+use super::output::note;
+use super::{motion, source, Failure, Outcome};
+
+/// Residual below which a loop is not named as open, m or rad.
+const OPEN: f64 = 1e-9;
+
+/// A model whose loops are closed.
+pub struct Assembly {
+    /// Coordinates.
+    pub q: Vec<f64>,
+    /// How they were found.
+    pub closed: Closed,
+    /// Largest change of a coordinate from the start, m or rad.
+    pub moved: f64,
+    /// Every loop and coupling.
+    pub bonds: Vec<Bond>,
+    /// Velocities that can be chosen.
+    pub mobility: usize,
+}
+
+/// A loop or coupling: its rows there.
+pub struct Bond {
+    /// Name.
+    pub name: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Of these, how many do not follow from others.
+    pub rank: usize,
+}
+
+impl Assembly {
+    /// Number of rows of all.
+    pub fn rows(&self) -> usize {
+        self.bonds.iter().map(|b| b.rows).sum()
+    }
+
+    /// Number of independent ones.
+    pub fn rank(&self) -> usize {
+        self.bonds.iter().map(|b| b.rank).sum()
+    }
+
+    /// One line: what was done, and what it leaves.
+    pub fn summary(&self) -> String {
+        let Closed { iterations, residual, .. } = self.closed;
+        let (rows, rank) = (self.rows(), self.rank());
+        let iterations = match iterations {
+            0 => "as they start".to_string(),
+            1 => "in 1 iteration".to_string(),
+            n => format!("in {n} iterations"),
+        };
+        format!(
+            "closed {iterations}, residual {residual:.1e}, moved by up to {:.3}; {rows} rows, {rank} independent, mobility {}",
+            self.moved, self.mobility
+        )
+    }
+}
+
+/// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
+pub fn stated_start(plan: &Plan, interpreter: &Interpreter<f64>) -> Vec<f64> {
+    let mut q = interpreter.neutral();
+    for start in &plan.model.starts {
+        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
+        let Some(Source::State { q: at, .. }) = slot.and_then(|s| s.at) else { continue };
+        for (q, start) in q[at..].iter_mut().zip(&start.q) {
+            *q = *start;
+        }
+    }
+    for at in interpreter.quaternions() {
+        let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));
+        q[at..at + 4].iter_mut().for_each(|x| *x /= norm);
+    }
+    q
+}
+
+/// Velocities of joints that the model holds.
+fn held(plan: &Plan) -> Vec<bool> {
+    let mut held = vec![false; plan.dims.nv];
+    for start in plan.model.starts.iter().filter(|s| s.held) {
+        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
+        if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
+            held[v..v + plan.model.joints[start.joint].kind.nv()].fill(true);
+        }
+    }
+    held
+}
+
+/// Closes the loops from coordinates, and looks how many rows are independent there.
+///
+/// # Errors
+/// Loops that do not close are told with their places in the file at `path`.
+pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
+    interpreter.check_rank(&start.to_vec()).map_err(|e| motion::rank_failure(plan, &e))?;
+    let held = held(plan);
+    let mut q = start.to_vec();
+    let closing = Closing { held: &held, ..Closing::default() };
+    let closed = match close(interpreter, &mut q, &closing) {
+        Ok(closed) => closed,
+        Err(error) => {
+            let free = close(interpreter, &mut start.to_vec(), &Closing::default()).is_ok();
+            return Err(does_not_close(path, plan, interpreter, &q, error, free));
+        }
+    };
+    let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.rest(), interpreter.zero_rows());
+    interpreter.correction(&q, &mut residual, &mut dq, &mut pivots);
+    let rows = interpreter.rows();
+    let bonds: Vec<Bond> = (0..plan.model.constraints.len())
+        .map(|k| {
+            let own = || rows.iter().zip(&pivots).filter(move |(row, _)| row.constraint == k);
+            let rank = own().filter(|(_, pivot)| **pivot != 0.0).count();
+            Bond { name: plan.model.constraints[k].name.clone(), rows: own().count(), rank }
+        })
+        .collect();
+    let mobility = plan.dims.nv - bonds.iter().map(|b| b.rank).sum::<usize>();
+    let moved = q.iter().zip(start).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    Ok(Assembly { q, closed, moved, bonds, mobility })
+}
+
+/// Tells which loops stay open, furthest first.
+fn does_not_close(
+    path: &Path,
+    plan: &Plan,
+    interpreter: &mut Interpreter<f64>,
+    q: &[f64],
+    error: ConstraintError,
+    free: bool,
+) -> Failure {
+    let ConstraintError::NotClosed { rank, rows, iterations, .. } = error else {
+        let what = format!("{}: the loops do not close: {error}", path.display());
+        return Failure::new(what, "look for very large numbers in the model and its start");
+    };
+    let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+    interpreter.closure(&q.to_vec(), &mut residual, &mut entries);
+    let mut open: Vec<(usize, f64, usize)> = Vec::new();
+    for k in 0..plan.model.constraints.len() {
+        let own = interpreter.rows().iter().enumerate().filter(|(_, row)| row.constraint == k);
+        let worst = own.enumerate().map(|(at, (i, _))| (residual[i].abs(), at)).max_by(|a, b| a.0.total_cmp(&b.0));
+        open.extend(worst.filter(|w| w.0 > OPEN).map(|(size, at)| (k, size, at)));
+    }
+    open.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let text = source::read(path).unwrap_or_default();
+    let help = match free {
+        true => "with no joint `held` they close: hold others, or give these another `start`",
+        false => "look at lengths and frames; if they can meet, give joints a `start` nearer to where they do",
+    };
+    let (last, count) = (open.len().saturating_sub(1), open.len());
+    for (n, (k, size, at)) in open.into_iter().enumerate() {
+        let (word, verb) = word(&plan.model, k);
+        let unit = unit(&plan.model, k, at);
+        let name = &plan.model.constraints[k].name;
+        let place = place(path, &text, &plan.model, k);
+        note(format_args!("{place}: error: {word} `{name}` {verb}: what is left is {size:.3e} {unit}"));
+        if n == last {
+            let all = if count > 1 { "all rows together" } else { "its model's rows" };
+            note(format_args!("  at the least that {iterations} iterations found, where rank is {rank} of {rows} ({all})\n  help: {help}"));
+        }
+    }
+    Failure::Shown
+}
+
+/// What a constraint is called, and what it fails to do.
+fn word(model: &Model, k: usize) -> (&'static str, &'static str) {
+    match model.constraints[k].kind {
+        ConstraintKind::Loop { .. } => ("loop", "does not close"),
+        ConstraintKind::Coupling { .. } => ("coupling", "cannot be met"),
+    }
+}
+
+/// Unit of the row `at` of a constraint.
+fn unit(model: &Model, k: usize, at: usize) -> &'static str {
+    let first_angle = match &model.constraints[k].kind {
+        ConstraintKind::Coupling { terms, .. } => {
+            let slides =
+                terms.iter().filter(|(j, _)| matches!(model.joints[*j].kind, JointKind::Slider { .. })).count();
+            return match slides {
+                0 => "rad",
+                n if n == terms.len() => "m",
+                _ => "(rad and m)",
+            };
+        }
+        ConstraintKind::Loop { kind, .. } => match kind {
+            LoopKind::Planar { .. } => 1,
+            LoopKind::Slider { .. } | LoopKind::Cylindrical { .. } => 2,
+            LoopKind::Helical { .. } if at == 4 => return "m",
+            LoopKind::Helical { .. } => 2,
+            _ => 3,
+        },
+    };
+    if at < first_angle {
+        "m"
+    } else {
+        "rad"
+    }
+}
+
+/// Rows that follow from others, loop by loop, and what moves: notes and warnings.
+pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
+    let text = source::read(path).unwrap_or_default();
+    for (k, bond) in assembly.bonds.iter().enumerate().filter(|(_, b)| b.rank < b.rows) {
+        let (word, _) = word(&plan.model, k);
+        let Bond { name, rows, rank } = bond;
+        let follow = match rows - rank {
+            1 => "1 follows".to_string(),
+            n => format!("{n} follow"),
+        };
+        let counted = if *rows == 1 { "1 row".to_string() } else { format!("{rows} rows") };
+        let place = place(path, &text, &plan.model, k);
+        note(format_args!("{place}: note: {word} `{name}`: {counted}, rank {rank}: {follow} from the rest"));
+    }
+    if assembly.mobility == 0 && plan.dims.nv > 0 {
+        note(format_args!(
+            "{}: warning: nothing can move: the loops leave no mobility to {} velocities ({} independent rows)\n  help: leave \
+             a loop out, or replace it by one of fewer rows, if it was meant to move",
+            path.display(),
+            plan.dims.nv,
+            assembly.rank()
+        ));
+    }
+}
+
+/// File and line of a constraint's name; the file alone where it is not written as a table of its own.
+fn place(path: &Path, text: &str, model: &Model, k: usize) -> String {
+    let table = match model.constraints[k].kind {
+        ConstraintKind::Loop { .. } => "[[loop]]",
+        ConstraintKind::Coupling { .. } => "[[coupling]]",
+    };
+    let name = &model.constraints[k].name;
+    let mut inside = false;
+    for (n, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.starts_with('[') {
+            inside = line.split('#').next().is_some_and(|l| l.trim() == table);
+        }
+        let value = line.strip_prefix("name").and_then(|rest| rest.trim_start().strip_prefix('='));
+        let own = value
+            .map(str::trim_start)
+            .is_some_and(|v| ['"', '\''].iter().any(|q| v.starts_with(&format!("{q}{name}{q}"))));
+        if inside && own {
+            return format!("{}:{}", path.display(), n + 1);
+        }
+    }
+    path.display().to_string()
+}
+
+/// Name of the constraint of an error, for its message.
+pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
+    let k = match *error {
+        ConstraintError::NotClosed { constraint, .. }
+        | ConstraintError::Incompatible { constraint, .. }
+        | ConstraintError::RankLoss { constraint, .. } => constraint,
+        _ => return None,
+    };
+    let constraint = plan.model.constraints.get(k)?;
+    Some(format!("{} `{}`", word(&plan.model, k).0, constraint.name))
+}
+
+/// Largest residual of the positions, m or rad.
+pub fn largest(rows: &[Row], residual: &[f64]) -> f64 {
+    let holonomic = rows.iter().zip(residual).filter(|(row, _)| row.holonomic);
+    holonomic.fold(0.0, |m, (_, x)| if x.abs() <= m { m } else { x.abs() })
+}
