@@ -4,7 +4,7 @@ use std::path::Path;
 
 use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Model};
 use multibody::codegen::plan::Plan;
-use multibody::runtime::constrained::{close, Closed, Closing, ConstraintError};
+use multibody::runtime::constrained::{close, complete, Closed, Closing, ConstraintError};
 use multibody::runtime::system::Row;
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
@@ -55,13 +55,17 @@ impl Assembly {
         let Closed { iterations, residual, .. } = self.closed;
         let (rows, rank) = (self.rows(), self.rank());
         let iterations = match iterations {
-            0 => "as they start".to_string(),
+            0 => "as it starts".to_string(),
             1 => "in 1 iteration".to_string(),
             n => format!("in {n} iterations"),
         };
+        let moved = match self.moved > 1e-9 {
+            true => format!(", coordinates moved by up to {:.1e}", self.moved),
+            false => String::new(),
+        };
         format!(
-            "closed {iterations}, residual {residual:.1e}, moved by up to {:.3}; {rows} rows, {rank} independent, mobility {}",
-            self.moved, self.mobility
+            "closed {iterations}{moved}, residual {residual:.1e}; {rows} rows, {rank} independent, mobility {}",
+            self.mobility
         )
     }
 }
@@ -124,6 +128,33 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
     let mobility = plan.dims.nv - bonds.iter().map(|b| b.rank).sum::<usize>();
     let moved = q.iter().zip(start).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
     Ok(Assembly { q, closed, moved, bonds, mobility })
+}
+
+/// Velocities that the loops allow: those of `held` joints stay, the others follow; where that cannot be, or none are held, the
+/// nearest in the metric of the mass matrix. `stated`: they are not a default, and not to be replaced by others silently.
+pub fn velocities(
+    plan: &Plan,
+    interpreter: &mut Interpreter<f64>,
+    q: &[f64],
+    v: &[f64],
+    stated: bool,
+) -> Outcome<Vec<f64>> {
+    let (held, q, mut v) = (held(plan), q.to_vec(), v.to_vec());
+    if held.iter().any(|h| *h) {
+        match complete(interpreter, 0.0, &q, &mut v, &held, 1e-9) {
+            Ok(_) => return Ok(v),
+            Err(error) if stated => {
+                let at = named(plan, &error).map_or(String::new(), |name| format!(" at {name}"));
+                let help = "lower them, hold other joints in the model, or leave a singular position";
+                return Err(Failure::new(format!("--v: held velocities cannot be kept{at}: {error}"), help));
+            }
+            Err(_) => {}
+        }
+    }
+    let (mut p, mut sigma) = (interpreter.rest(), interpreter.zero_rows());
+    interpreter.momenta(&q, &v.clone(), &mut p);
+    interpreter.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    Ok(v)
 }
 
 /// Tells which loops stay open, furthest first.

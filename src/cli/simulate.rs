@@ -55,7 +55,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         ));
     }
     let settings = settings(args)?;
-    let (mut q, v) = start(&plan, args)?;
+    let (mut q, mut v) = start(&plan, args)?;
     let assembly = match model.constraints.is_empty() {
         true => None,
         false => {
@@ -63,6 +63,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             let assembly = loops::assemble(path, &plan, &mut interpreter, &q)?;
             loops::tell(path, &plan, &assembly);
             q.clone_from(&assembly.q);
+            v = loops::velocities(&plan, &mut interpreter, &q, &v, args.v.is_some())?;
             Some(assembly)
         }
     };

@@ -32,8 +32,8 @@ pub struct Timed {
     /// For steps and for output.
     rates: [Clocked; 2],
     derivatives: Clocked,
-    /// What keeps constraints at the ends of steps.
-    constraints: Clocked,
+    /// What keeps constraints at the ends of steps, and in output.
+    constraints: [Clocked; 2],
 }
 
 impl Timed {
@@ -47,14 +47,14 @@ impl Timed {
             clock,
             rates: Default::default(),
             derivatives: Clocked::default(),
-            constraints: Clocked::default(),
+            constraints: Default::default(),
         }
     }
 
     /// Time taken in steps, s: by the rates, by their derivatives, by keeping constraints, and by looking at the clock around
     /// them.
     pub fn seconds(&self) -> [f64; 4] {
-        let kinds = [self.rates[0], self.derivatives, self.constraints];
+        let kinds = [self.rates[0], self.derivatives, self.constraints[0]];
         // Of the two readings about a call one lies within what is measured.
         let [rates, derivatives, constraints] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
         [rates, derivatives, constraints, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
@@ -110,12 +110,12 @@ impl Constrained for Timed {
         self.inner.closure(q, residual, jacobian);
     }
     fn settle(&mut self, t: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
-        let Timed { inner, constraints, .. } = self;
-        constraints.time(|| inner.settle(t, q, p, v, sigma));
+        let Timed { inner, constraints, output, .. } = self;
+        constraints[usize::from(*output)].time(|| inner.settle(t, q, p, v, sigma));
     }
     fn correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
-        let Timed { inner, constraints, .. } = self;
-        constraints.time(|| inner.correction(q, residual, dq, pivots));
+        let Timed { inner, constraints, output, .. } = self;
+        constraints[usize::from(*output)].time(|| inner.correction(q, residual, dq, pivots));
     }
     fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
         self.inner.multipliers(t, q, v, lambda);

@@ -429,8 +429,8 @@ equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
 floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
-neutral where it states none; loops are closed from there (from --q, if given), without moving what is `held`, and velocities
-become the nearest that they allow.
+neutral where it states none; loops are closed from there (from --q, if given) without moving what is `held`. Velocities then
+follow from those of the `held` joints; where none is held they become the nearest that the loops allow.
 
 Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
 largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."

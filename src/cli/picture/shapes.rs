@@ -86,12 +86,16 @@ impl Shapes {
                 continue;
             }
             let at = point(&joint.placement.xyz);
-            let parent = joint.parent.map_or(&mut ground, |b| &mut parts[b]);
-            parent.points.push(at);
+            match joint.parent {
+                // Where a slide is zero, nothing need be.
+                Some(_) if slides => {}
+                Some(b) => parts[b].points.push(at),
+                None => ground.points.push(at),
+            }
             let child = &mut parts[joint.child];
             child.points.push([0.0; 3]);
-            if !matches!(joint.kind, JointKind::Fixed) {
-                child.marks.push(([0.0; 3], slides));
+            if !matches!(joint.kind, JointKind::Fixed) && (joint.parent.is_none() || !slides) {
+                child.marks.push(([0.0; 3], slides && joint.parent.is_none()));
             }
         }
         for frame in &model.frames {
@@ -124,9 +128,10 @@ impl Shapes {
         }
         for (body, part) in model.bodies.iter().zip(&mut parts) {
             let first = part.points.first().copied();
-            // A body that is held at one point hangs on it with its mass.
+            // A body that is held at one point is a bar with its mass in the middle.
             if part.points.iter().all(|p| Some(*p) == first) {
-                part.points.push(point(&body.com));
+                let (end, com) = (first.unwrap_or_default(), point(&body.com));
+                part.points.push(std::array::from_fn(|k| 2.0 * com[k] - end[k]));
             }
         }
         for (mount, axis, radius) in discs {
