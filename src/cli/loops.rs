@@ -180,22 +180,24 @@ fn does_not_close(
     }
     open.sort_by(|a, b| b.1.total_cmp(&a.1));
     let text = source::read(path).unwrap_or_default();
-    let help = match free {
-        true => "with no joint `held` they close: hold others, or give these another `start`",
-        false => "look at lengths and frames; if they can meet, give joints a `start` nearer to where they do",
+    let couplings =
+        open.iter().all(|(k, ..)| matches!(plan.model.constraints[*k].kind, ConstraintKind::Coupling { .. }));
+    let help = match (free, couplings) {
+        (true, _) => "with no joint `held` all is met: hold others, or give these another `start`",
+        (_, true) => "couplings of the same joints have to agree: change an offset or a ratio, or leave one out",
+        _ => "look at lengths and frames; if they can meet, give joints a `start` nearer to where they do",
     };
-    let (last, count) = (open.len().saturating_sub(1), open.len());
-    for (n, (k, size, at)) in open.into_iter().enumerate() {
+    for (k, size, at) in open {
         let (word, verb) = word(&plan.model, k);
         let unit = unit(&plan.model, k, at);
         let name = &plan.model.constraints[k].name;
         let place = place(path, &text, &plan.model, k);
-        note(format_args!("{place}: error: {word} `{name}` {verb}: what is left is {size:.3e} {unit}"));
-        if n == last {
-            let all = if count > 1 { "all rows together" } else { "its model's rows" };
-            note(format_args!("  at the least that {iterations} iterations found, where rank is {rank} of {rows} ({all})\n  help: {help}"));
-        }
+        note(format_args!(
+            "{place}: error: {word} `{name}` {verb}: what is left is {size:.3e} {unit} after {iterations} iterations (rank \
+             {rank} of {rows} rows)"
+        ));
     }
+    note(format_args!("  help: {help}"));
     Failure::Shown
 }
 
@@ -293,6 +295,43 @@ pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
     };
     let constraint = plan.model.constraints.get(k)?;
     Some(format!("{} `{}`", word(&plan.model, k).0, constraint.name))
+}
+
+/// Loops and couplings that a state does not meet by more than 1e-6, in words.
+pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> Vec<String> {
+    const MOST: f64 = 1e-6;
+    if plan.dims.rows == 0 {
+        return Vec::new();
+    }
+    let q = q.to_vec();
+    let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+    let (mut p, mut allowed, mut sigma) = (interpreter.rest(), interpreter.rest(), interpreter.zero_rows());
+    interpreter.momenta(&q, v, &mut p);
+    interpreter.settle(0.0, &q, &mut p, &mut allowed, &mut sigma);
+    interpreter.closure(&q, &mut residual, &mut entries);
+    let mut worst = vec![[0.0_f64; 2]; plan.model.constraints.len()];
+    let columns = interpreter.entry_columns();
+    for (row, residual) in interpreter.rows().iter().zip(&residual) {
+        let own = row.first..row.first + row.len;
+        // Rates of the positions beside those that the row wants, which `allowed` has.
+        let rate: f64 = own.map(|e| entries[e] * (v[columns[e]] - allowed[columns[e]])).sum();
+        let [open, fast] = &mut worst[row.constraint];
+        (*open, *fast) = (open.max(residual.abs()), fast.max(rate.abs()));
+    }
+    let scale = v.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let mut out = Vec::new();
+    for (k, [open, fast]) in worst.into_iter().enumerate() {
+        let (word, name) = (word(&plan.model, k).0, &plan.model.constraints[k].name);
+        if open > MOST {
+            out.push(format!("`q` leaves {word} `{name}` open by {open:.1e}; nothing closes it here"));
+        }
+        if fast > MOST * scale {
+            out.push(format!(
+                "`v` breaks {word} `{name}` by {fast:.1e}; `qd` and `pd` are those of the nearest velocities it allows"
+            ));
+        }
+    }
+    out
 }
 
 /// Largest residual of the positions, m or rad.

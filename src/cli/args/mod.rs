@@ -372,7 +372,7 @@ pub struct EvalArgs {
     /// Order and form of the numbers, in and out
     #[arg(long, value_enum, default_value_t = LayoutArg::Mbd)]
     pub layout: LayoutArg,
-    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau [default: all]
+    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Angles this close to right angles are taken as exact, rad
@@ -415,6 +415,10 @@ pub enum Quantity {
     Bias,
     #[value(name = "tau")]
     InverseDynamics,
+    #[value(name = "phi")]
+    Residuals,
+    #[value(name = "lambda")]
+    Multipliers,
 }
 
 /// `mbd simulate`.
