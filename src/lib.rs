@@ -55,7 +55,7 @@ pub mod scenes;
 /// | `path = "models/arm.urdf"` | the description, a `.toml` or `.urdf` file; relative to the folder of `Cargo.toml` | |
 /// | `toml = r#"..."#`, `urdf = r#"..."#` | instead of `path`: the description itself | |
 /// | `name = Arm` | the type; attributes and a narrower visibility may stand before it: `pub(crate) Arm` | `pub` |
-/// | `outputs = [rates, energy]` | of `rates`, `velocities`, `momenta`, `energy`, `accelerations`, `reactions`, `mass_matrix`, `frames`, `inverse_dynamics`, `bias`, `jacobians`, `drifts`, `derivatives`, `momentum_derivatives`, `parameter_derivatives` | `[rates, momenta, energy]` |
+/// | `outputs = [rates, energy]` | of `rates`, `velocities`, `momenta`, `energy`, `accelerations`, `reactions`, `mass_matrix`, `frames`, `inverse_dynamics`, `bias`, `jacobians`, `drifts`, `derivatives`, `momentum_derivatives`, `parameter_derivatives`; of models with loops or couplings also `closure`, `settle`, `correction`, `multipliers` | `[rates, momenta, energy]`, and those four where there are loops or couplings |
 /// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |
 /// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `fast` |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |

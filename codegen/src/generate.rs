@@ -24,9 +24,10 @@ pub struct Generated {
 /// Generates code for a checked model.
 ///
 /// # Errors
-/// An unknown frame name in the options, or a number that is not finite in the code (a freedom without inertia, which the
+/// An unknown frame name in the options, an output that the model does not have, or a number that is not finite in the code (a freedom without inertia, which the
 /// checks cannot see where parameters are involved), as a message.
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
+    let options = &options.of_model(model);
     let plan = Plan::new(model, options.searches());
     let groups = options.outputs.iter().map(|&g| match looped(&plan, g, options) {
         Some(program) => Ok(GroupProgram::looped(program)),

@@ -333,6 +333,30 @@ pub enum LoopKind {
     },
 }
 
+impl LoopKind {
+    /// Its name in descriptions.
+    pub fn word(&self) -> &'static str {
+        match self {
+            LoopKind::Pin { .. } => "pin",
+            LoopKind::Slider { .. } => "slider",
+            LoopKind::Cylindrical { .. } => "cylindrical",
+            LoopKind::Helical { .. } => "helical",
+            LoopKind::Universal { .. } => "universal",
+            LoopKind::Planar { .. } => "planar",
+            LoopKind::Spherical => "spherical",
+            LoopKind::Fixed => "fixed",
+            LoopKind::Distance { .. } => "distance",
+            LoopKind::PointOnLine { .. } => "point_on_line",
+            LoopKind::PointOnPlane { .. } => "point_on_plane",
+            LoopKind::PointOnCylinder { .. } => "point_on_cylinder",
+            LoopKind::RollingDisc { .. } => "rolling_disc",
+            LoopKind::RollingBall { .. } => "rolling_ball",
+            LoopKind::KnifeEdge { .. } => "knife_edge",
+            LoopKind::Pfaffian { .. } => "pfaffian",
+        }
+    }
+}
+
 /// What a constraint binds.
 // A model has few of them, and they are read as they stand.
 #[allow(clippy::large_enum_variant)]

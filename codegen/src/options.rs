@@ -1,5 +1,6 @@
 //! What is to be generated, and how.
 
+use crate::model::Model;
 use crate::plan::PlanOptions;
 
 /// Number type of the generated code.
@@ -101,10 +102,18 @@ pub enum Group {
     MomentumDerivatives,
     /// `(q, p) →` derivatives of velocities and momentum rates with respect to the parameters.
     ParameterDerivatives,
+    /// `q →` residuals of the constraints and the entries of `Φ`.
+    Closure,
+    /// `(q, p) →` velocities, momenta freed of multipliers, multipliers `σ`.
+    Settle,
+    /// `q →` residuals of the constraints, Newton's step onto the closed positions, and its pivots.
+    Correction,
+    /// `(q, v) → λ`; with the rates and the three before it, makes the type `Constrained`.
+    Multipliers,
 }
 
 impl Group {
-    /// All of them.
+    /// Those of every mechanism.
     pub const ALL: [Group; 15] = [
         Group::Rates,
         Group::Velocities,
@@ -122,6 +131,14 @@ impl Group {
         Group::MomentumDerivatives,
         Group::ParameterDerivatives,
     ];
+
+    /// Those that mechanisms with constraints have besides.
+    pub const CONSTRAINED: [Group; 4] = [Group::Closure, Group::Settle, Group::Correction, Group::Multipliers];
+
+    /// Both.
+    pub fn every() -> impl Iterator<Item = Group> + Clone {
+        Group::ALL.into_iter().chain(Group::CONSTRAINED)
+    }
 
     /// Name of the generated function, and of the output in options.
     pub fn name(self) -> &'static str {
@@ -141,6 +158,10 @@ impl Group {
             Group::Derivatives => "derivatives",
             Group::MomentumDerivatives => "momentum_derivatives",
             Group::ParameterDerivatives => "parameter_derivatives",
+            Group::Closure => "closure",
+            Group::Settle => "settle",
+            Group::Correction => "correction",
+            Group::Multipliers => "multipliers",
         }
     }
 
@@ -149,9 +170,14 @@ impl Group {
         matches!(self, Group::Frames | Group::Jacobians | Group::Drifts)
     }
 
+    /// Whether mechanisms with constraints lack it.
+    pub fn of_trees(self) -> bool {
+        self == Group::MomentumDerivatives
+    }
+
     /// The group of a name.
     pub fn from_name(name: &str) -> Option<Group> {
-        Group::ALL.into_iter().find(|g| g.name() == name)
+        Group::every().find(|g| g.name() == name)
     }
 }
 
@@ -181,6 +207,22 @@ pub struct Options {
 }
 
 impl Options {
+    /// What is computed unless something else is asked for; and, where there are constraints, [`Group::CONSTRAINED`].
+    pub const OUTPUTS: [Group; 3] = [Group::Rates, Group::Momenta, Group::Energy];
+
+    /// The options for a model: where the outputs are [`Options::OUTPUTS`] or all of them, one with constraints also gets
+    /// [`Group::CONSTRAINED`], and not what such models lack.
+    pub fn of_model(&self, model: &Model) -> Options {
+        let mut options = self.clone();
+        let asked =
+            |groups: &[Group]| groups.len() == self.outputs.len() && groups.iter().all(|g| self.outputs.contains(g));
+        if !model.constraints.is_empty() && (asked(&Options::OUTPUTS) || asked(&Group::ALL)) {
+            options.outputs.retain(|g| !g.of_trees());
+            options.outputs.extend(Group::CONSTRAINED);
+        }
+        options
+    }
+
     /// [`Options::plan`] without the searches that no output asks for.
     pub fn searches(&self) -> PlanOptions {
         let asked = |groups: &[Group]| self.outputs.iter().any(|g| groups.contains(g));
@@ -196,7 +238,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             type_name: "Model".to_string(),
-            outputs: vec![Group::Rates, Group::Momenta, Group::Energy],
+            outputs: Options::OUTPUTS.to_vec(),
             precision: Precision::F64,
             efforts: true,
             frames: Vec::new(),

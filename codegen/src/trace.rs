@@ -1,5 +1,7 @@
 //! The sweeps run on symbols: from a plan to the program of each output group.
 
+mod directional;
+
 use mbd_runtime::spatial::Motion;
 use mbd_runtime::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Tree;
@@ -8,7 +10,7 @@ use mbd_runtime::{Dual, Scalar};
 
 use crate::loops::LoopProgram;
 use crate::model::Gravity;
-use crate::options::{Group, Options};
+use crate::options::{Group, Options, Precision};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Counts, Expr, Graph, Program};
 
@@ -89,10 +91,13 @@ impl<'g> Given<'g> {
         let dims = plan.dims;
         let q = symbols.array("q", dims.nq);
         let second = match group {
-            Group::Rates | Group::Velocities | Group::Energy | Group::Derivatives | Group::ParameterDerivatives => {
-                symbols.array("p", dims.nv)
-            }
-            Group::MassMatrix | Group::Jacobians => Vec::new(),
+            Group::Rates
+            | Group::Velocities
+            | Group::Energy
+            | Group::Derivatives
+            | Group::ParameterDerivatives
+            | Group::Settle => symbols.array("p", dims.nv),
+            Group::MassMatrix | Group::Jacobians | Group::Closure | Group::Correction => Vec::new(),
             _ => symbols.array("v", dims.nv),
         };
         let third = if group == Group::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
@@ -143,18 +148,44 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Strin
     options.frames.iter().map(find).collect()
 }
 
+/// Whether a model has an output.
+fn has(plan: &Plan, group: Group) -> Result<(), String> {
+    let (name, constrained) = (group.name(), !plan.constraints.is_empty());
+    let model = &plan.model.name;
+    if Group::CONSTRAINED.contains(&group) && !constrained {
+        return Err(format!("`{name}` is an output of mechanisms with loops or couplings, and `{model}` has none"));
+    }
+    if group.of_trees() && constrained {
+        return Err(format!("`{name}` does not know the loops and couplings of `{model}`: use `derivatives`"));
+    }
+    Ok(())
+}
+
+/// Part of a row's diagonal below which it counts as redundant.
+fn tolerance(precision: Precision) -> f64 {
+    match precision {
+        Precision::F64 => f64::rank_tolerance(),
+        Precision::F32 => f32::rank_tolerance().into(),
+    }
+}
+
 /// Runs the sweeps of one group on symbols.
 ///
 /// # Errors
-/// An unknown frame name in the options, as a message.
+/// An unknown frame name in the options, or an output that the model does not have, as a message.
 pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgram, String> {
+    has(plan, group)?;
     let graph = Graph::default();
     let given = Given::new(&graph, plan, group, options);
-    let physical: Tree<Expr> = plan.tree(&given.params);
+    let mut physical: Tree<Expr> = plan.tree(&given.params);
+    physical.tolerance = Expr::Const(tolerance(options.precision));
     let tree = physical.regrouped();
     let frames = chosen_frames(plan, options)?;
     let state = [given.q.as_slice(), &given.second, &given.third];
     let outputs = match group {
+        Group::Derivatives | Group::ParameterDerivatives if !plan.constraints.is_empty() => {
+            directional::derivatives(&graph, plan, group, &given, tree.tolerance)
+        }
         Group::ParameterDerivatives => {
             parameter_derivatives(&graph, plan, &tree, &given.q, &given.second, &given.params, &given.inputs())
         }
@@ -251,6 +282,27 @@ fn run<'g>(
             let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
             sweeps.momentum_derivatives(q, second, inputs, &mut w, &mut d, &mut out);
             [out.p, out.pd, out.dp_dq, out.dp_dv, out.dpd_dq, out.dpd_dv].concat()
+        }
+        Group::Closure => {
+            let (mut phi, mut entries) = (zeros(dims.rows), zeros(tree.entry_columns().len()));
+            sweeps.closure(q, inputs, &mut w, &mut phi, &mut entries);
+            [phi, entries].concat()
+        }
+        Group::Settle => {
+            let (mut freed, mut sigma) = (zeros(dims.nv), zeros(dims.rows));
+            sweeps.settle(q, second, inputs, &mut w, &mut v, &mut freed, &mut sigma);
+            [v, freed, sigma].concat()
+        }
+        Group::Correction => {
+            let (mut phi, mut pivots) = (zeros(dims.rows), zeros(dims.rows));
+            sweeps.correction(q, inputs, &mut w, &mut phi, &mut v, &mut pivots);
+            [phi, v, pivots].concat()
+        }
+        Group::Multipliers => {
+            let mut lambda = zeros(dims.rows);
+            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
+            sweeps.multipliers(q, second, inputs, &mut w, &mut v, &mut lambda);
+            lambda
         }
         // Needs the plan: see `parameter_derivatives`.
         Group::ParameterDerivatives => Vec::new(),

@@ -272,7 +272,7 @@ fn outputs(value: &[TokenTree]) -> Result<Vec<Group>, Message> {
     let mut chosen = Vec::new();
     for element in elements("outputs", value, "[rates, energy]")? {
         let written: String = element.iter().map(|t| t.to_string()).collect();
-        let names = || Group::ALL.into_iter().map(Group::name);
+        let names = || Group::every().map(Group::name);
         let Some(group) = Group::from_name(&written) else {
             let help = did_you_mean(&written, names(), || format!("the outputs are {}", list_all(names())));
             return Err(Message::new(place(&element), format!("unknown output {}", quote(&written)), help));

@@ -48,6 +48,10 @@ pub fn source(options: &Options) -> String {
         ("derivatives", "q p v pd dv_dq dv_dp dpd_dq dpd_dp"),
         ("momentum_derivatives", "q v p pd dp_dq dp_dv dpd_dq dpd_dv"),
         ("parameter_derivatives", "q p dv_dparams dpd_dparams"),
+        ("closure", "q residual jacobian"),
+        ("settle", "q p v freed sigma"),
+        ("correction", "q residual dq pivots"),
+        ("multipliers", "q v lambda"),
     ]
     .into_iter()
     .map(|(f, arguments)| {
@@ -65,6 +69,10 @@ pub fn source(options: &Options) -> String {
         impl {name} {{
             #[doc = \"\"] pub const NQ: usize = {LENGTH};
             #[doc = \"\"] pub const NV: usize = {LENGTH};
+            #[doc = \"\"] pub const ROWS: usize = {LENGTH};
+            #[doc = \"\"] pub const ENTRIES: usize = {LENGTH};
+            #[doc = \"\"] pub const CONSTRAINT_ROWS: [{rt}::system::Row; 0] = [];
+            #[doc = \"\"] pub const ENTRY_COLUMNS: [usize; 0] = [];
             #[doc = \"\"] pub const COORDINATES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
             #[doc = \"\"] pub const VELOCITIES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
             #[doc = \"\"] pub const fn new() -> Self {{ {name} {{ {values} }} }}
@@ -108,6 +116,18 @@ pub fn source(options: &Options) -> String {
             type Square = [{array}; {LENGTH}];
             fn square(&self) -> [{array}; {LENGTH}] {{ [[0.0; {LENGTH}]; {LENGTH}] }}
             fn rate_derivatives(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _v: &mut {array}, _pd: &mut {array}, _d: {rt}::Blocks<'_, [{array}; {LENGTH}]>) {{}}
+        }}
+        impl {rt}::Constrained for {name} {{
+            type Rows = {array};
+            type Entries = {array};
+            fn zero_rows(&self) -> {array} {{ [0.0; {LENGTH}] }}
+            fn zero_entries(&self) -> {array} {{ [0.0; {LENGTH}] }}
+            fn rows(&self) -> &[{rt}::system::Row] {{ &[] }}
+            fn entry_columns(&self) -> &[usize] {{ &[] }}
+            fn closure(&mut self, _q: &{array}, _residual: &mut {array}, _jacobian: &mut {array}) {{}}
+            fn settle(&mut self, _t: {t}, _q: &{array}, _p: &mut {array}, _v: &mut {array}, _sigma: &mut {array}) {{}}
+            fn correction(&mut self, _q: &{array}, _residual: &mut {array}, _dq: &mut {array}, _pivots: &mut {array}) {{}}
+            fn multipliers(&mut self, _t: {t}, _q: &{array}, _v: &{array}, _lambda: &mut {array}) {{}}
         }}"
     )
 }

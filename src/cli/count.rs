@@ -78,7 +78,7 @@ struct Part {
 /// Counts and prints.
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, args.code.plan_options())?;
-    let options = args.code.options(&plan.model.name);
+    let options = args.code.options(&plan.model.name).of_model(&plan.model);
     let counts = all(&plan, &options)?;
     let parts = match options.outputs.first() {
         Some(&group) => parts(&plan, &options, group)?,

@@ -2,6 +2,8 @@
 
 pub mod batch;
 pub mod chains;
+pub mod closed;
+pub mod kkt;
 pub mod newton;
 pub mod random;
 pub mod state;

@@ -2,10 +2,11 @@
 
 use std::fmt::Write;
 
+use mbd_runtime::system::Row;
 use mbd_runtime::tree::Source;
 
 use super::names::constant;
-use crate::model::{Gravity, JointKind, Value};
+use crate::model::{ConstraintKind, Gravity, JointKind, Mount, Value};
 use crate::options::{Group, Options};
 use crate::plan::Plan;
 use crate::symbolic::Counts;
@@ -93,7 +94,6 @@ pub fn header(out: &mut String, plan: &Plan, options: &Options, groups: &[GroupP
     for slot in &plan.slots {
         let joint = &plan.model.joints[slot.joint];
         let (nq, nv, word) = (joint.kind.nq(), joint.kind.nv(), joint_word(&joint.kind));
-        let range = |at: usize, n: usize| if n == 1 { format!("{at}") } else { format!("{at}..{}", at + n) };
         let child = &plan.model.bodies[joint.child].name;
         let _ = match slot.at {
             Some(Source::State { q, v }) => {
@@ -109,6 +109,7 @@ pub fn header(out: &mut String, plan: &Plan, options: &Options, groups: &[GroupP
             None => writeln!(out, "//   {}: {word}, follows another joint, moves {child}", joint.name),
         };
     }
+    constraints(out, plan);
     let _ = writeln!(
         out,
         "//\n// Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):"
@@ -128,6 +129,37 @@ pub fn header(out: &mut String, plan: &Plan, options: &Options, groups: &[GroupP
         );
     }
     out.push('\n');
+}
+
+/// Rows of the constraints in the header.
+fn constraints(out: &mut String, plan: &Plan) {
+    if plan.constraints.is_empty() {
+        return;
+    }
+    let _ = writeln!(out, "//\n// Constraints (rows; name; what they bind):");
+    let body = |mount: &Mount| mount.body.map_or("the ground", |b| plan.model.bodies[b].name.as_str());
+    for (constraint, model) in plan.constraints.iter().zip(&plan.model.constraints) {
+        let rows = range(constraint.first, constraint.slots.len());
+        let bound = match &model.kind {
+            ConstraintKind::Loop { kind, first, second } => {
+                format!("{}, {} to {}", kind.word(), body(first), body(second))
+            }
+            ConstraintKind::Coupling { terms, .. } => {
+                let joints: Vec<&str> = terms.iter().map(|(j, _)| plan.model.joints[*j].name.as_str()).collect();
+                format!("coupling of {}", joints.join(", "))
+            }
+        };
+        let _ = writeln!(out, "//   [{rows}] {}: {bound}", model.name);
+    }
+}
+
+/// Indices as they are written in the header.
+fn range(at: usize, n: usize) -> String {
+    if n == 1 {
+        format!("{at}")
+    } else {
+        format!("{at}..{}", at + n)
+    }
 }
 
 /// Fields of the type: name, array type, value of the constructor, doc.
@@ -221,6 +253,10 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options) {
         list(&q)
     );
     let _ = writeln!(out, "    /// Names of the velocities, in the order of `v`, `p`, `tau`.\n    pub const VELOCITIES: [&'static str; {}] = [{}];", v.len(), list(&v));
+    let rows = plan.rows();
+    if !rows.is_empty() {
+        row_constants(out, plan, options, &rows);
+    }
     let mut index = |prefix: &str, what: &str, name: &str, at: usize| {
         let _ = writeln!(
             out,
@@ -242,6 +278,9 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options) {
             None => {}
         }
     }
+    for constraint in &plan.constraints {
+        index("ROW", "the first row of constraint", &constraint.name, constraint.first);
+    }
     for (k, wrench) in plan.model.wrenches.iter().enumerate() {
         index("WRENCH", "external wrench", &wrench.name, k);
     }
@@ -258,6 +297,37 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options) {
             index("REACTION", "the reaction of joint", &plan.model.joints[plan.nodes[node].joint.0].name, k);
         }
     }
+}
+
+/// Rows of the constraints, and where their entries stand.
+fn row_constants(out: &mut String, plan: &Plan, options: &Options, rows: &[Row]) {
+    let (rt, columns) = (&options.runtime, plan.entry_columns());
+    let _ = writeln!(out, "    /// Number of rows of the constraints.\n    pub const ROWS: usize = {};", rows.len());
+    let _ = writeln!(
+        out,
+        "    /// Number of entries of `Φ` that can be other than zero.\n    pub const ENTRIES: usize = {};",
+        columns.len()
+    );
+    let each: Vec<String> = rows
+        .iter()
+        .map(|row| {
+            let Row { constraint, holonomic, first, len } = row;
+            format!(
+                "{rt}::system::Row {{ constraint: {constraint}, holonomic: {holonomic}, first: {first}, len: {len} }}"
+            )
+        })
+        .collect();
+    let _ = writeln!(
+        out,
+        "    /// Rows of the constraints.\n    pub const CONSTRAINT_ROWS: [{rt}::system::Row; {}] = [{}];",
+        rows.len(),
+        each.join(", ")
+    );
+    let _ = writeln!(
+        out,
+        "    /// Velocity index of each entry of `Φ`.\n    pub const ENTRY_COLUMNS: [usize; {}] = {columns:?};",
+        columns.len()
+    );
 }
 
 /// `new` and `Default` values.
@@ -294,6 +364,16 @@ const DERIVATIVES: &str =
 const MOMENTUM_DERIVATIVES: &str = "Momenta, their rates (accelerations do not enter), and their derivatives at given velocities, by rows; with respect
     /// to `q` as in `derivatives`. `∂p/∂v` is the mass matrix.";
 
+/// What the constraints' positions and directions are.
+const CLOSURE: &str =
+    "Residuals `φ(q)` of the constraints' positions, rad or m, and the entries of `Φ(q)`: those of row `r` from
+    /// `CONSTRAINT_ROWS[r].first` on, in the columns `ENTRY_COLUMNS`.";
+
+/// What the step onto closed positions is.
+const CORRECTION: &str =
+    "Residuals `φ(q)`, Newton's step `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ` onto the closed positions, and the pivots of `Φ M⁻¹Φᵀ`,
+    /// zero where a row was left out as redundant.";
+
 /// Arguments for blocks of `rows` rows.
 fn squares<const N: usize>(blocks: [&str; N], rows: usize, columns: usize, t: &str) -> String {
     blocks.map(|b| format!("{b}: &mut [[{t}; {columns}]; {rows}]")).join(", ")
@@ -304,6 +384,7 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
     let t = options.precision.name();
     let (nq, nv) = (plan.dims.nq, plan.dims.nv);
     let joints = plan.joint_nodes.len();
+    let (rows, entries) = (plan.dims.rows, plan.entry_columns().len());
     let frames = chosen_frames(plan, options).map_or(0, |f| f.len());
     let (second, doc): (&str, &str) = match group {
         Group::Rates => ("p", "Rates of the state: `(q, p) → (q̇, ṗ)`."),
@@ -320,6 +401,10 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
         Group::Drifts => ("v", "Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration."),
         Group::Derivatives => ("p", DERIVATIVES),
         Group::MomentumDerivatives => ("v", MOMENTUM_DERIVATIVES),
+        Group::Closure => ("", CLOSURE),
+        Group::Settle => ("p", "Velocities, momenta `p⁺ − Φᵀσ = M v` freed of the multipliers, multipliers `σ`."),
+        Group::Correction => ("", CORRECTION),
+        Group::Multipliers => ("v", "Multipliers `λ`, N and N m: the constraints act on the joints with `−Φᵀλ`."),
         Group::ParameterDerivatives => ("p", "Derivatives of velocities and momentum rates with respect to the parameters, by rows."),
     };
     let outputs = match group {
@@ -343,6 +428,12 @@ pub fn signature(plan: &Plan, options: &Options, group: Group) -> Function {
         Group::MomentumDerivatives => {
             format!("p: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], {}", squares(["dp_dq", "dp_dv", "dpd_dq", "dpd_dv"], nv, nv, t))
         }
+        Group::Closure => format!("residual: &mut [{t}; {rows}], jacobian: &mut [{t}; {entries}]"),
+        Group::Settle => format!("v: &mut [{t}; {nv}], freed: &mut [{t}; {nv}], sigma: &mut [{t}; {rows}]"),
+        Group::Correction => {
+            format!("residual: &mut [{t}; {rows}], dq: &mut [{t}; {nv}], pivots: &mut [{t}; {rows}]")
+        }
+        Group::Multipliers => format!("lambda: &mut [{t}; {rows}]"),
         Group::ParameterDerivatives => squares(["dv_dparams", "dpd_dparams"], nv, plan.model.params.len(), t),
     };
     let returns = if group == Group::Energy { format!(" -> [{t}; 2]") } else { String::new() };

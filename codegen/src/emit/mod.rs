@@ -26,11 +26,12 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
     let mut out = String::new();
     let has = |x: Group| groups.iter().any(|g| g.group == x);
     let rates = has(Group::Rates);
-    let traits: [(bool, Writer); 4] = [
+    let traits: [(bool, Writer); 5] = [
         (has(Group::Momenta), traits::conjugate),
         (has(Group::Energy), traits::energetic),
         (has(Group::Accelerations), traits::accelerated),
         (has(Group::Derivatives), traits::differentiable),
+        (Group::CONSTRAINED.into_iter().all(has), traits::constrained),
     ];
     layout::header(&mut out, plan, options, groups);
     layout::type_definition(&mut out, plan, options, groups);

@@ -142,3 +142,57 @@ impl {rt}::Differentiable for {name} {{
 "
     );
 }
+
+/// `impl Constrained`.
+pub fn constrained(out: &mut String, plan: &Plan, options: &Options) {
+    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let (rows, entries) = (plan.dims.rows, plan.entry_columns().len());
+    let _ = write!(
+        out,
+        "
+#[rustfmt::skip]
+impl {rt}::Constrained for {name} {{
+    type Rows = [{t}; {rows}];
+    type Entries = [{t}; {entries}];
+
+    fn zero_rows(&self) -> [{t}; {rows}] {{
+        [0.0; {rows}]
+    }}
+
+    fn zero_entries(&self) -> [{t}; {entries}] {{
+        [0.0; {entries}]
+    }}
+
+    fn rows(&self) -> &[{rt}::system::Row] {{
+        const {{ &Self::CONSTRAINT_ROWS }}
+    }}
+
+    fn entry_columns(&self) -> &[usize] {{
+        const {{ &Self::ENTRY_COLUMNS }}
+    }}
+
+    #[inline]
+    fn closure(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], jacobian: &mut [{t}; {entries}]) {{
+        Self::closure(self, q, residual, jacobian);
+    }}
+
+    #[inline]
+    fn settle(&mut self, _t: {t}, q: &[{t}; {nq}], p: &mut [{t}; {nv}], v: &mut [{t}; {nv}], sigma: &mut [{t}; {rows}]) {{
+        let augmented = *p;
+        Self::settle(self, q, &augmented, v, p, sigma);
+    }}
+
+    #[inline]
+    fn correction(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], dq: &mut [{t}; {nv}], pivots: &mut [{t}; {rows}]) {{
+        Self::correction(self, q, residual, dq, pivots);
+    }}
+
+    #[inline]
+    fn multipliers(&mut self, _t: {t}, q: &[{t}; {nq}], v: &[{t}; {nv}], lambda: &mut [{t}; {rows}]) {{
+        Self::multipliers(self, q, v, lambda);
+    }}
+}}
+"
+    );
+}

@@ -1,6 +1,6 @@
 //! A branch by itself: what a form costs there hardly depends on what else the tree carries.
 
-use super::{NodeKind, Plan, PlanNode, PoseStep};
+use super::{NodeKind, Plan, PlanConstraint, PlanNode, PoseStep};
 use crate::model::Value;
 
 impl Plan {
@@ -17,6 +17,11 @@ impl Plan {
         let follows: Vec<bool> = (0..self.shared.len())
             .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.shared == Some(g)))
             .collect();
+        let inside = |c: &PlanConstraint| c.nodes().all(|k| keep[k]);
+        let constraints: Vec<PlanConstraint> =
+            self.constraints.iter().filter(|c| inside(c)).map(|c| c.renumbered(&numbers)).collect();
+        let rows: Vec<usize> = constraints.iter().flat_map(|c| c.slots.iter().copied()).collect();
+        let follows: Vec<bool> = follows.iter().enumerate().map(|(g, follows)| *follows || rows.contains(&g)).collect();
         let left = |list: &[usize]| list.iter().copied().filter(|&g| follows[g]).collect::<Vec<_>>();
         let kept = self.nodes.iter().zip(&keep).filter(|(_, keep)| **keep);
         let nodes = kept.map(|(node, _)| PlanNode {
@@ -36,8 +41,7 @@ impl Plan {
         }
         plan.dims.wrenches = plan.wrenches.len();
         plan.joint_nodes.clear();
-        plan.constraints.clear();
-        plan.dims.rows = 0;
+        plan.constraints = constraints;
         (plan, numbers)
     }
 
@@ -80,6 +84,7 @@ impl Plan {
             ));
         }
         letters.extend(self.wrenches.iter().map(|_| 'w'));
+        self.constraints.iter().for_each(|c| letters.push_str(&c.letters()));
         letters
     }
 }

@@ -241,6 +241,39 @@ fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
 }
 
 impl PlanConstraint {
+    /// Nodes that it acts on.
+    pub(super) fn nodes(&self) -> impl Iterator<Item = usize> + '_ {
+        let (frames, terms) = match &self.bond {
+            PlanBond::Cut { frames, .. } => (Some(frames.iter().filter_map(|f| f.node)), None),
+            PlanBond::Coupling { terms, .. } => (None, Some(terms.iter().map(|(i, _)| *i))),
+        };
+        frames.into_iter().flatten().chain(terms.into_iter().flatten())
+    }
+
+    /// With other numbers for the nodes, all of which have one.
+    pub(super) fn renumbered(&self, numbers: &[Option<usize>]) -> PlanConstraint {
+        let mut out = self.clone();
+        let renumber = |i: &mut usize| *i = numbers[*i].unwrap_or_default();
+        match &mut out.bond {
+            PlanBond::Cut { frames, paths, .. } => {
+                frames.iter_mut().filter_map(|f| f.node.as_mut()).for_each(renumber);
+                paths.iter_mut().flatten().for_each(renumber);
+            }
+            PlanBond::Coupling { terms, .. } => terms.iter_mut().map(|(i, _)| i).for_each(renumber),
+        }
+        out
+    }
+
+    /// What of it decides which form is best.
+    pub(super) fn letters(&self) -> String {
+        match &self.bond {
+            PlanBond::Cut { kind, frames, paths } => {
+                format!("c{:?}{:?}{paths:?}", std::mem::discriminant(kind), frames.each_ref().map(|f| f.node))
+            }
+            PlanBond::Coupling { terms, .. } => format!("g{}", terms.len()),
+        }
+    }
+
     /// The constraint over any scalar.
     pub(super) fn instantiate<S: Scalar>(&self, params: &[S]) -> Constraint<S> {
         let bond = match &self.bond {

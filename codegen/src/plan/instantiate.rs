@@ -1,6 +1,7 @@
 //! From the plan to a tree of any scalar: numbers, symbols, duals. The fork is one type parameter.
 
 use mbd_runtime::spatial::{add3, Mat3, RigidInertia, Step, Vec3, SYM};
+use mbd_runtime::system::Row;
 use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
 use mbd_runtime::{Interpreter, Scalar};
 
@@ -62,6 +63,16 @@ impl Plan {
     /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
     pub fn interpreter(&self, params: &[f64]) -> Interpreter<f64> {
         Interpreter::new(self.tree(params), self.gravity(params))
+    }
+
+    /// Rows of the constraints.
+    pub fn rows(&self) -> Vec<Row> {
+        self.tree(&self.default_params()).rows()
+    }
+
+    /// Velocity index of every entry of `Φ`, row by row.
+    pub fn entry_columns(&self) -> Vec<usize> {
+        self.tree(&self.default_params()).entry_columns()
     }
 
     /// The tree with given parameters, not regrouped. `params` has one entry for each run-time parameter.

@@ -12,6 +12,8 @@ use crate::system::{Constrained, Real};
 pub(super) struct Basic<S> {
     pub blocks: Blocks<S>,
     bases: Vec<Basis<S>>,
+    /// Rows that are not derivatives of conditions on positions.
+    velocities: Vec<bool>,
     /// For each block: dependent columns and the rows that are solved for them, a pair for each pivot.
     pub pairs: Vec<Vec<(usize, usize)>>,
     pub lus: Vec<Lu<S>>,
@@ -26,6 +28,7 @@ impl<S: Real> Basic<S> {
         let most = |size: fn(&Block<S>) -> usize| blocks.list.iter().map(size).max().unwrap_or(0);
         let (m, n, mn) = (most(|b| b.rows.len()), most(|b| b.columns.len()), most(|b| b.a.len()));
         Basic {
+            velocities: system.rows().iter().map(|row| !row.holonomic).collect(),
             bases: blocks.list.iter().map(|b| Basis::new(b.rows.len(), b.columns.len())).collect(),
             pairs: blocks.list.iter().map(|b| Vec::with_capacity(b.rows.len())).collect(),
             lus: blocks.list.iter().map(|b| Lu::new(b.rows.len())).collect(),
@@ -37,9 +40,22 @@ impl<S: Real> Basic<S> {
     }
 
     /// The displacement of least norm after which the residuals are least, velocities of `held` left out; the rank of the rows.
-    pub fn least_without(&mut self, entries: &[S], held: &[bool], residual: &[S], dq: &mut [S]) -> usize {
+    /// Rows that bind velocities alone do not stand in the way of displacements.
+    pub fn least(&mut self, entries: &[S], held: &[bool], residual: &[S], dq: &mut [S]) -> usize {
         self.blocks.fill(entries);
         self.blocks.hold(held);
+        self.blocks.release(&self.velocities);
+        self.solve_least(residual, dq)
+    }
+
+    /// The same for velocities, with all rows.
+    pub fn least_velocities(&mut self, entries: &[S], held: &[bool], residual: &[S], dv: &mut [S]) -> usize {
+        self.blocks.fill(entries);
+        self.blocks.hold(held);
+        self.solve_least(residual, dv)
+    }
+
+    fn solve_least(&mut self, residual: &[S], dq: &mut [S]) -> usize {
         dq.fill(S::zero());
         let mut rank = 0;
         for (block, basis) in self.blocks.list.iter().zip(&mut self.bases) {
@@ -54,11 +70,6 @@ impl<S: Real> Basic<S> {
             }
         }
         rank
-    }
-
-    /// The same of all velocities.
-    pub fn least(&mut self, entries: &[S], residual: &[S], dq: &mut [S]) -> usize {
-        self.least_without(entries, &[], residual, dq)
     }
 
     /// Chooses dependent velocities and the rows to solve for them, by complete pivoting, from the entries that were taken last.

@@ -83,6 +83,17 @@ impl<S: Real> Blocks<S> {
         }
     }
 
+    /// Leaves out rows.
+    pub fn release(&mut self, rows: &[bool]) {
+        for block in &mut self.list {
+            for (row, a) in block.rows.iter().zip(block.a.chunks_mut(block.columns.len().max(1))) {
+                if rows[*row] {
+                    a.fill(S::zero());
+                }
+            }
+        }
+    }
+
     /// Leaves out velocities that are held.
     pub fn hold(&mut self, held: &[bool]) {
         for block in &mut self.list {

@@ -69,7 +69,7 @@ where
         if !size.is_finite() {
             return Err(ConstraintError::NotFinite { index: at });
         }
-        let rank = least.least_without(entries.as_ref(), closing.held, residual.as_ref(), dx.as_mut());
+        let rank = least.least(entries.as_ref(), closing.held, residual.as_ref(), dx.as_mut());
         let size = size.to_f64();
         let closed = size <= closing.tolerance;
         let (before, mut part, mut found) = (square(residual.as_ref()), Y::Scalar::one(), false);
@@ -149,7 +149,7 @@ where
     // The second step removes what rounding leaves of the first.
     for _ in 0..2 {
         off(system, &entries, &new, &wanted, &mut residual);
-        rank = least.least_without(entries.as_ref(), held, residual.as_ref(), dv.as_mut());
+        rank = least.least_velocities(entries.as_ref(), held, residual.as_ref(), dv.as_mut());
         for (v, dv) in new.as_mut().iter_mut().zip(dv.as_ref()) {
             *v = *v + *dv;
         }

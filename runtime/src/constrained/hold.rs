@@ -119,7 +119,7 @@ where
             system.closure(q, &mut self.residual, &mut self.entries);
             let (residual, entries, dq) = (self.residual.as_ref(), self.entries.as_ref(), self.v.as_mut());
             return match self.policy {
-                Stabilisation::Gradient => basic.least(entries, residual, dq),
+                Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
                 _ => basic.dependent(entries, residual, dq),
             };
         }

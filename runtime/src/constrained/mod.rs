@@ -9,6 +9,8 @@
 //! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
 //!
 //! | `Minimal` with `Watch` | gauge `p_dep = 0` | closed at every evaluation | `Φ` and a small LU, three or four times an evaluation |
+//! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
+//! | [`IndexTwo`] | re-zeroed | drift | inside of the step: iterations of 3 open evaluations and 3 projections |
 //!
 //! They are wrapped around any method ([`Bounded`], [`Hold`]); minimal coordinates are a [`System`](crate::System) of their own.
 
@@ -23,6 +25,7 @@ mod close;
 mod dense;
 mod error;
 mod hold;
+mod index_two;
 #[cfg(feature = "alloc")]
 mod minimal;
 mod rattle;
@@ -34,6 +37,7 @@ pub use boundary::{Boundary, Bounded};
 pub use close::{close, complete, Closed, Closing};
 pub use error::ConstraintError;
 pub use hold::{Effort, Hold, Stabilisation};
+pub use index_two::IndexTwo;
 #[cfg(feature = "alloc")]
 pub use minimal::{Minimal, Switch, Watch};
 pub use rattle::Rattle;

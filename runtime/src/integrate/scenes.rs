@@ -66,6 +66,8 @@ pub fn empty<S: Scalar>() -> Tree<S> {
         solve_at_ground: vec![],
         ground_moment: [S::zero(); 3],
         wrenches: vec![],
+        constraints: vec![],
+        tolerance: S::rank_tolerance(),
         frames: vec![],
         joint_nodes: vec![],
         matrix_depth: 0,

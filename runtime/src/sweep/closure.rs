@@ -177,7 +177,12 @@ impl<S: Scalar> Closure<S> {
         for (out, &k) in out.iter_mut().zip(self.components()) {
             *out = small[k];
         }
+        // Where `d` is not to vanish, its components change with a tilt as well, which is not what the rows say.
+        if let Closure::Slider | Closure::Cylindrical | Closure::Helical { .. } = self {
+            (out[0], out[1]) = (d[0] - d[2] * z[0], d[1] - d[2] * z[1]);
+        }
         match self {
+            Closure::Planar => out[0] = dot3(z, d),
             Closure::Helical { pitch } => {
                 let (s, c) = (d[2] / *pitch).sin_cos();
                 out[4] = *pitch * (s * x[0] + c * x[1]);

@@ -2,7 +2,7 @@
 
 use super::holding::{apart, held, march, State};
 use super::systems::*;
-use mbd_runtime::constrained::{Rattle, Split, Stabilisation};
+use mbd_runtime::constrained::{IndexTwo, Rattle, Split, Stabilisation};
 use mbd_runtime::integrate::{Stepper, Verner9};
 
 fn split<T: Model + Clone>(model: T) -> Split<Open<T>, Closed<T>> {
@@ -100,4 +100,47 @@ fn rattle_elsewhere() {
         apart(&end.0, &reference.0)
     });
     assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
+}
+
+/// Order 5 in the state, 3 in the multipliers; velocities meet the constraints at the end of every step, and positions with the
+/// projection around it.
+#[test]
+fn radau_has_order_five() {
+    let mut y = split(Sticks::double());
+    let start = (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]);
+    let mut closed = Closed::new(Sticks::double());
+    let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
+    let reference = march(&mut closed, &mut fine, 1000, 0.5, &start).unwrap();
+    for policy in [Stabilisation::None, Stabilisation::Mass] {
+        let errors = [10, 20, 40].map(|steps| {
+            let mut method = held(&y, IndexTwo::new(&y), policy);
+            let end = march(&mut y, &mut method, steps, 0.5, &start).unwrap();
+            let sigma = y.closed.velocities(&end.0, &end.1).1;
+            println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
+            assert!(policy == Stabilisation::Mass || sigma.iter().all(|s| s.abs() < 1e-12), "{sigma:?}");
+            assert!(policy == Stabilisation::None || y.closed.off(&end.0, &end.1).0 < 1e-14);
+            (apart(&end.0, &reference.0), method.method().lambda().clone())
+        });
+        assert!((errors[0].0 / errors[1].0).log2() > 4.5, "{errors:?}");
+        // Of the multipliers by the differences between step sizes.
+        let found = (apart(&errors[0].1, &errors[1].1) / apart(&errors[1].1, &errors[2].1)).log2();
+        assert!(found > 2.6, "{found} {errors:?}");
+    }
+    let mut y = split(Top::new());
+    let q = y.closed.model.leaning(0.3);
+    let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 30.0];
+    let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
+    mbd_runtime::Constrained::settle(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
+    let start = (q, p);
+    let mut closed = Closed::new(Top::new());
+    let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
+    let reference = march(&mut closed, &mut fine, 500, 0.3, &start).unwrap();
+    let errors = [15, 30].map(|steps| {
+        let mut method = held(&y, IndexTwo::new(&y), Stabilisation::Mass);
+        let end = march(&mut y, &mut method, steps, 0.3, &start).unwrap();
+        println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
+        apart(&end.0, &reference.0)
+    });
+    println!("{errors:?}");
+    assert!((errors[0] / errors[1]).log2() > 4.5, "{errors:?}");
 }

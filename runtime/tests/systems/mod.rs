@@ -121,6 +121,8 @@ pub fn rotor() -> Interpreter<f64> {
         solve_at_ground: vec![],
         ground_moment: [o; 3],
         wrenches: vec![],
+        constraints: vec![],
+        tolerance: 1e-10,
         frames: vec![],
         joint_nodes: vec![],
         matrix_depth: 0,

@@ -125,7 +125,13 @@ const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
   momentum_derivatives
                  (q, v) -> p, p' and their derivatives with respect to q and v
   parameter_derivatives
-                 (q, p) -> derivatives of v and p' with respect to parameters";
+                 (q, p) -> derivatives of v and p' with respect to parameters
+Of models with loops or couplings (they get these beside the defaults):
+  closure        q -> residuals of the constraints, and their Jacobian
+  settle         (q, p) -> v, momenta freed of multipliers, multipliers sigma
+  correction     q -> residuals, Newton's step onto closed positions, its pivots
+  multipliers    (q, v) -> forces of the constraints
+such models have no `momentum_derivatives`.";
 
 /// What code is generated.
 #[derive(Args)]

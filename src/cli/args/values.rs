@@ -53,7 +53,7 @@ pub fn outputs(text: &str) -> Result<OutputList, String> {
     if text == "all" {
         return Ok(OutputList(Group::ALL.to_vec()));
     }
-    let names = || Group::ALL.iter().map(|g| g.name()).chain(["all"]);
+    let names = || Group::every().map(|g| g.name()).chain(["all"]);
     let unknown = || words::did_you_mean(text, names(), || format!("outputs are {}", words::list(names())));
     Group::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
 }

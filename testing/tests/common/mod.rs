@@ -2,7 +2,7 @@
 //!
 //! What is run are the kernels, for one lane; `compiled.rs` has what stands around them, and lanes. The emitted language is
 //! tiny, and everything outside it is refused with a panic: `let` of a number or a pair, sums, products, quotients, signs,
-//! sine-cosine pairs one by one or all at once, roots, reads and writes of arrays at constant places, loops over lanes. A
+//! sine-cosine pairs one by one or all at once, roots, guarded reciprocals, reads and writes of arrays at constant places, loops over lanes. A
 //! name that is defined twice in a block is refused too, although Rust would allow it.
 
 use std::collections::HashMap;
@@ -22,6 +22,8 @@ enum Number {
     Product(Box<[Number; 2]>),
     Quotient(Box<[Number; 2]>),
     Root(Box<Number>),
+    /// `1 / a` where `a` is above `b`.
+    ReciprocalAbove(Box<[Number; 2]>),
 }
 
 enum Step {
@@ -125,6 +127,7 @@ impl Number {
             Number::Difference(x) => of(&x[0]) - of(&x[1]),
             Number::Product(x) => of(&x[0]) * of(&x[1]),
             Number::Quotient(x) => of(&x[0]) / of(&x[1]),
+            Number::ReciprocalAbove(x) => mbd_runtime::Scalar::reciprocal_above(of(&x[0]), of(&x[1])),
             Number::Root(x) => mbd_runtime::Scalar::sqrt(of(x)),
         }
     }
@@ -288,6 +291,9 @@ impl Function {
             }
             Expr::Call(call) if path(&call.func).ends_with("::Scalar::sqrt") => {
                 Number::Root(Box::new(self.number(&call.args[0])))
+            }
+            Expr::Call(call) if path(&call.func).ends_with("::Scalar::reciprocal_above") => {
+                Number::ReciprocalAbove(Box::new([self.number(&call.args[0]), self.number(&call.args[1])]))
             }
             other => panic!("unexpected expression {other:?}"),
         }

@@ -1,0 +1,458 @@
+//! Random trees with constraints that are closed exactly in a given state.
+
+use mbd_codegen::model::{
+    Constraint, ConstraintKind, JointKind, LoopKind, Model, Motion, Mount, Param, Placement, Rotation, Value,
+};
+use mbd_codegen::options::Loops;
+use mbd_codegen::plan::{Forms, Plan, PlanOptions, DEFAULT_SNAP};
+use mbd_runtime::spatial::{add3, dot3, scale3, Mat3, Vec3};
+use mbd_runtime::sweep::FrameState;
+use mbd_runtime::tree::Source;
+
+use crate::kkt::{across, mounted, rank, unit, Pose, Rows};
+use crate::random::{random_model, rotation_matrix, Knobs, Rng};
+use crate::state::{random_state, State};
+use crate::value;
+
+/// What constraints a random mechanism may have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopKnobs {
+    /// The tree.
+    pub tree: Knobs,
+    /// Pins and slides of one plane only: loops closed by whole joints have redundant rows.
+    pub planar: bool,
+    /// Smallest and largest number of constraints.
+    pub count: (usize, usize),
+    /// Probability that a loop goes by the ground.
+    pub ground: f64,
+    /// Probability that a constraint stands there twice.
+    pub twice: f64,
+    /// Probability that a constraint couples joints.
+    pub coupling: f64,
+    /// Weights of the kinds of loops, in the order of [`LoopKind`].
+    pub kinds: [f64; 16],
+    /// Probability that errors of positions are made to decay.
+    pub decay: f64,
+    /// Probability that a loop leaves its own joints no motion.
+    pub locked: f64,
+}
+
+impl LoopKnobs {
+    /// Spatial trees of pins with loops of every kind.
+    pub fn plain() -> LoopKnobs {
+        LoopKnobs {
+            tree: Knobs { bodies: (3, 8), ..Knobs::default() },
+            planar: false,
+            count: (1, 3),
+            ground: 0.6,
+            twice: 0.0,
+            coupling: 0.1,
+            kinds: [1.0; 16],
+            decay: 0.0,
+            locked: 0.0,
+        }
+    }
+
+    /// Everything there is, on up to `bodies` bodies; the mix itself is random.
+    pub fn everything(seed: u64, bodies: usize) -> LoopKnobs {
+        let mut rng = Rng::new(seed, 5);
+        let planar = rng.chance(0.25);
+        let mut tree = Knobs::everything(seed, bodies);
+        tree.bodies.0 = 2.min(bodies);
+        if planar {
+            tree = Knobs { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
+        }
+        let few = rng.chance(0.4);
+        let kinds: [f64; 16] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
+        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 16] } else { kinds };
+        LoopKnobs {
+            tree,
+            planar,
+            count: (1, 4),
+            ground: rng.pick(&[0.0, 0.4, 0.8]),
+            twice: if rng.chance(0.2) { 0.4 } else { 0.0 },
+            coupling: if rng.chance(0.3) { 0.4 } else { 0.0 },
+            kinds,
+            decay: if rng.chance(0.3) { 0.5 } else { 0.0 },
+            locked: if rng.chance(0.2) { 0.3 } else { 0.0 },
+        }
+    }
+}
+
+/// A mechanism with constraints, and a state where they are closed. The same for the same seed and knobs.
+#[derive(Clone, Debug)]
+pub struct LoopSystem {
+    /// Seed.
+    pub seed: u64,
+    /// The mechanism.
+    pub model: Model,
+    /// Without its constraints.
+    pub open: Plan,
+    /// Coordinates on which they are closed, velocities that do not care, inputs.
+    pub state: State,
+}
+
+/// A random mechanism that can still move: `Φ` has fewer independent rows than there are velocities. Where drives and loops
+/// contradict one another, the drives stand still.
+pub fn random_loops(seed: u64, knobs: &LoopKnobs) -> LoopSystem {
+    for attempt in 0..1000 {
+        if let Some(system) = attempted(seed, attempt, knobs) {
+            return system;
+        }
+    }
+    panic!("seed {seed}: no mechanism with these knobs can move: {knobs:?}")
+}
+
+fn attempted(seed: u64, attempt: u64, knobs: &LoopKnobs) -> Option<LoopSystem> {
+    let own = seed.wrapping_add(attempt << 32);
+    let mut tree = random_model(own, &knobs.tree);
+    tree.name = format!("loops{seed}");
+    let mut rng = Rng::new(own, 6);
+    if knobs.planar {
+        flatten(&mut tree, &mut rng);
+    }
+    let open = Plan::new(&tree, PLAIN);
+    let mut state = random_state(&open, own);
+    let mut frames = vec![FrameState::ground(); open.frames.len()];
+    state.interpreter(&open).frames(&state.q, &state.v, &mut frames);
+    let mut closer = Closer { rng, knobs, model: tree, open: &open, state: &mut state, frames };
+    let count = knobs.count.0 + closer.rng.below(knobs.count.1 - knobs.count.0 + 1);
+    for _ in 0..count {
+        closer.add();
+    }
+    let model = closer.model;
+    let (phi, b) = Rows { plan: &open, model: &model, state: &state }.jacobian();
+    let independent = rank(&phi, RANK);
+    if independent == 0 || independent >= open.dims.nv {
+        return None;
+    }
+    let augmented = |(row, b): (&Vec<f64>, &f64)| [row.clone(), vec![*b]].concat();
+    let with_drives: Vec<Vec<f64>> = phi.iter().zip(&b).map(augmented).collect();
+    if rank(&with_drives, RANK) > independent {
+        state.drive[1].fill(0.0);
+        state.drive[2].fill(0.0);
+    }
+    Some(LoopSystem { seed, model, open, state })
+}
+
+/// One joint after the other: neither the search for a form nor what it finds is part of a reference.
+const PLAIN: PlanOptions = PlanOptions {
+    snap: DEFAULT_SNAP,
+    forms: Forms::Single,
+    accelerations: false,
+    mass_matrix: false,
+    loops: Loops::Never,
+};
+
+/// Rows with less left of them than this are dependent on others.
+const RANK: f64 = 1e-7;
+
+/// All axes along z, all turns about z.
+fn flatten(model: &mut Model, rng: &mut Rng) {
+    let z = [0.0, 0.0, 1.0];
+    for joint in &mut model.joints {
+        match &mut joint.kind {
+            JointKind::Pin { axis } => *axis = scale3(rng.pick(&[1.0, -1.0, 2.0]), z),
+            JointKind::Planar { normal } => *normal = z,
+            JointKind::Slider { axis } => *axis = flat_direction(rng),
+            _ => {}
+        }
+        let angle = if rng.chance(0.3) { 0.0 } else { rng.around(3.0) };
+        joint.placement.rotation = Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(angle)]);
+    }
+}
+
+fn flat_direction(rng: &mut Rng) -> [f64; 3] {
+    let (s, c) = rng.around(3.0).sin_cos();
+    [c, s, 0.0]
+}
+
+fn about(axis: Vec3<f64>, angle: f64) -> Mat3<f64> {
+    rotation_matrix(&Rotation::AxisAngle { axis, angle: Value::Const(angle) }, &[])
+}
+
+fn times(a: &Mat3<f64>, b: &Mat3<f64>) -> Mat3<f64> {
+    std::array::from_fn(|i| std::array::from_fn(|k| (0..3).map(|j| a[i][j] * b[j][k]).sum()))
+}
+
+fn transposed(a: &Mat3<f64>) -> Mat3<f64> {
+    std::array::from_fn(|i| std::array::from_fn(|k| a[k][i]))
+}
+
+/// The rotation in words of the description; exact to rounding.
+fn described(r: &Mat3<f64>) -> Rotation {
+    let pitch = (-r[2][0]).atan2((r[2][1] * r[2][1] + r[2][2] * r[2][2]).sqrt());
+    let (roll, yaw) = if pitch.cos() > 1e-3 {
+        (r[2][1].atan2(r[2][2]), r[1][0].atan2(r[0][0]))
+    } else {
+        // Near the poles roll and yaw do the same: all of it is given to yaw.
+        (0.0, (-r[0][1]).atan2(r[1][1]))
+    };
+    Rotation::Rpy([roll, pitch, yaw].map(Value::Const))
+}
+
+/// Adds constraints to a model in a state.
+struct Closer<'a> {
+    rng: Rng,
+    knobs: &'a LoopKnobs,
+    model: Model,
+    open: &'a Plan,
+    state: &'a mut State,
+    frames: Vec<FrameState<f64>>,
+}
+
+impl Closer<'_> {
+    /// A constant, or a parameter that has this value in the state.
+    fn value(&mut self, x: f64) -> Value {
+        if !self.rng.chance(self.knobs.tree.params) {
+            return Value::Const(x);
+        }
+        let k = self.model.params.len();
+        self.model.params.push(Param { name: format!("c{k}"), default: x });
+        self.state.params.push(x);
+        Value::Param(k)
+    }
+
+    fn add(&mut self) {
+        let kind = if self.rng.chance(self.knobs.coupling) { self.coupling() } else { self.closed_loop() };
+        let Some(kind) = kind else { return };
+        let decay = if self.rng.chance(self.knobs.decay) { self.rng.range(0.5, 20.0) } else { 0.0 };
+        let decay = if decay == 0.0 { Value::ZERO } else { self.value(decay) };
+        let name = |n: usize| format!("loop{n}");
+        let n = self.model.constraints.len();
+        self.model.constraints.push(Constraint { name: name(n), kind: kind.clone(), decay });
+        if self.rng.chance(self.knobs.twice) {
+            self.model.constraints.push(Constraint { name: name(n + 1), kind, decay });
+        }
+    }
+
+    fn coupling(&mut self) -> Option<ConstraintKind> {
+        let single = |j: &usize| {
+            let joint = &self.model.joints[*j];
+            joint.kind.nv() == 1 && joint.motion == Motion::Free
+        };
+        let mut can: Vec<usize> = (0..self.model.joints.len()).filter(single).collect();
+        let n = (2 + self.rng.below(2)).min(can.len());
+        if n < 2 {
+            return None;
+        }
+        let mut terms = Vec::new();
+        let mut sum = 0.0;
+        for _ in 0..n {
+            let joint = can.swap_remove(self.rng.below(can.len()));
+            let ratio = self.rng.range(0.3, 2.0) * self.rng.pick(&[1.0, -1.0]);
+            let at = self.open.slots.iter().find(|s| s.joint == joint).and_then(|s| s.at);
+            let Some(Source::State { q, .. }) = at else { return None };
+            sum += ratio * self.state.q[q];
+            terms.push((joint, self.value(ratio)));
+        }
+        Some(ConstraintKind::Coupling { terms, offset: self.value(sum) })
+    }
+
+    /// Velocities of the free joints between two bodies, mimics counted as their own.
+    fn between(&self, a: Option<usize>, b: Option<usize>) -> usize {
+        let path = |mut body: Option<usize>| {
+            let mut joints = Vec::new();
+            while let Some(at) = body {
+                let Some(j) = self.model.joints.iter().position(|j| j.child == at) else { break };
+                joints.push(j);
+                body = self.model.joints[j].parent;
+            }
+            joints
+        };
+        let (a, b) = (path(a), path(b));
+        let only = |x: &[usize], y: &[usize]| x.iter().copied().filter(|j| !y.contains(j)).collect::<Vec<_>>();
+        let moves = |j: &usize| match self.model.joints[*j].motion {
+            Motion::Prescribed => 0,
+            _ => self.model.joints[*j].kind.nv(),
+        };
+        only(&a, &b).iter().chain(&only(&b, &a)).map(moves).sum()
+    }
+
+    fn closed_loop(&mut self) -> Option<ConstraintKind> {
+        let n = self.model.bodies.len();
+        let kind = self.kind();
+        for _ in 0..20 {
+            let ground = self.rng.chance(self.knobs.ground);
+            let mut ends = [Some(self.rng.below(n)), if ground { None } else { Some(self.rng.below(n)) }];
+            if self.rng.chance(0.5) {
+                ends.swap(0, 1);
+            }
+            let free = self.between(ends[0], ends[1]);
+            // In a plane at most three rows count.
+            let needed = if self.knobs.planar { rows(&kind).min(3) } else { rows(&kind) };
+            if free == 0 || (free <= needed && !self.rng.chance(self.knobs.locked)) {
+                continue;
+            }
+            let first = Mount { body: ends[0], placement: self.placement() };
+            let a = mounted(self.open, &self.state.params, &self.frames, &first);
+            let (turn, offset) = self.allowed(&kind);
+            let second = self.second(ends[1], &a, &turn, offset);
+            return Some(ConstraintKind::Loop { kind, first, second });
+        }
+        None
+    }
+
+    fn placement(&mut self) -> Placement {
+        let xyz: [f64; 3] = std::array::from_fn(|_| self.rng.around(0.4));
+        let xyz = xyz.map(|x| self.value(x));
+        let angle = self.rng.around(3.0);
+        if self.knobs.planar {
+            return Placement { xyz, rotation: Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(angle)]) };
+        }
+        if self.rng.chance(0.4) {
+            return Placement {
+                xyz,
+                rotation: Rotation::AxisAngle { axis: self.direction(), angle: self.value(angle) },
+            };
+        }
+        let rotation = if self.rng.chance(0.2) {
+            Rotation::NONE
+        } else {
+            Rotation::Rpy(std::array::from_fn(|_| Value::Const(self.rng.around(3.0))))
+        };
+        Placement { xyz, rotation }
+    }
+
+    /// The second frame, which is turned and displaced from the first, on its body.
+    fn second(&mut self, body: Option<usize>, a: &Pose<f64>, turn: &Mat3<f64>, offset: Vec3<f64>) -> Mount {
+        let at = Mount { body, placement: Placement::IDENTITY };
+        let carrier = mounted(self.open, &self.state.params, &self.frames, &at);
+        let origin = add3(a.origin, a.turn(offset));
+        let back = transposed(&carrier.axes);
+        let arm = [0, 1, 2].map(|k| origin[k] - carrier.origin[k]);
+        let xyz = back.map(|row| dot3(row, arm));
+        let rotation = described(&times(&back, &times(&a.axes, turn)));
+        Mount { body, placement: Placement { xyz: xyz.map(|x| self.value(x)), rotation } }
+    }
+
+    /// Any direction: in a plane that of its normal.
+    fn direction(&mut self) -> Vec3<f64> {
+        if self.knobs.planar {
+            return [0.0, 0.0, self.rng.pick(&[1.0, -1.0, 2.0])];
+        }
+        if self.rng.chance(0.4) {
+            let mut v = [0.0; 3];
+            v[self.rng.below(3)] = self.rng.pick(&[1.0, -1.0, 2.0]);
+            return v;
+        }
+        loop {
+            let v: Vec3<f64> = std::array::from_fn(|_| self.rng.around(1.0));
+            if dot3(v, v) > 0.04 {
+                return v;
+            }
+        }
+    }
+
+    /// Any direction: in a plane one of it.
+    fn sideways(&mut self) -> Vec3<f64> {
+        if self.knobs.planar {
+            flat_direction(&mut self.rng)
+        } else {
+            self.direction()
+        }
+    }
+
+    fn kind(&mut self) -> LoopKind {
+        let length = self.rng.range(0.2, 0.8);
+        match self.rng.weighted(&self.knobs.kinds) {
+            0 => LoopKind::Pin { axis: self.direction() },
+            1 => LoopKind::Slider { axis: self.sideways() },
+            2 => LoopKind::Cylindrical { axis: self.direction() },
+            3 => {
+                let pitch = self.rng.range(0.05, 0.3) * self.rng.pick(&[1.0, -1.0]);
+                LoopKind::Helical { axis: self.direction(), pitch: self.value(pitch) }
+            }
+            4 => {
+                let axis = self.direction();
+                LoopKind::Universal { axes: [axis, scale3(self.rng.range(0.5, 2.0), across(axis)[0])] }
+            }
+            5 => LoopKind::Planar { normal: self.direction() },
+            6 => LoopKind::Spherical,
+            7 => LoopKind::Fixed,
+            8 => LoopKind::Distance { length: self.value(length) },
+            9 => LoopKind::PointOnLine { axis: self.sideways() },
+            10 => LoopKind::PointOnPlane { normal: self.sideways() },
+            11 => LoopKind::PointOnCylinder { axis: self.direction(), radius: self.value(length) },
+            12 => LoopKind::RollingDisc { normal: self.sideways(), axis: self.direction(), radius: self.value(length) },
+            13 => LoopKind::RollingBall { normal: self.sideways(), radius: self.value(length) },
+            14 => LoopKind::KnifeEdge { axis: self.sideways() },
+            _ => {
+                let row: [f64; 6] = std::array::from_fn(|_| self.rng.around(1.0));
+                LoopKind::Pfaffian { row: row.map(|x| self.value(x)) }
+            }
+        }
+    }
+
+    fn any_turn(&mut self) -> Mat3<f64> {
+        let axis = self.direction();
+        about(axis, self.rng.around(3.0))
+    }
+
+    /// A turn and an offset of the second frame in axes of the first that a kind leaves free.
+    fn allowed(&mut self, kind: &LoopKind) -> (Mat3<f64>, Vec3<f64>) {
+        let none = about([1.0, 0.0, 0.0], 0.0);
+        let (angle, slide) = (self.rng.around(2.5), self.rng.around(0.6));
+        let params = self.state.params.clone();
+        let num = |x: Value| value(x, &params);
+        let along = |a: Vec3<f64>, x: f64| scale3(x, unit(a));
+        let level = |s: &mut Self, n: Vec3<f64>| {
+            let [x, y] = across(n);
+            add3(scale3(s.rng.around(0.6), x), scale3(s.rng.around(0.6), y))
+        };
+        match *kind {
+            LoopKind::Pin { axis } => (about(axis, angle), [0.0; 3]),
+            LoopKind::Slider { axis } => (none, along(axis, slide)),
+            LoopKind::Cylindrical { axis } => (about(axis, angle), along(axis, slide)),
+            LoopKind::Helical { axis, pitch } => (about(axis, angle), along(axis, num(pitch) * angle)),
+            LoopKind::Universal { axes: [a, b] } => {
+                (times(&about(a, angle), &about(b, self.rng.around(2.5))), [0.0; 3])
+            }
+            LoopKind::Planar { normal } => (about(normal, angle), level(self, normal)),
+            LoopKind::Spherical => (self.any_turn(), [0.0; 3]),
+            LoopKind::Fixed => (none, [0.0; 3]),
+            LoopKind::Distance { length } => (self.any_turn(), along(self.sideways(), num(length))),
+            LoopKind::PointOnLine { axis } => (self.any_turn(), along(axis, slide)),
+            LoopKind::PointOnPlane { normal } => (self.any_turn(), level(self, normal)),
+            LoopKind::PointOnCylinder { axis, radius } => {
+                let [x, y] = across(axis);
+                let off = add3(scale3(num(radius) * angle.cos(), x), scale3(num(radius) * angle.sin(), y));
+                (self.any_turn(), add3(off, along(axis, slide)))
+            }
+            LoopKind::RollingDisc { normal, axis, radius } => loop {
+                let turn = self.any_turn();
+                let axis = unit(axis);
+                let tilt = dot3(unit(normal), turn.map(|row| dot3(row, axis)));
+                if tilt.abs() < 0.9 {
+                    let height = num(radius) * (1.0 - tilt * tilt).sqrt();
+                    break (turn, add3(along(normal, height), level(self, normal)));
+                }
+            },
+            LoopKind::RollingBall { normal, radius } => {
+                (self.any_turn(), add3(along(normal, num(radius)), level(self, normal)))
+            }
+            LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {
+                let anywhere = self.direction();
+                (self.any_turn(), along(anywhere, slide))
+            }
+        }
+    }
+}
+
+/// Rows of a kind of loop.
+pub fn rows(kind: &LoopKind) -> usize {
+    match kind {
+        LoopKind::Fixed => 6,
+        LoopKind::Pin { .. } | LoopKind::Slider { .. } | LoopKind::Helical { .. } => 5,
+        LoopKind::Cylindrical { .. } | LoopKind::Universal { .. } => 4,
+        LoopKind::Planar { .. } | LoopKind::Spherical | LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } => {
+            3
+        }
+        LoopKind::PointOnLine { .. } => 2,
+        LoopKind::Distance { .. }
+        | LoopKind::PointOnPlane { .. }
+        | LoopKind::PointOnCylinder { .. }
+        | LoopKind::KnifeEdge { .. }
+        | LoopKind::Pfaffian { .. } => 1,
+    }
+}

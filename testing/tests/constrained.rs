@@ -1,0 +1,322 @@
+//! Integration of interpreted mechanisms with constraints: every stabilisation, minimal coordinates and methods with multipliers
+//! find the same motion.
+
+use mbd_codegen::import::toml::read;
+use mbd_codegen::model::{Gravity, Model, Value};
+use mbd_codegen::plan::Plan;
+use mbd_runtime::constrained::{
+    close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Watch,
+};
+use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
+use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
+
+type Mechanism = Interpreter<f64>;
+type State = (Vec<f64>, Vec<f64>);
+
+/// Crank, coupler and rocker, pinned together at the coupler's end; bars with mass in their middle.
+fn four_bar(pin: &str) -> String {
+    let bar = |name: &str, parent: &str, at: f64, length: f64, joint: &str| {
+        format!(
+            r#"
+[[body]]
+name = "{name}"
+mass = {length}
+com = [{}, 0, 0]
+inertia = [0.001, 0.1, 0.1]
+[[joint]]
+name = "{joint}"
+type = "pin"
+parent = "{parent}"
+child = "{name}"
+xyz = [{at}, 0, 0]
+axis = [0, 1, 0]
+"#,
+            length / 2.0
+        )
+    };
+    let bars = bar("crank", "ground", 0.0, 1.0, "a") + &bar("coupler", "crank", 1.0, 2.0, "b");
+    let bars = bars + &bar("rocker", "ground", 2.5, 2.0, "d");
+    format!(
+        r#"name = "four_bar"
+gravity = [0, 0, -9.81]
+{bars}
+[[frame]]
+name = "coupler_end"
+body = "coupler"
+xyz = [2, 0, 0]
+[[frame]]
+name = "rocker_end"
+body = "rocker"
+xyz = [2, 0, 0]
+[[loop]]
+name = "c"
+{pin}
+between = ["coupler_end", "rocker_end"]
+"#
+    )
+}
+
+/// A plate that floats on three rods.
+const PLATE: &str = r#"name = "plate"
+gravity = [0, 0, -9.81]
+[[body]]
+name = "plate"
+mass = 2.0
+com = [0.02, 0, 0.01]
+inertia = [0.05, 0.06, 0.1]
+[[joint]]
+name = "free"
+type = "floating"
+child = "plate"
+[[frame]]
+name = "p0"
+body = "plate"
+xyz = [0.3, 0, 0]
+[[frame]]
+name = "p1"
+body = "plate"
+xyz = [-0.2, 0.3, 0]
+[[frame]]
+name = "p2"
+body = "plate"
+xyz = [-0.2, -0.3, 0]
+[[frame]]
+name = "g0"
+body = "ground"
+xyz = [0.5, 0.1, 1]
+[[frame]]
+name = "g1"
+body = "ground"
+xyz = [-0.4, 0.5, 1]
+[[frame]]
+name = "g2"
+body = "ground"
+xyz = [-0.4, -0.5, 1]
+[[loop]]
+name = "rod0"
+type = "distance"
+between = ["g0", "p0"]
+length = 1.0
+[[loop]]
+name = "rod1"
+type = "distance"
+between = ["g1", "p1"]
+length = 1.1
+[[loop]]
+name = "rod2"
+type = "distance"
+between = ["g2", "p2"]
+length = 1.0
+"#;
+
+/// A disc of 1 kg and 0.5 m that rolls on the ground.
+const DISC: &str = r#"name = "disc"
+gravity = [0, 0, -9.81]
+[[body]]
+name = "disc"
+mass = 1.0
+inertia = [0.0625, 0.125, 0.0625]
+[[joint]]
+name = "free"
+type = "floating"
+child = "disc"
+[[loop]]
+name = "contact"
+type = "rolling_disc"
+between = ["ground", "disc"]
+normal = [0, 0, 1]
+axis = [0, 1, 0]
+radius = 0.5
+"#;
+
+fn model(text: &str) -> Model {
+    let (model, findings) = read("model.toml", text);
+    model.unwrap_or_else(|| panic!("{findings}"))
+}
+
+fn interpreter(model: &Model) -> Mechanism {
+    let plan = Plan::new(model, Default::default());
+    let Gravity::Constant(g) = model.gravity else { panic!("constant gravity") };
+    let number = |v: Value| match v {
+        Value::Const(x) => x,
+        Value::Param(_) => panic!("no parameters"),
+    };
+    Interpreter::new(plan.tree(&[]), g.map(number))
+}
+
+fn split(text: &str) -> Split<Mechanism, Mechanism> {
+    let closed = model(text);
+    let mut open = closed.clone();
+    open.constraints.clear();
+    Split { open: interpreter(&open), closed: interpreter(&closed) }
+}
+
+/// A closed state: coordinates near a guess, velocities near others.
+fn state(y: &mut Split<Mechanism, Mechanism>, q: &[f64], v: &[f64], held: &[bool]) -> State {
+    let (mut q, mut v, mut p) = (q.to_vec(), v.to_vec(), vec![0.0; v.len()]);
+    let closed = close(y, &mut q, &Closing { held, ..Closing::default() }).unwrap();
+    let met = complete(y, 0.0, &q, &mut v, &[], 1e-12).unwrap();
+    assert!(closed.residual < 1e-14 && met.residual < 1e-13, "{closed:?} {met:?}");
+    y.open.state_momenta(&q, &v, &mut p);
+    (q, p)
+}
+
+fn crank(pin: &str) -> (Split<Mechanism, Mechanism>, State) {
+    let mut y = split(&four_bar(pin));
+    // The rocker is the last joint of the file, and of the state.
+    let start = state(&mut y, &[-1.5, 1.0, -2.0], &[5.0, 0.0, 0.0], &[true]);
+    (y, start)
+}
+
+fn plate() -> (Split<Mechanism, Mechanism>, State) {
+    let mut y = split(PLATE);
+    let start = state(&mut y, &[0.1, 0.05, 0.0, 0.1, 0.0, 0.1, 1.0], &[0.5, 0.3, 0.0, 0.0, 0.2, 1.0], &[]);
+    (y, start)
+}
+
+fn off<Y: Constrained<Scalar = f64>>(y: &mut Y, q: &Y::Coordinates) -> f64 {
+    let (mut residual, mut entries) = (y.zero_rows(), y.zero_entries());
+    y.closure(q, &mut residual, &mut entries);
+    residual.as_ref().iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+fn energy<Y: Energetic<Scalar = f64>>(y: &mut Y, q: &Y::Coordinates, p: &Y::Momenta) -> f64 {
+    let (kinetic, potential) = y.state_energy(q, p);
+    kinetic + potential
+}
+
+fn march<Y, M>(y: &mut Y, method: &mut M, steps: u32, end: f64, (q, p): &State) -> State
+where
+    Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+    M: Stepper<Y>,
+{
+    let (h, mut q, mut p) = (end / f64::from(steps), q.clone(), p.clone());
+    for k in 0..steps {
+        method.step(y, f64::from(k) * h, h, &mut q, &mut p).unwrap();
+    }
+    (q, p)
+}
+
+fn held<Y: Constrained<Scalar = f64>, M: Stepper<Y>>(
+    y: &Y,
+    method: M,
+    policy: Stabilisation,
+) -> Bounded<Y, M, Hold<Y>> {
+    Bounded::new(y, method, Hold::new(y, policy, Effort::default()))
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+}
+
+/// All ways lead to the same end, each with its order: planar, redundant in space, and with a quaternion.
+#[test]
+fn all_ways_lead_to_the_same_end() {
+    let planar = "type = \"point_on_line\"\naxis = [0, 1, 0]";
+    let pin = "type = \"pin\"\naxis = [0, 1, 0]";
+    for (name, (mut y, start)) in [("planar", crank(planar)), ("redundant", crank(pin)), ("plate", plate())] {
+        let end = 1.0;
+        let before = energy(&mut y, &start.0, &start.1);
+        let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
+        let reference = march(&mut y, &mut fine, 2000, end, &start);
+        assert!((energy(&mut y, &reference.0, &reference.1) - before).abs() < 1e-11 * before.abs().max(10.0), "{name}");
+        println!("{name}: rank {:?} of {} rows", fine.boundary.rank(), y.rows().len());
+        for policy in [
+            Stabilisation::None,
+            Stabilisation::Settle,
+            Stabilisation::Mass,
+            Stabilisation::Gradient,
+            Stabilisation::Partition,
+        ] {
+            let errors = [200, 400].map(|steps| {
+                let mut method = held(&y, Rk4::new(&y), policy);
+                let state = march(&mut y, &mut method, steps, end, &start);
+                let closes = !matches!(policy, Stabilisation::None | Stabilisation::Settle);
+                assert!(!closes || off(&mut y, &state.0) < 1e-13, "{name} {policy:?}");
+                apart(&state.0, &reference.0)
+            });
+            println!("{name} {policy:?}: {errors:?}");
+            assert!((errors[0] / errors[1]).log2() > 3.5, "{name} {policy:?}: {errors:?}");
+        }
+        // Minimal coordinates.
+        let errors = [200, 400].map(|steps| {
+            let (mut q, mut p) = start.clone();
+            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let mut method = Bounded::new(&m, Rk4::new(&m), Watch);
+            let state = march(&mut m, &mut method, steps, end, &(q, p));
+            assert!(off(&mut y, &state.0) < 1e-13);
+            println!("{name} minimal: {} switches", m.switches().0);
+            apart(&state.0, &reference.0)
+        });
+        println!("{name} minimal: {errors:?}");
+        assert!((errors[0] / errors[1]).log2() > 3.5, "{name}: {errors:?}");
+        // Multipliers of the methods' own.
+        let errors = [400, 800].map(|steps| {
+            let mut method = Rattle::new(&y);
+            let state = march(&mut y, &mut method, steps, end, &start);
+            assert!(off(&mut y, &state.0) < 1e-13);
+            apart(&state.0, &reference.0)
+        });
+        println!("{name} rattle: {errors:?}");
+        assert!((errors[0] / errors[1] - 4.0).abs() < 0.4, "{name}: {errors:?}");
+        let errors = [50, 100].map(|steps| {
+            let mut method = held(&y, IndexTwo::new(&y), Stabilisation::Mass);
+            let state = march(&mut y, &mut method, steps, end, &start);
+            assert!(off(&mut y, &state.0) < 1e-13);
+            apart(&state.0, &reference.0)
+        });
+        println!("{name} radau: {errors:?}");
+        assert!((errors[0] / errors[1]).log2() > 4.4, "{name}: {errors:?}");
+    }
+}
+
+/// Implicit methods use the derivatives of the constrained rates, settled in between.
+#[test]
+fn implicit_methods() {
+    let (y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let mut y = y.closed;
+    let before = energy(&mut y, &start.0, &start.1);
+    let method = held(&y, Radau5::new(&y), Stabilisation::Mass);
+    let step = Step::Adaptive(Tolerances::new(1e-8));
+    let mut solver = Solver::new(&mut y, method, step, 0.0, &start.0, &start.1).unwrap();
+    solver.run(&mut y, 2.0).unwrap();
+    let (mut q, mut p) = start;
+    solver.state(&y, &mut q, &mut p);
+    println!("{:?}", solver.statistics());
+    assert!(off(&mut y, &q) < 1e-13);
+    let lost = (energy(&mut y, &q, &p) - before).abs();
+    // Some hundred steps, each within 1e-8 of a state of size 10.
+    assert!(lost < 1e-5, "{lost:e}");
+}
+
+/// A rolling disc: two of three rows bind velocities only. They hold to round-off at the end, the height too, energy as the
+/// tolerance asks.
+#[test]
+fn rolling() {
+    let mut y = split(DISC);
+    // The disc leans and rolls along x.
+    let (s, c) = (0.1_f64.sin(), 0.1_f64.cos());
+    let start = state(&mut y, &[0.0, 0.0, 0.49, s, 0.0, 0.0, c], &[1.5, 0.0, 0.0, 0.0, 3.0, 0.5], &[]);
+    let before = energy(&mut y, &start.0, &start.1);
+    for policy in [Stabilisation::Mass, Stabilisation::Gradient, Stabilisation::Partition] {
+        let method = held(&y, Dop853::new(&y), policy);
+        let step = Step::Adaptive(Tolerances::new(1e-11));
+        let mut solver = Solver::new(&mut y, method, step, 0.0, &start.0, &start.1).unwrap();
+        solver.run(&mut y, 2.0).unwrap();
+        let (mut q, mut p) = start.clone();
+        solver.state(&y, &mut q, &mut p);
+        let lost = (energy(&mut y, &q, &p) - before).abs();
+        println!("{policy:?}: {q:?}, {lost:e}");
+        assert!(off(&mut y, &q) < 1e-13 && lost < 1e-8, "{policy:?} {lost:e}");
+    }
+    let (mut q, mut p) = start;
+    let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
+    let method = Bounded::new(&m, Dop853::new(&m), Watch);
+    let step = Step::Adaptive(Tolerances::new(1e-11));
+    let mut solver = Solver::new(&mut m, method, step, 0.0, &q, &p).unwrap();
+    solver.run(&mut m, 2.0).unwrap_or_else(|e| panic!("{e} {:?}", m.trouble()));
+    solver.state(&m, &mut q, &mut p);
+    let lost = (energy(&mut m, &q, &p) - before).abs();
+    println!("minimal: {q:?}, {lost:e}, {:?}", m.switches());
+    assert!(off(&mut y, &q) < 1e-13 && lost < 1e-8, "{lost:e}");
+}
