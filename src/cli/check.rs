@@ -5,12 +5,13 @@ use std::io::Write;
 use std::path::Path;
 
 use multibody::codegen::emit::joint_word;
-use multibody::codegen::model::{Model, Value};
+use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::tree::Source;
+use multibody::runtime::Interpreter;
 
 use super::args::CheckArgs;
-use super::{source, stale, Failure, Outcome};
+use super::{loops, source, stale, Failure, Outcome};
 
 /// Checks models, or the generated files of a directory.
 pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
@@ -20,7 +21,15 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     let mut worst = Ok(());
     for path in &args.models {
         match source::model(path, &args.import.import()) {
-            Ok(model) => summary(path, &model, out)?,
+            Ok(model) => match summary(path, &model, out) {
+                Err(Failure::Pipe) => return Err(Failure::Pipe),
+                Err(Failure::Message(what, help)) => {
+                    super::output::note(format_args!("{}: error: {what}\n  help: {help}", path.display()));
+                    worst = Err(Failure::Shown);
+                }
+                Err(failure) => worst = Err(failure),
+                Ok(()) => {}
+            },
             Err(Failure::Message(what, help)) => {
                 super::output::note(format_args!("error: {what}\n  help: {help}"));
                 worst = Err(Failure::Shown);
@@ -31,10 +40,27 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     worst
 }
 
+/// Numbers of loops and of couplings, in words.
+fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
+    let loops = model.constraints.iter().filter(|c| matches!(c.kind, ConstraintKind::Loop { .. })).count();
+    let count = |n: usize, what: &str| (n > 0).then(|| format!("{n} {what}{}", if n == 1 { "" } else { "s" }));
+    (count(loops, "loop"), count(model.constraints.len() - loops, "coupling"))
+}
+
 fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
     let plan = Plan::new(model, PlanOptions::default());
     source::tell_notices(path, &plan.notices);
     let params = plan.default_params();
+    let closed = match model.constraints.is_empty() {
+        true => None,
+        false => {
+            let mut interpreter = Interpreter::new(plan.tree(&params), plan.gravity(&params));
+            let start = loops::stated_start(&plan, &interpreter);
+            let assembly = loops::assemble(path, &plan, &mut interpreter, &start)?;
+            loops::tell(path, &plan, &assembly);
+            Some(assembly)
+        }
+    };
     let value = |v: Value| match v {
         Value::Const(x) => x,
         Value::Param(k) => params[k],
@@ -67,6 +93,14 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
     ];
     for (n, what) in counted.into_iter().filter(|(n, _)| *n > 0) {
         line += &format!(", {what}: {n}");
+    }
+    if let Some(assembly) = closed {
+        let (loops, couplings) = counted_constraints(model);
+        line += &format!(
+            "; {}: {}",
+            [loops, couplings].into_iter().flatten().collect::<Vec<_>>().join(", "),
+            assembly.summary()
+        );
     }
     Ok(writeln!(out, "{line}")?)
 }

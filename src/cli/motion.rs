@@ -1,17 +1,20 @@
 //! A motion: steps through the interpreter, and what is recorded of them.
 
+use std::cell::RefCell;
 use std::io::{IsTerminal, Write as _};
+use std::rc::Rc;
 use std::time::{Duration, Instant};
 
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
+use multibody::runtime::constrained::{Boundary, ConstraintError, Effort, Hold, Stabilisation};
 use multibody::runtime::integrate::catalogue::{self, Drive, Start};
 use multibody::runtime::integrate::{Projection, Statistics, Step, StepError};
 use multibody::runtime::interp::RankLoss;
-use multibody::runtime::Interpreter;
+use multibody::runtime::{Constrained, Interpreter};
 
 use super::timed::Timed;
-use super::{Failure, Outcome};
+use super::{loops, Failure, Outcome};
 
 /// How to simulate.
 pub struct Settings<'a> {
@@ -25,6 +28,8 @@ pub struct Settings<'a> {
     pub every: f64,
     /// Whether steps are put back on the energy of the start.
     pub project: bool,
+    /// How loops are kept closed.
+    pub hold: Stabilisation,
 }
 
 /// What was recorded.
@@ -46,6 +51,19 @@ pub struct Record {
     pub statistics: Statistics,
     /// Where the time went.
     pub spent: Spent,
+    /// What became of loops and couplings.
+    pub drift: Drift,
+}
+
+/// Loops and couplings at the ends of steps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Drift {
+    /// Largest residual before it was put back, m or rad.
+    pub found: f64,
+    /// Largest residual that is left, m or rad.
+    pub left: f64,
+    /// Largest number of independent rows, and smallest.
+    pub ranks: Option<[usize; 2]>,
 }
 
 /// Energy at the ends of steps.
@@ -70,6 +88,8 @@ pub struct Spent {
     pub rates: f64,
     /// Their derivatives.
     pub derivatives: f64,
+    /// Keeping loops closed.
+    pub constraints: f64,
     /// Dense output, energies, rows.
     pub output: f64,
     /// Looking at the clock.
@@ -97,6 +117,8 @@ struct Observer {
     interpreter: Interpreter<f64>,
     record: Record,
     start: f64,
+    residual: Vec<f64>,
+    entries: Vec<f64>,
 }
 
 impl Observer {
@@ -111,6 +133,11 @@ impl Observer {
     }
 
     fn end(&mut self, t: f64, q: &[f64], p: &[f64], kept: bool) {
+        let Observer { interpreter, record, residual, entries, .. } = self;
+        if !residual.is_empty() {
+            interpreter.closure(&q.to_vec(), residual, entries);
+            record.drift.left = record.drift.left.max(loops::largest(interpreter.rows(), residual));
+        }
         let (kinetic, potential) = self.interpreter.energy(q, p);
         let (change, ends) = (kinetic + potential - self.start, &mut self.record.ends);
         (ends.scale, ends.worst) = (ends.scale.max(kinetic), ends.worst.max(change.abs()));
@@ -118,6 +145,32 @@ impl Observer {
             ends.t.push(t);
             ends.change.push(change);
         }
+    }
+}
+
+/// [`Hold`], with what it met.
+struct Keeper {
+    hold: Hold<Timed>,
+    met: Rc<RefCell<Drift>>,
+}
+
+impl Boundary<Timed> for Keeper {
+    fn close(
+        &mut self,
+        system: &mut Timed,
+        t: f64,
+        remembers: bool,
+        q: &mut Vec<f64>,
+        p: &mut Vec<f64>,
+    ) -> Result<(), ConstraintError> {
+        self.hold.close(system, t, remembers, q, p)?;
+        let mut met = self.met.borrow_mut();
+        met.found = met.found.max(self.hold.drift());
+        if let (Some(rank), _) = self.hold.rank() {
+            let [most, least] = met.ranks.unwrap_or([rank; 2]);
+            met.ranks = Some([most.max(rank), least.min(rank)]);
+        }
+        Ok(())
     }
 }
 
@@ -133,12 +186,36 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     interpreter.check_rank(&q).map_err(|e| rank_failure(plan, &e))?;
     let mut p = vec![0.0; plan.dims.nv];
     interpreter.momenta(&q, &v, &mut p);
+    let (mut residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+    let bound = !residual.is_empty();
+    if bound {
+        // Velocities that the loops allow, nearest in the metric of the mass matrix.
+        let mut v = v.clone();
+        interpreter.settle(0.0, &q, &mut p, &mut v, &mut residual);
+    }
     let (kinetic, potential) = interpreter.energy(&q, &p);
-    let mut observer =
-        Observer { interpreter: interpreter.clone(), record: Record::default(), start: kinetic + potential };
+    let mut observer = Observer {
+        interpreter: interpreter.clone(),
+        record: Record::default(),
+        start: kinetic + potential,
+        residual,
+        entries,
+    };
     let mut system = Timed::new(interpreter);
     let start = Start { q: &q, p: &p, step: settings.step, compensated: false };
-    let made = catalogue::any(settings.method, &mut system, &start);
+    let met = Rc::new(RefCell::new(Drift::default()));
+    let made = match bound {
+        false => catalogue::any(settings.method, &mut system, &start),
+        true => {
+            let keeper =
+                |system: &Timed| Keeper { hold: Hold::new(system, settings.hold, Effort::default()), met: met.clone() };
+            let boundary = keeper(&system);
+            catalogue::implicit_bounded(settings.method, &mut system, &start, boundary).or_else(|| {
+                let boundary = keeper(&system);
+                catalogue::explicit_bounded(settings.method, &mut system, &start, boundary)
+            })
+        }
+    };
     let made =
         made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
     let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
@@ -150,7 +227,9 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let total = clock.elapsed().as_secs_f64();
     let mut record = observer.record;
     record.statistics = driver.statistics();
-    [record.spent.rates, record.spent.derivatives, record.spent.clock] = system.seconds();
+    [record.spent.rates, record.spent.derivatives, record.spent.constraints, record.spent.clock] = system.seconds();
+    let met = *met.borrow();
+    (record.drift.found, record.drift.ranks) = (met.found, met.ranks);
     record.spent.total = total;
     Ok(record)
 }
@@ -201,11 +280,15 @@ fn go(
 /// A run that did not reach its end: what happened when, and what to do.
 fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
     let names = plan.velocity_names();
-    let what = match *e {
-        StepError::NotFinite { index, .. } if index < 2 * names.len() => {
-            let kind = if index < names.len() { "coordinate" } else { "momentum" };
+    let what = match e {
+        StepError::NotFinite { index, .. } if *index < 2 * names.len() => {
+            let kind = if *index < names.len() { "coordinate" } else { "momentum" };
             format!("the simulation failed: {e} (it is the {kind} of `{}`)", names[index % names.len()])
         }
+        StepError::Constraint { error, .. } => match loops::named(plan, error) {
+            Some(name) => format!("the simulation failed at {name}: {e}"),
+            None => format!("the simulation failed: {e}"),
+        },
         _ => format!("the simulation failed: {e}"),
     };
     let time = e.time();

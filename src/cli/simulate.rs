@@ -6,16 +6,17 @@ use std::path::PathBuf;
 
 use multibody::codegen::model::{JointKind, Value};
 use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::catalogue;
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
 use super::args::SimulateArgs;
-use super::motion::{simulate, Record, Settings, Spent};
+use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
-use super::{source, Failure, Outcome};
+use super::{loops, picture, source, Failure, Outcome};
 
 /// Method and tolerance unless the user says otherwise. Of double and spherical pendulum, UR5 and Panda the error at the end
 /// was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
@@ -47,8 +48,25 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             "leave them out with --no-damping, or leave --project out",
         ));
     }
+    if args.project && !model.constraints.is_empty() {
+        return Err(Failure::new(
+            "--project does not keep loops closed",
+            "leave it out: loops are kept closed anyway, and the energy with them; --hold says how",
+        ));
+    }
     let settings = settings(args)?;
-    let (q, v) = start(&plan, args)?;
+    let (mut q, mut v) = start(&plan, args)?;
+    let assembly = match model.constraints.is_empty() {
+        true => None,
+        false => {
+            let mut interpreter = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+            let assembly = loops::assemble(path, &plan, &mut interpreter, &q)?;
+            loops::tell(path, &plan, &assembly);
+            q.clone_from(&assembly.q);
+            v = loops::velocities(&plan, &mut interpreter, &q, &v, args.v.is_some())?;
+            Some(assembly)
+        }
+    };
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
     let svg = args.svg.clone().unwrap_or_else(|| PathBuf::from(format!("{}.svg", model.name)));
     if csv == svg {
@@ -59,20 +77,41 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
     writable(&csv)?;
     writable(&svg)?;
+    let drawing = picture::drawing(&plan, args)?;
+    if let Some(file) = &args.picture {
+        if *file == csv || *file == svg {
+            let what = format!("--picture: `{}` is to hold the table or plot already", file.display());
+            return Err(Failure::new(what, "give it a name of its own"));
+        }
+        writable(file)?;
+    }
     let record = simulate(&plan, (q, v), &settings)?;
     let picture = plot::svg(&title(&plan, &settings), &panels(&plan, &record)).map_err(|e| {
         Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
     })?;
-    write_files(&[(&csv, &table(&plan, &record)), (&svg, &picture)])?;
+    let table = table(&plan, &record);
+    let mut files = vec![(csv.as_path(), table.as_str()), (svg.as_path(), picture.as_str())];
+    let motion = args.picture.as_deref().map(|file| (file, picture::svg(&plan, &record, &drawing)));
+    files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
+    write_files(&files)?;
     writeln!(out, "{}", title(&plan, &settings))?;
+    if let Some(assembly) = &assembly {
+        writeln!(out, "loops: {}", assembly.summary())?;
+    }
     let (worst, scale) = (record.ends.worst(), record.ends.scale);
     match damped && !args.no_damping {
         true => writeln!(out, "energy: changes by up to {worst:.1e} of the largest kinetic energy, {scale:.3e} J (the model has dampers; --no-damping leaves them out)")?,
         false => writeln!(out, "energy error: at most {worst:.1e} of the largest kinetic energy, {scale:.3e} J")?,
     }
+    if assembly.is_some() {
+        writeln!(out, "drift: {}", drift(&settings, &record.drift))?;
+    }
     writeln!(out, "work: {}", work(&record.statistics))?;
     writeln!(out, "time: {}", spent(args.time, &record.spent))?;
     writeln!(out, "table: {} ({} rows)\nplot: {}", csv.display(), record.t.len(), svg.display())?;
+    if let Some(file) = &args.picture {
+        writeln!(out, "picture: {}", file.display())?;
+    }
     Ok(())
 }
 
@@ -101,7 +140,7 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             "raise --every or lower --rows",
         ));
     }
-    Ok(Settings { method, step, time: args.time, every, project: args.project })
+    Ok(Settings { method, step, time: args.time, every, project: args.project, hold: args.hold.stabilisation() })
 }
 
 /// Title of the plot, and what is told first.
@@ -132,17 +171,35 @@ fn work(s: &Statistics) -> String {
     text
 }
 
+/// What became of the loops.
+fn drift(settings: &Settings, drift: &Drift) -> String {
+    let Drift { found, left, ranks } = drift;
+    let kept = matches!(settings.hold, Stabilisation::Mass | Stabilisation::Gradient | Stabilisation::Partition);
+    let mut text = match kept {
+        true => format!("loops open by up to {found:.1e} in a step (m or rad), and are closed again to {left:.1e}"),
+        false => format!("loops open by up to {left:.1e} (m or rad); --hold says how they are kept closed"),
+    };
+    if let Some([most, least]) = ranks.filter(|[most, least]| most != least) {
+        let _ = write!(text, "; independent rows between {least} and {most}: it passes singular positions");
+    }
+    text
+}
+
 /// Where the time went.
 fn spent(time: f64, spent: &Spent) -> String {
-    let Spent { total, rates, derivatives, output, clock } = *spent;
+    let Spent { total, rates, derivatives, constraints, output, clock } = *spent;
     let share = |x: f64| format!("{:.0} %", 100.0 * (x / total).clamp(0.0, 1.0));
-    let method = (total - rates - derivatives - output - clock).max(0.0);
+    let method = (total - rates - derivatives - constraints - output - clock).max(0.0);
     let derivatives = match derivatives > 0.0 {
         true => format!(", their derivatives {}", share(derivatives)),
         false => String::new(),
     };
+    let constraints = match constraints > 0.0 {
+        true => format!(", loops {}", share(constraints)),
+        false => String::new(),
+    };
     format!(
-        "{total:.3} s, {:.0} times faster than time itself; rates {} (interpreter){derivatives}, the method's own sums {}, \
+        "{total:.3} s, {:.0} times faster than time itself; rates {} (interpreter){derivatives}{constraints}, the method's own sums {}, \
          energies and rows {}",
         time / total,
         share(rates),
@@ -181,6 +238,9 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
 /// The start that the help states: see `mbd simulate --help`.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+    if !plan.model.constraints.is_empty() || !plan.model.starts.is_empty() {
+        return loops::stated_start(plan, &interpreter);
+    }
     let mut q = interpreter.neutral();
     let mut angle = 0.3;
     for slot in &plan.slots {

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use multibody::runtime::system::Group;
-use multibody::runtime::{Blocks, Differentiable, Energetic, Interpreter, System};
+use multibody::runtime::system::{Group, Row};
+use multibody::runtime::{Blocks, Constrained, Differentiable, Energetic, Interpreter, System};
 
 /// Time that calls of one kind take.
 #[derive(Clone, Copy, Debug, Default)]
@@ -32,6 +32,8 @@ pub struct Timed {
     /// For steps and for output.
     rates: [Clocked; 2],
     derivatives: Clocked,
+    /// What keeps constraints at the ends of steps, and in output.
+    constraints: [Clocked; 2],
 }
 
 impl Timed {
@@ -39,15 +41,23 @@ impl Timed {
     pub fn new(inner: Interpreter<f64>) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
-        Timed { inner, output: false, clock, rates: Default::default(), derivatives: Clocked::default() }
+        Timed {
+            inner,
+            output: false,
+            clock,
+            rates: Default::default(),
+            derivatives: Clocked::default(),
+            constraints: Default::default(),
+        }
     }
 
-    /// Time taken in steps, s: by the rates, by their derivatives, and by looking at the clock around them.
-    pub fn seconds(&self) -> [f64; 3] {
-        let kinds = [self.rates[0], self.derivatives];
+    /// Time taken in steps, s: by the rates, by their derivatives, by keeping constraints, and by looking at the clock around
+    /// them.
+    pub fn seconds(&self) -> [f64; 4] {
+        let kinds = [self.rates[0], self.derivatives, self.constraints[0]];
         // Of the two readings about a call one lies within what is measured.
-        let [rates, derivatives] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
-        [rates, derivatives, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
+        let [rates, derivatives, constraints] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
+        [rates, derivatives, constraints, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
     }
 }
 
@@ -77,6 +87,38 @@ impl System for Timed {
     }
     fn coordinate_rates(&self, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>) {
         self.inner.coordinate_rates(q, v, qd);
+    }
+}
+
+impl Constrained for Timed {
+    type Rows = Vec<f64>;
+    type Entries = Vec<f64>;
+
+    fn zero_rows(&self) -> Vec<f64> {
+        self.inner.zero_rows()
+    }
+    fn zero_entries(&self) -> Vec<f64> {
+        self.inner.zero_entries()
+    }
+    fn rows(&self) -> &[Row] {
+        self.inner.rows()
+    }
+    fn entry_columns(&self) -> &[usize] {
+        self.inner.entry_columns()
+    }
+    fn closure(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
+        self.inner.closure(q, residual, jacobian);
+    }
+    fn settle(&mut self, t: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
+        let Timed { inner, constraints, output, .. } = self;
+        constraints[usize::from(*output)].time(|| inner.settle(t, q, p, v, sigma));
+    }
+    fn correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
+        let Timed { inner, constraints, output, .. } = self;
+        constraints[usize::from(*output)].time(|| inner.correction(q, residual, dq, pivots));
+    }
+    fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
+        self.inner.multipliers(t, q, v, lambda);
     }
 }
 

@@ -8,6 +8,7 @@ use std::time::Instant;
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::codegen::{Group, Options};
+use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;
 
@@ -154,7 +155,8 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
 
 /// How the interpreter simulates what the generated code does.
 fn settings() -> Settings<'static> {
-    Settings { method: "rk4", step: Step::Fixed(TIME / STEPS as f64), time: TIME, every: TIME / 1000.0, project: false }
+    let step = Step::Fixed(TIME / STEPS as f64);
+    Settings { method: "rk4", step, time: TIME, every: TIME / 1000.0, project: false, hold: Stabilisation::default() }
 }
 
 /// Simulates with the generated code and with the interpreter.

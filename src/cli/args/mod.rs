@@ -11,6 +11,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
+use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
@@ -380,7 +381,7 @@ pub struct EvalArgs {
     /// Order and form of the numbers, in and out
     #[arg(long, value_enum, default_value_t = LayoutArg::Mbd)]
     pub layout: LayoutArg,
-    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau [default: all]
+    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Angles this close to right angles are taken as exact, rad
@@ -423,6 +424,10 @@ pub enum Quantity {
     Bias,
     #[value(name = "tau")]
     InverseDynamics,
+    #[value(name = "phi")]
+    Residuals,
+    #[value(name = "lambda")]
+    Multipliers,
 }
 
 /// `mbd simulate`.
@@ -436,7 +441,9 @@ they are all the same, by the classical Runge-Kutta method of order 4 unless --m
 equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
-floating joints neutral; every velocity 0.1 (rad/s or m/s).
+floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
+neutral where it states none; loops are closed from there (from --q, if given) without moving what is `held`. Velocities then
+follow from those of the `held` joints; where none is held they become the nearest that the loops allow.
 
 Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
 largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."
@@ -487,6 +494,49 @@ pub struct SimulateArgs {
     /// Time from one row of the table to the next, s
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
+    /// How loops are kept closed
+    #[arg(long, value_enum, default_value_t = HoldArg::Mass)]
+    pub hold: HoldArg,
+    /// Picture of the motion to write, an SVG: the mechanism at several instants, the last one darkest
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
+    pub view: Option<[f64; 3]>,
+    /// Bodies or frames whose paths are drawn, with commas between
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
+    pub trace: Vec<String>,
+    /// Number of instants that are drawn
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub strobes: u16,
+}
+
+/// How loops are kept closed; see `multibody::runtime::constrained`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum HoldArg {
+    /// Not at all: multipliers add up in the momenta, positions drift
+    None,
+    /// Momenta are freed of multipliers after every step, positions drift by the error of the method
+    Settle,
+    /// Positions are put back after every step too, least in the metric of the mass matrix
+    Mass,
+    /// The same, by displacements of least norm
+    Gradient,
+    /// The same, by dependent coordinates alone
+    Partition,
+}
+
+impl HoldArg {
+    /// As the runtime takes it.
+    pub fn stabilisation(self) -> Stabilisation {
+        match self {
+            HoldArg::None => Stabilisation::None,
+            HoldArg::Settle => Stabilisation::Settle,
+            HoldArg::Mass => Stabilisation::Mass,
+            HoldArg::Gradient => Stabilisation::Gradient,
+            HoldArg::Partition => Stabilisation::Partition,
+        }
+    }
 }
 
 /// `mbd explain`.

@@ -7,13 +7,13 @@ use std::io::{Read, Write};
 
 use clap::ValueEnum;
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::runtime::Interpreter;
+use multibody::runtime::{Constrained, Interpreter};
 use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
 use super::motion::rank_failure;
 use super::output::{note, write_file};
-use super::{source, Failure, Outcome};
+use super::{loops, source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;
 
@@ -38,6 +38,10 @@ struct Results {
     h: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     tau: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    phi: Option<Vec<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lambda: Option<Vec<f64>>,
 }
 
 impl Results {
@@ -54,6 +58,8 @@ impl Results {
             ("potential", bad_number(self.potential)),
             ("h", bad(&self.h)),
             ("tau", bad(&self.tau)),
+            ("phi", bad(&self.phi)),
+            ("lambda", bad(&self.lambda)),
             ("M", self.m.iter().flatten().flatten().any(|x| !x.is_finite())),
         ];
         checks.into_iter().find(|(_, bad)| *bad).map(|(key, _)| key)
@@ -111,6 +117,9 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
         if needs_rank {
             interpreter.check_rank(&state.q).map_err(|e| (k, rank_failure(plan, &e)))?;
         }
+        for open in loops::violated(plan, &mut interpreter, &state.q, &state.v) {
+            note(format_args!("states[{k}]: warning: {open}"));
+        }
         let results = results(plan, outer, &mut interpreter, state, wanted);
         if let Some(key) = results.not_finite() {
             let what = format!("the result `{key}` is not finite");
@@ -164,6 +173,16 @@ fn results(
             interpreter.inverse_dynamics(q, v, &outer.derivative_from(q, v, v, a), &mut tau);
             *to = Some(outer.velocities(q, &tau));
         }
+    }
+    if plan.dims.rows > 0 {
+        let (mut phi, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+        interpreter.closure(q, &mut phi, &mut entries);
+        out.phi = has(Quantity::Residuals).then_some(phi);
+        out.lambda = has(Quantity::Multipliers).then(|| {
+            let mut lambda = interpreter.zero_rows();
+            interpreter.multipliers(0.0, q, v, &mut lambda);
+            lambda
+        });
     }
     out.p = has(Quantity::Momenta).then(|| outer.velocities(q, &p));
     out

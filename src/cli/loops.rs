@@ -1,0 +1,341 @@
+//! Loops and couplings of a model: closed from its start, and what is said about them.
+
+use std::path::Path;
+
+use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Model};
+use multibody::codegen::plan::Plan;
+use multibody::runtime::constrained::{close, complete, Closed, Closing, ConstraintError};
+use multibody::runtime::system::Row;
+use multibody::runtime::tree::Source;
+use multibody::runtime::{Constrained, Interpreter, System};
+
+use super::output::note;
+use super::{motion, source, Failure, Outcome};
+
+/// Residual below which a loop is not named as open, m or rad.
+const OPEN: f64 = 1e-9;
+
+/// A model whose loops are closed.
+pub struct Assembly {
+    /// Coordinates.
+    pub q: Vec<f64>,
+    /// How they were found.
+    pub closed: Closed,
+    /// Largest change of a coordinate from the start, m or rad.
+    pub moved: f64,
+    /// Every loop and coupling.
+    pub bonds: Vec<Bond>,
+    /// Velocities that can be chosen.
+    pub mobility: usize,
+}
+
+/// A loop or coupling: its rows there.
+pub struct Bond {
+    /// Name.
+    pub name: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// Of these, how many do not follow from others.
+    pub rank: usize,
+}
+
+impl Assembly {
+    /// Number of rows of all.
+    pub fn rows(&self) -> usize {
+        self.bonds.iter().map(|b| b.rows).sum()
+    }
+
+    /// Number of independent ones.
+    pub fn rank(&self) -> usize {
+        self.bonds.iter().map(|b| b.rank).sum()
+    }
+
+    /// One line: what was done, and what it leaves.
+    pub fn summary(&self) -> String {
+        let Closed { iterations, residual, .. } = self.closed;
+        let (rows, rank) = (self.rows(), self.rank());
+        let iterations = match iterations {
+            0 => "as it starts".to_string(),
+            1 => "in 1 iteration".to_string(),
+            n => format!("in {n} iterations"),
+        };
+        let moved = match self.moved > 1e-9 {
+            true => format!(", coordinates moved by up to {:.1e}", self.moved),
+            false => String::new(),
+        };
+        format!(
+            "closed {iterations}{moved}, residual {residual:.1e}; {rows} rows, {rank} independent, mobility {}",
+            self.mobility
+        )
+    }
+}
+
+/// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
+pub fn stated_start(plan: &Plan, interpreter: &Interpreter<f64>) -> Vec<f64> {
+    let mut q = interpreter.neutral();
+    for start in &plan.model.starts {
+        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
+        let Some(Source::State { q: at, .. }) = slot.and_then(|s| s.at) else { continue };
+        for (q, start) in q[at..].iter_mut().zip(&start.q) {
+            *q = *start;
+        }
+    }
+    for at in interpreter.quaternions() {
+        let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));
+        q[at..at + 4].iter_mut().for_each(|x| *x /= norm);
+    }
+    q
+}
+
+/// Velocities of joints that the model holds.
+fn held(plan: &Plan) -> Vec<bool> {
+    let mut held = vec![false; plan.dims.nv];
+    for start in plan.model.starts.iter().filter(|s| s.held) {
+        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
+        if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
+            held[v..v + plan.model.joints[start.joint].kind.nv()].fill(true);
+        }
+    }
+    held
+}
+
+/// Closes the loops from coordinates, and looks how many rows are independent there.
+///
+/// # Errors
+/// Loops that do not close are told with their places in the file at `path`.
+pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
+    interpreter.check_rank(&start.to_vec()).map_err(|e| motion::rank_failure(plan, &e))?;
+    let held = held(plan);
+    let mut q = start.to_vec();
+    let closing = Closing { held: &held, ..Closing::default() };
+    let closed = match close(interpreter, &mut q, &closing) {
+        Ok(closed) => closed,
+        Err(error) => {
+            let free = close(interpreter, &mut start.to_vec(), &Closing::default()).is_ok();
+            return Err(does_not_close(path, plan, interpreter, &q, error, free));
+        }
+    };
+    let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.rest(), interpreter.zero_rows());
+    interpreter.correction(&q, &mut residual, &mut dq, &mut pivots);
+    let rows = interpreter.rows();
+    let bonds: Vec<Bond> = (0..plan.model.constraints.len())
+        .map(|k| {
+            let own = || rows.iter().zip(&pivots).filter(move |(row, _)| row.constraint == k);
+            let rank = own().filter(|(_, pivot)| **pivot != 0.0).count();
+            Bond { name: plan.model.constraints[k].name.clone(), rows: own().count(), rank }
+        })
+        .collect();
+    let mobility = plan.dims.nv - bonds.iter().map(|b| b.rank).sum::<usize>();
+    let moved = q.iter().zip(start).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    Ok(Assembly { q, closed, moved, bonds, mobility })
+}
+
+/// Velocities that the loops allow: those of `held` joints stay, the others follow; where that cannot be, or none are held, the
+/// nearest in the metric of the mass matrix. `stated`: they are not a default, and not to be replaced by others silently.
+pub fn velocities(
+    plan: &Plan,
+    interpreter: &mut Interpreter<f64>,
+    q: &[f64],
+    v: &[f64],
+    stated: bool,
+) -> Outcome<Vec<f64>> {
+    let (held, q, mut v) = (held(plan), q.to_vec(), v.to_vec());
+    if held.iter().any(|h| *h) {
+        match complete(interpreter, 0.0, &q, &mut v, &held, 1e-9) {
+            Ok(_) => return Ok(v),
+            Err(error) if stated => {
+                let at = named(plan, &error).map_or(String::new(), |name| format!(" at {name}"));
+                let help = "lower them, hold other joints in the model, or leave a singular position";
+                return Err(Failure::new(format!("--v: held velocities cannot be kept{at}: {error}"), help));
+            }
+            Err(_) => {}
+        }
+    }
+    let (mut p, mut sigma) = (interpreter.rest(), interpreter.zero_rows());
+    interpreter.momenta(&q, &v.clone(), &mut p);
+    interpreter.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    Ok(v)
+}
+
+/// Tells which loops stay open, furthest first.
+fn does_not_close(
+    path: &Path,
+    plan: &Plan,
+    interpreter: &mut Interpreter<f64>,
+    q: &[f64],
+    error: ConstraintError,
+    free: bool,
+) -> Failure {
+    let ConstraintError::NotClosed { rank, rows, iterations, .. } = error else {
+        let what = format!("{}: the loops do not close: {error}", path.display());
+        return Failure::new(what, "look for very large numbers in the model and its start");
+    };
+    let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+    interpreter.closure(&q.to_vec(), &mut residual, &mut entries);
+    let mut open: Vec<(usize, f64, usize)> = Vec::new();
+    for k in 0..plan.model.constraints.len() {
+        let own = interpreter.rows().iter().enumerate().filter(|(_, row)| row.constraint == k);
+        let worst = own.enumerate().map(|(at, (i, _))| (residual[i].abs(), at)).max_by(|a, b| a.0.total_cmp(&b.0));
+        open.extend(worst.filter(|w| w.0 > OPEN).map(|(size, at)| (k, size, at)));
+    }
+    open.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let text = source::read(path).unwrap_or_default();
+    let couplings =
+        open.iter().all(|(k, ..)| matches!(plan.model.constraints[*k].kind, ConstraintKind::Coupling { .. }));
+    let help = match (free, couplings) {
+        (true, _) => "with no joint `held` all is met: hold others, or give these another `start`",
+        (_, true) => "couplings of the same joints have to agree: change an offset or a ratio, or leave one out",
+        _ => "look at lengths and frames; if they can meet, give joints a `start` nearer to where they do",
+    };
+    for (k, size, at) in open {
+        let (word, verb) = word(&plan.model, k);
+        let unit = unit(&plan.model, k, at);
+        let name = &plan.model.constraints[k].name;
+        let place = place(path, &text, &plan.model, k);
+        note(format_args!(
+            "{place}: error: {word} `{name}` {verb}: what is left is {size:.3e} {unit} after {iterations} iterations (rank \
+             {rank} of {rows} rows)"
+        ));
+    }
+    note(format_args!("  help: {help}"));
+    Failure::Shown
+}
+
+/// What a constraint is called, and what it fails to do.
+fn word(model: &Model, k: usize) -> (&'static str, &'static str) {
+    match model.constraints[k].kind {
+        ConstraintKind::Loop { .. } => ("loop", "does not close"),
+        ConstraintKind::Coupling { .. } => ("coupling", "cannot be met"),
+    }
+}
+
+/// Unit of the row `at` of a constraint.
+fn unit(model: &Model, k: usize, at: usize) -> &'static str {
+    let first_angle = match &model.constraints[k].kind {
+        ConstraintKind::Coupling { terms, .. } => {
+            let slides =
+                terms.iter().filter(|(j, _)| matches!(model.joints[*j].kind, JointKind::Slider { .. })).count();
+            return match slides {
+                0 => "rad",
+                n if n == terms.len() => "m",
+                _ => "(rad and m)",
+            };
+        }
+        ConstraintKind::Loop { kind, .. } => match kind {
+            LoopKind::Planar { .. } => 1,
+            LoopKind::Slider { .. } | LoopKind::Cylindrical { .. } => 2,
+            LoopKind::Helical { .. } if at == 4 => return "m",
+            LoopKind::Helical { .. } => 2,
+            _ => 3,
+        },
+    };
+    if at < first_angle {
+        "m"
+    } else {
+        "rad"
+    }
+}
+
+/// Rows that follow from others, loop by loop, and what moves: notes and warnings.
+pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
+    let text = source::read(path).unwrap_or_default();
+    for (k, bond) in assembly.bonds.iter().enumerate().filter(|(_, b)| b.rank < b.rows) {
+        let (word, _) = word(&plan.model, k);
+        let Bond { name, rows, rank } = bond;
+        let follow = match rows - rank {
+            1 => "1 follows".to_string(),
+            n => format!("{n} follow"),
+        };
+        let counted = if *rows == 1 { "1 row".to_string() } else { format!("{rows} rows") };
+        let place = place(path, &text, &plan.model, k);
+        note(format_args!("{place}: note: {word} `{name}`: {counted}, rank {rank}: {follow} from the rest"));
+    }
+    if assembly.mobility == 0 && plan.dims.nv > 0 {
+        note(format_args!(
+            "{}: warning: nothing can move: the loops leave no mobility to {} velocities ({} independent rows)\n  help: leave \
+             a loop out, or replace it by one of fewer rows, if it was meant to move",
+            path.display(),
+            plan.dims.nv,
+            assembly.rank()
+        ));
+    }
+}
+
+/// File and line of a constraint's name; the file alone where it is not written as a table of its own.
+fn place(path: &Path, text: &str, model: &Model, k: usize) -> String {
+    let table = match model.constraints[k].kind {
+        ConstraintKind::Loop { .. } => "[[loop]]",
+        ConstraintKind::Coupling { .. } => "[[coupling]]",
+    };
+    let name = &model.constraints[k].name;
+    let mut inside = false;
+    for (n, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.starts_with('[') {
+            inside = line.split('#').next().is_some_and(|l| l.trim() == table);
+        }
+        let value = line.strip_prefix("name").and_then(|rest| rest.trim_start().strip_prefix('='));
+        let own = value
+            .map(str::trim_start)
+            .is_some_and(|v| ['"', '\''].iter().any(|q| v.starts_with(&format!("{q}{name}{q}"))));
+        if inside && own {
+            return format!("{}:{}", path.display(), n + 1);
+        }
+    }
+    path.display().to_string()
+}
+
+/// Name of the constraint of an error, for its message.
+pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
+    let k = match *error {
+        ConstraintError::NotClosed { constraint, .. }
+        | ConstraintError::Incompatible { constraint, .. }
+        | ConstraintError::RankLoss { constraint, .. } => constraint,
+        _ => return None,
+    };
+    let constraint = plan.model.constraints.get(k)?;
+    Some(format!("{} `{}`", word(&plan.model, k).0, constraint.name))
+}
+
+/// Loops and couplings that a state does not meet by more than 1e-6, in words.
+pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> Vec<String> {
+    const MOST: f64 = 1e-6;
+    if plan.dims.rows == 0 {
+        return Vec::new();
+    }
+    let q = q.to_vec();
+    let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
+    let (mut p, mut allowed, mut sigma) = (interpreter.rest(), interpreter.rest(), interpreter.zero_rows());
+    interpreter.momenta(&q, v, &mut p);
+    interpreter.settle(0.0, &q, &mut p, &mut allowed, &mut sigma);
+    interpreter.closure(&q, &mut residual, &mut entries);
+    let mut worst = vec![[0.0_f64; 2]; plan.model.constraints.len()];
+    let columns = interpreter.entry_columns();
+    for (row, residual) in interpreter.rows().iter().zip(&residual) {
+        let own = row.first..row.first + row.len;
+        // Rates of the positions beside those that the row wants, which `allowed` has.
+        let rate: f64 = own.map(|e| entries[e] * (v[columns[e]] - allowed[columns[e]])).sum();
+        let [open, fast] = &mut worst[row.constraint];
+        (*open, *fast) = (open.max(residual.abs()), fast.max(rate.abs()));
+    }
+    let scale = v.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
+    let mut out = Vec::new();
+    for (k, [open, fast]) in worst.into_iter().enumerate() {
+        let (word, name) = (word(&plan.model, k).0, &plan.model.constraints[k].name);
+        if open > MOST {
+            out.push(format!("`q` leaves {word} `{name}` open by {open:.1e}; nothing closes it here"));
+        }
+        if fast > MOST * scale {
+            out.push(format!(
+                "`v` breaks {word} `{name}` by {fast:.1e}; `qd` and `pd` are those of the nearest velocities it allows"
+            ));
+        }
+    }
+    out
+}
+
+/// Largest residual of the positions, m or rad.
+pub fn largest(rows: &[Row], residual: &[f64]) -> f64 {
+    let holonomic = rows.iter().zip(residual).filter(|(row, _)| row.holonomic);
+    holonomic.fold(0.0, |m, (_, x)| if x.abs() <= m { m } else { x.abs() })
+}
