@@ -19,7 +19,7 @@
 //   [0..5] end: pin, link10 to the ground
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 435 + 598 + 11 = 1044; 0, 10
+//   rates: 436 + 598 + 11 = 1045; 0, 10
 
 /// Dynamics of `closed10` in canonical form: rates. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,7 +95,7 @@ impl Closed10 {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 1044 operations: 435 additions, 598 multiplications, 11 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 1045 operations: 436 additions, 598 multiplications, 11 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         ::multibody::runtime::kernel::call::<Self, 0, _>((q, p, qd, pd,));
     }
@@ -379,13 +379,10 @@ impl Closed10 {
             // link7: momentum rate (4.36)
             let link7_pdot0 = link7_pivot6 + link7_pivot4;
             // ground: loops and couplings
-            let ground_loop17 = 0.05 * link10_cos0;
-            let ground_loop18 = ground_loop17 - ground_loop16;
-            let ground_loop19 = ground_loop17 - ground_loop18;
-            let ground_loop20 = 0.05 * link10_sin0;
-            let ground_loop21 = ground_loop20 + ground_loop12;
-            let ground_loop22 = ground_loop20 + ground_loop10;
-            let ground_loop23 = ground_loop21 - ground_loop22;
+            let ground_loop17 = 0.05 * link10_sin0;
+            let ground_loop18 = ground_loop17 + ground_loop12;
+            let ground_loop19 = ground_loop17 + ground_loop10;
+            let ground_loop20 = ground_loop18 - ground_loop19;
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot5 = link7_inertia8 * link7_inertia8;
             let link6_pivot6 = A::fma_f64(-link6_pivot0, link6_pivot5, link7_pivot6);
@@ -393,6 +390,11 @@ impl Closed10 {
             let link6_inertia1 = A::fma_f64(link6_pose2, link6_pivot6, -link6_inertia0);
             let link6_inertia2 = A::fma_f64(link6_pose1, link6_pivot2, link6_inertia1);
             let link6_inertia3 = link6_pose2 * link6_pivot2;
+            // ground: loops and couplings
+            let ground_loop21 = 0.05 * link10_cos0;
+            let ground_loop22 = ground_loop21 - ground_loop16;
+            let ground_loop23 = ground_loop21 - ground_loop22;
+            // link6: inertia carried to the parent, M* (4.48)
             let link6_inertia4 = link6_pose2 * link6_pose2;
             let link6_inertia5 = A::fma_f64(link6_pivot6, link6_inertia4, -0.00013333333333333337);
             let link6_inertia6 = A::fma_f64(-link6_pose1, link6_pivot4, link6_inertia3);
@@ -401,12 +403,14 @@ impl Closed10 {
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot0 = 1.0 / link6_inertia8;
             // link10: U, Mj, k and the reduced inertia M' (4.44)
-            let link10_pivot0 = A::fma_f64(-30.0, ground_loop23, link10_sin0);
-            let link10_pivot1 = A::fma_f64(30.0, ground_loop19, link10_cos0);
+            let link10_pivot0 = A::fma_f64(-30.0, ground_loop20, link10_sin0);
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia19 = A::fma_f64(link10_cos0, link10_pivot1, link10_inertia3);
-            let link10_inertia20 = link10_cos0 * link10_cos0;
-            let link10_inertia21 = A::fma_f64(link10_sin0, link10_pivot0, link10_inertia20);
+            let link10_inertia19 = link10_cos0 * link10_cos0;
+            let link10_inertia20 = A::fma_f64(link10_sin0, link10_pivot0, link10_inertia19);
+            // link10: U, Mj, k and the reduced inertia M' (4.44)
+            let link10_pivot1 = A::fma_f64(30.0, ground_loop23, link10_cos0);
+            // link10: inertia carried to the parent, M* (4.48)
+            let link10_inertia21 = A::fma_f64(link10_cos0, link10_pivot1, link10_inertia3);
             let link10_inertia22 = A::fma_f64(-link10_sin0, link10_pivot1, link10_inertia2);
             let link10_inertia23 = A::fma_f64(-link10_cos0, link10_pivot0, link10_inertia2);
             // link5: sine and cosine, rotation
@@ -414,16 +418,16 @@ impl Closed10 {
             // link6: inertia carried to the parent, M* (4.48)
             let link6_inertia9 = link5_pose3 - link6_inertia6;
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia24 = link10_pose2 * link10_inertia21;
+            let link10_inertia24 = link10_pose2 * link10_inertia20;
             let link10_inertia25 = A::fma_f64(-link10_pose1, link10_inertia23, link10_inertia24);
             let link10_inertia26 = link10_pose2 * link10_inertia22;
-            let link10_inertia27 = A::fma_f64(-link10_pose1, link10_inertia19, link10_inertia26);
+            let link10_inertia27 = A::fma_f64(-link10_pose1, link10_inertia21, link10_inertia26);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot1 = link6_inertia2 * link6_inertia9;
             let link5_pivot2 = A::fma_f64(link5_pivot0, link5_pivot1, link6_pivot2);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot7 = link10_inertia17 * link10_inertia25;
-            let link9_pivot8 = A::fma_f64(-link9_pivot0, link9_pivot7, link10_inertia21);
+            let link9_pivot8 = A::fma_f64(-link9_pivot0, link9_pivot7, link10_inertia20);
             let link9_pivot9 = link10_inertia17 * link10_inertia27;
             let link9_pivot10 = A::fma_f64(-link9_pivot0, link9_pivot9, link10_inertia22);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
@@ -434,23 +438,27 @@ impl Closed10 {
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot11 = link10_inertia18 * link10_inertia25;
             let link9_pivot12 = A::fma_f64(-link9_pivot0, link9_pivot11, link10_inertia23);
-            let link9_pivot13 = link10_inertia18 * link10_inertia27;
-            let link9_pivot14 = A::fma_f64(-link9_pivot0, link9_pivot13, link10_inertia19);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot5 = link6_inertia2 * link6_inertia2;
             let link5_pivot6 = A::fma_f64(-link5_pivot0, link5_pivot5, link6_pivot6);
             // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia1 = A::fma_f64(link5_pose2, link5_pivot6, -link5_inertia0);
             let link5_inertia2 = A::fma_f64(link5_pose1, link5_pivot2, link5_inertia1);
+            // link9: U, Mj, k and the reduced inertia M' (4.44)
+            let link9_pivot13 = link10_inertia18 * link10_inertia27;
+            let link9_pivot14 = A::fma_f64(-link9_pivot0, link9_pivot13, link10_inertia21);
+            // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia3 = link5_pose2 * link5_pivot2;
             // link9: inertia carried to the parent, M* (4.48)
             let link9_inertia10 = link9_pose2 * link9_pivot8;
             let link9_inertia11 = A::fma_f64(-link9_pose3, link9_pivot12, link9_inertia10);
-            let link9_inertia12 = link9_pose2 * link9_pivot10;
-            let link9_inertia13 = A::fma_f64(-link9_pose3, link9_pivot14, link9_inertia12);
             // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia4 = link5_pose2 * link5_pose2;
             let link5_inertia5 = A::fma_f64(link5_pivot6, link5_inertia4, -0.00015833333333333338);
+            // link9: inertia carried to the parent, M* (4.48)
+            let link9_inertia12 = link9_pose2 * link9_pivot10;
+            let link9_inertia13 = A::fma_f64(-link9_pose3, link9_pivot14, link9_inertia12);
+            // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia6 = A::fma_f64(-link5_pose1, link5_pivot4, link5_inertia3);
             let link5_inertia7 = link5_inertia3 + link5_inertia6;
             let link5_inertia8 = link4_pose3 - link5_inertia6;
@@ -471,17 +479,22 @@ impl Closed10 {
             let link8_inertia11 = A::fma_f64(-link8_pose3, link8_pivot12, link8_inertia10);
             let link8_inertia12 = link8_pose2 * link8_pivot10;
             let link8_inertia13 = A::fma_f64(-link8_pose3, link8_pivot14, link8_inertia12);
-            // link10: momentum remainder D, D' (4.45, 4.49)
-            let link10_rest2 = link10_sin0 * link10_rest0;
-            let link10_rest3 = link10_cos0 * link10_rest0;
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot1 = link5_inertia2 * link5_inertia8;
             let link4_pivot2 = A::fma_f64(link4_pivot0, link4_pivot1, link5_pivot2);
+            // link10: momentum remainder D, D' (4.45, 4.49)
+            let link10_rest2 = link10_sin0 * link10_rest0;
+            let link10_rest3 = link10_cos0 * link10_rest0;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot7 = link8_inertia8 * link8_inertia11;
             let link7_pivot8 = A::fma_f64(-link7_pivot0, link7_pivot7, link8_pivot8);
             let link7_pivot9 = link8_inertia8 * link8_inertia13;
             let link7_pivot10 = A::fma_f64(-link7_pivot0, link7_pivot9, link8_pivot10);
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot3 = link5_inertia8 * link5_inertia8;
+            let link4_pivot4 = A::fma_f64(link4_pivot0, link4_pivot3, link5_pivot4);
+            // link5: momentum rate (4.36)
+            let link5_pdot0 = link5_pivot6 + link5_pivot4;
             // link9: momentum remainder D, D' (4.45, 4.49)
             let link9_rest0 = A::fma_f64(link10_pose1, link10_rest3, -p_8);
             let link9_rest1 = A::fma_f64(link10_pose2, link10_rest2, p_9);
@@ -492,45 +505,45 @@ impl Closed10 {
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot15 = link10_inertia17 * link9_pivot0;
             let link9_pivot16 = link10_inertia18 * link9_pivot0;
-            // link4: U, Mj, k and the reduced inertia M' (4.44)
-            let link4_pivot3 = link5_inertia8 * link5_inertia8;
-            let link4_pivot4 = A::fma_f64(link4_pivot0, link4_pivot3, link5_pivot4);
-            // link5: momentum rate (4.36)
-            let link5_pdot0 = link5_pivot6 + link5_pivot4;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot11 = link8_inertia9 * link8_inertia11;
             let link7_pivot12 = A::fma_f64(-link7_pivot0, link7_pivot11, link8_pivot12);
-            let link7_pivot13 = link8_inertia9 * link8_inertia13;
-            let link7_pivot14 = A::fma_f64(-link7_pivot0, link7_pivot13, link8_pivot14);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot5 = link5_inertia2 * link5_inertia2;
             let link4_pivot6 = A::fma_f64(-link4_pivot0, link4_pivot5, link5_pivot6);
             // link4: inertia carried to the parent, M* (4.48)
             let link4_inertia1 = A::fma_f64(link4_pose2, link4_pivot6, -link4_inertia0);
             let link4_inertia2 = A::fma_f64(link4_pose1, link4_pivot2, link4_inertia1);
+            // link7: U, Mj, k and the reduced inertia M' (4.44)
+            let link7_pivot13 = link8_inertia9 * link8_inertia13;
+            let link7_pivot14 = A::fma_f64(-link7_pivot0, link7_pivot13, link8_pivot14);
+            // link4: inertia carried to the parent, M* (4.48)
             let link4_inertia3 = link4_pose2 * link4_pivot2;
             // link7: inertia carried to the parent, M* (4.48)
             let link7_inertia10 = link7_pose2 * link7_pivot8;
             let link7_inertia11 = A::fma_f64(-link7_pose3, link7_pivot12, link7_inertia10);
-            let link7_inertia12 = link7_pose2 * link7_pivot10;
-            let link7_inertia13 = A::fma_f64(-link7_pose3, link7_pivot14, link7_inertia12);
             // link4: inertia carried to the parent, M* (4.48)
             let link4_inertia4 = link4_pose2 * link4_pose2;
             let link4_inertia5 = A::fma_f64(link4_pivot6, link4_inertia4, -0.00018333333333333336);
+            // link7: inertia carried to the parent, M* (4.48)
+            let link7_inertia12 = link7_pose2 * link7_pivot10;
+            let link7_inertia13 = A::fma_f64(-link7_pose3, link7_pivot14, link7_inertia12);
+            // link4: inertia carried to the parent, M* (4.48)
             let link4_inertia6 = A::fma_f64(-link4_pose1, link4_pivot4, link4_inertia3);
             let link4_inertia7 = link4_inertia3 + link4_inertia6;
             let link4_inertia8 = link3_pose3 - link4_inertia6;
             let link4_inertia9 = A::fma_f64(link4_pose1, link4_inertia7, link4_inertia5);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot0 = 1.0 / link4_inertia9;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot7 = link7_inertia8 * link7_inertia11;
+            let link6_pivot8 = A::fma_f64(-link6_pivot0, link6_pivot7, link7_pivot8);
             // link8: momentum remainder D, D' (4.45, 4.49)
             let link8_rest0 = A::fma_f64(link9_pose3, link9_rest5, -p_7);
             let link8_rest1 = A::fma_f64(link9_pose2, link9_rest4, p_8);
             let link8_rest2 = link8_rest0 + link8_rest1;
             let link8_rest3 = link8_pivot0 * link8_rest2;
             // link6: U, Mj, k and the reduced inertia M' (4.44)
-            let link6_pivot7 = link7_inertia8 * link7_inertia11;
-            let link6_pivot8 = A::fma_f64(-link6_pivot0, link6_pivot7, link7_pivot8);
             let link6_pivot9 = link7_inertia8 * link7_inertia13;
             let link6_pivot10 = A::fma_f64(-link6_pivot0, link6_pivot9, link7_pivot10);
             let link6_pivot11 = link7_inertia9 * link7_inertia11;
@@ -550,17 +563,18 @@ impl Closed10 {
             let link8_rest5 = A::fma_f64(link9_inertia9, link8_rest3, link9_rest5);
             // link8: U, Mj, k and the reduced inertia M' (4.44)
             let link8_pivot16 = link9_inertia9 * link8_pivot0;
-            // link7: momentum remainder D, D' (4.45, 4.49)
-            let link7_rest0 = A::fma_f64(link8_pose3, link8_rest5, -p_6);
-            let link7_rest1 = A::fma_f64(link8_pose2, link8_rest4, p_7);
-            let link7_rest2 = link7_rest0 + link7_rest1;
-            let link7_rest3 = link7_pivot0 * link7_rest2;
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot1 = link4_inertia2 * link4_inertia8;
             let link3_pivot2 = A::fma_f64(link3_pivot0, link3_pivot1, link4_pivot2);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot7 = link6_inertia2 * link6_inertia11;
             let link5_pivot8 = A::fma_f64(-link5_pivot0, link5_pivot7, link6_pivot8);
+            // link7: momentum remainder D, D' (4.45, 4.49)
+            let link7_rest0 = A::fma_f64(link8_pose3, link8_rest5, -p_6);
+            let link7_rest1 = A::fma_f64(link8_pose2, link8_rest4, p_7);
+            let link7_rest2 = link7_rest0 + link7_rest1;
+            let link7_rest3 = link7_pivot0 * link7_rest2;
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot9 = link6_inertia2 * link6_inertia13;
             let link5_pivot10 = A::fma_f64(-link5_pivot0, link5_pivot9, link6_pivot10);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
@@ -571,20 +585,33 @@ impl Closed10 {
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot11 = link6_inertia9 * link6_inertia11;
             let link5_pivot12 = A::fma_f64(-link5_pivot0, link5_pivot11, link6_pivot12);
-            let link5_pivot13 = link6_inertia9 * link6_inertia13;
-            let link5_pivot14 = A::fma_f64(-link5_pivot0, link5_pivot13, link6_pivot14);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot5 = link4_inertia2 * link4_inertia2;
             let link3_pivot6 = A::fma_f64(-link3_pivot0, link3_pivot5, link4_pivot6);
             // link3: inertia carried to the parent, M* (4.48)
             let link3_inertia1 = A::fma_f64(link3_pose2, link3_pivot6, -link3_inertia0);
             let link3_inertia2 = A::fma_f64(link3_pose1, link3_pivot2, link3_inertia1);
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot13 = link6_inertia9 * link6_inertia13;
+            let link5_pivot14 = A::fma_f64(-link5_pivot0, link5_pivot13, link6_pivot14);
+            // link3: inertia carried to the parent, M* (4.48)
             let link3_inertia3 = link3_pose2 * link3_pivot2;
             // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia10 = link5_pose2 * link5_pivot8;
             let link5_inertia11 = A::fma_f64(-link5_pose1, link5_pivot12, link5_inertia10);
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia4 = link3_pose2 * link3_pose2;
+            let link3_inertia5 = A::fma_f64(link3_pivot6, link3_inertia4, -0.00020833333333333335);
+            // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia12 = link5_pose2 * link5_pivot10;
             let link5_inertia13 = A::fma_f64(-link5_pose1, link5_pivot14, link5_inertia12);
+            // link3: inertia carried to the parent, M* (4.48)
+            let link3_inertia6 = A::fma_f64(-link3_pose1, link3_pivot4, link3_inertia3);
+            let link3_inertia7 = link3_inertia3 + link3_inertia6;
+            let link3_inertia8 = link2_pose3 - link3_inertia6;
+            let link3_inertia9 = A::fma_f64(link3_pose1, link3_inertia7, link3_inertia5);
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot0 = 1.0 / link3_inertia9;
             // link7: momentum remainder D, D' (4.45, 4.49)
             let link7_rest4 = A::fma_f64(-link8_inertia8, link7_rest3, link8_rest4);
             // link7: U, Mj, k and the reduced inertia M' (4.44)
@@ -593,23 +620,15 @@ impl Closed10 {
             let link7_rest5 = A::fma_f64(link8_inertia9, link7_rest3, link8_rest5);
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot16 = link8_inertia9 * link7_pivot0;
-            // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia4 = link3_pose2 * link3_pose2;
-            let link3_inertia5 = A::fma_f64(link3_pivot6, link3_inertia4, -0.00020833333333333335);
-            let link3_inertia6 = A::fma_f64(-link3_pose1, link3_pivot4, link3_inertia3);
-            let link3_inertia7 = link3_inertia3 + link3_inertia6;
-            let link3_inertia8 = link2_pose3 - link3_inertia6;
-            let link3_inertia9 = A::fma_f64(link3_pose1, link3_inertia7, link3_inertia5);
-            // link2: U, Mj, k and the reduced inertia M' (4.44)
-            let link2_pivot0 = 1.0 / link3_inertia9;
+            // link4: U, Mj, k and the reduced inertia M' (4.44)
+            let link4_pivot7 = link5_inertia2 * link5_inertia11;
+            let link4_pivot8 = A::fma_f64(-link4_pivot0, link4_pivot7, link5_pivot8);
             // link6: momentum remainder D, D' (4.45, 4.49)
             let link6_rest0 = A::fma_f64(link7_pose3, link7_rest5, -p_5);
             let link6_rest1 = A::fma_f64(link7_pose2, link7_rest4, p_6);
             let link6_rest2 = link6_rest0 + link6_rest1;
             let link6_rest3 = link6_pivot0 * link6_rest2;
             // link4: U, Mj, k and the reduced inertia M' (4.44)
-            let link4_pivot7 = link5_inertia2 * link5_inertia11;
-            let link4_pivot8 = A::fma_f64(-link4_pivot0, link4_pivot7, link5_pivot8);
             let link4_pivot9 = link5_inertia2 * link5_inertia13;
             let link4_pivot10 = A::fma_f64(-link4_pivot0, link4_pivot9, link5_pivot10);
             let link4_pivot11 = link5_inertia8 * link5_inertia11;
@@ -630,30 +649,32 @@ impl Closed10 {
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot16 = link7_inertia9 * link6_pivot0;
             // link10: U, Mj, k and the reduced inertia M' (4.44)
-            let link10_pivot2 = 120000.0 * ground_loop23;
-            let link10_pivot3 = 120000.0 * ground_loop19;
+            let link10_pivot2 = 120000.0 * ground_loop20;
+            let link10_pivot3 = 120000.0 * ground_loop23;
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot1 = link3_inertia2 * link3_inertia8;
+            let link2_pivot2 = A::fma_f64(link2_pivot0, link2_pivot1, link3_pivot2);
             // link5: momentum remainder D, D' (4.45, 4.49)
             let link5_rest0 = A::fma_f64(link6_pose1, link6_rest5, -p_4);
             let link5_rest1 = A::fma_f64(link6_pose2, link6_rest4, p_5);
             let link5_rest2 = link5_rest0 + link5_rest1;
             let link5_rest3 = link5_pivot0 * link5_rest2;
-            // link2: U, Mj, k and the reduced inertia M' (4.44)
-            let link2_pivot1 = link3_inertia2 * link3_inertia8;
-            let link2_pivot2 = A::fma_f64(link2_pivot0, link2_pivot1, link3_pivot2);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot17 = link10_inertia25 * link9_pivot0;
             let link9_pivot18 = link10_inertia27 * link9_pivot0;
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot7 = link4_inertia2 * link4_inertia11;
             let link3_pivot8 = A::fma_f64(-link3_pivot0, link3_pivot7, link4_pivot8);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = ground_loop20 * link10_pivot2;
+            let link1_pivot1 = A::fma_f64(link10_inertia25, link9_pivot17, -link1_pivot0);
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot9 = link4_inertia2 * link4_inertia13;
             let link3_pivot10 = A::fma_f64(-link3_pivot0, link3_pivot9, link4_pivot10);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot0 = ground_loop23 * link10_pivot2;
-            let link1_pivot1 = A::fma_f64(link10_inertia25, link9_pivot17, -link1_pivot0);
-            let link1_pivot2 = ground_loop19 * link10_pivot3;
+            let link1_pivot2 = ground_loop23 * link10_pivot3;
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest0 = ground_loop19 * link10_rest1;
+            let link1_rest0 = ground_loop23 * link10_rest1;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
             let link1_pivot3 = A::fma_f64(link10_inertia27, link9_pivot18, -link1_pivot2);
             // link1: momentum remainder D, D' (4.45, 4.49)
@@ -683,14 +704,6 @@ impl Closed10 {
             let link2_pivot6 = A::fma_f64(-link3_inertia2, link2_pivot3, link3_pivot6);
             // link2: inertia carried to the parent, M* (4.48)
             let link2_inertia1 = link2_pose1 * link2_pivot2;
-            // link5: momentum remainder D, D' (4.45, 4.49)
-            let link5_rest4 = A::fma_f64(-link6_inertia2, link5_rest3, link6_rest4);
-            // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot15 = link6_inertia2 * link5_pivot0;
-            // link5: momentum remainder D, D' (4.45, 4.49)
-            let link5_rest5 = A::fma_f64(link6_inertia9, link5_rest3, link6_rest5);
-            // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot16 = link6_inertia9 * link5_pivot0;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot17 = link8_inertia11 * link7_pivot0;
             let link7_pivot18 = link8_inertia13 * link7_pivot0;
@@ -700,6 +713,15 @@ impl Closed10 {
             // link3: inertia carried to the parent, M* (4.48)
             let link3_inertia10 = link3_pose2 * link3_pivot8;
             let link3_inertia11 = A::fma_f64(-link3_pose1, link3_pivot12, link3_inertia10);
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest4 = A::fma_f64(-link6_inertia2, link5_rest3, link6_rest4);
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot15 = link6_inertia2 * link5_pivot0;
+            // link5: momentum remainder D, D' (4.45, 4.49)
+            let link5_rest5 = A::fma_f64(link6_inertia9, link5_rest3, link6_rest5);
+            // link5: U, Mj, k and the reduced inertia M' (4.44)
+            let link5_pivot16 = link6_inertia9 * link5_pivot0;
+            // link3: inertia carried to the parent, M* (4.48)
             let link3_inertia12 = link3_pose2 * link3_pivot10;
             let link3_inertia13 = A::fma_f64(-link3_pose1, link3_pivot14, link3_inertia12);
             // link2: inertia carried to the parent, M* (4.48)
@@ -717,6 +739,12 @@ impl Closed10 {
             let link2_inertia6 = A::fma_f64(link2_pose0, link2_inertia3, link2_inertia5);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
             let link1_pivot8 = 1.0 / link2_inertia6;
+            // link6: U, Mj, k and the reduced inertia M' (4.44)
+            let link6_pivot17 = link7_inertia11 * link6_pivot0;
+            let link6_pivot18 = link7_inertia13 * link6_pivot0;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot9 = A::fma_f64(link7_inertia11, link6_pivot17, link1_pivot6);
+            let link1_pivot10 = A::fma_f64(link7_inertia13, link6_pivot18, link1_pivot7);
             // link4: momentum remainder D, D' (4.45, 4.49)
             let link4_rest0 = A::fma_f64(link5_pose1, link5_rest5, -p_3);
             let link4_rest1 = A::fma_f64(link5_pose2, link5_rest4, p_4);
@@ -724,12 +752,6 @@ impl Closed10 {
             let link4_rest3 = link4_pivot0 * link4_rest2;
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest6 = A::fma_f64(link5_inertia13, link4_rest3, link1_rest5);
-            // link6: U, Mj, k and the reduced inertia M' (4.44)
-            let link6_pivot17 = link7_inertia11 * link6_pivot0;
-            let link6_pivot18 = link7_inertia13 * link6_pivot0;
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot9 = A::fma_f64(link7_inertia11, link6_pivot17, link1_pivot6);
-            let link1_pivot10 = A::fma_f64(link7_inertia13, link6_pivot18, link1_pivot7);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot17 = link6_inertia11 * link5_pivot0;
             let link5_pivot18 = link6_inertia13 * link5_pivot0;
@@ -749,31 +771,41 @@ impl Closed10 {
             let link4_pivot16 = link5_inertia13 * link4_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
             let link1_pivot14 = A::fma_f64(link5_inertia13, link4_pivot16, link1_pivot12);
-            let link1_pivot15 = ground_loop23 * link10_pivot3;
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest7 = ground_loop23 * link10_rest1;
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
+            let link3_pivot15 = link4_inertia11 * link3_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot16 = A::fma_f64(link10_inertia25, link9_pivot18, -link1_pivot15);
+            let link1_pivot15 = A::fma_f64(link4_inertia11, link3_pivot15, link1_pivot13);
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot11 = A::fma_f64(-link3_inertia11, link2_pivot3, link3_pivot8);
+            // link2: inertia carried to the parent, M* (4.48)
+            let link2_inertia7 = link2_pose0 * link2_pivot8;
+            let link2_inertia8 = A::fma_f64(link2_pose1, link2_pivot11, -link2_inertia7);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot16 = ground_loop20 * link10_pivot3;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest7 = ground_loop20 * link10_rest1;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot17 = A::fma_f64(link10_inertia25, link9_pivot18, -link1_pivot16);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest8 = A::fma_f64(link10_inertia25, link9_rest3, link1_rest7);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot17 = A::fma_f64(link9_inertia11, link8_pivot18, link1_pivot16);
+            let link1_pivot18 = A::fma_f64(link9_inertia11, link8_pivot18, link1_pivot17);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest9 = A::fma_f64(link9_inertia11, link8_rest3, link1_rest8);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot18 = A::fma_f64(link8_inertia11, link7_pivot18, link1_pivot17);
+            let link1_pivot19 = A::fma_f64(link8_inertia11, link7_pivot18, link1_pivot18);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest10 = A::fma_f64(link8_inertia11, link7_rest3, link1_rest9);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot19 = A::fma_f64(link7_inertia11, link6_pivot18, link1_pivot18);
+            let link1_pivot20 = A::fma_f64(link7_inertia11, link6_pivot18, link1_pivot19);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest11 = A::fma_f64(link7_inertia11, link6_rest3, link1_rest10);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot20 = A::fma_f64(link6_inertia11, link5_pivot18, link1_pivot19);
+            let link1_pivot21 = A::fma_f64(link6_inertia11, link5_pivot18, link1_pivot20);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest12 = A::fma_f64(link6_inertia11, link5_rest3, link1_rest11);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot21 = A::fma_f64(link5_inertia11, link4_pivot16, link1_pivot20);
+            let link1_pivot22 = A::fma_f64(link5_inertia11, link4_pivot16, link1_pivot21);
             // link1: momentum remainder D, D' (4.45, 4.49)
             let link1_rest13 = A::fma_f64(link5_inertia11, link4_rest3, link1_rest12);
             // link4: momentum remainder D, D' (4.45, 4.49)
@@ -784,24 +816,21 @@ impl Closed10 {
             // link4: momentum remainder D, D' (4.45, 4.49)
             let link4_rest5 = A::fma_f64(link5_inertia8, link4_rest3, link5_rest5);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
-            let link3_pivot15 = link4_inertia11 * link3_pivot0;
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot22 = A::fma_f64(link4_inertia11, link3_pivot15, link1_pivot13);
-            // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot16 = link4_inertia13 * link3_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
             let link1_pivot23 = A::fma_f64(link4_inertia13, link3_pivot16, link1_pivot14);
-            let link1_pivot24 = A::fma_f64(link4_inertia11, link3_pivot16, link1_pivot21);
+            let link1_pivot24 = A::fma_f64(link4_inertia11, link3_pivot16, link1_pivot22);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
-            let link2_pivot11 = A::fma_f64(-link3_inertia11, link2_pivot3, link3_pivot8);
             let link2_pivot12 = A::fma_f64(-link3_inertia13, link2_pivot3, link3_pivot10);
             // link2: velocity and joint rate (4.40)
             let link2_vel0 = link2_pose1 * link2_pivot3;
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia7 = link2_pose0 * link2_pivot8;
-            let link2_inertia8 = A::fma_f64(link2_pose1, link2_pivot11, -link2_inertia7);
             let link2_inertia9 = link2_pose0 * link2_pivot10;
             let link2_inertia10 = A::fma_f64(link2_pose1, link2_pivot12, -link2_inertia9);
+            // link2: U, Mj, k and the reduced inertia M' (4.44)
+            let link2_pivot13 = link3_inertia11 * link2_pivot0;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot25 = A::fma_f64(link3_inertia11, link2_pivot13, link1_pivot15);
             // link3: momentum remainder D, D' (4.45, 4.49)
             let link3_rest0 = A::fma_f64(link4_pose1, link4_rest5, -p_2);
             let link3_rest1 = A::fma_f64(link4_pose2, link4_rest4, p_3);
@@ -811,10 +840,6 @@ impl Closed10 {
             let link1_rest14 = A::fma_f64(link4_inertia11, link3_rest3, link1_rest13);
             let link1_rest15 = A::fma_f64(link4_inertia13, link3_rest3, link1_rest6);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
-            let link2_pivot13 = link3_inertia11 * link2_pivot0;
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot25 = A::fma_f64(link3_inertia11, link2_pivot13, link1_pivot22);
-            // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot14 = link3_inertia13 * link2_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
             let link1_pivot26 = A::fma_f64(link3_inertia13, link2_pivot14, link1_pivot23);
@@ -823,6 +848,9 @@ impl Closed10 {
             let link1_pivot29 = A::fma_f64(link1_pivot8, link1_pivot28, link1_pivot25);
             let link1_pivot30 = link2_inertia10 * link2_inertia10;
             let link1_pivot31 = A::fma_f64(link1_pivot8, link1_pivot30, link1_pivot26);
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_pivot0 = link1_pivot29 - 1.0;
+            let ground_pivot1 = link1_pivot31 + ground_pivot0;
             // link3: momentum remainder D, D' (4.45, 4.49)
             let link3_rest4 = A::fma_f64(-link4_inertia2, link3_rest3, link4_rest4);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
@@ -830,8 +858,6 @@ impl Closed10 {
             let link3_pivot18 = link4_inertia8 * link3_pivot0;
             // link3: momentum remainder D, D' (4.45, 4.49)
             let link3_rest5 = A::fma_f64(link4_inertia8, link3_rest3, link4_rest5);
-            // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = link1_pivot29 + link1_pivot31;
             // link2: momentum remainder D, D' (4.45, 4.49)
             let link2_rest0 = A::fma_f64(link3_pose1, link3_rest5, -p_1);
             let link2_rest1 = A::fma_f64(link3_pose2, link3_rest4, p_2);
@@ -842,11 +868,11 @@ impl Closed10 {
             let link1_rest16 = A::fma_f64(link3_inertia11, link2_rest3, link1_rest14);
             let link1_rest17 = A::fma_f64(link3_inertia13, link2_rest3, link1_rest15);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot1 = A::fma_f64(1e-10, ground_pivot0, link1_pivot29);
-            let ground_pivot2 = A::fma_f64(1e-10, ground_pivot0, link1_pivot31);
-            let ground_pivot3 = 1e-10 * ground_pivot1;
+            let ground_pivot2 = A::fma_f64(1e-10, ground_pivot1, link1_pivot29);
+            let ground_pivot3 = A::fma_f64(1e-10, ground_pivot1, link1_pivot31);
             let ground_pivot4 = 1e-10 * ground_pivot2;
-            let ground_pivot5 = ::multibody::runtime::Scalar::reciprocal_above(-link1_pivot29, -ground_pivot3);
+            let ground_pivot5 = 1e-10 * ground_pivot3;
+            let ground_pivot6 = ::multibody::runtime::Scalar::reciprocal_above(-link1_pivot29, -ground_pivot4);
             // link2: momentum remainder D, D' (4.45, 4.49)
             let link2_rest5 = A::fma_f64(link3_inertia8, link2_rest3, link3_rest5);
             // link2: velocity and joint rate (4.40)
@@ -866,7 +892,7 @@ impl Closed10 {
             let link1_pivot34 = link2_inertia10 * link1_pivot8;
             let link1_pivot35 = link2_inertia8 * link1_pivot8;
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest24 = ground_pivot5 * link1_rest22;
+            let link1_rest24 = ground_pivot6 * link1_rest22;
             let link1_rest25 = A::fma_f64(link1_pivot33, link1_rest24, link1_rest23);
             // link1: velocity and joint rate (4.40)
             let link1_vel0 = link1_pivot34 * link1_rest25;
@@ -915,35 +941,35 @@ impl Closed10 {
             // link10: momentum rate (4.36)
             let link10_pdot0 = link10_pivot1 * link1_rest25;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot6 = link1_pivot33 * link1_pivot33;
-            let ground_pivot7 = link1_pivot33 * ground_pivot5;
-            let ground_pivot8 = A::fma_f64(ground_pivot5, ground_pivot6, link1_pivot31);
+            let ground_pivot7 = link1_pivot33 * link1_pivot33;
+            let ground_pivot8 = link1_pivot33 * ground_pivot6;
+            let ground_pivot9 = A::fma_f64(ground_pivot6, ground_pivot7, link1_pivot31);
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot7 * link1_rest25;
+            let ground_vel0 = ground_pivot8 * link1_rest25;
             // ground: loops and couplings
             let ground_loop24 = link10_sin0 * link1_rest25;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot9 = ::multibody::runtime::Scalar::reciprocal_above(-ground_pivot8, -ground_pivot4);
+            let ground_pivot10 = ::multibody::runtime::Scalar::reciprocal_above(-ground_pivot9, -ground_pivot5);
             // ground: velocity and joint rate (4.40)
-            let ground_vel1 = A::fma_f64(ground_pivot9, ground_vel0, link1_rest24);
+            let ground_vel1 = A::fma_f64(ground_pivot10, ground_vel0, link1_rest24);
             // link1: velocity and joint rate (4.40)
-            let link1_vel1 = A::fma_f64(ground_pivot9, link1_vel0, link1_rest21);
+            let link1_vel1 = A::fma_f64(ground_pivot10, link1_vel0, link1_rest21);
             // link2: velocity and joint rate (4.40)
-            let link2_vel4 = A::fma_f64(ground_pivot9, link2_vel3, link2_rest3);
+            let link2_vel4 = A::fma_f64(ground_pivot10, link2_vel3, link2_rest3);
             // link3: velocity and joint rate (4.40)
-            let link3_vel1 = A::fma_f64(ground_pivot9, link3_vel0, link3_rest3);
+            let link3_vel1 = A::fma_f64(ground_pivot10, link3_vel0, link3_rest3);
             // link4: velocity and joint rate (4.40)
-            let link4_vel1 = A::fma_f64(ground_pivot9, link4_vel0, link4_rest3);
+            let link4_vel1 = A::fma_f64(ground_pivot10, link4_vel0, link4_rest3);
             // link5: velocity and joint rate (4.40)
-            let link5_vel1 = A::fma_f64(ground_pivot9, link5_vel0, link5_rest3);
+            let link5_vel1 = A::fma_f64(ground_pivot10, link5_vel0, link5_rest3);
             // link6: velocity and joint rate (4.40)
-            let link6_vel1 = A::fma_f64(ground_pivot9, link6_vel0, link6_rest3);
+            let link6_vel1 = A::fma_f64(ground_pivot10, link6_vel0, link6_rest3);
             // link7: velocity and joint rate (4.40)
-            let link7_vel1 = A::fma_f64(ground_pivot9, link7_vel0, link7_rest3);
+            let link7_vel1 = A::fma_f64(ground_pivot10, link7_vel0, link7_rest3);
             // link1: velocity and joint rate (4.40)
             let link1_vel2 = A::fma_f64(link1_pivot35, ground_vel1, link1_vel1);
             // link8: velocity and joint rate (4.40)
-            let link8_vel1 = A::fma_f64(ground_pivot9, link8_vel0, link8_rest3);
+            let link8_vel1 = A::fma_f64(ground_pivot10, link8_vel0, link8_rest3);
             // link2: velocity and joint rate (4.40)
             let link2_vel5 = A::fma_f64(link2_pivot13, ground_vel1, link2_vel4);
             // link3: velocity and joint rate (4.40)
@@ -963,46 +989,46 @@ impl Closed10 {
             // link8: velocity and joint rate (4.40)
             let link8_vel2 = A::fma_f64(link8_pivot17, ground_vel1, link8_vel1);
             // link9: velocity and joint rate (4.40)
-            let link9_vel1 = A::fma_f64(ground_pivot9, link9_vel0, link9_rest3);
+            let link9_vel1 = A::fma_f64(ground_pivot10, link9_vel0, link9_rest3);
             // link2: momentum rate (4.36)
-            let link2_pdot5 = A::fma_f64(-ground_pivot9, link2_pdot3, link2_rest5);
-            let link2_pdot6 = A::fma_f64(-ground_pivot9, link2_pdot4, -link2_rest4);
+            let link2_pdot5 = A::fma_f64(-ground_pivot10, link2_pdot3, link2_rest5);
+            let link2_pdot6 = A::fma_f64(-ground_pivot10, link2_pdot4, -link2_rest4);
             // link3: momentum rate (4.36)
-            let link3_pdot3 = A::fma_f64(-ground_pivot9, link3_pdot1, link3_rest5);
-            let link3_pdot4 = A::fma_f64(-ground_pivot9, link3_pdot2, -link3_rest4);
+            let link3_pdot3 = A::fma_f64(-ground_pivot10, link3_pdot1, link3_rest5);
+            let link3_pdot4 = A::fma_f64(-ground_pivot10, link3_pdot2, -link3_rest4);
             // link4: momentum rate (4.36)
-            let link4_pdot3 = A::fma_f64(-ground_pivot9, link4_pdot1, link4_rest5);
+            let link4_pdot3 = A::fma_f64(-ground_pivot10, link4_pdot1, link4_rest5);
             // link2: velocity and joint rate (4.40)
             let link2_vel9 = A::fma_f64(link1_vel2, link2_vel2, link2_vel8);
             // link4: momentum rate (4.36)
-            let link4_pdot4 = A::fma_f64(-ground_pivot9, link4_pdot2, -link4_rest4);
+            let link4_pdot4 = A::fma_f64(-ground_pivot10, link4_pdot2, -link4_rest4);
             // link9: velocity and joint rate (4.40)
             let link9_vel2 = A::fma_f64(link9_pivot17, ground_vel1, link9_vel1);
             // link5: momentum rate (4.36)
-            let link5_pdot3 = A::fma_f64(-ground_pivot9, link5_pdot1, link5_rest5);
-            let link5_pdot4 = A::fma_f64(-ground_pivot9, link5_pdot2, -link5_rest4);
+            let link5_pdot3 = A::fma_f64(-ground_pivot10, link5_pdot1, link5_rest5);
+            let link5_pdot4 = A::fma_f64(-ground_pivot10, link5_pdot2, -link5_rest4);
             // link6: momentum rate (4.36)
-            let link6_pdot3 = A::fma_f64(-ground_pivot9, link6_pdot1, link6_rest5);
-            let link6_pdot4 = A::fma_f64(-ground_pivot9, link6_pdot2, -link6_rest4);
+            let link6_pdot3 = A::fma_f64(-ground_pivot10, link6_pdot1, link6_rest5);
+            let link6_pdot4 = A::fma_f64(-ground_pivot10, link6_pdot2, -link6_rest4);
             // link7: momentum rate (4.36)
-            let link7_pdot3 = A::fma_f64(-ground_pivot9, link7_pdot1, link7_rest5);
+            let link7_pdot3 = A::fma_f64(-ground_pivot10, link7_pdot1, link7_rest5);
             // link3: velocity and joint rate (4.40)
             let link3_vel3 = A::fma_f64(link3_pose2, link2_vel9, link2_vel6);
             let link3_vel4 = A::fma_f64(link3_pose1, link2_vel9, link2_vel7);
             // link7: momentum rate (4.36)
-            let link7_pdot4 = A::fma_f64(-ground_pivot9, link7_pdot2, -link7_rest4);
+            let link7_pdot4 = A::fma_f64(-ground_pivot10, link7_pdot2, -link7_rest4);
             // link8: momentum rate (4.36)
-            let link8_pdot3 = A::fma_f64(-ground_pivot9, link8_pdot1, link8_rest5);
-            let link8_pdot4 = A::fma_f64(-ground_pivot9, link8_pdot2, -link8_rest4);
+            let link8_pdot3 = A::fma_f64(-ground_pivot10, link8_pdot1, link8_rest5);
+            let link8_pdot4 = A::fma_f64(-ground_pivot10, link8_pdot2, -link8_rest4);
             // link9: momentum rate (4.36)
-            let link9_pdot3 = A::fma_f64(-ground_pivot9, link9_pdot1, link9_rest5);
-            let link9_pdot4 = A::fma_f64(-ground_pivot9, link9_pdot2, -link9_rest4);
+            let link9_pdot3 = A::fma_f64(-ground_pivot10, link9_pdot1, link9_rest5);
+            let link9_pdot4 = A::fma_f64(-ground_pivot10, link9_pdot2, -link9_rest4);
             // link10: velocity and joint rate (4.40)
-            let link10_vel1 = A::fma_f64(-ground_pivot9, link10_vel0, link10_rest1);
+            let link10_vel1 = A::fma_f64(-ground_pivot10, link10_vel0, link10_rest1);
             // link3: velocity and joint rate (4.40)
             let link3_vel5 = A::fma_f64(-link3_pivot17, link3_vel3, link3_vel2);
             // ground: loops and couplings
-            let ground_loop25 = ground_pivot9 * ground_loop24;
+            let ground_loop25 = ground_pivot10 * ground_loop24;
             // link2: momentum rate (4.36)
             let link2_pdot7 = A::fma_f64(-link2_pivot8, ground_vel1, link2_pdot5);
             let link2_pdot8 = A::fma_f64(-link2_pivot11, ground_vel1, link2_pdot6);
@@ -1050,7 +1076,7 @@ impl Closed10 {
             let link4_pdot7 = A::fma_f64(link4_vel4, link4_pdot0, link4_pdot5);
             let link4_pdot8 = A::fma_f64(link4_pivot2, link4_vel4, link4_pdot6);
             // link10: momentum rate (4.36)
-            let link10_pdot1 = A::fma_f64(ground_pivot9, link10_pdot0, -link10_rest0);
+            let link10_pdot1 = A::fma_f64(ground_pivot10, link10_pdot0, -link10_rest0);
             // link2: momentum rate (4.36)
             let link2_pdot11 = A::fma_f64(-link2_inertia1, link1_vel2, link2_pdot9);
             // link4: velocity and joint rate (4.40)
