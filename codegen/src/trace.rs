@@ -162,7 +162,7 @@ fn has(plan: &Plan, group: Group) -> Result<(), String> {
 }
 
 /// Part of a row's diagonal below which it counts as redundant.
-fn tolerance(precision: Precision) -> f64 {
+pub(crate) fn tolerance(precision: Precision) -> f64 {
     match precision {
         Precision::F64 => f64::rank_tolerance(),
         Precision::F32 => f32::rank_tolerance().into(),

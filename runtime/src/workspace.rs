@@ -152,6 +152,9 @@ pub struct RowState<S> {
 /// Constraints at the configuration.
 #[derive(Clone, Debug)]
 pub struct Constraints<S> {
+    /// Rotation to and position in the innermost common node, along the path to each frame of a constraint as far as it is
+    /// done.
+    pub reach: Vec<[(Mat3<S>, Vec3<S>); 2]>,
     /// Relative pose of each constraint's frames.
     pub relative: Vec<Relative<S>>,
     /// Rows.
@@ -295,6 +298,7 @@ impl<S: Scalar> Workspace<S> {
                 later: later(tree),
             },
             constraints: Constraints {
+                reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
                 relative: vec![Relative { turn: [[o; 3]; 3], d: [o; 3] }; tree.constraints.len()],
                 rows: vec![
                     RowState { e: Force::zero(), at_a: Force::zero(), at_b: Force::zero(), residual: o };

@@ -6,6 +6,7 @@ mod bench;
 mod check;
 mod count;
 mod eval;
+mod experiments;
 mod explain;
 mod generate;
 mod loops;
@@ -84,6 +85,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Generate(a)) => generate::run(&a, out),
         Some(Command::Eval(a)) => eval::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
+        Some(Command::Experiments(a)) => experiments::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         #[cfg(feature = "bench")]
         Some(Command::Bench(a)) => bench::run(&a, out),

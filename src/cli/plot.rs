@@ -3,13 +3,13 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-/// One panel: lines over time.
+/// One panel: lines over time, or over something else that begins at zero.
 pub struct Panel {
     /// Label of the vertical axis, with the unit.
     pub label: String,
     /// Times, s.
     pub t: Vec<f64>,
-    /// Name (empty: not in the legend) and values.
+    /// Name (empty: not in the legend) and values; what is not a number is left out.
     pub lines: Vec<(String, Vec<f64>)>,
 }
 
@@ -29,12 +29,17 @@ const ROW: u32 = 14 * SCALE;
 
 /// Panels below each other, all over the same time.
 pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
+    svg_over(title, "time [s]", panels)
+}
+
+/// Panels below each other, all over the same quantity, whose label is `x`.
+pub fn svg_over(title: &str, x: &str, panels: &[Panel]) -> Result<String, String> {
     let heights: Vec<u32> = panels.iter().enumerate().map(|(k, p)| height(p, k + 1 == panels.len())).collect();
     let mut text = String::new();
     {
         let size = (WIDTH, TITLE + heights.iter().sum::<u32>());
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        let drawn = draw(&root, title, panels, &heights);
+        let drawn = draw(&root, title, x, panels, &heights);
         drawn.and_then(|()| root.present()).map_err(|e| e.to_string())?;
     }
     Ok(shrunk(&text))
@@ -58,6 +63,7 @@ fn height(panel: &Panel, last: bool) -> u32 {
 fn draw(
     root: &Area,
     title: &str,
+    x: &str,
     panels: &[Panel],
     heights: &[u32],
 ) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
@@ -69,7 +75,7 @@ fn draw(
         let (here, below) = rest.split_vertically(height);
         rest = below;
         let (chart, legend) = here.split_horizontally(WIDTH - LEGEND);
-        draw_chart(&chart, panel)?;
+        draw_chart(&chart, x, panel)?;
         draw_legend(&legend, panel)?;
     }
     Ok(())
@@ -81,7 +87,7 @@ pub fn colour(k: usize) -> HSLColor {
     HSLColor(hue, 0.75, [0.42, 0.3, 0.55][k % 3])
 }
 
-fn draw_chart(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+fn draw_chart(area: &Area, x: &str, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
     let end = panel.t.last().copied().unwrap_or(1.0);
     let all = panel.lines.iter().flat_map(|l| &l.1).copied();
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
@@ -99,7 +105,7 @@ fn draw_chart(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std
         .bold_line_style(RGBColor(222, 222, 222).stroke_width(SCALE))
         .axis_style(RGBColor(90, 90, 90).stroke_width(SCALE))
         .set_all_tick_mark_size(4 * SCALE)
-        .x_desc("time [s]")
+        .x_desc(x)
         .y_desc(panel.label.as_str())
         .x_labels(11)
         .y_labels(6)
@@ -112,7 +118,8 @@ fn draw_chart(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<std
     for (k, (_, values)) in panel.lines.iter().enumerate() {
         let last = panel.t.len().saturating_sub(1);
         let points = panel.t.iter().copied().zip(values.iter().copied()).enumerate();
-        let points = points.filter(|(i, _)| i % stride == 0 || *i == last).map(|(_, point)| point);
+        let points =
+            points.filter(|(i, (_, y))| (i % stride == 0 || *i == last) && y.is_finite()).map(|(_, point)| point);
         chart.draw_series(LineSeries::new(points, colour(k).stroke_width(SCALE)))?;
     }
     Ok(())

@@ -4,6 +4,7 @@
 //! any release.
 
 mod dynamics;
+pub mod experiments;
 mod list;
 mod text;
 

@@ -46,6 +46,22 @@ impl Text {
         }
     }
 
+    /// Coordinate of the last joint to begin with.
+    pub fn start(&mut self, q: f64, held: bool) {
+        let _ = writeln!(self.0, "start = {q:?}\nheld = {held}");
+    }
+
+    /// A loop between a place on a body and one on another or the ground, m.
+    pub fn close(&mut self, name: &str, kind: &str, ends: [(&str, [f64; 3]); 2]) {
+        for (end, (body, place)) in ["a", "b"].iter().zip(ends) {
+            let _ = write!(self.0, "\n[[frame]]\nname = \"{name}_{end}\"\nbody = \"{body}\"\nxyz = {place:?}\n");
+        }
+        let _ = write!(
+            self.0,
+            "\n[[loop]]\nname = \"{name}\"\ntype = \"{kind}\"\nbetween = [\"{name}_a\", \"{name}_b\"]\n"
+        );
+    }
+
     /// The file.
     pub fn finish(self) -> String {
         self.0
@@ -54,13 +70,18 @@ impl Text {
 
 /// A link of thesis 7.2, kg and m: uniform and slender, so `m l²/3` about its pin.
 const MASS: f64 = 0.01;
-const LENGTH: f64 = 0.05;
+pub(super) const LENGTH: f64 = 0.05;
 /// Viscous friction of every pin there, N m s/rad.
 pub(super) const FRICTION: f64 = 0.001;
 /// In the plane x-y, m/s².
-const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
+pub(super) const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
 
 fn thesis_link(text: &mut Text, name: &str, parent: Option<&str>, damping: f64) {
+    thesis_link_about(text, name, parent, [0.0, 0.0, 1.0], damping);
+}
+
+/// The same on a pin about any axis.
+pub(super) fn thesis_link_about(text: &mut Text, name: &str, parent: Option<&str>, axis: [f64; 3], damping: f64) {
     let across = MASS * LENGTH * LENGTH / 12.0;
     text.link(&Link {
         name,
@@ -69,7 +90,7 @@ fn thesis_link(text: &mut Text, name: &str, parent: Option<&str>, damping: f64) 
         com: [LENGTH / 2.0, 0.0, 0.0],
         inertia: [0.0, across, across],
         place: [if parent.is_some() { LENGTH } else { 0.0 }, 0.0, 0.0],
-        axis: [0.0, 0.0, 1.0],
+        axis,
         damping,
     });
 }
@@ -91,14 +112,19 @@ pub(super) fn chain(name: &str, n: usize, damping: f64) -> String {
 /// level, and in a level branch by branch. Straight along x at zero angles.
 pub(super) fn tree(name: &str, levels: u32, damping: f64) -> String {
     let comment = format!("Planar tree (thesis 7.2): branches of ten links that fork in two, {levels} levels.");
-    let mut text = Text::new(name, &comment, GRAVITY);
+    forking(name, &comment, levels, damping, |_| 10)
+}
+
+/// A tree whose branch number `k`, counted as the links are, has `links(k)` links.
+pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, links: impl Fn(usize) -> usize) -> String {
+    let mut text = Text::new(name, comment, GRAVITY);
     let mut tips: Vec<Option<String>> = vec![None];
-    let mut number = 0;
+    let (mut number, mut count) = (0, 0);
     for level in 0..levels {
         let mut next = Vec::new();
         for branch in 0..1_usize << level {
             let mut parent = tips[branch / 2].clone();
-            for k in 0..10 {
+            for k in 0..links(count) {
                 number += 1;
                 // The first link of a branch says to which side it forks.
                 let side = match (level, k, branch % 2) {
@@ -110,6 +136,7 @@ pub(super) fn tree(name: &str, levels: u32, damping: f64) -> String {
                 thesis_link(&mut text, &link, parent.as_deref(), damping);
                 parent = Some(link);
             }
+            count += 1;
             next.push(parent);
         }
         tips = next;

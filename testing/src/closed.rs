@@ -61,6 +61,8 @@ impl LoopKnobs {
         tree.bodies.0 = 2.min(bodies);
         if planar {
             tree = Knobs { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
+            // Axes that are made parallel may leave a body without mass motions that nothing feels.
+            tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
         let kinds: [f64; 16] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });

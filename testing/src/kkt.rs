@@ -306,14 +306,13 @@ pub fn unit_of(n: usize, k: usize) -> Vec<f64> {
     (0..n).map(|j| f64::from(u8::from(j == k))).collect()
 }
 
-/// Rank of rows, each scaled to unit length (what is rounding beside the largest is zero), by elimination with pivots of the
+/// Rank of rows, each scaled to unit length (what is rounding of unit directions is zero), by elimination with pivots of the
 /// largest remainder.
 pub fn rank(rows: &[Vec<f64>], tolerance: f64) -> usize {
     let norm = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let largest = rows.iter().map(|r| norm(r)).fold(0.0, f64::max);
     let scaled = |r: &Vec<f64>| {
         let n = norm(r);
-        r.iter().map(|x| if n > 1e-12 * largest { x / n } else { 0.0 }).collect::<Vec<f64>>()
+        r.iter().map(|x| if n > 1e-12 { x / n } else { 0.0 }).collect::<Vec<f64>>()
     };
     let mut rest: Vec<Vec<f64>> = rows.iter().map(scaled).collect();
     let mut rank = 0;

@@ -9,7 +9,7 @@ pub mod random;
 pub mod state;
 pub mod toml;
 
-use mbd_codegen::model::{Gravity, JointKind, Model, Motion, Placement, Rotation, Value};
+use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, Motion, Placement, Rotation, Value};
 
 /// A number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {
@@ -55,6 +55,28 @@ pub fn substituted(model: &Model, params: &[f64]) -> Model {
     }
     for frame in &mut model.frames {
         placement(&mut frame.placement);
+    }
+    for constraint in &mut model.constraints {
+        of(&mut constraint.decay);
+        match &mut constraint.kind {
+            ConstraintKind::Coupling { terms, offset } => {
+                terms.iter_mut().for_each(|(_, ratio)| of(ratio));
+                of(offset);
+            }
+            ConstraintKind::Loop { kind, first, second } => {
+                placement(&mut first.placement);
+                placement(&mut second.placement);
+                match kind {
+                    LoopKind::Helical { pitch: x, .. }
+                    | LoopKind::Distance { length: x }
+                    | LoopKind::PointOnCylinder { radius: x, .. }
+                    | LoopKind::RollingDisc { radius: x, .. }
+                    | LoopKind::RollingBall { radius: x, .. } => of(x),
+                    LoopKind::Pfaffian { row } => row.iter_mut().for_each(of),
+                    _ => {}
+                }
+            }
+        }
     }
     model
 }

@@ -2,7 +2,7 @@
 //! find the same motion.
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Gravity, Model, Value};
+use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
     close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Watch,
@@ -136,12 +136,7 @@ fn model(text: &str) -> Model {
 
 fn interpreter(model: &Model) -> Mechanism {
     let plan = Plan::new(model, Default::default());
-    let Gravity::Constant(g) = model.gravity else { panic!("constant gravity") };
-    let number = |v: Value| match v {
-        Value::Const(x) => x,
-        Value::Param(_) => panic!("no parameters"),
-    };
-    Interpreter::new(plan.tree(&[]), g.map(number))
+    plan.interpreter(&[])
 }
 
 fn split(text: &str) -> Split<Mechanism, Mechanism> {

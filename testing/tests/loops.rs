@@ -4,9 +4,10 @@
 
 use mbd_codegen::generate::trace;
 use mbd_codegen::loops::{looped, LoopProgram};
-use mbd_codegen::model::Model;
+use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::plan::{Forms, Plan, PlanOptions};
 use mbd_codegen::{Arithmetic, Group, Loops, Options};
+use mbd_testing::chains::{general, planar};
 use mbd_testing::random::{random_model, Knobs, Rng};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
@@ -117,6 +118,37 @@ fn chains_of_pins() {
         let knobs = Knobs { bodies: (n, n), taper: 1.0, ..Knobs::default() };
         let nodes = compare(&random_model(seed, &knobs), seed, &forced(seed));
         assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+    }
+}
+
+/// Chains whose tips are held by the ground, in space and in a plane, equal links among them: columns of the rows are carried
+/// through the turns.
+#[test]
+fn closed_chains() {
+    let kinds = [
+        LoopKind::Spherical,
+        LoopKind::Pin { axis: [0.2, 0.0, 1.0] },
+        LoopKind::Planar { normal: [0.0, 0.0, 1.0] },
+        LoopKind::Fixed,
+        LoopKind::Helical { axis: [1.0, 0.0, 0.0], pitch: Value::Const(0.3) },
+    ];
+    for seed in 0..20 {
+        let n = 8 + seed as usize % 7;
+        let mut model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
+        let at = |x: f64| Placement { xyz: [x, 0.3 - x, 0.1].map(Value::Const), rotation: Rotation::NONE };
+        let (ground, tip) = (
+            Mount { body: None, placement: at(0.4) },
+            Mount { body: Some(model.joints[n - 1].child), placement: at(0.2) },
+        );
+        let [first, second] = if seed % 3 == 0 { [ground, tip] } else { [tip, ground] };
+        let kind = ConstraintKind::Loop { kind: kinds[seed as usize % 5], first, second };
+        let decay = if seed % 4 == 0 { Value::Const(5.0) } else { Value::ZERO };
+        model.constraints.push(Constraint { name: "loop".to_string(), kind, decay });
+        let mut options = forced(seed);
+        let nodes = compare(&model, seed, &options);
+        assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+        options.arithmetic = Arithmetic::Fast;
+        compare(&model, seed, &options);
     }
 }
 

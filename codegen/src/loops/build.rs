@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Source, Tree};
+use mbd_runtime::tree::{Bond, Closure, Source, Tree};
 
 use super::link::Link;
 use super::main_line::MainLine;
@@ -14,18 +14,23 @@ use super::{Block, Loop, LoopProgram, Place, Repeat, Start, Target};
 use crate::options::{Group, Options};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, Output};
-use crate::trace::Given;
+use crate::trace::{tolerance, Given};
 
 /// Builds the loop form; `None` where no run is long enough.
 pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Option<LoopProgram> {
-    let ways = passes(group)?;
+    let ways = passes(group, !plan.constraints.is_empty())?;
     let graph = Graph::default();
     let given = Given::new(&graph, plan, group, options);
-    let tree: Tree<Expr> = plan.tree(&given.params).regrouped();
+    let mut tree: Tree<Expr> = plan.tree(&given.params);
+    tree.tolerance = Expr::Const(tolerance(options.precision));
+    let tree = tree.regrouped();
     let (plan_of_tree, tree) = match (group, &plan.accelerations) {
         (Group::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
         _ => (plan, tree),
     };
+    if !carried(group, &tree) {
+        return None;
+    }
     let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.looped).collect();
     let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
@@ -33,10 +38,10 @@ pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Opti
     }
     let starts: Vec<(usize, usize)> = runs.iter().map(|run| state_of(&tree, run.nodes.start)).collect();
     let graphs: Vec<Graph> = runs.iter().map(|_| Graph::default()).collect();
-    let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, options.efforts));
+    let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, &tree, options.efforts));
     let mut links: Vec<Link> = links.collect();
     let next_input = given.arrays.iter().map(|a| a.len).sum();
-    let stage = Stage::new(group, &graph, tree);
+    let stage = Stage::new(group, &graph, tree, false);
     let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
     for (pass, way) in ways.iter().enumerate() {
         line.pass(pass, *way, &mut links);
@@ -46,6 +51,18 @@ pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Opti
         links.iter_mut().zip(&starts).map(|(link, start)| results_of_turn(plan, group, link, *start)).collect();
     let mut build = Build { group, line: &line, graphs: &graphs, links: &links, starts: &starts, own, ways, results };
     Some(build.program(options))
+}
+
+/// Whether loops can carry the constraints where they matter: cuts between a body and the ground whose rows are constant in its
+/// axes, so that nothing pulls at the joints as they turn.
+fn carried(group: Group, tree: &Tree<Expr>) -> bool {
+    let steady = |closure: &Closure<Expr>| {
+        use Closure::{Cylindrical, Fixed, Helical, Pin, Planar, Slider, Spherical};
+        matches!(closure, Pin | Slider | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
+    };
+    let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.b.node.is_none() && steady(&cut.closure));
+    let solves = matches!(group, Group::Rates | Group::Velocities | Group::Energy);
+    !solves || tree.constraints.iter().all(|c| simple(&c.bond))
 }
 
 /// First coordinate and velocity of a node.

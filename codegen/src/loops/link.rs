@@ -2,7 +2,7 @@
 //! taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
-use mbd_runtime::tree::{Dims, Kind, Node, Source, Tree};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Shared, Source, Tree, TreeFrame};
 use mbd_runtime::Scalar;
 
 use super::runs::{map_node, Run, Slot};
@@ -54,7 +54,7 @@ pub struct Link<'g> {
 
 impl<'g> Link<'g> {
     /// Nothing done yet.
-    pub fn new(graph: &'g Graph, group: Group, run: &Run, efforts: bool) -> Self {
+    pub fn new(graph: &'g Graph, group: Group, run: &Run, tree: &Tree<Expr<'_>>, efforts: bool) -> Self {
         let mut inputs = Vec::new();
         let mut symbols = |of: &dyn Fn(usize) -> LinkInput, n: usize| -> Vec<Expr<'g>> {
             let first = inputs.len();
@@ -87,22 +87,26 @@ impl<'g> Link<'g> {
             params: Vec::new(),
             gravity: [zero; 3],
         };
-        let dims = Dims { nq, nv, ..Dims::default() };
+        let dims = Dims { nq, nv, rows: tree.dims.rows, ..Dims::default() };
+        let constraints: Vec<_> = tree.constraints.iter().map(|c| stand_in(c, run)).collect();
+        // Numbered as in the tree; coordinates are open nowhere in a run.
+        let row = |shared: &Shared| if let Shared::Row(_) = shared { *shared } else { Shared::Row(0) };
+        let shared = if constraints.is_empty() { Vec::new() } else { tree.shared.iter().map(row).collect() };
         let tree = Tree {
             nodes,
             dims,
-            shared: Vec::new(),
+            shared,
             solve_at_ground: Vec::new(),
             ground_moment: [zero; 3],
             wrenches: Vec::new(),
-            constraints: Vec::new(),
+            constraints,
             tolerance: Expr::rank_tolerance(),
             frames: Vec::new(),
             joint_nodes: Vec::new(),
             accelerations: None,
             matrix_depth: 0,
         };
-        let stage = Stage::new(group, graph, tree);
+        let stage = Stage::new(group, graph, tree, true);
         Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) }
     }
 
@@ -153,22 +157,28 @@ impl<'g> Link<'g> {
     fn turn(&self, stage: &mut Stage<'g>, pass: usize, way: Way, incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
         stage.begin(pass, &self.given);
         let (inner, outer) = (0, self.nodes);
-        match way {
+        let (local, running) = incoming.split_at(stage.carried(pass, outer).len());
+        for (own, from) in stage.running(pass).into_iter().zip(running) {
+            *own = *from;
+        }
+        let mut out: Vec<Expr<'g>> = match way {
             Way::Back => {
-                for (own, from) in stage.carried(pass, outer).into_iter().zip(incoming) {
+                for (own, from) in stage.carried(pass, outer).into_iter().zip(local) {
                     *own = *own + *from;
                 }
                 (1..=outer).rev().for_each(|i| stage.node(pass, i, &self.given));
                 stage.carried(pass, inner).into_iter().map(|e| *e).collect()
             }
             Way::Forth => {
-                for (own, from) in stage.carried(pass, inner).into_iter().zip(incoming) {
+                for (own, from) in stage.carried(pass, inner).into_iter().zip(local) {
                     *own = *from;
                 }
                 (1..=outer).for_each(|i| stage.node(pass, i, &self.given));
                 stage.carried(pass, outer).into_iter().map(|e| *e).collect()
             }
-        }
+        };
+        out.extend(stage.running(pass).into_iter().map(|e| *e));
+        out
     }
 
     /// Results of one turn, after the last pass.
@@ -184,6 +194,26 @@ fn symbols_of<'g>(incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
         Expr::Const(x) => Expr::Const(x),
     });
     plain.collect()
+}
+
+/// A constraint as a turn sees it: on the path to a frame if all of the run is.
+fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr<'g>> {
+    let on_path = |path: &[usize]| match path.contains(&run.nodes.start) {
+        true => (1..=run.period).collect(),
+        false => Vec::new(),
+    };
+    let [path_a, path_b] = match &constraint.bond {
+        Bond::Cut(cut) => [on_path(&cut.path_a), on_path(&cut.path_b)],
+        Bond::Coupling { .. } => [Vec::new(), Vec::new()],
+    };
+    let nowhere = || TreeFrame { node: None, place: Vec::new() };
+    Constraint {
+        bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b }),
+        slots: constraint.slots.clone(),
+        first: constraint.first,
+        decay: None,
+        velocities: Vec::new(),
+    }
 }
 
 /// Stands for whatever is inboard of a turn: has no inertia, and is never stepped.

@@ -90,6 +90,8 @@ impl<'m> MainLine<'m, '_> {
             Way::Forth => (parent, run.last()),
         };
         let mut start: Vec<Expr<'m>> = self.stage.carried(pass, from).into_iter().map(|e| *e).collect();
+        let local = start.len();
+        start.extend(self.stage.running(pass).into_iter().map(|e| *e));
         let at = self.graph.len();
         links[k].pass(way, &start);
         let negative = &links[k].passes[pass].negative;
@@ -107,12 +109,16 @@ impl<'m> MainLine<'m, '_> {
                 }
             })
             .collect();
-        for ((place, out), negative) in self.stage.carried(pass, to).into_iter().zip(&end).zip(negative) {
-            let out = if *negative { -*out } else { *out };
+        let signed = |(out, negative): (&Expr<'m>, &bool)| if *negative { -*out } else { *out };
+        let out: Vec<Expr<'m>> = end.iter().zip(negative).map(signed).collect();
+        for (place, out) in self.stage.carried(pass, to).into_iter().zip(&out[..local]) {
             *place = match way {
-                Way::Back => *place + out,
-                Way::Forth => out,
+                Way::Back => *place + *out,
+                Way::Forth => *out,
             };
+        }
+        for (place, out) in self.stage.running(pass).into_iter().zip(&out[local..]) {
+            *place = *out;
         }
         self.events.push(Event { at, run: k, pass, start, end });
     }

@@ -192,9 +192,6 @@ pub fn looped(plan: &Plan, group: Group, options: &Options) -> Option<LoopProgra
         Loops::Auto => LEAST,
         Loops::Always => LEAST_ALWAYS,
     };
-    stage::passes(group)?;
-    if !plan.constraints.is_empty() {
-        return None;
-    }
+    stage::passes(group, !plan.constraints.is_empty())?;
     build::build(plan, group, options, least)
 }

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mbd_runtime::spatial::Step;
-use mbd_runtime::tree::{Kind, Node, Source, Tree};
+use mbd_runtime::tree::{Bond, Kind, Node, Shared, Source, Tree};
 
 use crate::symbolic::Expr;
 
@@ -97,7 +97,8 @@ fn constant_link(tree: &Tree<Expr>, i: usize) -> Option<Node<f64>> {
         && !node.gather
         && !node.unturned
         && !node.parent.is_some_and(|p| tree.nodes[p].gather || tree.nodes[p].unturned)
-        && node.open.is_empty()
+        && node.open.iter().all(|&g| matches!(tree.shared[g], Shared::Row(_)))
+        && !tree.constraints.iter().any(|c| ends_at(&c.bond, i))
         && node.ends.is_empty()
         && node.screws.is_empty()
         && node.solve_before.is_empty()
@@ -112,6 +113,14 @@ fn constant_link(tree: &Tree<Expr>, i: usize) -> Option<Node<f64>> {
         }
     });
     (plain && constant).then_some(link)
+}
+
+/// Whether a constraint acts on node `i` itself.
+fn ends_at(bond: &Bond<Expr>, i: usize) -> bool {
+    match bond {
+        Bond::Cut(cut) => [cut.a.node, cut.b.node].contains(&Some(i)),
+        Bond::Coupling { terms, .. } => terms.iter().any(|(node, _)| *node == i),
+    }
 }
 
 /// Runs in a path: strictly alike where that covers most of it, otherwise as alike as possible.
@@ -186,6 +195,7 @@ fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
     std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
         && a.quarter == b.quarter
         && a.parent_side == b.parent_side
+        && a.open == b.open
 }
 
 /// The same structure and zeros and ones in the same places.

@@ -20,9 +20,12 @@ pub enum Way {
     Forth,
 }
 
-/// Passes of a group; `None` for groups that have no loop form.
-pub fn passes(group: Group) -> Option<&'static [Way]> {
+/// Passes of a group; `None` for groups that have no loop form. With constraints, `constrained`, the way to their frames
+/// comes first.
+pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
     match group {
+        Group::Rates | Group::Velocities | Group::Energy if constrained => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        Group::Accelerations if constrained => None,
         Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),
         Group::Momenta | Group::InverseDynamics | Group::Bias => Some(&[Way::Forth, Way::Back]),
         Group::Accelerations => Some(&[Way::Forth, Way::Back, Way::Forth]),
@@ -35,6 +38,10 @@ pub fn passes(group: Group) -> Option<&'static [Way]> {
 pub struct Stage<'g> {
     group: Group,
     graph: &'g Graph,
+    /// Whether the first pass goes to the frames of constraints.
+    reaches: bool,
+    /// Whether it is a link alone, whose constraints stand for columns that are carried.
+    alone: bool,
     /// Whether momentum rates wait for accumulated momenta.
     gathers: bool,
     /// The mechanism, regrouped.
@@ -50,17 +57,26 @@ pub struct Stage<'g> {
 
 impl<'g> Stage<'g> {
     /// Nothing done yet.
-    pub fn new(group: Group, graph: &'g Graph, tree: Tree<Expr<'g>>) -> Self {
+    pub fn new(group: Group, graph: &'g Graph, tree: Tree<Expr<'g>>, alone: bool) -> Self {
         let zeros = |n: usize| vec![Expr::zero(); n];
         let (nq, nv) = (tree.dims.nq, tree.dims.nv);
         let work = Workspace::new(&tree);
         let energy = [Expr::zero(); 2];
+        let solves = matches!(group, Group::Rates | Group::Velocities | Group::Energy);
+        let reaches = solves && !tree.constraints.is_empty();
         let gathers = tree.nodes.iter().any(|n| n.gather);
-        Stage { group, graph, gathers, work, v: zeros(nv), qd: zeros(nq), pd: zeros(nv), p: zeros(nv), energy, tree }
+        let (v, qd, pd, p) = (zeros(nv), zeros(nq), zeros(nv), zeros(nv));
+        Stage { group, graph, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
+    }
+
+    /// The pass among those of a mechanism without constraints; `None`: that to the frames of the constraints.
+    fn own(&self, pass: usize) -> Option<usize> {
+        pass.checked_sub(usize::from(self.reaches))
     }
 
     /// Before the first node of a pass.
     pub fn begin(&mut self, pass: usize, given: &Given<'g>) {
+        let own = self.own(pass);
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
         if pass == 0 && self.group != Group::Momenta {
@@ -69,7 +85,12 @@ impl<'g> Stage<'g> {
                 sweeps.articulate_node(i, &given.q, &given.drive[0], &mut w.poses);
             }
         }
-        let load = Load::velocities(&given.second, &u, &[]);
+        let Some(pass) = own else { return sweeps.reach_begin(w) };
+        if self.reaches && pass == 0 && !self.alone {
+            sweeps.set_rows(w);
+        }
+        let rows = w.constraints.rhs.clone();
+        let load = Load::velocities(&given.second, &u, &rows);
         match (self.group, pass) {
             (Group::Momenta, 1) => sweeps.momentum_begin(w),
             (Group::Momenta | Group::InverseDynamics | Group::Bias, _) | (Group::Accelerations, 0) => {}
@@ -87,6 +108,9 @@ impl<'g> Stage<'g> {
             }
             (_, 0) => {
                 sweeps.factor_begin(&w.poses, &mut w.factor);
+                if !self.alone {
+                    sweeps.seed_columns(&w.constraints.rows, &mut w.factor);
+                }
                 sweeps.remainder_begin(&load, &mut w.velocity);
                 sweeps.moment_begin(w);
             }
@@ -101,6 +125,9 @@ impl<'g> Stage<'g> {
 
     /// One node of a pass.
     pub fn node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+        let Some(pass) = self.own(pass) else {
+            return Sweeps { tree: &self.tree, trace: self.graph }.reach_node(i, &mut self.work);
+        };
         match self.group {
             Group::Momenta => self.momentum_node(pass, i, given),
             Group::Accelerations => self.acceleration_node(pass, i, given),
@@ -150,7 +177,7 @@ impl<'g> Stage<'g> {
     fn velocity_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
-        let load = Load::velocities(&given.second, &u, &[]);
+        let load = Load::velocities(&given.second, &u, &w.constraints.rhs);
         if pass == 0 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
             sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
@@ -177,6 +204,7 @@ impl<'g> Stage<'g> {
 
     /// After the last node of a pass.
     pub fn end(&mut self, pass: usize, given: &Given<'g>) {
+        let Some(pass) = self.own(pass) else { return };
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
         match (self.group, pass) {
@@ -189,7 +217,8 @@ impl<'g> Stage<'g> {
             (Group::Accelerations, _) => {}
             (_, 0) => {
                 sweeps.factor_ground(&mut w.factor);
-                sweeps.remainder_ground(&w.factor, &Load::velocities(&given.second, &u, &[]), &mut w.velocity);
+                let load = Load::velocities(&given.second, &u, &w.constraints.rhs);
+                sweeps.remainder_ground(&w.factor, &load, &mut w.velocity);
             }
             _ => {}
         }
@@ -236,6 +265,8 @@ impl<'g> Stage<'g> {
     /// What a pass carries through node `i`: on the way back what its children hand to it, on the way forth what it hands
     /// to its children.
     pub fn carried(&mut self, pass: usize, i: usize) -> Vec<&mut Expr<'g>> {
+        let Some(pass) = self.own(pass) else { return Vec::new() };
+        let (n, slots) = (self.tree.nodes.len(), slots(&self.tree));
         let w = &mut self.work;
         match (self.group, pass) {
             (Group::Momenta, 0) => motion(&mut w.velocity.omega[i]),
@@ -256,6 +287,8 @@ impl<'g> Stage<'g> {
                 if group != Group::Velocities {
                     all.extend(w.loads.moment[i].iter_mut().chain(Some(&mut w.loads.mass[i])));
                 }
+                let columns = w.factor.columns.iter_mut().enumerate();
+                columns.filter(|(k, _)| k % n == i && slots.contains(&(k / n))).for_each(|(_, c)| all.extend(force(c)));
                 all
             }
             (group, _) => {
@@ -269,6 +302,32 @@ impl<'g> Stage<'g> {
             }
         }
     }
+
+    /// What a pass carries whatever node it is at: sums over all nodes so far, and multipliers.
+    pub fn running(&mut self, pass: usize) -> Vec<&mut Expr<'g>> {
+        if !self.reaches {
+            return Vec::new();
+        }
+        let (own, ng, slots) = (self.own(pass), self.tree.shared.len(), slots(&self.tree));
+        let w = &mut self.work;
+        let Some(pass) = own else {
+            let ends = w.constraints.reach.iter_mut().flatten();
+            return ends.flat_map(|(rot, pos)| rot.iter_mut().flatten().chain(pos)).collect();
+        };
+        let row = |g: &usize| slots.contains(g);
+        let rates = w.velocity.shared_rate.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
+        if pass == 1 {
+            return rates.collect();
+        }
+        let gram = w.factor.gram.iter_mut().enumerate().filter(|(k, _)| row(&(k / ng)) && row(&(k % ng)));
+        let whole = w.factor.whole.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
+        rates.chain(whole).chain(gram.map(|(_, x)| x)).collect()
+    }
+}
+
+/// Places of the constraints' rows among the shared coordinates.
+fn slots(tree: &Tree<Expr>) -> Vec<usize> {
+    tree.constraints.iter().flat_map(|c| c.slots.iter().copied()).collect()
 }
 
 /// Accelerations that the inverse dynamics of a group start from.

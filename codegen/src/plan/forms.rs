@@ -455,6 +455,14 @@ fn eligible(node: &PlanNode) -> bool {
     single && plain && matches!(node.source, Source::State { .. })
 }
 
+/// The same, though columns of constraints go by.
+fn eligible_in_loop(plan: &Plan, i: usize) -> bool {
+    let row = |g: &usize| matches!(plan.shared[*g], Shared::Row(_));
+    let mut node = plan.nodes[i].clone();
+    node.open.retain(|g| !row(g));
+    eligible(&node)
+}
+
 /// Number of children of every node.
 fn children(plan: &Plan) -> Vec<usize> {
     let mut children = vec![0; plan.nodes.len()];
@@ -487,7 +495,7 @@ pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
     }
     for i in long.concat() {
         plan.nodes[i].looped = true;
-        plan.nodes[i].parent_side = fastest && eligible(&plan.nodes[i]);
+        plan.nodes[i].parent_side = fastest && eligible_in_loop(plan, i);
     }
 }
 

@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 use crate::system::Real;
 
 /// Rows that stand out of the others by less than this part of the largest count as dependent on them: the square root of the
-/// part of a pivot of `Φ M⁻¹ Φᵀ` that kernels drop a row at.
+/// part of a pivot of `Φ M⁻¹ Φᵀ` that kernels leave a row out at.
 pub(super) fn rank_tolerance<S: Real>() -> S {
-    S::constant(if S::epsilon() < 1e-10 { 1e-5 } else { 3e-3 })
+    S::rank_tolerance().sqrt()
 }
 
 fn dot<S: Real>(a: &[S], b: &[S]) -> S {

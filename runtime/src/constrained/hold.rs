@@ -97,12 +97,13 @@ where
         }
     }
 
-    /// The largest residual that was found at the end of the last step, before anything was done, m or rad.
+    /// The largest residual of the last state that was corrected, at the end of a step or inside of it, before anything was
+    /// done, m or rad.
     pub fn drift(&self) -> Y::Scalar {
         self.found
     }
 
-    /// Multipliers `σ` that the last step ended with.
+    /// Multipliers `σ` that it had.
     pub fn sigma(&self) -> &Y::Rows {
         &self.sigma
     }

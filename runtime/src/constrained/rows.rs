@@ -1,6 +1,7 @@
 //! Products with `Φ`, row by row.
 
-use crate::system::{Constrained, Real};
+use crate::system::{Constrained, Real, Row};
+#[cfg(feature = "alloc")]
 use crate::Scalar;
 
 /// Index and size of the largest of some numbers; the first that is not a number is larger than all.
@@ -17,11 +18,16 @@ pub(super) fn worst<S: Real>(x: &[S]) -> (usize, S) {
     found
 }
 
+/// Columns and values of a row of `Φ`.
+fn row<'a, S>(row: &Row, columns: &'a [usize], entries: &'a [S]) -> impl Iterator<Item = (&'a usize, &'a S)> {
+    let range = row.first..row.first + row.len;
+    columns.get(range.clone()).unwrap_or(&[]).iter().zip(entries.get(range).unwrap_or(&[]))
+}
+
 /// `p += Φᵀ σ`.
 pub(super) fn add_forces<Y: Constrained>(system: &Y, entries: &Y::Entries, sigma: &Y::Rows, p: &mut Y::Momenta) {
-    for (row, sigma) in system.rows().iter().zip(sigma.as_ref()) {
-        let columns = system.entry_columns().iter().zip(entries.as_ref());
-        for (column, entry) in columns.skip(row.first).take(row.len) {
+    for (r, sigma) in system.rows().iter().zip(sigma.as_ref()) {
+        for (column, entry) in row(r, system.entry_columns(), entries.as_ref()) {
             if let Some(p) = p.as_mut().get_mut(*column) {
                 *p = *p + *entry * *sigma;
             }
@@ -30,12 +36,10 @@ pub(super) fn add_forces<Y: Constrained>(system: &Y, entries: &Y::Entries, sigma
 }
 
 /// `Φ v`.
+#[cfg(feature = "alloc")]
 pub(super) fn rates<Y: Constrained>(system: &Y, entries: &Y::Entries, v: &Y::Momenta, out: &mut Y::Rows) {
-    for (row, out) in system.rows().iter().zip(out.as_mut()) {
-        let columns = system.entry_columns().iter().zip(entries.as_ref());
-        *out = columns
-            .skip(row.first)
-            .take(row.len)
+    for (r, out) in system.rows().iter().zip(out.as_mut()) {
+        *out = row(r, system.entry_columns(), entries.as_ref())
             .fold(Y::Scalar::zero(), |sum, (column, entry)| v.as_ref().get(*column).map_or(sum, |v| sum + *entry * *v));
     }
 }

@@ -68,6 +68,43 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Poses and rows of the constraints; `b` of each from its decay.
     pub(super) fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
         self.articulate(q, u.drive_q, &mut w.poses);
+        self.reach_begin(w);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            self.trace.at(None, Quantity::Constraint);
+            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
+                path.iter().for_each(|&i| self.reach(i, index, side, w));
+            }
+        }
+        self.set_rows(w);
+    }
+
+    /// Before the first [`Sweeps::reach_node`].
+    pub fn reach_begin(&self, w: &mut Workspace<S>) {
+        let (o, one) = (S::zero(), S::one());
+        w.constraints.reach.fill([([[one, o, o], [o, one, o], [o, o, one]], [o; 3]); 2]);
+    }
+
+    /// The step from its parent to node `i` in the paths of all cuts that go by it, its parent being done.
+    pub fn reach_node(&self, i: usize, w: &mut Workspace<S>) {
+        self.trace.at(Some(i), Quantity::Constraint);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
+                if path.contains(&i) {
+                    self.reach(i, index, side, w);
+                }
+            }
+        }
+    }
+
+    fn reach(&self, i: usize, index: usize, side: usize, w: &mut Workspace<S>) {
+        let (rot, pos) = &mut w.constraints.reach[index][side];
+        self.steps(&w.poses, i).for_each(|step| step.pose(rot, pos));
+    }
+
+    /// Rows of the constraints, the paths of all cuts being known.
+    pub fn set_rows(&self, w: &mut Workspace<S>) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
@@ -86,7 +123,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Rows of a cut, in its second frame and at the nodes.
     fn cut_rows(&self, index: usize, constraint: &Constraint<S>, cut: &Cut<S>, w: &mut Workspace<S>) {
-        let at = self.relative(cut, &w.poses);
+        let at = self.relative(cut, w.constraints.reach[index], &w.poses);
         let (directions, residuals) = (cut.closure.directions(&at), cut.closure.residuals(&at));
         w.constraints.relative[index] = at;
         for (k, r) in constraint.range().enumerate() {
@@ -97,15 +134,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Pose of the first frame in the second, by way of the innermost common node.
-    fn relative(&self, cut: &Cut<S>, poses: &Poses<S>) -> Relative<S> {
-        let pose = |path: &[usize], frame: &TreeFrame<S>| {
-            let (o, one) = (S::zero(), S::one());
-            let (mut rot, mut pos): (Mat3<S>, Vec3<S>) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
-            path.iter().flat_map(|&i| self.steps(poses, i)).for_each(|step| step.pose(&mut rot, &mut pos));
-            self.on_body(poses, frame).for_each(|step| step.pose(&mut rot, &mut pos));
-            (rot, pos)
-        };
-        let ((ra, pa), (rb, pb)) = (pose(&cut.path_a, &cut.a), pose(&cut.path_b, &cut.b));
+    fn relative(&self, cut: &Cut<S>, reach: [(Mat3<S>, Vec3<S>); 2], poses: &Poses<S>) -> Relative<S> {
+        let [mut a, mut b] = reach;
+        for (frame, (rot, pos)) in [(&cut.a, &mut a), (&cut.b, &mut b)] {
+            self.on_body(poses, frame).for_each(|step| step.pose(rot, pos));
+        }
+        let ((ra, pa), (rb, pb)) = (a, b);
         let way: Vec3<S> = core::array::from_fn(|k| pb[k] - pa[k]);
         let along = |k: usize, x: Vec3<S>| rb[0][k] * x[0] + rb[1][k] * x[1] + rb[2][k] * x[2];
         let turn = core::array::from_fn(|i| core::array::from_fn(|k| along(i, [ra[0][k], ra[1][k], ra[2][k]])));
@@ -145,12 +179,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Pivot of row `r`, the shared `g`: negative, or zero where what is left of the row's diagonal is too little of what it
     /// was, or of what those of its constraint are together. The first says that it follows from rows before it, the second
-    /// that its bodies cannot move along it.
+    /// that its bodies cannot move along it. Where they can move along none of its rows, all of them are rounding, and small
+    /// beside what a body of 1 kg or 1 kg m² would give, for which the one stands.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.shared.len();
         let tolerance = self.tree.tolerance;
         let all = self.tree.constraint_of(r).slots.iter().fold(S::zero(), |sum, &h| sum + f.whole[h]);
-        let floor = tolerance * (f.whole[g] + tolerance * all);
+        let floor = tolerance * (f.whole[g] + tolerance * (all + S::one()));
         -(-f.gram[g * ng + g]).reciprocal_above(floor)
     }
 

@@ -33,7 +33,7 @@ fn nothing_is_moved_in_vain() {
     assert_eq!((q.clone(), closed.iterations, closed.rank), (start, 0, 2));
     let mut q = vec![0.61, -0.8, 1.2, -1.61];
     close(&mut y, &mut q, &Closing::default()).unwrap();
-    assert!(y.off(&q, &vec![0.0; 4]).0 < 1e-15);
+    assert!(y.off(&q, &[0.0; 4]).0 < 1e-15);
 }
 
 /// Lengths that cannot meet: 5 m of ground, 1 + 1 + 1 m of links. What is left is the gap, shared: the sum of squares of `φ` at its

@@ -89,15 +89,15 @@ fn orders() {
             assert!(found > f64::from(order) - 0.4, "{name} {policy:?}: {found}");
         }
     }
-    check("euler", 1, 200, |y| Euler::new(y));
-    check("semi-implicit", 1, 200, |y| SemiImplicitEuler::new(y));
-    check("rk4", 4, 25, |y| Rk4::new(y));
+    check("euler", 1, 200, Euler::new);
+    check("semi-implicit", 1, 200, SemiImplicitEuler::new);
+    check("rk4", 4, 25, Rk4::new);
     check("rk4 doubled", 4, 15, |y| StepDoubling::new(y, Rk4::new(y)));
-    check("tsit5", 5, 20, |y| Tsit5::new(y));
-    check("dop853", 8, 5, |y| Dop853::new(y));
-    check("abm4", 4, 100, |y| Abm4::new(y));
+    check("tsit5", 5, 20, Tsit5::new);
+    check("dop853", 8, 5, Dop853::new);
+    check("abm4", 4, 100, Abm4::new);
     // Its order, 12, shows only where the error is round-off.
-    check("gauss12", 8, 2, |y| Gauss12Inserted::new(y));
+    check("gauss12", 8, 2, Gauss12Inserted::new);
 }
 
 /// Steps by error control, with stages used again, dense output on the way, events' states.
@@ -126,9 +126,9 @@ fn adaptive_steps() {
             assert!(error < factor * 1e-10, "{name} {policy:?}: {error}");
         }
     }
-    check("tsit5", 200.0, |y| Tsit5::new(y));
-    check("dop853", 200.0, |y| Dop853::new(y));
-    check("adams", 200.0, |y| VariableAdams::new(y));
+    check("tsit5", 200.0, Tsit5::new);
+    check("dop853", 200.0, Dop853::new);
+    check("adams", 200.0, VariableAdams::new);
 }
 
 /// A redundant row changes nothing.

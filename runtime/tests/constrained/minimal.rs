@@ -8,10 +8,7 @@ use mbd_runtime::{Energetic, System};
 
 type State = (Vec<f64>, Vec<f64>);
 
-fn minimal<T: Model>(y: &Closed<T>, (q, p): &State) -> (Minimal<Closed<T>>, State)
-where
-    T: Clone,
-{
+fn minimal<T: Model + Clone>(y: &Closed<T>, (q, p): &State) -> (Minimal<Closed<T>>, State) {
     let (mut q, mut p) = (q.clone(), p.clone());
     let y = Minimal::new(y.clone(), &mut q, &mut p).unwrap();
     (y, (q, p))
@@ -76,8 +73,8 @@ fn the_same_motion_as_method_one() {
         assert!(error < 1e-7 && drift < 5e-7, "{name}");
         assert!(switches > 5 && record.iter().all(|s| s.pivot > 2.0), "{name}: {switches}");
     }
-    check("dop853", |y| Dop853::new(y));
-    check("verner9", |y| Verner9::new(y));
+    check("dop853", Dop853::new);
+    check("verner9", Verner9::new);
 }
 
 /// Order 4 with steps of one size, in a method with a history as well, which starts anew after a switch.
@@ -100,9 +97,9 @@ fn orders() {
         assert!(m.switches().0 > 0);
         apart(&end.0, &reference.0)
     }
-    let errors = [100, 200].map(|n| error(&y, &start, &reference, n, |y| Rk4::new(y)));
+    let errors = [100, 200].map(|n| error(&y, &start, &reference, n, Rk4::new));
     assert!((errors[0] / errors[1]).log2() > 3.6, "{errors:?}");
-    let errors = [400, 800].map(|n| error(&y, &start, &reference, n, |y| Abm4::new(y)));
+    let errors = [400, 800].map(|n| error(&y, &start, &reference, n, Abm4::new));
     assert!((errors[0] / errors[1]).log2() > 3.4, "{errors:?}");
 }
 

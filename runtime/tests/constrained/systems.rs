@@ -108,13 +108,14 @@ impl<T: Model> Closed<T> {
     }
 
     /// The largest residual, of positions and of velocities.
-    pub fn off(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
+    pub fn off(&mut self, q: &[f64], p: &[f64]) -> (f64, f64) {
         let (v, _, phi) = self.velocities(q, p);
         let residual = self.model.closure(q).0;
         let rates = phi.iter().map(|row| row.iter().zip(&v).map(|(a, v)| a * v).sum::<f64>());
         (residual.iter().fold(0.0, |m, x| m.max(x.abs())), rates.fold(0.0, |m, x| m.max(x.abs())))
     }
 
+    #[allow(clippy::ptr_arg)] // what the trait takes
     pub fn energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> f64 {
         let (t, v) = self.state_energy(q, p);
         t + v

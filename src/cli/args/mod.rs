@@ -2,6 +2,7 @@
 
 #[cfg_attr(not(feature = "bench"), allow(dead_code))]
 pub mod bench;
+pub mod experiments;
 mod values;
 
 use std::path::PathBuf;
@@ -58,6 +59,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Show what the generator made of a model on the way
     Explain(ExplainArgs),
+    /// Repeat the experiments of the thesis's chapter 7
+    Experiments(experiments::ExperimentsArgs),
     /// Measure integrators: work against error, long runs, stress
     Bench(bench::BenchArgs),
 }

@@ -31,7 +31,7 @@ pub fn pivot(dense: &Dense, dependents: &[usize]) -> f64 {
     let mut phi = dense.phi.clone();
     for k in 0..phi.nrows() {
         let length = phi.row(k).norm();
-        phi.row_mut(k).scale_mut(if length > 1e-12 * dense.phi.amax() { 1.0 / length } else { 0.0 });
+        phi.row_mut(k).scale_mut(if length > 1e-12 { 1.0 / length } else { 0.0 });
     }
     let mut values: Vec<f64> = phi.select_columns(dependents).singular_values().iter().copied().collect();
     values.sort_by(|a, b| b.total_cmp(a));

@@ -8,6 +8,7 @@ use mbd_testing::closed::LoopSystem;
 use mbd_testing::kkt::Rows;
 use nalgebra::{DMatrix, DVector};
 
+pub mod case;
 pub mod minimal;
 pub mod thesis;
 
@@ -20,7 +21,7 @@ pub const ZERO: f64 = 1e-6;
 /// And above this they are clearly not.
 pub const CLEAR: f64 = 1e-3;
 
-/// Rows of `Φ L⁻ᵀ` smaller than this beside the largest are rounding.
+/// Rows of `Φ`, which come from unit directions and arms of about one metre, smaller than this are rounding.
 const NOTHING: f64 = 1e-12;
 
 /// Mass matrix and constraints of a system in its state.
@@ -69,9 +70,7 @@ impl Dense {
         let lower = m.clone().cholesky().expect("M is positive definite").l();
         let mut w = lower.solve_lower_triangular(&phi.transpose()).expect("L is regular").transpose();
         // A row that nothing moves along is zero, not what rounding left of it.
-        let largest = (0..rows).map(|k| w.row(k).norm()).fold(0.0, f64::max);
-        let lengths =
-            Vector::from_fn(rows, |k, _| Some(w.row(k).norm()).filter(|l| *l > NOTHING * largest).unwrap_or(0.0));
+        let lengths = Vector::from_fn(rows, |k, _| if phi.row(k).amax() > NOTHING { w.row(k).norm() } else { 0.0 });
         for k in 0..rows {
             w.row_mut(k).scale_mut(if lengths[k] > 0.0 { 1.0 / lengths[k] } else { 0.0 });
         }

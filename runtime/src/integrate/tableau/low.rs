@@ -86,3 +86,27 @@ pub static CASH_KARP: Tableau<6> = Tableau {
     fsal: false,
     dense: None,
 };
+
+/// Dormand and Prince 5(4), the pair of MATLAB's `ode45`; the estimate is that of the formula of order 4.
+///
+/// J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied Mathematics 6
+/// (1980).
+pub static DORMAND_PRINCE: Tableau<7> = Tableau {
+    name: "Dormand-Prince 5(4)",
+    order: 5,
+    c: list("0 1/5 3/10 4/5 8/9 1 1"),
+    a: lower([
+        "",
+        "1/5",
+        "3/40 9/40",
+        "44/45 -56/15 32/9",
+        "19372/6561 -25360/2187 64448/6561 -212/729",
+        "9017/3168 -355/33 46732/5247 49/176 -5103/18656",
+        "35/384 0 500/1113 125/192 -2187/6784 11/84",
+    ]),
+    b: list("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
+    error: &[list("71/57600 0 -71/16695 71/1920 -17253/339200 22/525 -1/40")],
+    error_order: 4,
+    fsal: true,
+    dense: None,
+};

@@ -218,6 +218,7 @@ fn low_orders() {
 #[test]
 fn pairs() {
     check(&RKF45, &[4]);
+    check(&DORMAND_PRINCE, &[4]);
     check(&CASH_KARP, &[4]);
     check(&TSIT5, &[4]);
     check(&VERNER9, &[8]);

@@ -1,0 +1,54 @@
+//! Times of calls.
+
+use std::time::Instant;
+
+/// Shortest time of a call of each, s, over rounds that take turns: what disturbs one disturbs the others too.
+pub fn least(calls: &mut [&mut dyn FnMut()], rounds: u32, round: f64) -> Vec<f64> {
+    let counts: Vec<u32> = calls.iter_mut().map(|call| count(call, round)).collect();
+    let mut best = vec![f64::INFINITY; calls.len()];
+    for _ in 0..rounds {
+        for ((call, &count), best) in calls.iter_mut().zip(&counts).zip(&mut best) {
+            *best = best.min(time(call, count) / f64::from(count));
+        }
+    }
+    best
+}
+
+fn time(call: &mut dyn FnMut(), count: u32) -> f64 {
+    let start = Instant::now();
+    (0..count).for_each(|_| call());
+    start.elapsed().as_secs_f64()
+}
+
+/// How many calls fill a round of so many seconds; they warm up the caches besides.
+fn count(call: &mut dyn FnMut(), round: f64) -> u32 {
+    let mut count = 1;
+    while count < 1 << 24 && time(call, count) < 0.5 * round {
+        count *= 2;
+    }
+    count
+}
+
+/// A straight line through points, by least squares.
+pub struct Line {
+    /// Value at zero.
+    pub start: f64,
+    /// Slope.
+    pub slope: f64,
+    /// Largest distance of a point from the line, relative to the line there.
+    pub farthest: f64,
+}
+
+impl Line {
+    /// Through points whose distances count relative to their sizes.
+    pub fn through(points: &[(f64, f64)]) -> Line {
+        // Weights 1/y²: the small ones say as much as the large ones.
+        let sum = |f: &dyn Fn(f64, f64) -> f64| points.iter().map(|&(x, y)| f(x, y) / (y * y)).sum::<f64>();
+        let (w, x, y) = (sum(&|_, _| 1.0), sum(&|x, _| x), sum(&|_, y| y));
+        let (xx, xy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));
+        let slope = (w * xy - x * y) / (w * xx - x * x);
+        let start = (y - slope * x) / w;
+        let apart = |&(x, y): &(f64, f64)| (y / (start + slope * x) - 1.0).abs();
+        Line { start, slope, farthest: points.iter().map(apart).fold(0.0, f64::max) }
+    }
+}
