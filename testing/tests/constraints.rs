@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use mbd_runtime::{Accelerated, Constrained, Energetic};
+use mbd_runtime::{Accelerated, Constrained, Energetic, System};
 use mbd_testing::random::Rng;
 
 mod dense;
