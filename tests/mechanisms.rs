@@ -171,7 +171,7 @@ fn they_keep_their_loops_and_their_energy() {
         let (mut residual, mut entries) = (system.zero_rows(), system.zero_entries());
         while driver.time() < case.time {
             driver.advance(&mut system, case.time).unwrap_or_else(|e| panic!("{}: {e}", case.name));
-            driver.state(&mut system, &mut q, &mut p);
+            driver.state(&system, &mut q, &mut p);
             let (kinetic, potential) = energy(&mut system, &q, &p);
             (scale, worst) = (scale.max(kinetic), worst.max((kinetic + potential - before).abs()));
             system.closure(&q, &mut residual, &mut entries);
@@ -195,6 +195,35 @@ fn they_keep_their_loops_and_their_energy() {
         );
         assert!(steps >= 5.0, "{}: it moves", case.name);
     }
+}
+
+/// Steps that jump over the change point go on smoothly: the bars stay parallel, three times round and more.
+#[test]
+fn a_parallelogram_passes_its_change_points() {
+    let plan = plan("fourbar_equal");
+    let (mut system, mut q) = closed(&plan);
+    let (mut v, mut p, mut sigma) = (vec![6.0, 0.0, 0.0], system.rest(), system.zero_rows());
+    system.momenta(&q, &v, &mut p);
+    system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
+    let before = sum(system.energy(&q, &p));
+    let start = catalogue::Start { q: &q.clone(), p: &p.clone(), step: Step::Fixed(0.002), compensated: false };
+    let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
+    let mut driver =
+        catalogue::explicit_bounded("dop853", &mut system, &start, hold).expect("it is there").expect("a start");
+    let (mut apart, mut lost, mut passed, mut above) = (0.0_f64, 0.0_f64, 0, true);
+    while driver.time() < 2.0 {
+        driver.advance(&mut system, 2.0).expect("a step");
+        driver.state(&system, &mut q, &mut p);
+        apart = apart.max((q[0] - q[2]).abs());
+        lost = lost.max((sum(system.energy(&q, &p)) - before).abs());
+        passed += u32::from((q[0].sin() > 0.0) != above);
+        above = q[0].sin() > 0.0;
+    }
+    assert!(passed >= 4, "{passed} change points");
+    // Positions are closed to 1e-14; near the fork, 1e-3 rad away, sideways only to that over 1e-3.
+    assert!(apart < 1e-9, "bars at {apart:e} rad");
+    assert!(lost < 1e-8 * 3.5, "{lost:e} J of 3.5 J");
 }
 
 /// Small motions of the bicycle at 5 m/s have the four published eigenvalues (Meijaard et al. 2007, table 2): the lean, sampled
@@ -241,7 +270,7 @@ fn the_bicycle_rides_as_published() {
         while driver.time() < end {
             driver.advance(&mut system, end).expect("a step");
         }
-        driver.state(&mut system, &mut q, &mut p);
+        driver.state(&system, &mut q, &mut p);
         leans.push(lean(&q));
     }
     // Leans of 1e-3 rad: what is not linear is of the third order, the bicycle being the same to both sides: 1e-6 of them.

@@ -104,7 +104,7 @@ fn held(plan: &Plan) -> Vec<bool> {
 /// # Errors
 /// Loops that do not close are told with their places in the file at `path`.
 pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
-    interpreter.check_rank(&start.to_vec()).map_err(|e| motion::rank_failure(plan, &e))?;
+    interpreter.check_rank(start).map_err(|e| motion::rank_failure(plan, &e))?;
     let held = held(plan);
     let mut q = start.to_vec();
     let closing = Closing { held: &held, ..Closing::default() };
