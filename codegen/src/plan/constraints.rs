@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use mbd_runtime::spatial::Axis;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Shared, Source, TreeFrame};
+use mbd_runtime::sweep::Sweeps;
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Shared, Source, Tree, TreeFrame};
+use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
 use super::elements::{Carried, Elements};
@@ -12,6 +14,9 @@ use super::placement::{direction, placement};
 use super::shared::ancestors;
 use super::{Plan, PlanFrame, PoseStep, Rigid};
 use crate::model::{ConstraintKind, LoopKind, Model, Mount, Value};
+use crate::options::{Group, Options};
+use crate::symbolic::{Expr, Graph};
+use crate::trace::Given;
 
 /// What a constraint binds, on nodes.
 #[derive(Clone, Debug)]
@@ -156,6 +161,31 @@ pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
         let decay = constraint.decay;
         plan.constraints.push(PlanConstraint { name: constraint.name, bond, slots, first, velocities, decay });
     }
+}
+
+/// Closes the columns of rows along which nothing can move whatever the coordinates are: those of a pin that closes a loop of
+/// parallel pins, three of five. The structure of the tree says so, in zeros.
+pub fn rest_idle(plan: &mut Plan) {
+    if plan.constraints.is_empty() {
+        return;
+    }
+    let graph = Graph::default();
+    let given = Given::new(&graph, plan, Group::Correction, &Options::default());
+    let tree: Tree<Expr> = plan.tree(&given.params);
+    let mut w = Workspace::new(&tree);
+    let [mut phi, mut pivots] = [plan.dims.rows, plan.dims.rows].map(|n| vec![Expr::Const(0.0); n]);
+    let mut dq = vec![Expr::Const(0.0); plan.dims.nv];
+    let sweeps = Sweeps { tree: &tree, trace: &graph };
+    sweeps.correction(&given.q, &given.inputs(), &mut w, &mut phi, &mut dq, &mut pivots);
+    let rows = plan.constraints.iter().flat_map(|c| c.slots.iter().zip(c.first..));
+    let idle: Vec<usize> =
+        rows.filter(|(_, r)| matches!(pivots[*r], Expr::Const(x) if x == 0.0)).map(|(g, _)| *g).collect();
+    for node in &mut plan.nodes {
+        for list in [&mut node.open, &mut node.solve_before, &mut node.solve_after] {
+            list.retain(|g| !idle.contains(g));
+        }
+    }
+    plan.solve_at_ground.retain(|g| !idle.contains(g));
 }
 
 /// Nodes whose freedoms a constraint binds.

@@ -251,6 +251,7 @@ impl Plan {
             .collect();
         shared::share(&mut plan);
         constraints::constrain(&mut plan, framed.mounts);
+        constraints::rest_idle(&mut plan);
         forms::lay_out(&mut plan, options);
         if options.forms != Forms::Single {
             forms::choose(&mut plan, options);
