@@ -7,7 +7,7 @@ use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
     close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Watch,
 };
-use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
+use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
 type Mechanism = Interpreter<f64>;
@@ -267,6 +267,39 @@ fn all_ways_lead_to_the_same_end() {
         });
         println!("{name} radau: {errors:?}");
         assert!((errors[0] / errors[1]).log2() > 4.4, "{name}: {errors:?}");
+    }
+}
+
+/// Every method of the catalogue runs with the projection around it, to the accuracy of its order.
+#[test]
+fn every_method_by_its_name() {
+    let (y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let mut y = y.closed;
+    let end = 0.2;
+    let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
+    let reference = march(&mut y, &mut fine, 1000, end, &start);
+    for entry in catalogue::entries() {
+        let from = catalogue::Start { q: &start.0, p: &start.1, step: Step::Fixed(1e-3), compensated: false };
+        let hold = |y: &Mechanism| Hold::new(y, Stabilisation::Mass, Effort::default());
+        let boundary = hold(&y);
+        let made = if entry.implicit {
+            catalogue::implicit_bounded(entry.name, &mut y, &from, boundary)
+        } else {
+            catalogue::explicit_bounded(entry.name, &mut y, &from, boundary)
+        };
+        let mut solver = made.expect(entry.name).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        let (mut q, mut p) = start.clone();
+        solver.run(&mut y, end).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        solver.state(&y, &mut q, &mut p);
+        let (error, drift) = (apart(&q, &reference.0), off(&mut y, &q));
+        println!("{}: {error:.1e}, drift {drift:.1e}", entry.name);
+        // First order with rates that change by some 30/s² in each of the 200 steps; second order; all others.
+        let bound = match entry.name {
+            "euler" | "semi-implicit-euler" | "backward-euler" => 2e-2,
+            "midpoint" | "implicit-midpoint" | "doubled" => 1e-4,
+            _ => 1e-7,
+        };
+        assert!(error < bound && drift < 1e-13, "{}: {error:e} {drift:e}", entry.name);
     }
 }
 
