@@ -481,3 +481,59 @@ fn nothing_is_allocated() {
         assert!(m.switches().0 > 0);
     }
 }
+
+/// Time a step, drift and energy of all ways on the redundant four-bar, 1 ms, 2 s; prints, and holds nothing:
+/// `cargo test -p mbd-testing --test constrained comparison -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints a comparison"]
+fn comparison() {
+    let (mut y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let before = energy(&mut y, &start.0, &start.1);
+    let mut best = [(f64::INFINITY, 0.0, 0.0); 9];
+    fn timed<Y, M>(y: &mut Y, mut method: M, start: &State) -> (f64, State)
+    where
+        Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+        M: Stepper<Y>,
+    {
+        let clock = std::time::Instant::now();
+        let end = march(y, &mut method, 2000, 2.0, start);
+        (clock.elapsed().as_secs_f64() / 2000.0, end)
+    }
+    let policies = [
+        Stabilisation::None,
+        Stabilisation::Settle,
+        Stabilisation::Mass,
+        Stabilisation::Gradient,
+        Stabilisation::Partition,
+    ];
+    for _ in 0..15 {
+        let mut note = |k: usize, (time, end): (f64, State), y: &mut Split<Mechanism, Mechanism>| {
+            let lost = (energy(y, &end.0, &end.1) - before).abs();
+            best[k] = (best[k].0.min(time), off(y, &end.0), lost);
+        };
+        for (k, policy) in policies.into_iter().enumerate() {
+            let method = held(&y.closed, Rk4::new(&y.closed), policy);
+            let end = timed(&mut y.closed, method, &start);
+            note(k, end, &mut y);
+        }
+        for (k, settle) in [false, true].into_iter().enumerate() {
+            let (mut q, mut p) = start.clone();
+            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let method = Bounded::new(&m, Rk4::new(&m), Watch { settle });
+            let end = timed(&mut m, method, &(q, p));
+            note(5 + k, end, &mut y);
+        }
+        let method = Rattle::new(&y);
+        let end = timed(&mut y, method, &start);
+        note(7, end, &mut y);
+        let method = IndexTwo::new(&y);
+        let end = timed(&mut y, method, &start);
+        note(8, end, &mut y);
+    }
+    let names =
+        ["none", "settle", "mass", "gradient", "partition", "minimal", "minimal settled", "rattle", "index two"];
+    for (name, (time, drift, lost)) in names.iter().zip(best) {
+        let ratio = time / best[0].0;
+        println!("{name:16} {:6.2} us/step, {ratio:5.2}, drift {drift:.1e}, energy {lost:.1e}", time * 1e6);
+    }
+}
