@@ -7,7 +7,7 @@ use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
     close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Watch,
 };
-use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
+use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
 type Mechanism = Interpreter<f64>;
@@ -270,6 +270,39 @@ fn all_ways_lead_to_the_same_end() {
     }
 }
 
+/// Every method of the catalogue runs with the projection around it, to the accuracy of its order.
+#[test]
+fn every_method_by_its_name() {
+    let (y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let mut y = y.closed;
+    let end = 0.2;
+    let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
+    let reference = march(&mut y, &mut fine, 1000, end, &start);
+    for entry in catalogue::entries() {
+        let from = catalogue::Start { q: &start.0, p: &start.1, step: Step::Fixed(1e-3), compensated: false };
+        let hold = |y: &Mechanism| Hold::new(y, Stabilisation::Mass, Effort::default());
+        let boundary = hold(&y);
+        let made = if entry.implicit {
+            catalogue::implicit_bounded(entry.name, &mut y, &from, boundary)
+        } else {
+            catalogue::explicit_bounded(entry.name, &mut y, &from, boundary)
+        };
+        let mut solver = made.expect(entry.name).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        let (mut q, mut p) = start.clone();
+        solver.run(&mut y, end).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        solver.state(&y, &mut q, &mut p);
+        let (error, drift) = (apart(&q, &reference.0), off(&mut y, &q));
+        println!("{}: {error:.1e}, drift {drift:.1e}", entry.name);
+        // First order with rates that change by some 30/s² in each of the 200 steps; second order; all others.
+        let bound = match entry.name {
+            "euler" | "semi-implicit-euler" | "backward-euler" => 2e-2,
+            "midpoint" | "implicit-midpoint" | "doubled" => 1e-4,
+            _ => 1e-7,
+        };
+        assert!(error < bound && drift < 1e-13, "{}: {error:e} {drift:e}", entry.name);
+    }
+}
+
 /// Implicit methods use the derivatives of the constrained rates, settled in between.
 #[test]
 fn implicit_methods() {
@@ -446,5 +479,61 @@ fn nothing_is_allocated() {
         let method = Bounded::new(&m, Rk4::new(&m), Watch { settle });
         check("minimal", &mut m, method, &(q, p));
         assert!(m.switches().0 > 0);
+    }
+}
+
+/// Time a step, drift and energy of all ways on the redundant four-bar, 1 ms, 2 s; prints, and holds nothing:
+/// `cargo test -p mbd-testing --test constrained comparison -- --ignored --nocapture`.
+#[test]
+#[ignore = "prints a comparison"]
+fn comparison() {
+    let (mut y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let before = energy(&mut y, &start.0, &start.1);
+    let mut best = [(f64::INFINITY, 0.0, 0.0); 9];
+    fn timed<Y, M>(y: &mut Y, mut method: M, start: &State) -> (f64, State)
+    where
+        Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+        M: Stepper<Y>,
+    {
+        let clock = std::time::Instant::now();
+        let end = march(y, &mut method, 2000, 2.0, start);
+        (clock.elapsed().as_secs_f64() / 2000.0, end)
+    }
+    let policies = [
+        Stabilisation::None,
+        Stabilisation::Settle,
+        Stabilisation::Mass,
+        Stabilisation::Gradient,
+        Stabilisation::Partition,
+    ];
+    for _ in 0..15 {
+        let mut note = |k: usize, (time, end): (f64, State), y: &mut Split<Mechanism, Mechanism>| {
+            let lost = (energy(y, &end.0, &end.1) - before).abs();
+            best[k] = (best[k].0.min(time), off(y, &end.0), lost);
+        };
+        for (k, policy) in policies.into_iter().enumerate() {
+            let method = held(&y.closed, Rk4::new(&y.closed), policy);
+            let end = timed(&mut y.closed, method, &start);
+            note(k, end, &mut y);
+        }
+        for (k, settle) in [false, true].into_iter().enumerate() {
+            let (mut q, mut p) = start.clone();
+            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let method = Bounded::new(&m, Rk4::new(&m), Watch { settle });
+            let end = timed(&mut m, method, &(q, p));
+            note(5 + k, end, &mut y);
+        }
+        let method = Rattle::new(&y);
+        let end = timed(&mut y, method, &start);
+        note(7, end, &mut y);
+        let method = IndexTwo::new(&y);
+        let end = timed(&mut y, method, &start);
+        note(8, end, &mut y);
+    }
+    let names =
+        ["none", "settle", "mass", "gradient", "partition", "minimal", "minimal settled", "rattle", "index two"];
+    for (name, (time, drift, lost)) in names.iter().zip(best) {
+        let ratio = time / best[0].0;
+        println!("{name:16} {:6.2} us/step, {ratio:5.2}, drift {drift:.1e}, energy {lost:.1e}", time * 1e6);
     }
 }
