@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::io::Write;
-use std::time::Instant;
 
 use multibody::runtime::integrate::tableau::RKF45;
 use multibody::runtime::{Interpreter, System};
@@ -49,8 +48,8 @@ struct Measured {
     n: usize,
     /// Time of an evaluation, s.
     evaluation: f64,
-    /// Evaluations for a second of motion, and what it takes, s; none where the steps became too small.
-    second: Option<(u64, f64)>,
+    /// Evaluations for a second of motion; none where the steps became too small.
+    second: Option<u64>,
 }
 
 /// How long is measured.
@@ -119,10 +118,8 @@ fn measure(family: &'static str, n: usize, effort: &Effort) -> Outcome<Measured>
     let mut mechanism = mechanism::read(&text(family, n))?;
     let evaluation = effort.times(std::slice::from_mut(&mut mechanism))[0];
     let y: Vec<f64> = mechanism.q.iter().copied().chain(mechanism.q.iter().map(|_| 0.0)).collect();
-    let start = Instant::now();
     let run = controlled(&mut Whole::new(&mut mechanism.system, Kind::Momenta), &RKF45, &y, 1.0, 1e-6);
-    let second = run.map(|run| (run.evaluations, start.elapsed().as_secs_f64()));
-    Ok(Measured { family, n, evaluation, second })
+    Ok(Measured { family, n, evaluation, second: run.map(|run| run.evaluations) })
 }
 
 fn of<'a>(all: &'a [Measured], family: &'a str) -> impl Iterator<Item = &'a Measured> {
@@ -158,20 +155,29 @@ fn told(line: &Line, unit: &str) -> String {
     format!("{start:.2} µs + {slope:.0} ns for every {unit}; no point is farther from that than {farthest:.0} %")
 }
 
+impl Measured {
+    /// Time that the evaluations for a second of motion take, s.
+    fn time(&self) -> Option<f64> {
+        self.second.map(|count| count as f64 * self.evaluation)
+    }
+}
+
 /// Figures 7.4 and 7.5 in numbers.
 fn seconds(all: &[Measured]) -> String {
-    let columns = ["links", "evaluations, open", "tree", "closed", "time, ms, open", "tree", "closed"];
+    let columns = ["links", "evaluations, open", "tree", "closed", "their time, ms, open", "tree", "closed"];
     let title = "Figures 7.5 and 7.4: a second of motion, Runge-Kutta-Fehlberg, both tolerances 1e-6";
     let mut text = head(title, &columns);
     let mut sizes: Vec<usize> = all.iter().map(|m| m.n).collect();
     sizes.sort_unstable();
     sizes.dedup();
     for n in sizes {
-        let second = |family| of(all, family).find(|m| m.n == n).map(|m| m.second);
-        let told = |x: Option<Option<String>>| x.map_or(String::new(), |x| x.unwrap_or_else(|| "–".into()));
+        let cell = |family, told: &dyn Fn(&Measured) -> Option<String>| {
+            let found = of(all, family).find(|m| m.n == n);
+            found.map_or(String::new(), |m| told(m).unwrap_or_else(|| "–".into()))
+        };
         let mut cells = vec![n.to_string()];
-        cells.extend(FAMILIES.map(|f| told(second(f).map(|s| s.map(|s| s.0.to_string())))));
-        cells.extend(FAMILIES.map(|f| told(second(f).map(|s| s.map(|s| format!("{:.1}", 1e3 * s.1))))));
+        cells.extend(FAMILIES.map(|f| cell(f, &|m| m.second.map(|count| count.to_string()))));
+        cells.extend(FAMILIES.map(|f| cell(f, &|m| m.time().map(|s| format!("{:.1}", 1e3 * s)))));
         row(&mut text, &cells);
     }
     let (count, _, time) = thesis::CHAIN100;
@@ -196,33 +202,40 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
         let panel = Panel { label: label.into(), lines: FAMILIES.map(line).into(), t: t.clone() };
         figure(out, path, name, title, "number of links", &[panel])
     };
-    let second = |m: &Measured| m.second.unwrap_or((0, f64::NAN));
-    draw("figure_7_4", "Time for a second of motion, interpreter", "s", &|m| second(m).1)?;
-    draw("figure_7_5", "Evaluations for a second of motion", "evaluations", &|m| match m.second {
-        Some((count, _)) => count as f64,
-        None => f64::NAN,
-    })?;
+    let title = "Time in the equations for a second of motion, interpreter";
+    draw("figure_7_4", title, "s", &|m| m.time().unwrap_or(f64::NAN))?;
+    let count = |m: &Measured| m.second.map_or(f64::NAN, |count| count as f64);
+    draw("figure_7_5", "Evaluations for a second of motion", "evaluations", &count)?;
     draw("figure_7_6", "Time of an evaluation, interpreter", "µs", &|m| 1e6 * m.evaluation)
 }
 
-/// Generated code beside the interpreter, rounds in turn.
+/// Generated code beside the interpreter, rounds of all systems in turn.
 #[cfg(feature = "bench")]
 fn code(effort: &Effort) -> Outcome<String> {
     use multibody::scenes::generated::visit_chain;
     note(format_args!("generated code"));
-    let title = "Generated code, time of an evaluation, µs";
-    let mut text = head(title, &["system", "links", "interpreter", "generated", "ns for every link"]);
-    for (family, n) in [("open", 10), ("open", 50), ("open", 100), ("tree", 150), ("closed", 10), ("closed", 100)] {
+    let systems = [("open", 10), ("open", 50), ("open", 100), ("tree", 150), ("closed", 10), ("closed", 100)];
+    let (mut mechanisms, mut generated) = (Vec::new(), Vec::new());
+    for (family, n) in systems {
         let mut mechanism = mechanism::read(&self::text(family, n))?;
-        let q = mechanism.q.clone();
         let mut p = mechanism.system.rest();
-        moving(&mut mechanism.system, &q, &mut p);
-        let Some(mut generated) = visit_chain(family, n, Repeated { q: &q, p: &p }) else { continue };
-        let times = least(&mut [&mut *call(&mut mechanism), &mut *generated], effort.rounds, effort.round);
-        let cells = [1e6 * times[0], 1e6 * times[1], 1e9 * times[1] / n as f64].map(|x| format!("{x:.2}"));
-        row(&mut text, &[family.to_string(), n.to_string()].into_iter().chain(cells).collect::<Vec<_>>());
+        moving(&mut mechanism.system, &mechanism.q, &mut p);
+        generated.extend(visit_chain(family, n, Repeated { q: &mechanism.q, p: &p }));
+        mechanisms.push(mechanism);
     }
-    Ok(text + "\nOpen chains of 50 and 100 links and the tree are loops over like links; closed chains are straight-line code.\n\n")
+    let interpreted = effort.times(&mut mechanisms);
+    let mut calls: Vec<&mut dyn FnMut()> = generated.iter_mut().map(|c| &mut **c as &mut dyn FnMut()).collect();
+    let times = least(&mut calls, effort.rounds, effort.round);
+    let columns = ["system", "links", "interpreter", "generated", "ns for every link", "to the open one"];
+    let mut text = head("Generated code, time of an evaluation, µs", &columns);
+    for (k, (family, n)) in systems.iter().enumerate() {
+        let open = systems.iter().position(|s| s.0 == "open" && s.1 == *n);
+        let mut cells = vec![family.to_string(), n.to_string()];
+        cells.extend([1e6 * interpreted[k], 1e6 * times[k], 1e9 * times[k] / *n as f64].map(|x| format!("{x:.2}")));
+        cells.push(open.map_or(String::new(), |open| format!("{:.2}", times[k] / times[open])));
+        row(&mut text, &cells);
+    }
+    Ok(text + "\nThose of ten links are straight-line code, the others loops over like links.\n\n")
 }
 
 /// A call of generated rates at one state.
