@@ -47,3 +47,9 @@ pub mod arm7_f32;
 
 /// From scene chain10.
 pub mod chain10_f32;
+
+/// From models/experiments/closed10.toml.
+pub mod closed10;
+
+/// From models/experiments/closed100.toml.
+pub mod closed100;

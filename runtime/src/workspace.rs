@@ -155,6 +155,8 @@ pub struct Constraints<S> {
     /// Rotation to and position in the innermost common node, along the path to each frame of a constraint as far as it is
     /// done.
     pub reach: Vec<[(Mat3<S>, Vec3<S>); 2]>,
+    /// Wrenches of each constraint's frames on the way inward along their paths.
+    pub hold: Vec<[Force<S>; 2]>,
     /// Relative pose of each constraint's frames.
     pub relative: Vec<Relative<S>>,
     /// Rows.
@@ -298,6 +300,7 @@ impl<S: Scalar> Workspace<S> {
                 later: later(tree),
             },
             constraints: Constraints {
+                hold: vec![[Force::zero(); 2]; tree.constraints.len()],
                 reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
                 relative: vec![Relative { turn: [[o; 3]; 3], d: [o; 3] }; tree.constraints.len()],
                 rows: vec![

@@ -7,7 +7,7 @@ mod code;
 pub use code::*;
 
 use super::dynamics::Dynamics;
-use crate::runtime::Differentiable;
+use crate::runtime::{Differentiable, System};
 
 /// What is done with the generated system of a scene.
 pub trait Visit<S> {
@@ -70,3 +70,25 @@ scenes!(f32, visit_f32, visit_differentiable_f32, {
     "arm7" => arm7_f32::Arm7F32,
     "chain10" | "chain10_swing" => chain10_f32::Chain10F32,
 }, {});
+
+/// What is done with a system of which nothing but the rates is needed.
+pub trait VisitRates {
+    /// What comes of it.
+    type Out;
+    /// Does it.
+    fn visit<Y: System<Scalar = f64> + 'static>(self, system: Y) -> Self::Out;
+}
+
+/// Does something with the generated chains and trees of [`experiments`](super::experiments) that have friction: kind and number
+/// of links.
+pub fn visit_chain<V: VisitRates>(family: &str, links: usize, visitor: V) -> Option<V::Out> {
+    Some(match (family, links) {
+        ("open", 10) => visitor.visit(chain10_friction::Chain10Friction::new()),
+        ("open", 50) => visitor.visit(chain50_friction::Chain50Friction::new()),
+        ("open", 100) => visitor.visit(chain100_friction::Chain100Friction::new()),
+        ("tree", 150) => visitor.visit(tree150_friction::Tree150Friction::new()),
+        ("closed", 10) => visitor.visit(closed10::Closed10::new()),
+        ("closed", 100) => visitor.visit(closed100::Closed100::new()),
+        _ => return None,
+    })
+}

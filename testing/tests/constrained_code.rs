@@ -199,13 +199,13 @@ fn batch(seeds: std::ops::Range<u64>) {
 // Two tests, so that cores have something to do.
 
 #[test]
-fn mechanisms_0_to_39() {
-    batch(0..40);
+fn mechanisms_0_to_24() {
+    batch(0..25);
 }
 
 #[test]
-fn mechanisms_40_to_79() {
-    batch(40..80);
+fn mechanisms_25_to_49() {
+    batch(25..50);
 }
 
 /// Constraints by default and with everything, and not for trees.

@@ -7,6 +7,7 @@ use mbd_codegen::loops::{looped, LoopProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::plan::{Forms, Plan, PlanOptions};
 use mbd_codegen::{Arithmetic, Group, Loops, Options};
+use mbd_runtime::Constrained;
 use mbd_testing::chains::{general, planar};
 use mbd_testing::random::{random_model, Knobs, Rng};
 use mbd_testing::state::{random_state, State};
@@ -48,7 +49,8 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     let mut a = vec![0.0; nv];
     i.accelerations(&s.q, &s.v, &mut a);
     let mut nodes = 0;
-    for group in Group::ALL {
+    let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
+    for group in Group::every() {
         let Some(program) = looped(&plan, group, options) else { continue };
         nodes = nodes.max(program.loops.iter().map(|l| l.nodes.len()).sum());
         let results = program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
@@ -70,6 +72,15 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
             Group::Bias => {
                 i.bias(&s.q, &s.v, &mut v);
                 v.clone()
+            }
+            Group::Settle => {
+                let mut freed = p.clone();
+                i.settle(0.0, &s.q, &mut freed, &mut v, &mut rows);
+                [v.as_slice(), &freed, &rows].concat()
+            }
+            Group::Correction => {
+                i.correction(&s.q, &mut rows, &mut v, &mut pivots);
+                [rows.as_slice(), &v, &pivots].concat()
             }
             _ => {
                 let (kinetic, potential) = i.energy(&s.q, &p);
@@ -145,7 +156,16 @@ fn closed_chains() {
         let decay = if seed % 4 == 0 { Value::Const(5.0) } else { Value::ZERO };
         model.constraints.push(Constraint { name: "loop".to_string(), kind, decay });
         let mut options = forced(seed);
+        // Frames that do not turn keep their nodes out of loops.
+        if options.plan.forms == Forms::Fewest {
+            options.plan.forms = Forms::Single;
+        }
         let nodes = compare(&model, seed, &options);
+        let plan = Plan::new(&model, options.plan);
+        for group in [Group::Rates, Group::Energy, Group::Settle, Group::Correction] {
+            let looped = looped(&plan, group, &options).is_some();
+            assert!(looped, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);
+        }
         assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
         options.arithmetic = Arithmetic::Fast;
         compare(&model, seed, &options);

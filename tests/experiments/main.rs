@@ -10,8 +10,10 @@ use biped::{absolute, relative, Biped, Vector};
 use command::{files, folder, good, out, read, run_in};
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::constrained::Minimal;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
 use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
+use multibody::scenes::experiments;
 
 const END: f64 = 0.85;
 
@@ -84,6 +86,26 @@ fn every_way_leads_to_the_same_end() {
         assert!((energy(&mut system, &q, &p) - before).abs() < 1e-10);
     }
     assert!(apart(&q, &reference) < 1e-9, "method 1: {q:?} {reference:?}");
+
+    // Method 2: minimal coordinates, dependents chosen and changed by the library; then those of the thesis throughout.
+    for thesis in [false, true] {
+        let (mut q, mut p) = (start.clone(), system.rest());
+        let minimal = Minimal::new(system.clone(), &mut q, &mut p).expect("closed");
+        let mut minimal = if thesis { minimal.with_ratio(f64::INFINITY) } else { minimal };
+        if thesis {
+            minimal.choose_among(&[3, 4], &mut q, &mut p).expect("a choice of the thesis");
+        }
+        let mut method = Verner9::new(&minimal);
+        for k in 0..steps {
+            let t = f64::from(k) * h;
+            method.step(&mut minimal, t, h, &mut q, &mut p).expect("a step");
+            minimal.watch(t + h, &q, Some(&mut p)).expect("dependents");
+            assert!((energy(&mut minimal, &q, &p) - before).abs() < 1e-10);
+        }
+        minimal.close(&mut q).expect("closed");
+        assert!(apart(&q, &reference) < 1e-9, "method 2, {thesis}: {q:?} {reference:?}");
+        assert!(thesis == (minimal.switches().0 == 0), "{:?}", minimal.switches());
+    }
 
     // The acceleration form, its index reduced.
     let mut form = AccelerationForm::new(system);
@@ -189,6 +211,15 @@ fn the_command_repeats_the_biped() {
     assert_eq!(names, wanted);
     for name in names {
         assert!(read(&folder.join("figures"), &name).starts_with("<svg"));
+    }
+}
+
+/// Files of chains, of which generated code is kept, are what the functions write that every other number of links comes from.
+#[test]
+fn model_files_are_as_written() {
+    let folder = Path::new(command::ROOT).join("models/experiments");
+    for (name, links) in [("closed10.toml", 10), ("closed100.toml", 100)] {
+        assert!(read(&folder, name) == experiments::closed(links, "pin", false), "{name}");
     }
 }
 

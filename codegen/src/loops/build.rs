@@ -9,7 +9,7 @@ use super::link::Link;
 use super::main_line::MainLine;
 use super::partition::{assemble, output, partition, Body, Wanted};
 use super::runs::{find, Run};
-use super::stage::{passes, Stage, Way};
+use super::stage::{passes, solves, Stage, Way};
 use super::{Block, Loop, LoopProgram, Place, Repeat, Start, Target};
 use crate::options::{Group, Options};
 use crate::plan::Plan;
@@ -61,8 +61,7 @@ fn carried(group: Group, tree: &Tree<Expr>) -> bool {
         matches!(closure, Pin | Slider | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
     };
     let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.b.node.is_none() && steady(&cut.closure));
-    let solves = matches!(group, Group::Rates | Group::Velocities | Group::Energy);
-    !solves || tree.constraints.iter().all(|c| simple(&c.bond))
+    !solves(group) || tree.constraints.iter().all(|c| simple(&c.bond))
 }
 
 /// First coordinate and velocity of a node.
@@ -96,6 +95,8 @@ fn results_of_turn<'g>(
     let lists = match group {
         Group::Rates => vec![coordinates, (plan.dims.nq + start.1, nv)],
         Group::Energy => Vec::new(),
+        Group::Settle => vec![velocities, (plan.dims.nv + start.1, nv)],
+        Group::Correction => vec![(plan.dims.rows + start.1, nv)],
         _ => vec![velocities],
     };
     let targets = lists

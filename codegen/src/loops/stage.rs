@@ -2,7 +2,7 @@
 //! alone.
 
 use mbd_runtime::spatial::{ArticulatedInertia, Force, Motion};
-use mbd_runtime::sweep::{Accelerations, Load, Sweeps};
+use mbd_runtime::sweep::{Accelerations, Inputs, Load, Quantity, Sweeps};
 use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
@@ -24,7 +24,10 @@ pub enum Way {
 /// comes first.
 pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
     match group {
-        Group::Rates | Group::Velocities | Group::Energy if constrained => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        Group::Rates | Group::Velocities | Group::Energy | Group::Correction if constrained => {
+            Some(&[Way::Forth, Way::Back, Way::Forth])
+        }
+        Group::Settle => Some(&[Way::Forth, Way::Back, Way::Forth, Way::Back]),
         Group::Accelerations if constrained => None,
         Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),
         Group::Momenta | Group::InverseDynamics | Group::Bias => Some(&[Way::Forth, Way::Back]),
@@ -62,8 +65,7 @@ impl<'g> Stage<'g> {
         let (nq, nv) = (tree.dims.nq, tree.dims.nv);
         let work = Workspace::new(&tree);
         let energy = [Expr::zero(); 2];
-        let solves = matches!(group, Group::Rates | Group::Velocities | Group::Energy);
-        let reaches = solves && !tree.constraints.is_empty();
+        let reaches = solves(group) && !tree.constraints.is_empty();
         let gathers = tree.nodes.iter().any(|n| n.gather);
         let (v, qd, pd, p) = (zeros(nv), zeros(nq), zeros(nv), zeros(nv));
         Stage { group, graph, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
@@ -88,9 +90,11 @@ impl<'g> Stage<'g> {
         let Some(pass) = own else { return sweeps.reach_begin(w) };
         if self.reaches && pass == 0 && !self.alone {
             sweeps.set_rows(w);
+            if self.group == Group::Correction {
+                sweeps.aim_at_closed(w);
+            }
         }
-        let rows = w.constraints.rhs.clone();
-        let load = Load::velocities(&given.second, &u, &rows);
+        let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
         match (self.group, pass) {
             (Group::Momenta, 1) => sweeps.momentum_begin(w),
             (Group::Momenta | Group::InverseDynamics | Group::Bias, _) | (Group::Accelerations, 0) => {}
@@ -113,6 +117,12 @@ impl<'g> Stage<'g> {
                 }
                 sweeps.remainder_begin(&load, &mut w.velocity);
                 sweeps.moment_begin(w);
+            }
+            (Group::Settle, 2) => {
+                self.p = given.second.clone();
+                if !self.alone {
+                    sweeps.hold_begin(w);
+                }
             }
             (group, _) => {
                 sweeps.motion_ground(&w.factor, &load, &mut w.velocity);
@@ -173,15 +183,18 @@ impl<'g> Stage<'g> {
         }
     }
 
-    /// Of rates, velocities and energy.
+    /// Of all groups that solve for velocities.
     fn velocity_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
-        let load = Load::velocities(&given.second, &u, &w.constraints.rhs);
+        if (self.group, pass) == (Group::Settle, 2) {
+            return sweeps.hold_node(i, w, &mut self.p);
+        }
+        let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
         if pass == 0 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
             sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
-            if self.group != Group::Velocities {
+            if weighs(self.group) {
                 sweeps.moment_node(i, w);
             }
             return;
@@ -217,7 +230,7 @@ impl<'g> Stage<'g> {
             (Group::Accelerations, _) => {}
             (_, 0) => {
                 sweeps.factor_ground(&mut w.factor);
-                let load = Load::velocities(&given.second, &u, &w.constraints.rhs);
+                let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
                 sweeps.remainder_ground(&w.factor, &load, &mut w.velocity);
             }
             _ => {}
@@ -243,6 +256,22 @@ impl<'g> Stage<'g> {
             Group::Velocities => {
                 sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
                 self.v.clone()
+            }
+            Group::Settle => {
+                sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
+                let mut sigma = vec![Expr::zero(); self.tree.dims.rows];
+                sweeps.settled_multipliers(&self.work, &mut sigma);
+                [self.v.as_slice(), &self.p, &sigma].concat()
+            }
+            Group::Correction => {
+                sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
+                let rows = vec![Expr::zero(); if self.alone { 0 } else { self.tree.dims.rows }];
+                let (mut residuals, mut pivots) = (rows.clone(), rows);
+                sweeps.residuals(&self.work, &mut residuals);
+                if !self.alone {
+                    sweeps.row_pivots(&self.work, &mut pivots);
+                }
+                [residuals, self.v.clone(), pivots].concat()
             }
             Group::Momenta => self.p.clone(),
             Group::Accelerations => {
@@ -284,13 +313,14 @@ impl<'g> Stage<'g> {
             (group, 0) => {
                 let mut all = inertia(&mut w.factor.m[i]);
                 all.extend(force(&mut w.velocity.d[i]));
-                if group != Group::Velocities {
+                if weighs(group) {
                     all.extend(w.loads.moment[i].iter_mut().chain(Some(&mut w.loads.mass[i])));
                 }
                 let columns = w.factor.columns.iter_mut().enumerate();
                 columns.filter(|(k, _)| k % n == i && slots.contains(&(k / n))).for_each(|(_, c)| all.extend(force(c)));
                 all
             }
+            (Group::Settle, 2) => Vec::new(),
             (group, _) => {
                 let mut all = motion(&mut w.velocity.omega[i]);
                 match group {
@@ -314,6 +344,9 @@ impl<'g> Stage<'g> {
             let ends = w.constraints.reach.iter_mut().flatten();
             return ends.flat_map(|(rot, pos)| rot.iter_mut().flatten().chain(pos)).collect();
         };
+        if pass == 2 {
+            return w.constraints.hold.iter_mut().flatten().flat_map(force).collect();
+        }
         let row = |g: &usize| slots.contains(g);
         let rates = w.velocity.shared_rate.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
         if pass == 1 {
@@ -322,6 +355,30 @@ impl<'g> Stage<'g> {
         let gram = w.factor.gram.iter_mut().enumerate().filter(|(k, _)| row(&(k / ng)) && row(&(k % ng)));
         let whole = w.factor.whole.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
         rates.chain(whole).chain(gram.map(|(_, x)| x)).collect()
+    }
+}
+
+/// Whether a group solves for velocities.
+pub fn solves(group: Group) -> bool {
+    matches!(group, Group::Rates | Group::Velocities | Group::Energy | Group::Settle | Group::Correction)
+}
+
+/// Whether it needs masses and first moments.
+fn weighs(group: Group) -> bool {
+    matches!(group, Group::Rates | Group::Energy)
+}
+
+/// What velocities are solved from; `own` are the workspace's right-hand sides: of freedoms, drives, rows.
+fn load<'a, 'g>(
+    group: Group,
+    given: &'a Given<'g>,
+    u: &Inputs<'a, Expr<'g>>,
+    own: [&'a [Expr<'g>]; 3],
+) -> Load<'a, Expr<'g>> {
+    let [p, drive, rows] = own;
+    match group {
+        Group::Correction => Load { p, drive, seeds: None, rows, what: Quantity::Constraint },
+        _ => Load::velocities(&given.second, u, rows),
     }
 }
 

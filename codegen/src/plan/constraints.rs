@@ -250,6 +250,11 @@ impl PlanConstraint {
         frames.into_iter().flatten().chain(terms.into_iter().flatten())
     }
 
+    /// Nodes whose freedoms it binds.
+    pub(super) fn cycle(&self) -> Vec<usize> {
+        cycle(&self.bond)
+    }
+
     /// With other numbers for the nodes, all of which have one.
     pub(super) fn renumbered(&self, numbers: &[Option<usize>]) -> PlanConstraint {
         let mut out = self.clone();

@@ -107,7 +107,7 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
         chains.retain(|chain| !chain.iter().any(|&i| plan.nodes[i].looped));
         runs.retain(|run| !touches_loop(plan, run));
     }
-    if chains.is_empty() && runs.is_empty() {
+    if chains.is_empty() && runs.is_empty() && plan.constraints.is_empty() {
         return;
     }
     let goals = [Group::Rates, Group::Accelerations].map(|group| Goal { forms: options.forms, group });
@@ -133,8 +133,10 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
         }
     }
     toggle_unturned(plan, &single, &runs, goals[0]);
+    super::cycles::choose(plan, &single, goals[0]);
     if let Some(mut other) = other {
         toggle_unturned(&mut other, &single, &runs, goals[1]);
+        super::cycles::choose(&mut other, &single, goals[1]);
         if goals[1].score(&other) < goals[1].score(plan) || !goals[1].accepts(plan, &single) {
             plan.accelerations = Some(Box::new(other));
         }
@@ -209,7 +211,7 @@ const TRIED: usize = 6;
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
 /// the same axis.
-fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
+pub(super) fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     let swings = |i: usize| {
         let node = &plan.nodes[i];
         node.kind == NodeKind::Pin && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
@@ -246,7 +248,7 @@ fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Go
 
 /// What is to be made small.
 #[derive(Clone, Copy)]
-struct Goal {
+pub(super) struct Goal {
     forms: Forms,
     group: Group,
 }
@@ -278,12 +280,12 @@ impl Goal {
         Some(Look { cost: symbolic::cost(&program), program })
     }
 
-    fn score(self, plan: &Plan) -> f64 {
+    pub(super) fn score(self, plan: &Plan) -> f64 {
         self.look(plan).map_or(f64::INFINITY, |look| self.forms.score(&look.cost))
     }
 
     /// Whether a plan is accurate; `single` is the same with joints one by one.
-    fn accepts(self, plan: &Plan, single: &Plan) -> bool {
+    pub(super) fn accepts(self, plan: &Plan, single: &Plan) -> bool {
         let limit = self.forms.limit();
         let loss = || self.look(plan).map(|look| Judge::new(single, self.group).loss(&look.program));
         limit == f64::INFINITY || loss().is_some_and(|loss| loss <= limit)

@@ -4,6 +4,7 @@
 mod accuracy;
 mod branch;
 mod constraints;
+mod cycles;
 mod elements;
 mod forms;
 mod frames;

@@ -230,12 +230,17 @@ where
         }
     }
 
-    /// Exchanges dependents for independents that move more than `ratio` times as fast, and changes the momenta with them.
-    /// Whether any were.
+    /// Exchanges dependents for independents that move more than `ratio` times as fast, and changes momenta that are given to the
+    /// new gauge `p_dep = 0`. Whether any were.
     ///
     /// # Errors
     /// As [`Minimal::close`]; the dependents are chosen anew before.
-    pub fn watch(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &mut Y::Momenta) -> Result<bool, ConstraintError> {
+    pub fn watch(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: Option<&mut Y::Momenta>,
+    ) -> Result<bool, ConstraintError> {
         self.look(Some(q));
         let before = self.switches;
         for k in 0..self.basic.pairs.len() {
@@ -278,7 +283,9 @@ where
                 return Err(self.lost(k));
             }
         }
-        self.gauge(p);
+        if let Some(p) = p {
+            self.gauge(p);
+        }
         Ok(true)
     }
 
@@ -360,7 +367,12 @@ where
 /// The [`Boundary`] of minimal coordinates: closes the dependents at the end of every step, and changes the partition before
 /// the next one where it has become poor.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Watch;
+pub struct Watch {
+    /// Whether each step begins with `σ = 0` rather than `p_dep = 0`: `p_dep` is then what it is in `M v`, and stays so during
+    /// the step. Costs one solve a step more; where the mechanism is nearly singular the gauge `p_dep = 0` has multipliers that
+    /// grow beyond all bounds. Not for methods that remember rates of the past, which go on in the gauge they are in.
+    pub settle: bool,
+}
 
 impl<Y> Boundary<Minimal<Y>> for Watch
 where
@@ -372,12 +384,18 @@ where
     fn close(
         &mut self,
         system: &mut Minimal<Y>,
-        _t: Y::Scalar,
-        _remembers: bool,
+        t: Y::Scalar,
+        remembers: bool,
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
         system.close(q)?;
+        if self.settle {
+            if !remembers {
+                system.system.settle(t, q, p, &mut system.dq, &mut system.residual);
+            }
+            return Ok(());
+        }
         // Zero already, but where a rotation has mixed the components of a joint's momenta.
         system.gauge(p);
         Ok(())
@@ -390,6 +408,6 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<bool, ConstraintError> {
-        system.watch(t, q, p)
+        system.watch(t, q, if self.settle { None } else { Some(p) })
     }
 }

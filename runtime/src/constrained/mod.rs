@@ -8,11 +8,19 @@
 //! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
 //! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
 //!
-//! | `Minimal` with `Watch` | gauge `p_dep = 0` | closed at every evaluation | `Φ` and a small LU, three or four times an evaluation |
+//! | `Minimal` with `Watch` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
 //! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
-//! | [`IndexTwo`] | re-zeroed | drift | inside of the step: iterations of 3 open evaluations and 3 projections |
+//! | [`IndexTwo`] | re-zeroed | drift | inside of the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
 //!
-//! They are wrapped around any method ([`Bounded`], [`Hold`]); minimal coordinates are a [`System`](crate::System) of their own.
+//! The first five are wrapped around any method ([`Bounded`], [`Hold`]; by name `catalogue::explicit_bounded` and
+//! `implicit_bounded`); minimal coordinates are a [`System`](crate::System) of their own, and the last two are methods on a
+//! system with and without its constraints ([`Split`]).
+//!
+//! Methods that remember rates of the past go on with their `σ`, as their history must. [`Stabilisation::Mass`] is the choice
+//! where nothing speaks for another: what it costs is small, and of a mechanism that passes a singular position it loses least.
+//! There steps of given size step past; a tight error control sees the rates' round-off and may not get by.
+//!
+//! States to begin with come from `close` and `complete`.
 
 #[cfg(feature = "alloc")]
 mod basic;

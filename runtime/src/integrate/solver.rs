@@ -151,6 +151,11 @@ where
         }
     }
 
+    /// The method.
+    pub fn method(&self) -> &M {
+        &self.method
+    }
+
     /// Time of the state, s.
     pub fn time(&self) -> Y::Scalar {
         self.pending.map_or(self.t, |step| step.end)

@@ -200,15 +200,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// its first, is along it.
     fn along_loop(&self, cut: &Cut<S>, ends: (Force<S>, Force<S>), poses: &Poses<S>, mut visit: impl FnMut(usize, S)) {
         for (path, f) in [(&cut.path_a, ends.0), (&cut.path_b, ends.1)] {
-            let mut f = f;
-            for &i in path.iter().rev() {
-                let node = &self.tree.nodes[i];
-                if let Source::State { v, .. } = node.source {
-                    (0..node.kind.nv()).for_each(|k| visit(v + k, node.ratio * node.kind.axis(k).dot(&f)));
-                }
-                f = self.force_out(poses, i, &f);
-            }
+            path.iter().rev().fold(f, |f, &i| self.bear(i, &f, poses, &mut visit));
         }
+    }
+
+    /// Calls `visit` with the velocities of node `i` and what a wrench `f` on it is along them; gives `f` on its parent.
+    fn bear(&self, i: usize, f: &Force<S>, poses: &Poses<S>, visit: &mut impl FnMut(usize, S)) -> Force<S> {
+        let node = &self.tree.nodes[i];
+        if let Source::State { v, .. } = node.source {
+            (0..node.kind.nv()).for_each(|k| visit(v + k, node.ratio * node.kind.axis(k).dot(f)));
+        }
+        self.force_out(poses, i, f)
     }
 
     /// `Eᵀ` of the wrenches that constraints put on the bodies of their loops as their directions turn,
@@ -263,26 +265,58 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.on_body(&w.poses, frame).fold(outer, |m, step| step.motion(&m))
     }
 
-    /// `Φᵀ` times multipliers, added to `p`.
-    fn add_multipliers(&self, multipliers: &[S], w: &Workspace<S>, p: &mut [S]) {
-        for constraint in &self.tree.constraints {
+    /// Before the first [`Sweeps::hold_node`], after the velocities: the negative of the multipliers, and what they are at the
+    /// ends of cuts.
+    pub fn hold_begin(&self, w: &mut Workspace<S>) {
+        self.collect_multipliers(&w.velocity.shared_rate, &mut w.constraints.multipliers);
+        w.constraints.multipliers.iter_mut().for_each(|x| *x = -*x);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            let Bond::Cut(_) = &constraint.bond else { continue };
+            self.trace.at(None, Quantity::Constraint);
+            let (rows, multipliers) = (&w.constraints.rows, &w.constraints.multipliers);
+            let sum = |of: fn(&crate::workspace::RowState<S>) -> Force<S>| {
+                let each = constraint.range().map(|r| of(&rows[r]).times(multipliers[r]));
+                each.fold(Force::zero(), |sum, f| sum.plus(&f))
+            };
+            w.constraints.hold[index] = [sum(|row| row.at_a), sum(|row| row.at_b)];
+        }
+    }
+
+    /// What [`Sweeps::hold_begin`] put at the ends of cuts, along the freedoms of node `i`, added to `p`; all nodes behind it
+    /// being done.
+    pub fn hold_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
+        self.trace.at(Some(i), Quantity::Constraint);
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            let Bond::Cut(cut) = &constraint.bond else { continue };
+            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
+                if path.contains(&i) {
+                    self.hold(i, index, side, w, p);
+                }
+            }
+        }
+    }
+
+    fn hold(&self, i: usize, index: usize, side: usize, w: &mut Workspace<S>, p: &mut [S]) {
+        let f = &mut w.constraints.hold[index][side];
+        *f = self.bear(i, f, &w.poses, &mut |v, x| p[v] = p[v] + x);
+    }
+
+    /// `Φᵀ` times the multipliers of [`Sweeps::hold_begin`], added to `p`.
+    fn add_multipliers(&self, w: &mut Workspace<S>, p: &mut [S]) {
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
                 Bond::Coupling { terms, .. } => {
                     for (i, ratio) in terms {
                         if let Source::State { v, .. } = self.tree.nodes[*i].source {
-                            p[v] = p[v] + *ratio * multipliers[constraint.first];
+                            p[v] = p[v] + *ratio * w.constraints.multipliers[constraint.first];
                         }
                     }
                 }
                 Bond::Cut(cut) => {
-                    let sum = |of: fn(&crate::workspace::RowState<S>) -> Force<S>| {
-                        let rows = constraint.range();
-                        let each = rows.map(|r| of(&w.constraints.rows[r]).times(multipliers[r]));
-                        each.fold(Force::zero(), |sum, f| sum.plus(&f))
-                    };
-                    let ends = (sum(|row| row.at_a), sum(|row| row.at_b));
-                    self.along_loop(cut, ends, &w.poses, |v, f| p[v] = p[v] + f);
+                    for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
+                        path.iter().rev().for_each(|&i| self.hold(i, index, side, w, p));
+                    }
                 }
             }
         }
@@ -323,7 +357,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Residuals of the positions.
-    fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
+    pub fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
         for (phi, row) in phi.iter_mut().zip(&w.constraints.rows) {
             *phi = row.residual;
         }
@@ -341,12 +375,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sigma: &mut [S],
     ) {
         self.velocities(q, p, u, w, v);
-        self.collect_multipliers(&w.velocity.shared_rate, sigma);
-        for (x, sigma) in w.constraints.multipliers.iter_mut().zip(&*sigma) {
-            *x = -*sigma;
-        }
+        self.hold_begin(w);
         freed.copy_from_slice(p);
-        self.add_multipliers(&w.constraints.multipliers, w, freed);
+        self.add_multipliers(w, freed);
+        self.settled_multipliers(w, sigma);
+    }
+
+    /// The multipliers `σ` after [`Sweeps::hold_begin`].
+    pub fn settled_multipliers(&self, w: &Workspace<S>, sigma: &mut [S]) {
+        for (sigma, x) in sigma.iter_mut().zip(&w.constraints.multipliers) {
+            *sigma = -*x;
+        }
     }
 
     /// Newton's step onto the closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`, with the residuals
@@ -362,9 +401,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) {
         self.prepare(q, u, w);
         self.residuals(w, phi);
-        for (b, phi) in w.constraints.rhs.iter_mut().zip(&*phi) {
-            *b = -*phi;
-        }
+        self.aim_at_closed(w);
         w.generalized.fill(S::zero());
         w.drive.fill(S::zero());
         let load = super::Load {
@@ -376,6 +413,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         };
         self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
         self.collect_rates(&w.velocity, &w.first, dq);
+        self.row_pivots(w, pivots);
+    }
+
+    /// Right-hand sides that take the residuals away.
+    pub fn aim_at_closed(&self, w: &mut Workspace<S>) {
+        for (b, row) in w.constraints.rhs.iter_mut().zip(&w.constraints.rows) {
+            *b = -row.residual;
+        }
+    }
+
+    /// Pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
+    pub fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
         let ng = self.tree.shared.len();
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
             // Zero where the pivot was not taken: x · (ρ x).

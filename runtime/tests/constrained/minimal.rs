@@ -51,7 +51,7 @@ fn the_same_motion_as_method_one() {
         let reference = march(&mut y, &mut fine, 4000, 4.0, &start).unwrap();
         let energy = y.energy(&start.0, &start.1);
         let (mut m, (q, p)) = minimal(&y, &start);
-        let method = Bounded::new(&m, make(&m), Watch);
+        let method = Bounded::new(&m, make(&m), Watch::default());
         let mut solver = Solver::new(&mut m, method, Step::Adaptive(Tolerances::new(1e-10)), 0.0, &q, &p).unwrap();
         let (mut q, mut p) = (q, p);
         while solver.time() < 4.0 {
@@ -92,7 +92,7 @@ fn orders() {
         make: impl Fn(&Minimal<Closed<Sticks>>) -> M,
     ) -> f64 {
         let (mut m, start) = minimal(y, start);
-        let mut method = Bounded::new(&m, make(&m), Watch);
+        let mut method = Bounded::new(&m, make(&m), Watch::default());
         let end = march(&mut m, &mut method, steps, 1.0, &start).unwrap();
         assert!(m.switches().0 > 0);
         apart(&end.0, &reference.0)
@@ -113,7 +113,7 @@ fn through_the_dead_point() {
         let mut m = m.with_ratio(ratio);
         // The rocker's x is the independent coordinate.
         m.choose_among(&[0, 1, 3], &mut q, &mut p).unwrap();
-        let method = Bounded::new(&m, Dop853::new(&m), Watch);
+        let method = Bounded::new(&m, Dop853::new(&m), Watch::default());
         let mut solver = Solver::new(&mut m, method, Step::Adaptive(Tolerances::new(1e-12)), 0.0, &q, &p).unwrap();
         let (t, v) = m.state_energy(&q, &p);
         let before = t + v;
@@ -135,7 +135,7 @@ fn redundant_rows() {
     let start = (vec![1.0, 0.0], vec![0.0; 2]);
     let (mut m, from) = minimal(&y, &start);
     assert_eq!(m.dependents().count(), 1);
-    let mut method = Bounded::new(&m, Rk4::new(&m), Watch);
+    let mut method = Bounded::new(&m, Rk4::new(&m), Watch::default());
     let end = march(&mut m, &mut method, 2000, 2.0, &from).unwrap();
     let energy = y.energy(&end.0, &end.1) - y.energy(&start.0, &start.1);
     // Measured: 1.5e-8 at 1 ms, 2.4e-7 at 2 ms; the place along x is a more crooked coordinate than the angle.
@@ -161,10 +161,10 @@ fn many_loops() {
         p.extend([0.0; 4]);
     }
     let (mut m, from) = minimal(&Closed::new(all), &(q, p));
-    let mut method = Bounded::new(&m, Rk4::new(&m), Watch);
+    let mut method = Bounded::new(&m, Rk4::new(&m), Watch::default());
     let end = march(&mut m, &mut method, 500, 1.0, &from).unwrap();
     let (mut m1, from) = minimal(&Closed::new(one), &(vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]));
-    let mut method = Bounded::new(&m1, Rk4::new(&m1), Watch);
+    let mut method = Bounded::new(&m1, Rk4::new(&m1), Watch::default());
     let single = march(&mut m1, &mut method, 500, 1.0, &from).unwrap();
     for k in 0..n {
         assert!(apart(&end.0[4 * k..4 * k + 4], &single.0) < 1e-11);
@@ -188,7 +188,7 @@ fn a_body_on_its_group() {
         let (mut m, (mut q, mut p)) = minimal(&y, &start);
         m.choose_among(&dependents, &mut q, &mut p).unwrap();
         let mut error = |steps| {
-            let mut method = Bounded::new(&m, Rk4::new(&m), Watch);
+            let mut method = Bounded::new(&m, Rk4::new(&m), Watch::default());
             let end = march(&mut m, &mut method, steps, 0.5, &(q.clone(), p.clone())).unwrap();
             assert!(y.off(&end.0, &end.1).0 < 1e-14);
             apart(&end.0, &reference.0)
@@ -215,7 +215,7 @@ fn impossible_partitions_are_refused() {
     let (mut qd, mut pd) = (m.neutral(), m.rest());
     m.state_rates(0.0, &far, &p, &mut qd, &mut pd);
     assert!(qd.iter().chain(&pd).all(|x| x.is_nan()) && m.trouble().is_some(), "{qd:?}");
-    let mut method = Bounded::new(&m, Rk4::new(&m), Watch);
+    let mut method = Bounded::new(&m, Rk4::new(&m), Watch::default());
     let error = method.step(&mut m, 0.0, 0.1, &mut far, &mut p).unwrap_err();
     assert!(matches!(error, StepError::NotFinite { .. }), "{error:?}");
     m.state_rates(0.0, &q, &p, &mut qd, &mut pd);

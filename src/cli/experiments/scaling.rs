@@ -107,6 +107,8 @@ pub fn run(args: &ScalingArgs, out: &mut dyn Write) -> Outcome {
     if let Some(path) = &args.out {
         figures(&all, path, out)?;
     }
+    #[cfg(feature = "bench")]
+    write!(out, "{}", code(&effort)?)?;
     write!(out, "{}", ratios(args.quick, &effort)?)?;
     write!(out, "{}", space(&effort)?)?;
     out.flush()?;
@@ -201,6 +203,47 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
         None => f64::NAN,
     })?;
     draw("figure_7_6", "Time of an evaluation, interpreter", "µs", &|m| 1e6 * m.evaluation)
+}
+
+/// Generated code beside the interpreter, rounds in turn.
+#[cfg(feature = "bench")]
+fn code(effort: &Effort) -> Outcome<String> {
+    use multibody::scenes::generated::visit_chain;
+    note(format_args!("generated code"));
+    let title = "Generated code, time of an evaluation, µs";
+    let mut text = head(title, &["system", "links", "interpreter", "generated", "ns for every link"]);
+    for (family, n) in [("open", 10), ("open", 50), ("open", 100), ("tree", 150), ("closed", 10), ("closed", 100)] {
+        let mut mechanism = mechanism::read(&self::text(family, n))?;
+        let q = mechanism.q.clone();
+        let mut p = mechanism.system.rest();
+        moving(&mut mechanism.system, &q, &mut p);
+        let Some(mut generated) = visit_chain(family, n, Repeated { q: &q, p: &p }) else { continue };
+        let times = least(&mut [&mut *call(&mut mechanism), &mut *generated], effort.rounds, effort.round);
+        let cells = [1e6 * times[0], 1e6 * times[1], 1e9 * times[1] / n as f64].map(|x| format!("{x:.2}"));
+        row(&mut text, &[family.to_string(), n.to_string()].into_iter().chain(cells).collect::<Vec<_>>());
+    }
+    Ok(text + "\nOpen chains of 50 and 100 links and the tree are loops over like links; closed chains are straight-line code.\n\n")
+}
+
+/// A call of generated rates at one state.
+#[cfg(feature = "bench")]
+struct Repeated<'a> {
+    q: &'a [f64],
+    p: &'a [f64],
+}
+
+#[cfg(feature = "bench")]
+impl multibody::scenes::generated::VisitRates for Repeated<'_> {
+    type Out = Box<dyn FnMut()>;
+    fn visit<Y: System<Scalar = f64> + 'static>(self, mut system: Y) -> Box<dyn FnMut()> {
+        let (mut q, mut p, mut qd, mut pd) = (system.neutral(), system.rest(), system.neutral(), system.rest());
+        q.as_mut().copy_from_slice(self.q);
+        p.as_mut().copy_from_slice(self.p);
+        Box::new(move || {
+            system.state_rates(0.0, std::hint::black_box(&q), &p, &mut qd, &mut pd);
+            std::hint::black_box(&pd);
+        })
+    }
 }
 
 /// The closed chain against the open one, by the kind of the loop.

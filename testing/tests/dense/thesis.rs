@@ -182,7 +182,7 @@ impl Chain {
 /// Serial chains with one loop to the ground, as section 5.3.3 wants them: nothing hangs on their joints but drives of force.
 pub fn chain(seed: u64) -> LoopSystem {
     let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
-    let kinds = if seed % 2 == 0 { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
+    let kinds = if seed.is_multiple_of(2) { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
     let tree = Knobs { bodies: (3, 6), kinds, ..Knobs::default() };
     let mut cuts = [0.0; 16];
     for k in [0, 1, 2, 5, 6, 7, 9, 10] {
