@@ -197,7 +197,7 @@ fn they_keep_their_loops_and_their_energy() {
     }
 }
 
-/// Steps that jump over the change point go on smoothly: the bars stay parallel, three times round and more.
+/// Steps that jump over the change point go on smoothly: the bars stay parallel, time after time.
 #[test]
 fn a_parallelogram_passes_its_change_points() {
     let plan = plan("fourbar_equal");
@@ -221,7 +221,7 @@ fn a_parallelogram_passes_its_change_points() {
         above = q[0].sin() > 0.0;
     }
     assert!(passed >= 4, "{passed} change points");
-    // Positions are closed to 1e-14; near the fork, 1e-3 rad away, sideways only to that over 1e-3.
+    // Positions are closed to 1e-14, across the way only to that over the distance from the fork, which counts from 1e-5 rad on.
     assert!(apart < 1e-9, "bars at {apart:e} rad");
     assert!(lost < 1e-8 * 3.5, "{lost:e} J of 3.5 J");
 }

@@ -80,8 +80,9 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         let opacity = 0.14 + 0.86 * fade * fade * fade;
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
         let mut lines = shapes.lines(frames);
-        // Nearer things over those behind.
-        lines.sort_by(|a, b| view.depth(a.middle()).total_cmp(&view.depth(b.middle())));
+        // Nearer things over those behind; what is at the same place keeps its order, whatever rounding says.
+        let depth = |line: &Line| (view.depth(line.middle()) / (1e-6 * page.size())).round();
+        lines.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         for line in &lines {
             body(&mut text, &page, &view, line, &hsl(line.colour));
         }
