@@ -172,7 +172,10 @@ impl<S: Scalar> Closure<S> {
     pub(super) fn residuals(&self, at: &Relative<S>) -> [S; 6] {
         let half = S::constant(0.5);
         let [x, z, d] = [at.axis(0), at.axis(2), at.d];
-        let small = [d[0], d[1], d[2], z[1], -z[0], -x[1]];
+        // Twice the tangent of half the angle: a sine would call frames closed that are turned over as well.
+        let tangent = |cosine: S| S::constant(2.0) / (S::one() + cosine);
+        let (tilt, spin) = (tangent(z[2]), tangent(x[0]));
+        let small = [d[0], d[1], d[2], tilt * z[1], -(tilt * z[0]), -(spin * x[1])];
         let mut out = [S::zero(); 6];
         for (out, &k) in out.iter_mut().zip(self.components()) {
             *out = small[k];
@@ -185,7 +188,8 @@ impl<S: Scalar> Closure<S> {
             Closure::Planar => out[0] = dot3(z, d),
             Closure::Helical { pitch } => {
                 let (s, c) = (d[2] / *pitch).sin_cos();
-                out[4] = *pitch * (s * x[0] + c * x[1]);
+                let turned = tangent(c * x[0] - s * x[1]);
+                out[4] = *pitch * (turned * (s * x[0] + c * x[1]));
             }
             Closure::Universal => out[3] = x[1],
             Closure::Distance { length } => out[0] = half * (dot3(d, d) / *length - *length),
