@@ -12,6 +12,7 @@
 //! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
 //! | [`IndexTwo`] | re-zeroed | drift | inside of the step: iterations of 3 open evaluations and 3 projections |
 //!
+//! [`Steady`] is the third of them with a number of iterations that is fixed when it is compiled.
 //! They are wrapped around any method ([`Bounded`], [`Hold`]); minimal coordinates are a [`System`](crate::System) of their own.
 
 #[cfg(feature = "alloc")]
@@ -31,6 +32,7 @@ mod minimal;
 mod rattle;
 mod rows;
 mod split;
+mod steady;
 
 pub use boundary::{Boundary, Bounded};
 #[cfg(feature = "alloc")]
@@ -42,6 +44,7 @@ pub use index_two::IndexTwo;
 pub use minimal::{Minimal, Switch, Watch};
 pub use rattle::Rattle;
 pub use split::{Parted, Split};
+pub use steady::Steady;
 
 #[cfg(doc)]
 use crate::Constrained;
