@@ -358,6 +358,7 @@ impl PlanConstraint {
             },
         };
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
-        Constraint { bond, slots: self.slots.clone(), first: self.first, velocities: self.velocities.clone(), decay }
+        let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
+        Constraint { bond, slots, first: self.first, velocities, decay, compliance: None }
     }
 }

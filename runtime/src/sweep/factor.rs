@@ -46,7 +46,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             };
             match shared {
                 Shared::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
-                Shared::Row(_) => f.later[g].iter().for_each(|&h| clear(h, &mut f.gram)),
+                Shared::Row(r) => {
+                    f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
+                    f.gram[g * ng + g] = -self.compliance(*r);
+                }
             }
         }
     }
