@@ -206,9 +206,16 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), StepError> {
-        self.resume(system, t, q, p)?;
-        self.attempt(system, t, h, None)?;
-        self.accept(system, t, h)?;
+        if B::TURNS || self.method.remembers() {
+            self.resume(system, t, q, p)?;
+            self.attempt(system, t, h, None)?;
+            self.accept(system, t, h)?;
+        } else {
+            // The next step begins anew: the rate that is found where a step is accepted would be of no use to it.
+            self.begin(system, t, q, p)?;
+            self.attempt(system, t, h, None)?;
+            self.method.parts().0.advance(system, t, &self.delta)?;
+        }
         self.method.parts().0.store(system, q, p);
         Ok(())
     }
