@@ -17,6 +17,7 @@ cxx=${CXX:-$(echo "$cc" | sed 's/clang/clang++/')}
 site=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
 if [ ! -e "$build/race" ] || [ "$here/race.cpp" -nt "$build/race" ]; then
     "$cxx" -O3 -march=native -std=c++17 -w -DNDEBUG -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS \
+        -DBOOST_FUSION_INVOKE_MAX_ARITY=10 \
         -isystem "$site/cmeel.prefix/include" -isystem /usr/include/eigen3 "$here/race.cpp" -o "$build/race" -ldl
 fi
 # With a target the flags are not those of the generator, which is built once.
