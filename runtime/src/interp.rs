@@ -257,7 +257,7 @@ impl<S: Real> Interpreter<S> {
     /// [`RankLoss`] for the first freedom, outboard first, without inertia.
     pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.prepare(q, &self.inputs.view(), &mut self.work);
+        sweeps.prepare(q, &self.inputs.view(), &mut self.work, false);
         let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.shared) {
             (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
             _ => None,

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Bond, Closure, Source, Tree};
+use mbd_runtime::tree::{Bond, Source, Tree};
 
 use super::link::Link;
 use super::main_line::MainLine;
@@ -53,15 +53,11 @@ pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Opti
     Some(build.program(options))
 }
 
-/// Whether loops can carry the constraints where they matter: cuts between a body and the ground whose rows are constant in its
-/// axes, so that nothing pulls at the joints as they turn.
+/// Whether loops can carry the constraints where they matter: joints to the ground, whose rows are constants of the last body, so
+/// that nothing pulls at the joints as they turn.
 fn carried(group: Group, tree: &Tree<Expr>) -> bool {
-    let steady = |closure: &Closure<Expr>| {
-        use Closure::{Cylindrical, Fixed, Helical, Pin, Planar, Slider, Spherical};
-        matches!(closure, Pin | Slider | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
-    };
-    let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.b.node.is_none() && steady(&cut.closure));
-    !solves(group) || tree.constraints.iter().all(|c| simple(&c.bond))
+    let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.a.node.is_none() && cut.closure.is_joint());
+    !solves(group) || tree.constraints.iter().all(|c| simple(&c.bond) && c.decay.is_none())
 }
 
 /// First coordinate and velocity of a node.

@@ -24,10 +24,8 @@ pub enum Way {
 /// comes first.
 pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
     match group {
-        Group::Rates | Group::Velocities | Group::Energy | Group::Correction if constrained => {
-            Some(&[Way::Forth, Way::Back, Way::Forth])
-        }
-        Group::Settle => Some(&[Way::Forth, Way::Back, Way::Forth, Way::Back]),
+        Group::Correction => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        Group::Settle => Some(&[Way::Back, Way::Forth, Way::Back]),
         Group::Accelerations if constrained => None,
         Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),
         Group::Momenta | Group::InverseDynamics | Group::Bias => Some(&[Way::Forth, Way::Back]),
@@ -41,7 +39,9 @@ pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
 pub struct Stage<'g> {
     group: Group,
     graph: &'g Graph,
-    /// Whether the first pass goes to the frames of constraints.
+    /// Whether there are constraints that matter.
+    bound: bool,
+    /// Whether the first pass goes to their frames.
     reaches: bool,
     /// Whether it is a link alone, whose constraints stand for columns that are carried.
     alone: bool,
@@ -65,10 +65,11 @@ impl<'g> Stage<'g> {
         let (nq, nv) = (tree.dims.nq, tree.dims.nv);
         let work = Workspace::new(&tree);
         let energy = [Expr::zero(); 2];
-        let reaches = solves(group) && !tree.constraints.is_empty();
+        let bound = solves(group) && !tree.constraints.is_empty();
+        let reaches = bound && group == Group::Correction;
         let gathers = tree.nodes.iter().any(|n| n.gather);
         let (v, qd, pd, p) = (zeros(nv), zeros(nq), zeros(nv), zeros(nv));
-        Stage { group, graph, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
+        Stage { group, graph, bound, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
     }
 
     /// The pass among those of a mechanism without constraints; `None`: that to the frames of the constraints.
@@ -88,8 +89,8 @@ impl<'g> Stage<'g> {
             }
         }
         let Some(pass) = own else { return sweeps.reach_begin(w) };
-        if self.reaches && pass == 0 && !self.alone {
-            sweeps.set_rows(w);
+        if self.bound && pass == 0 && !self.alone {
+            sweeps.set_rows(w, self.reaches);
             if self.group == Group::Correction {
                 sweeps.aim_at_closed(w);
             }
@@ -335,7 +336,7 @@ impl<'g> Stage<'g> {
 
     /// What a pass carries whatever node it is at: sums over all nodes so far, and multipliers.
     pub fn running(&mut self, pass: usize) -> Vec<&mut Expr<'g>> {
-        if !self.reaches {
+        if !self.bound {
             return Vec::new();
         }
         let (own, ng, slots) = (self.own(pass), self.tree.shared.len(), slots(&self.tree));

@@ -26,7 +26,7 @@ pub enum PlanBond {
         /// What it binds.
         kind: LoopKind,
         /// First and second frame, axes along z, or along x and y for a universal joint. The ground, if it is one of them
-        /// and the kind looks the same from both sides, is the second: rows stand in its axes, which do not move.
+        /// and the kind is that of a joint, is the first: rows are constants of the body then. Of a rod it is the second.
         frames: Box<[PlanFrame; 2]>,
         /// Nodes from the innermost common one, which is left out, to those of the frames.
         paths: [Vec<usize>; 2],
@@ -103,29 +103,19 @@ fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
     }
 }
 
-/// Whether the rows of a kind look the same from both frames.
-fn symmetric(kind: &LoopKind) -> bool {
-    matches!(
-        kind,
-        LoopKind::Pin { .. }
-            | LoopKind::Slider { .. }
-            | LoopKind::Cylindrical { .. }
-            | LoopKind::Helical { .. }
-            | LoopKind::Planar { .. }
-            | LoopKind::Spherical
-            | LoopKind::Fixed
-            | LoopKind::Distance { .. }
-    )
-}
-
 /// Puts the model's constraints on the nodes, after [`super::shared::share`]. `frames` are those of [`mounts`].
 pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
     let constraints = plan.model.constraints.clone();
     for (constraint, frames) in constraints.into_iter().zip(frames) {
         let (bond, members) = match (constraint.kind, frames) {
             (ConstraintKind::Loop { kind, .. }, Some(mut frames)) => {
-                if frames[0].node.is_none() && symmetric(&kind) || frames[1].node.is_none() {
-                    frames.sort_by_key(|f| f.node.is_none());
+                let ground = frames.iter().any(|f| f.node.is_none());
+                match closure::<f64>(&kind, &[]).is_joint() {
+                    true if ground => frames.sort_by_key(|f| f.node.is_some()),
+                    false if ground && matches!(kind, LoopKind::Distance { .. }) => {
+                        frames.sort_by_key(|f| f.node.is_none())
+                    }
+                    _ => {}
                 }
                 let ways = frames.each_ref().map(|f| f.node.map_or(Vec::new(), |i| ancestors(plan, i)));
                 let [a, b] = &ways;

@@ -14,7 +14,7 @@ use crate::Scalar;
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Accelerations from velocities: `(q, v, τ) → v̇`.
     pub fn accelerations(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S]) {
-        self.prepare(q, u, w);
+        self.prepare(q, u, w, true);
         self.newton(v, Accelerations::Chosen, u, w);
         self.row_accelerations(v, u, w);
         self.wrench_loads(u, w);

@@ -84,8 +84,14 @@ impl<S: Scalar> Closure<S> {
         }
     }
 
+    /// Whether it leaves what a joint would: the motions of a group.
+    pub fn is_joint(&self) -> bool {
+        use Closure::{Cylindrical, Fixed, Helical, Pin, Planar, Slider, Spherical};
+        matches!(self, Pin | Slider | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
+    }
+
     /// Whether the rows are constants.
-    fn constant(&self) -> bool {
+    pub(super) fn constant(&self) -> bool {
         !matches!(
             self,
             Closure::Universal

@@ -16,6 +16,21 @@ use crate::Scalar;
 use alloc::vec::Vec;
 
 impl<S: Scalar> Constraint<S> {
+    /// Whether its rows are constants at the one node that they act on.
+    fn at_hand(&self) -> bool {
+        match &self.bond {
+            Bond::Cut(cut) => cut.a.node.is_none() && cut.closure.constant() && self.decay.is_none(),
+            Bond::Coupling { .. } => false,
+        }
+    }
+
+    /// Whether it is a joint to the ground whose rows stand in the axes of the body. Motions that such a joint leaves free are
+    /// a group, so `Ω × E_c` does no work on any of them: it changes `σ` alone, which is gauge, and need not be known.
+    fn gauge(&self) -> bool {
+        let held = self.decay.is_none() && self.compliance.is_none();
+        matches!(&self.bond, Bond::Cut(cut) if held && cut.a.node.is_none() && cut.closure.is_joint())
+    }
+
     /// Whether row `k` is the derivative of a condition on positions.
     fn holonomic(&self, k: usize) -> bool {
         match &self.bond {
@@ -60,23 +75,27 @@ impl<S: Scalar> Tree<S> {
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Poses, rows of the constraints, articulated inertia.
-    pub(crate) fn prepare(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        self.place_rows(q, u, w);
+    pub(crate) fn prepare(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, all: bool) {
+        self.place_rows(q, u, w, all);
         self.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
     }
 
-    /// Poses and rows of the constraints; `b` of each from its decay.
-    pub(super) fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+    /// Poses and rows of the constraints; `b` of each from its decay. Relative poses and residuals are left out where neither
+    /// rows nor `b` ask for them, unless `all` are wanted.
+    pub(super) fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, all: bool) {
         self.articulate(q, u.drive_q, &mut w.poses);
         self.reach_begin(w);
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(cut) = &constraint.bond else { continue };
+            if !all && constraint.at_hand() {
+                continue;
+            }
             self.trace.at(None, Quantity::Constraint);
             for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
                 path.iter().for_each(|&i| self.reach(i, index, side, w));
             }
         }
-        self.set_rows(w);
+        self.set_rows(w, all);
     }
 
     /// Before the first [`Sweeps::reach_node`].
@@ -103,12 +122,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.steps(&w.poses, i).for_each(|step| step.pose(rot, pos));
     }
 
-    /// Rows of the constraints, the paths of all cuts being known.
-    pub fn set_rows(&self, w: &mut Workspace<S>) {
+    /// Rows of the constraints, the paths of all cuts being known that are needed (`all`: whatever they are needed for).
+    pub fn set_rows(&self, w: &mut Workspace<S>, all: bool) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
-                Bond::Cut(cut) => self.cut_rows(index, constraint, cut, w),
+                Bond::Cut(cut) => self.cut_rows(index, constraint, cut, w, all || !constraint.at_hand()),
                 Bond::Coupling { terms, offset } => {
                     let sum = terms.iter().map(|(i, ratio)| *ratio * w.poses.coordinate(*i, 0));
                     w.constraints.rows[constraint.first].residual = sum.fold(-*offset, |sum, x| sum + x);
@@ -121,10 +140,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Rows of a cut, in its second frame and at the nodes.
-    fn cut_rows(&self, index: usize, constraint: &Constraint<S>, cut: &Cut<S>, w: &mut Workspace<S>) {
-        let at = self.relative(cut, w.constraints.reach[index], &w.poses);
-        let (directions, residuals) = (cut.closure.directions(&at), cut.closure.residuals(&at));
+    /// Rows of a cut, in its second frame and at the nodes; residuals if the relative pose is `known`.
+    fn cut_rows(&self, index: usize, constraint: &Constraint<S>, cut: &Cut<S>, w: &mut Workspace<S>, known: bool) {
+        let (mut at, mut residuals) = (w.constraints.relative[index], [S::zero(); 6]);
+        if known {
+            at = self.relative(cut, w.constraints.reach[index], &w.poses);
+            residuals = cut.closure.residuals(&at);
+        }
+        let directions = cut.closure.directions(&at);
         w.constraints.relative[index] = at;
         for (k, r) in constraint.range().enumerate() {
             let row = &mut w.constraints.rows[r];
@@ -228,6 +251,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         w.constraints.pull.fill(S::zero());
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(cut) = &constraint.bond else { continue };
+            if constraint.gauge() {
+                continue;
+            }
             self.trace.at(None, Quantity::Constraint);
             let at = w.constraints.relative[index];
             let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
@@ -329,7 +355,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Residuals `φ(q)` of the positions and the entries of `Φ`, placed as [`Tree::entry_columns`] says.
     pub fn closure(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, phi: &mut [S], entries: &mut [S]) {
-        self.place_rows(q, u, w);
+        self.place_rows(q, u, w, true);
         self.residuals(w, phi);
         entries.fill(S::zero());
         let mut first = 0;
@@ -404,7 +430,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         dq: &mut [S],
         pivots: &mut [S],
     ) {
-        self.prepare(q, u, w);
+        self.prepare(q, u, w, true);
         self.residuals(w, phi);
         self.aim_at_closed(w);
         w.generalized.fill(S::zero());

@@ -25,7 +25,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// (4.66), on a tree that was not regrouped. The multipliers `λ` of constraints are those of the last
     /// [`Sweeps::accelerations`].
     pub fn reactions(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [[S; 6]]) {
-        self.place_rows(q, u, w);
+        self.place_rows(q, u, w, false);
         self.needed_wrenches(v, Accelerations::Given(a), u, w);
         self.add_seeds(w);
         self.wrenches_back(w);

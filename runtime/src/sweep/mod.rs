@@ -201,7 +201,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Velocities from momenta.
     pub fn velocities(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
-        self.prepare(q, u, w);
+        self.prepare(q, u, w, false);
         self.solve_velocities(p, u, w);
         self.collect_rates(&w.velocity, &w.first, v);
     }
