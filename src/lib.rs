@@ -92,3 +92,8 @@ macro_rules! mbd_model {
 #[cfg(doctest)]
 #[doc = include_str!("../docs/integrators.md")]
 struct Guide;
+
+/// So does that of the page on constraints.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/constraints.md")]
+struct Constraints;

@@ -79,11 +79,12 @@ value() {
     echo $((16#$(sed -n "s/^$1 //p")))
 }
 
-# within_limits SCENE BYTES STACK INSTRUCTIONS EVALUATIONS [ERROR]: adds to `over` what is above the limits of limits.txt.
+# within_limits SCENE BYTES STACK INSTRUCTIONS EVALUATIONS [ERROR [GAP]]: adds to `over` what is above the limits of limits.txt.
 over=""
 within_limits() {
     local limits what value at=0
-    local names=("image bytes" "stack bytes" "instructions/step" evaluations "hundred millionths of energy error")
+    local names=("image bytes" "stack bytes" "instructions/step" evaluations "hundred millionths of energy error"
+        "hundred millionths of m or rad the loop is open")
     read -ra limits <<< "$(sed -n "s/^$1 //p" limits.txt)"
     [ ${#limits[@]} -eq $(($# - 1)) ] || fail "limits.txt has no line for $1 with $(($# - 1)) numbers"
     for what in "${names[@]:0:$(($# - 1))}"; do
@@ -118,17 +119,19 @@ for scene in "${scenes[@]}"; do
         instructions=$(($(value ticks <<< "$out") * 40 / $(value steps <<< "$out")))
         evaluations=$(value evaluations <<< "$out")
         error=() shown=""
-        if grep -q '^error ' <<< "$host"; then
-            error=("$(value error <<< "$host")") shown="$(value error <<< "$host")e-8"
-        fi
-        table+=$(printf '%-28s %-10s %11d %11d %17d %11d %12s' "$scene" "$board" "$bytes" "$stack" "$instructions" \
+        for what in error gap; do
+            if grep -q "^$what " <<< "$host"; then
+                error+=("$(value $what <<< "$host")") shown+="$(printf '%13s' "$(value $what <<< "$host")e-8")"
+            fi
+        done
+        table+=$(printf '%-28s %-10s %11d %11d %17d %11d%s' "$scene" "$board" "$bytes" "$stack" "$instructions" \
             "$evaluations" "$shown")$'\n'
         within_limits "$scene" "$bytes" "$stack" "$instructions" "$evaluations" "${error[@]}"
     done
 done
 
-printf '%-28s %-10s %11s %11s %17s %11s %12s\n' scene board 'image bytes' 'stack bytes' instructions/step evaluations \
-    'energy error'
+printf '%-28s %-10s %11s %11s %17s %11s %12s %12s\n' scene board 'image bytes' 'stack bytes' instructions/step evaluations \
+    'energy error' 'open by'
 printf '%s' "$table"
 echo "every final state and energy has the host's bits; no panic, no allocator"
 [ -z "$over" ] || fail "over the limits of limits.txt:"$'\n'"$over"

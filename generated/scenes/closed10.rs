@@ -38,6 +38,10 @@ impl Closed10 {
     pub const COORDINATES: [&'static str; 10] = ["pin_link1", "pin_link2", "pin_link3", "pin_link4", "pin_link5", "pin_link6", "pin_link7", "pin_link8", "pin_link9", "pin_link10"];
     /// Names of the velocities, in the order of `v`, `p`, `tau`.
     pub const VELOCITIES: [&'static str; 10] = ["pin_link1", "pin_link2", "pin_link3", "pin_link4", "pin_link5", "pin_link6", "pin_link7", "pin_link8", "pin_link9", "pin_link10"];
+    /// Coordinates that the model starts with.
+    pub const START: [f64; 10] = [1.0999999999999999, -0.19999999999999996, -0.19999999999999996, -0.19999999999999996, -0.20000000000000007, -0.20000000000000007, -0.19999999999999996, -0.19999999999999996, -0.19999999999999996, -0.19999999999999996];
+    /// Velocities of joints that stay where they start when loops are closed.
+    pub const HELD: [bool; 10] = [false, false, false, false, false, false, false, false, false, false];
     /// Number of rows of the constraints.
     pub const ROWS: usize = 5;
     /// Number of entries of `Φ` that can be other than zero.

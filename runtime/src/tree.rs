@@ -343,6 +343,8 @@ pub struct Constraint<S> {
     pub velocities: Vec<usize>,
     /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s.
     pub decay: Option<S>,
+    /// What the rows give way by, `Φ v = b + μ σ`, in place of being held: the penalty method with the weight `1/μ`.
+    pub compliance: Option<S>,
 }
 
 /// A mechanism. `S` is the scalar of its constants and of everything computed from them.
@@ -392,6 +394,19 @@ pub struct Dims {
 }
 
 impl<S: Scalar> Tree<S> {
+    /// The same mechanism with penalties in place of multipliers: momenta `σ = α (Φ v + ω φ)` with the weight `α` in kg (of
+    /// turns kg m²) and `ω` in 1/s. That is Bayo's method on the level of velocities, without the integral of the positions'
+    /// errors (Bayo and others 1988; C.7 of the thesis). Rows hold to `σ/α` only, and none is ever redundant.
+    pub fn penalised(&self, weight: S, rate: S) -> Tree<S> {
+        let mut tree = self.clone();
+        let other = tree.accelerations.as_deref_mut();
+        let all = tree.constraints.iter_mut().chain(other.into_iter().flat_map(|tree| &mut tree.constraints));
+        for constraint in all {
+            (constraint.compliance, constraint.decay) = (Some(S::one() / weight), Some(rate));
+        }
+        tree
+    }
+
     /// Whether node `i` is less than [`Tree::matrix_depth`] nodes away from the ground.
     pub fn inner(&self, i: usize) -> bool {
         let up = core::iter::successors(self.nodes[i].parent, |&i| self.nodes[i].parent);

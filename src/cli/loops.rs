@@ -6,7 +6,6 @@ use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Model};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::constrained::{close, complete, Closed, Closing, ConstraintError};
 use multibody::runtime::system::Row;
-use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
 
 use super::output::note;
@@ -70,42 +69,13 @@ impl Assembly {
     }
 }
 
-/// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
-pub fn stated_start(plan: &Plan, interpreter: &Interpreter<f64>) -> Vec<f64> {
-    let mut q = interpreter.neutral();
-    for start in &plan.model.starts {
-        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
-        let Some(Source::State { q: at, .. }) = slot.and_then(|s| s.at) else { continue };
-        for (q, start) in q[at..].iter_mut().zip(&start.q) {
-            *q = *start;
-        }
-    }
-    for at in interpreter.quaternions() {
-        let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));
-        q[at..at + 4].iter_mut().for_each(|x| *x /= norm);
-    }
-    q
-}
-
-/// Velocities of joints that the model holds.
-fn held(plan: &Plan) -> Vec<bool> {
-    let mut held = vec![false; plan.dims.nv];
-    for start in plan.model.starts.iter().filter(|s| s.held) {
-        let slot = plan.slots.iter().find(|s| s.joint == start.joint);
-        if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
-            held[v..v + plan.model.joints[start.joint].kind.nv()].fill(true);
-        }
-    }
-    held
-}
-
 /// Closes the loops from coordinates, and looks how many rows are independent there.
 ///
 /// # Errors
 /// Loops that do not close are told with their places in the file at `path`.
 pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
     interpreter.check_rank(start).map_err(|e| motion::rank_failure(plan, &e))?;
-    let held = held(plan);
+    let held = plan.held();
     let mut q = start.to_vec();
     let closing = Closing { held: &held, ..Closing::default() };
     let closed = match close(interpreter, &mut q, &closing) {
@@ -139,7 +109,7 @@ pub fn velocities(
     v: &[f64],
     stated: bool,
 ) -> Outcome<Vec<f64>> {
-    let (held, q, mut v) = (held(plan), q.to_vec(), v.to_vec());
+    let (held, q, mut v) = (plan.held(), q.to_vec(), v.to_vec());
     if held.iter().any(|h| *h) {
         match complete(interpreter, 0.0, &q, &mut v, &held, 1e-9) {
             Ok(_) => return Ok(v),

@@ -239,7 +239,7 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
 pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
     if !plan.model.constraints.is_empty() || !plan.model.starts.is_empty() {
-        return loops::stated_start(plan, &interpreter);
+        return plan.start();
     }
     let mut q = interpreter.neutral();
     let mut angle = 0.3;

@@ -28,14 +28,14 @@ fn arc(i: usize, n: usize) -> f64 {
 /// is about y, at a small angle.
 pub fn closed(n: usize, kind: &str, crosswise: bool) -> String {
     let comment = format!("Closed chain of {n} equal links (thesis 7.2) in an arc; the last tip is held by a loop.");
-    let axis = |i: usize| if crosswise && i % 2 == 0 { Y } else { Z };
+    let axis = |i: usize| if !crosswise || i % 2 == 1 { Z } else { Y };
     chain(&format!("closed{n}"), &comment, n, axis, Some(kind))
 }
 
 /// Open chain of `n` links with pins about z and y in turn.
 pub fn crosswise(n: usize) -> String {
     let comment = format!("Open chain of {n} equal links, pins about z and y in turn (thesis 7.2).");
-    chain(&format!("crosswise{n}"), &comment, n, |i| if i % 2 == 0 { Y } else { Z }, None)
+    chain(&format!("crosswise{n}"), &comment, n, |i| if i % 2 == 1 { Z } else { Y }, None)
 }
 
 fn chain(name: &str, comment: &str, n: usize, axis: impl Fn(usize) -> [f64; 3], closed: Option<&str>) -> String {

@@ -253,6 +253,19 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options) {
         list(&q)
     );
     let _ = writeln!(out, "    /// Names of the velocities, in the order of `v`, `p`, `tau`.\n    pub const VELOCITIES: [&'static str; {}] = [{}];", v.len(), list(&v));
+    if !plan.model.starts.is_empty() {
+        let start: Vec<String> =
+            plan.start().iter().map(|x| super::statements::literal(*x, options.precision)).collect();
+        let held: Vec<String> = plan.held().iter().map(|held| held.to_string()).collect();
+        let _ = writeln!(
+            out,
+            "    /// Coordinates that the model starts with.\n    pub const START: [{}; {}] = [{}];",
+            options.precision.name(),
+            start.len(),
+            start.join(", ")
+        );
+        let _ = writeln!(out, "    /// Velocities of joints that stay where they start when loops are closed.\n    pub const HELD: [bool; {}] = [{}];", held.len(), held.join(", "));
+    }
     let rows = plan.rows();
     if !rows.is_empty() {
         row_constants(out, plan, options, &rows);

@@ -212,6 +212,7 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
         slots: constraint.slots.clone(),
         first: constraint.first,
         decay: None,
+        compliance: None,
         velocities: Vec::new(),
     }
 }

@@ -13,7 +13,7 @@ use super::instantiate::{steps, value};
 use super::placement::{direction, placement};
 use super::shared::ancestors;
 use super::{Plan, PlanFrame, PoseStep, Rigid};
-use crate::model::{ConstraintKind, LoopKind, Model, Mount, Value};
+use crate::model::{ConstraintKind, JointKind, LoopKind, Model, Mount, Value};
 use crate::options::{Group, Options};
 use crate::symbolic::{Expr, Graph};
 use crate::trace::Given;
@@ -270,6 +270,41 @@ fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
     }
 }
 
+impl Plan {
+    /// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
+    pub fn start(&self) -> Vec<f64> {
+        let mut q = vec![0.0; self.dims.nq];
+        for slot in &self.slots {
+            let Some(Source::State { q: at, .. }) = slot.at else { continue };
+            let kind = self.model.joints[slot.joint].kind;
+            let stated = self.model.starts.iter().find(|s| s.joint == slot.joint);
+            if let Some(stated) = stated {
+                q[at..].iter_mut().zip(&stated.q).for_each(|(q, stated)| *q = *stated);
+            }
+            if let JointKind::Spherical | JointKind::Floating = kind {
+                let turn = &mut q[at + kind.nq() - 4..at + kind.nq()];
+                match turn.iter().fold(0.0_f64, |n, x| n.hypot(*x)) {
+                    0.0 => turn[3] = 1.0,
+                    norm => turn.iter_mut().for_each(|x| *x /= norm),
+                }
+            }
+        }
+        q
+    }
+
+    /// Velocities of joints that stay where they start when loops are closed.
+    pub fn held(&self) -> Vec<bool> {
+        let mut held = vec![false; self.dims.nv];
+        for start in self.model.starts.iter().filter(|s| s.held) {
+            let slot = self.slots.iter().find(|s| s.joint == start.joint);
+            if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
+                held[v..v + self.model.joints[start.joint].kind.nv()].fill(true);
+            }
+        }
+        held
+    }
+}
+
 impl PlanConstraint {
     /// Nodes that it acts on.
     pub(super) fn nodes(&self) -> impl Iterator<Item = usize> + '_ {
@@ -323,6 +358,7 @@ impl PlanConstraint {
             },
         };
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
-        Constraint { bond, slots: self.slots.clone(), first: self.first, velocities: self.velocities.clone(), decay }
+        let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
+        Constraint { bond, slots, first: self.first, velocities, decay, compliance: None }
     }
 }

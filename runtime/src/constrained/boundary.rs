@@ -94,6 +94,29 @@ where
         Chart::correct(system, (&old.0, &old.1), (q, p), point);
         Ok(())
     }
+
+    /// The method takes the displacement as the boundary left it.
+    fn hand_over(&mut self) {
+        let delta = self.method.parts().1;
+        if delta.parts() != self.delta.parts() {
+            delta.copy_from(&self.delta);
+            self.method.corrected();
+        }
+        self.end_known = false;
+    }
+
+    /// What the boundary does before the next step.
+    fn turn(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if B::TURNS {
+            let (q, p) = (&mut self.new.0, &mut self.new.1);
+            self.method.parts().0.store(system, q, p);
+            let turned = self.boundary.turn(system, t + h, q, p);
+            if turned.map_err(|error| StepError::Constraint { time: t.to_f64(), error })? {
+                self.method.begin(system, t + h, q, p)?;
+            }
+        }
+        Ok(())
+    }
 }
 
 impl<Y, M, B> Stepper<Y> for Bounded<Y, M, B>
@@ -161,22 +184,15 @@ where
     }
 
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        let delta = self.method.parts().1;
-        if delta.parts() != self.delta.parts() {
-            delta.copy_from(&self.delta);
-            self.method.corrected();
-        }
+        self.hand_over();
         self.method.accept(system, t, h)?;
-        self.end_known = false;
-        if B::TURNS {
-            let (q, p) = (&mut self.new.0, &mut self.new.1);
-            self.method.parts().0.store(system, q, p);
-            let turned = self.boundary.turn(system, t + h, q, p);
-            if turned.map_err(|error| StepError::Constraint { time: t.to_f64(), error })? {
-                self.method.begin(system, t + h, q, p)?;
-            }
-        }
-        Ok(())
+        self.turn(system, t, h)
+    }
+
+    fn finish(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        self.hand_over();
+        self.method.finish(system, t, h)?;
+        self.turn(system, t, h)
     }
 
     /// That of the method, changed by the boundary; where it cannot be, that of the method.
@@ -208,7 +224,7 @@ where
     ) -> Result<(), StepError> {
         self.resume(system, t, q, p)?;
         self.attempt(system, t, h, None)?;
-        self.accept(system, t, h)?;
+        self.finish(system, t, h)?;
         self.method.parts().0.store(system, q, p);
         Ok(())
     }

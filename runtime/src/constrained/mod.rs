@@ -20,6 +20,8 @@
 //! where nothing speaks for another: what it costs is small, and of a mechanism that passes a singular position it loses least.
 //! There steps of given size step past; a tight error control sees the rates' round-off and may not get by.
 //!
+//! [`Steady`] is the third of them with a number of iterations that is fixed when it is compiled, for firmware.
+//!
 //! States to begin with come from `close` and `complete`.
 
 #[cfg(feature = "alloc")]
@@ -39,6 +41,7 @@ mod minimal;
 mod rattle;
 mod rows;
 mod split;
+mod steady;
 
 pub use boundary::{Boundary, Bounded};
 #[cfg(feature = "alloc")]
@@ -50,6 +53,7 @@ pub use index_two::IndexTwo;
 pub use minimal::{Minimal, Switch, Watch};
 pub use rattle::Rattle;
 pub use split::{Parted, Split};
+pub use steady::Steady;
 
 #[cfg(doc)]
 use crate::Constrained;

@@ -292,6 +292,13 @@ where
         }
     }
 
+    fn finish(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
+        self.field.advance(system, t, &self.delta)?;
+        (self.first_known, self.end_known, self.extra_known) = (false, false, false);
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
     fn corrected(&mut self) {
         self.end_known = false;
     }

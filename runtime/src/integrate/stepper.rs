@@ -88,6 +88,14 @@ where
     /// [`StepError::NotFinite`]; the state has not moved then.
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
 
+    /// As [`Stepper::accept`], where the next attempt begins anew: nothing is made ready for it.
+    ///
+    /// # Errors
+    /// As [`Stepper::accept`].
+    fn finish(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        self.accept(system, t, h)
+    }
+
     /// The displacement of the last attempt has been changed, and the rate at its end with it: if that was evaluated, it
     /// does not hold. Nothing to do for methods that keep no such rate.
     fn corrected(&mut self) {}

@@ -189,6 +189,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         -(-f.gram[g * ng + g]).reciprocal_above(floor)
     }
 
+    /// What row `r` gives way by for its multiplier.
+    pub(super) fn compliance(&self, r: usize) -> S {
+        self.tree.constraint_of(r).compliance.unwrap_or(S::zero())
+    }
+
     /// Multipliers out of a solution, in [`crate::workspace::Constraints::multipliers`].
     pub(super) fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {

@@ -46,7 +46,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             };
             match shared {
                 Shared::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
-                Shared::Row(_) => f.later[g].iter().for_each(|&h| clear(h, &mut f.gram)),
+                Shared::Row(r) => {
+                    f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
+                    f.gram[g * ng + g] = -self.compliance(*r);
+                }
             }
         }
     }
@@ -148,7 +151,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for h in Self::open_after(node, 0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
-            f.whole[h] = f.whole[h] + c * (pivot.rho * c);
+            if let Shared::Row(_) = self.tree.shared[h] {
+                f.whole[h] = f.whole[h] + c * (pivot.rho * c);
+            }
             for h2 in Self::open_after(node, 0) {
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
             }
@@ -200,7 +205,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         for h in open.clone() {
             let c = f.shared_cross[g * ng + h];
-            if let Shared::Velocity(_) = self.tree.shared[g] {
+            if let (Shared::Velocity(_), Shared::Row(_)) = (self.tree.shared[g], self.tree.shared[h]) {
                 f.whole[h] = f.whole[h] + c * (rho * c);
             }
             if let Some(i) = i {

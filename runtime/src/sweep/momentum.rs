@@ -54,8 +54,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (g, shared) in self.tree.shared.iter().enumerate() {
             twice = match *shared {
                 Shared::Velocity(v) => twice + p[v] * w.velocity.shared_rate[g],
-                // Of p⁺ᵀv the part σᵀb is no energy.
-                Shared::Row(r) => twice - w.constraints.rhs[r] * w.velocity.shared_rate[g],
+                // Of p⁺ᵀv the part σᵀΦv is no energy.
+                Shared::Row(r) => {
+                    let sigma = w.velocity.shared_rate[g];
+                    twice - (w.constraints.rhs[r] + self.compliance(r) * sigma) * sigma
+                }
             };
         }
         S::constant(0.5) * twice

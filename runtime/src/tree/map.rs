@@ -113,6 +113,7 @@ impl<S: Scalar> Constraint<S> {
             first: self.first,
             velocities: self.velocities.clone(),
             decay: self.decay.map(of),
+            compliance: self.compliance.map(of),
         }
     }
 }

@@ -120,7 +120,7 @@ fn motion<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write
 fn projected<Y: Closed>(study: &mut Study<Y>, steps: u64, out: &mut dyn Write) -> Outcome {
     let every = (steps / 10).max(1);
     let [after, before, energy] = study.projected(STEP, steps, |step| {
-        if step % every == 0 {
+        if step.is_multiple_of(every) {
             note(format_args!("projection: {step} of {steps} steps"));
         }
     });

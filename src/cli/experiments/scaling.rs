@@ -319,7 +319,7 @@ fn many_loops(args: &ScalingArgs, effort: &Effort, out: &mut dyn Write) -> Outco
         let points: Vec<(f64, f64)> = rows.iter().map(|(n, t)| (*n as f64, t[k])).collect();
         let _ = writeln!(text, "- {name}: {}", told(&Line::through(&points), "loop"));
     }
-    write!(out, "{text}\n")?;
+    writeln!(out, "{text}")?;
     let Some(path) = &args.out else { return Ok(()) };
     let t = rows.iter().map(|r| r.0 as f64).collect();
     let line = |k: usize| (names[k].to_string(), rows.iter().map(|r| 1e6 * r.1[k]).collect());

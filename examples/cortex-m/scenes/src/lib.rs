@@ -1,8 +1,9 @@
 //! What the firmware and its host twin both run: generated dynamics in steps of 1 ms.
 #![no_std]
 
+use mbd_runtime::constrained::{Bounded, Steady};
 use mbd_runtime::integrate::{Ab6, ImplicitMidpoint, Rk4, Stepper};
-use mbd_runtime::{Differentiable, Energetic, Real, Scalar, System};
+use mbd_runtime::{Constrained, Differentiable, Energetic, Real, Scalar, System};
 
 mbd_macros::mbd_model! {
     path = "../../../models/double_pendulum.toml",
@@ -28,11 +29,28 @@ mbd_macros::mbd_model! {
     scalar = f64,
     outputs = [rates, momenta, energy]
 }
+mbd_macros::mbd_model! {
+    path = "../../../models/mechanisms/fourbar.toml",
+    name = FourbarF32,
+    scalar = f32,
+    outputs = [rates, closure, settle, correction, multipliers, energy]
+}
+mbd_macros::mbd_model! {
+    path = "../../../models/mechanisms/fourbar.toml",
+    name = FourbarF64,
+    scalar = f64,
+    outputs = [rates, closure, settle, correction, multipliers, energy]
+}
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
 /// Number of steps of the run of a minute, and after how many of them the energy is looked at.
 pub const MINUTE: (u32, u32) = (60_000, 100);
+
+/// Number of steps of the four-bar's run, and after how many of them the energy is looked at.
+pub const LOOP: (u32, u32) = (3000, 100);
+/// Where the four-bar starts, rad: closed, its crank at 60 degrees.
+const FOURBAR: [f64; 3] = [1.047_197_551_196_597_6, -0.541_626_669_742_253_2, 1.633_456_164_175_602_2];
 
 /// Where a run ended, and what it took.
 pub struct End<Y: System> {
@@ -98,10 +116,7 @@ where
 ///
 /// # Errors
 /// [`Unusable`].
-pub fn watched_minute<Y>(
-    system: &mut Y,
-    mut watch: impl FnMut(&Y::Coordinates, &Y::Momenta),
-) -> Result<End<Y>, Unusable>
+pub fn watched_minute<Y>(system: &mut Y, watch: impl FnMut(&Y::Coordinates, &Y::Momenta)) -> Result<End<Y>, Unusable>
 where
     Y: Energetic,
     Y::Scalar: Real,
@@ -113,14 +128,30 @@ where
         start = -start;
     }
     let p = system.rest();
+    let method = Ab6::compensated(system);
+    watched(system, method, MINUTE, (q, p), watch)
+}
+
+/// A run of so many steps with a look at every state, and at the energy every so many steps.
+fn watched<Y, M>(
+    system: &mut Y,
+    method: M,
+    (steps, often): (u32, u32),
+    (q, p): (Y::Coordinates, Y::Momenta),
+    mut watch: impl FnMut(&Y::Coordinates, &Y::Momenta),
+) -> Result<End<Y>, Unusable>
+where
+    Y: Energetic,
+    Y::Scalar: Real,
+    M: Stepper<Y>,
+{
     watch(&q, &p);
     let (kinetic, potential) = system.state_energy(&q, &p);
     let start = kinetic + potential;
     let (mut change, mut largest) = (Y::Scalar::zero(), kinetic);
-    let method = Ab6::compensated(system);
-    let end = run(system, method, MINUTE.0, (q, p), |system, step, q, p| {
+    let end = run(system, method, steps, (q, p), |system, step, q, p| {
         watch(q, p);
-        if step % MINUTE.1 == 0 {
+        if step % often == 0 {
             let (kinetic, potential) = system.state_energy(q, p);
             let off = ((potential - start) + kinetic).abs();
             change = if off > change { off } else { change };
@@ -128,6 +159,37 @@ where
         }
     })?;
     Ok(End { energy: Some([start, change, largest]), ..end })
+}
+
+/// Three seconds of the four-bar from rest by the method of Runge and Kutta of order 4. At every end of a step, always the same
+/// work: momenta are freed of the multipliers, then positions moved back once.
+///
+/// # Errors
+/// [`Unusable`].
+pub fn closed<Y>(system: &mut Y) -> Result<End<Y>, Unusable>
+where
+    Y: Constrained + Energetic,
+    Y::Scalar: Real,
+{
+    watched_closed(system, |_, _| ())
+}
+
+/// The same, with a look at every state from the start on.
+///
+/// # Errors
+/// [`Unusable`].
+pub fn watched_closed<Y>(system: &mut Y, watch: impl FnMut(&Y::Coordinates, &Y::Momenta)) -> Result<End<Y>, Unusable>
+where
+    Y: Constrained + Energetic,
+    Y::Scalar: Real,
+{
+    let (mut q, p) = (system.neutral(), system.rest());
+    for (q, start) in q.as_mut().iter_mut().zip(FOURBAR) {
+        *q = Y::Scalar::constant(start);
+    }
+    let hold = Steady::<_, 1>::new(system);
+    let method = Bounded::new(system, Rk4::new(system), hold);
+    watched(system, method, LOOP, (q, p), watch)
 }
 
 /// [`STEPS`] steps from rest, each joint 0.2 rad further out than the one before.
@@ -199,5 +261,7 @@ macro_rules! each_scene {
         $what!(ur5_f64, $crate::Ur5F64, $crate::rk4);
         $what!(ur5_midpoint_f32, $crate::Ur5F32, $crate::midpoint);
         $what!(ur5_minute_f32, $crate::Ur5F32, $crate::minute);
+        $what!(fourbar_f32, $crate::FourbarF32, $crate::closed);
+        $what!(fourbar_f64, $crate::FourbarF64, $crate::closed);
     };
 }
