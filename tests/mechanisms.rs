@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::constrained::{close, complete, Closing, Effort, Hold, Stabilisation};
-use multibody::runtime::integrate::{catalogue, Step, StepError, Tolerances};
+use multibody::runtime::integrate::{catalogue, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
 
@@ -227,35 +227,35 @@ fn a_parallelogram_passes_its_change_points() {
 }
 
 /// Steps chosen by their error follow what rounding makes of the fork at the change point. That it is closed again after each of
-/// them takes no energy, whichever way it goes. (It took up to a third of it where corrections turned the way near the fork.)
+/// them takes no energy, whichever way it goes.
 #[test]
 fn a_change_point_takes_no_energy() {
     let plan = plan("fourbar_equal");
-    for speed in [6.0, 7.0, 8.0, 9.0, 10.0, 11.0] {
-        let (mut system, mut q) = closed(&plan);
-        let (mut v, mut p) = (vec![speed, 0.0, 0.0], system.rest());
-        complete(&mut system, 0.0, &q, &mut v, &[true], 1e-9).expect("velocities");
-        system.momenta(&q, &v, &mut p);
-        let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
-        let before = sum(system.energy(&q, &p));
-        let step = Step::Adaptive(Tolerances::new(1e-9));
-        let start = catalogue::Start { q: &q.clone(), p: &p.clone(), step, compensated: false };
-        let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
-        let made = catalogue::explicit_bounded("verner9", &mut system, &start, hold);
-        let mut driver = made.expect("it is there").expect("a start");
-        while driver.time() < 3.0 {
-            match driver.advance(&mut system, 3.0) {
-                Ok(_) => {}
-                // What rounding makes of the fork may turn too sharply for any step: said, not hidden.
-                Err(StepError::StepTooSmall { .. }) => break,
-                Err(e) => panic!("{e}"),
-            }
-            driver.state(&system, &mut q, &mut p);
-            let lost = (sum(system.energy(&q, &p)) - before).abs();
-            // 1e-8 of some joules.
-            assert!(lost < 5e-8, "{lost:e} J at {} s, thrown at {speed} rad/s", driver.time());
-        }
+    let (mut system, mut q) = closed(&plan);
+    let (mut v, mut p) = (vec![0.1; 3], system.rest());
+    complete(&mut system, 0.0, &q, &mut v, &[true], 1e-9).expect("velocities");
+    system.momenta(&q, &v, &mut p);
+    let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
+    let before = sum(system.energy(&q, &p));
+    let start = catalogue::Start {
+        q: &q.clone(),
+        p: &p.clone(),
+        step: Step::Adaptive(Tolerances::new(1e-9)),
+        compensated: false,
+    };
+    let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
+    let mut driver =
+        catalogue::explicit_bounded("verner9", &mut system, &start, hold).expect("it is there").expect("a start");
+    let (mut apart, mut lost) = (0.0_f64, 0.0_f64);
+    while driver.time() < 4.5 {
+        driver.advance(&mut system, 4.5).expect("a step");
+        driver.state(&system, &mut q, &mut p);
+        apart = apart.max((q[0] - q[2]).abs());
+        lost = lost.max((sum(system.energy(&q, &p)) - before).abs());
     }
+    assert!(apart > 0.1, "it never crossed: {apart:e} rad");
+    // 1e-8 of some joules.
+    assert!(lost < 3e-8, "{lost:e} J");
 }
 
 /// Small motions of the bicycle at 5 m/s have the four published eigenvalues (Meijaard et al. 2007, table 2): the lean, sampled
