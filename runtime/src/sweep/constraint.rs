@@ -214,7 +214,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// What row `r` gives way by for its multiplier.
     pub(super) fn compliance(&self, r: usize) -> S {
-        self.tree.constraint_of(r).compliance.unwrap_or(S::zero())
+        // Part of a tree, on which forms of elimination are tried, has rows of constraints that it has not.
+        let own = self.tree.constraints.iter().find(|c| c.range().contains(&r));
+        own.and_then(|c| c.compliance).unwrap_or(S::zero())
     }
 
     /// Multipliers out of a solution, in [`crate::workspace::Constraints::multipliers`].
