@@ -19,7 +19,7 @@
 //   [0..5] end: pin, link10 to the ground
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 436 + 598 + 11 = 1045; 0, 10
+//   rates: 402 + 579 + 11 = 992; 0, 10
 
 /// Dynamics of `closed10` in canonical form: rates. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
@@ -99,7 +99,7 @@ impl Closed10 {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 1045 operations: 436 additions, 598 multiplications, 11 divisions; apart: 0 square roots, 10 sine-cosine pairs.
+    /// 992 operations: 402 additions, 579 multiplications, 11 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         ::multibody::runtime::kernel::call::<Self, 0, _>((q, p, qd, pd,));
     }
@@ -118,8 +118,8 @@ impl Closed10 {
             let q_7 = q.get(7, l);
             let q_8 = q.get(8, l);
             let q_9 = q.get(9, l);
-            let link2_pose2 = q_0 + q_1;
-            let link3_pose0 = q_2 + link2_pose2;
+            let link2_pose1 = q_0 + q_1;
+            let link3_pose0 = q_2 + link2_pose1;
             let link4_pose0 = q_3 + link3_pose0;
             let link5_pose0 = q_4 + link4_pose0;
             let link6_pose0 = q_5 + link5_pose0;
@@ -128,7 +128,7 @@ impl Closed10 {
             let link9_pose0 = q_8 + link8_pose0;
             let link10_pose0 = q_9 + link9_pose0;
             angles[0][l] = q_0;
-            angles[1][l] = link2_pose2;
+            angles[1][l] = link2_pose1;
             angles[2][l] = link3_pose0;
             angles[3][l] = link4_pose0;
             angles[4][l] = link5_pose0;
@@ -165,65 +165,62 @@ impl Closed10 {
             // link1: sine and cosine, rotation
             let link1_sin0 = sines[0][l];
             let link1_cos0 = cosines[0][l];
-            // link2: sine and cosine, rotation
-            let link2_pose0 = 0.05 * link1_cos0;
-            let link2_pose1 = 0.05 * link1_sin0;
             // link10: momentum remainder D, D' (4.45, 4.49)
             let link10_rest0 = 30.0 * p_9;
-            let link10_rest1 = 120000.0 * p_9;
+            // link2: sine and cosine, rotation
+            let link2_pose0 = 0.05 * link1_sin0;
+            let link2_pose2 = 0.05 * link1_cos0;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest0 = 6000.0 * p_9;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel0 = 120000.0 * p_9;
             // link2: inertia carried to the parent, M* (4.48)
             let link2_inertia0 = 0.00475 * link1_cos0;
             // link2: sine and cosine, rotation
-            let link2_cos0 = cosines[1][l];
             let link2_sin0 = sines[1][l];
+            let link2_cos0 = cosines[1][l];
             // link3: sine and cosine, rotation
-            let link3_pose1 = 0.05 * link2_cos0;
-            let link3_pose2 = 0.05 * link2_sin0;
-            // ground: loops and couplings
-            let ground_loop0 = link2_pose0 - 0.41303684484266145;
+            let link3_pose1 = 0.05 * link2_sin0;
+            let link3_pose2 = 0.05 * link2_cos0;
             // link3: inertia carried to the parent, M* (4.48)
             let link3_inertia0 = 0.00425 * link2_sin0;
             // link2: sine and cosine, rotation
             let link2_pose3 = 0.00425 * link2_cos0;
             // link3: sine and cosine, rotation
-            let link3_cos0 = cosines[2][l];
             let link3_sin0 = sines[2][l];
+            let link3_cos0 = cosines[2][l];
             // link4: sine and cosine, rotation
-            let link4_pose1 = 0.05 * link3_cos0;
-            let link4_pose2 = 0.05 * link3_sin0;
+            let link4_pose1 = 0.05 * link3_sin0;
+            let link4_pose2 = 0.05 * link3_cos0;
             // link4: inertia carried to the parent, M* (4.48)
             let link4_inertia0 = 0.0037500000000000007 * link3_sin0;
             // link3: sine and cosine, rotation
             let link3_pose3 = 0.0037500000000000007 * link3_cos0;
-            // ground: loops and couplings
-            let ground_loop1 = link3_pose1 + ground_loop0;
-            let ground_loop2 = link3_pose2 - 0.08372671348444602;
             // link4: sine and cosine, rotation
-            let link4_cos0 = cosines[3][l];
             let link4_sin0 = sines[3][l];
+            let link4_cos0 = cosines[3][l];
             // link5: sine and cosine, rotation
-            let link5_pose1 = 0.05 * link4_cos0;
-            let link5_pose2 = 0.05 * link4_sin0;
+            let link5_pose1 = 0.05 * link4_sin0;
+            let link5_pose2 = 0.05 * link4_cos0;
             // link5: inertia carried to the parent, M* (4.48)
             let link5_inertia0 = 0.0032500000000000003 * link4_sin0;
             // link4: sine and cosine, rotation
             let link4_pose3 = 0.0032500000000000003 * link4_cos0;
-            // ground: loops and couplings
-            let ground_loop3 = link4_pose1 + ground_loop1;
-            let ground_loop4 = link2_pose1 + link4_pose2;
             // link5: sine and cosine, rotation
-            let link5_cos0 = cosines[4][l];
             let link5_sin0 = sines[4][l];
+            let link5_cos0 = cosines[4][l];
             // link6: sine and cosine, rotation
-            let link6_pose1 = 0.05 * link5_cos0;
-            let link6_pose2 = 0.05 * link5_sin0;
+            let link6_pose1 = 0.05 * link5_sin0;
+            let link6_pose2 = 0.05 * link5_cos0;
             // link6: inertia carried to the parent, M* (4.48)
             let link6_inertia0 = 0.0027500000000000007 * link5_sin0;
-            // ground: loops and couplings
-            let ground_loop5 = link5_pose1 + ground_loop3;
-            let ground_loop6 = link5_pose2 + ground_loop2;
-            let ground_loop7 = link6_pose1 + ground_loop5;
-            let ground_loop8 = link6_pose2 + ground_loop4;
+            // link5: sine and cosine, rotation
+            let link5_pose3 = 0.0027500000000000007 * link5_cos0;
+            // link6: sine and cosine, rotation
+            let link6_sin0 = sines[5][l];
+            let link6_cos0 = cosines[5][l];
+            // link7: sine and cosine, rotation
+            let link7_pose1 = 0.05 * link6_sin0;
             // link9: sine and cosine, rotation
             let link9_sin0 = sines[8][l];
             let link9_cos0 = cosines[8][l];
@@ -237,20 +234,20 @@ impl Closed10 {
             let link10_inertia0 = 0.0075 * link10_sin0;
             let link10_inertia1 = 0.000375 * link9_sin0;
             let link10_inertia2 = link10_sin0 * link10_cos0;
-            let link10_inertia3 = link10_sin0 * link10_sin0;
+            let link10_inertia3 = link10_inertia1 * link10_inertia2;
+            let link10_inertia4 = link10_sin0 * link10_sin0;
+            let link10_inertia5 = link10_inertia1 * link10_inertia4;
             // link10: sine and cosine, rotation
             let link10_pose1 = 0.05 * link9_cos0;
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia4 = A::fma_f64(link10_sin0, link10_inertia0, -0.0075);
-            let link10_inertia5 = link10_sin0 * link10_inertia0;
-            let link10_inertia6 = link10_inertia1 * link10_inertia2;
-            let link10_inertia7 = link10_inertia1 * link10_inertia3;
+            let link10_inertia6 = A::fma_f64(link10_sin0, link10_inertia0, -0.0075);
+            let link10_inertia7 = link10_sin0 * link10_inertia0;
             // link10: sine and cosine, rotation
             let link10_pose2 = 0.05 * link9_sin0;
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia8 = A::fma_f64(-link10_pose1, link10_inertia4, link10_inertia6);
-            let link10_inertia9 = link10_inertia6 + link10_inertia8;
-            let link10_inertia10 = A::fma_f64(link10_pose2, link10_inertia7, -3.3333333333333335e-5);
+            let link10_inertia8 = A::fma_f64(-link10_pose1, link10_inertia6, link10_inertia3);
+            let link10_inertia9 = link10_inertia3 + link10_inertia8;
+            let link10_inertia10 = A::fma_f64(link10_pose2, link10_inertia5, -3.3333333333333335e-5);
             let link10_inertia11 = A::fma_f64(link10_pose1, link10_inertia9, link10_inertia10);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot0 = 1.0 / link10_inertia11;
@@ -260,7 +257,7 @@ impl Closed10 {
             let link10_inertia14 = 0.00075 * link9_sin0;
             let link10_inertia15 = A::fma_f64(link10_inertia12, link10_inertia13, -link10_inertia14);
             let link10_inertia16 = link10_sin0 * link10_inertia12;
-            let link10_inertia17 = link10_inertia7 + link10_inertia15;
+            let link10_inertia17 = link10_inertia5 + link10_inertia15;
             // link9: sine and cosine, rotation
             let link9_pose1 = 0.00075 * link9_cos0;
             // link10: inertia carried to the parent, M* (4.48)
@@ -275,9 +272,9 @@ impl Closed10 {
             let link9_pose2 = 0.05 * link8_sin0;
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot3 = link10_inertia18 * link10_inertia18;
-            let link9_pivot4 = A::fma_f64(link9_pivot0, link9_pivot3, link10_inertia4);
+            let link9_pivot4 = A::fma_f64(link9_pivot0, link9_pivot3, link10_inertia6);
             let link9_pivot5 = link10_inertia17 * link10_inertia17;
-            let link9_pivot6 = A::fma_f64(-link9_pivot0, link9_pivot5, link10_inertia5);
+            let link9_pivot6 = A::fma_f64(-link9_pivot0, link9_pivot5, link10_inertia7);
             // link9: sine and cosine, rotation
             let link9_pose3 = 0.05 * link8_cos0;
             // link9: inertia carried to the parent, M* (4.48)
@@ -297,17 +294,11 @@ impl Closed10 {
             let link8_pose1 = 0.00125 * link8_cos0;
             // link9: inertia carried to the parent, M* (4.48)
             let link9_inertia9 = link8_pose1 - link9_inertia3;
-            // link6: sine and cosine, rotation
-            let link6_sin0 = sines[5][l];
-            let link6_cos0 = cosines[5][l];
             // link8: U, Mj, k and the reduced inertia M' (4.44)
             let link8_pivot1 = link9_inertia8 * link9_inertia9;
             let link8_pivot2 = A::fma_f64(link8_pivot0, link8_pivot1, link9_pivot2);
             // link8: sine and cosine, rotation
             let link8_pose2 = 0.05 * link7_sin0;
-            // ground: loops and couplings
-            let ground_loop9 = link8_pose2 + ground_loop8;
-            let ground_loop10 = link9_pose2 + ground_loop9;
             // link8: U, Mj, k and the reduced inertia M' (4.44)
             let link8_pivot3 = link9_inertia9 * link9_inertia9;
             let link8_pivot4 = A::fma_f64(link8_pivot0, link8_pivot3, link9_pivot4);
@@ -332,18 +323,12 @@ impl Closed10 {
             let link8_inertia7 = A::fma_f64(link8_pose2, link8_pivot6, -link8_inertia6);
             let link8_inertia8 = A::fma_f64(link8_pose3, link8_pivot2, link8_inertia7);
             // link7: sine and cosine, rotation
-            let link7_pose1 = 0.00175 * link7_cos0;
+            let link7_pose2 = 0.00175 * link7_cos0;
             // link8: inertia carried to the parent, M* (4.48)
-            let link8_inertia9 = link7_pose1 - link8_inertia3;
+            let link8_inertia9 = link7_pose2 - link8_inertia3;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot1 = link8_inertia8 * link8_inertia9;
             let link7_pivot2 = A::fma_f64(link7_pivot0, link7_pivot1, link8_pivot2);
-            // link7: sine and cosine, rotation
-            let link7_pose2 = 0.05 * link6_sin0;
-            // ground: loops and couplings
-            let ground_loop11 = link7_pose2 + ground_loop6;
-            let ground_loop12 = A::fma_f64(-0.05, link9_sin0, -ground_loop11);
-            // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot3 = link8_inertia9 * link8_inertia9;
             let link7_pivot4 = A::fma_f64(link7_pivot0, link7_pivot3, link8_pivot4);
             // link8: momentum rate (4.36)
@@ -353,14 +338,9 @@ impl Closed10 {
             let link7_pivot6 = A::fma_f64(-link7_pivot0, link7_pivot5, link8_pivot6);
             // link7: sine and cosine, rotation
             let link7_pose3 = 0.05 * link6_cos0;
-            // ground: loops and couplings
-            let ground_loop13 = link7_pose3 + ground_loop7;
-            let ground_loop14 = link8_pose3 + ground_loop13;
-            let ground_loop15 = link9_pose3 + ground_loop14;
-            let ground_loop16 = link10_pose1 + ground_loop15;
             // link7: inertia carried to the parent, M* (4.48)
-            let link7_inertia0 = link7_pose2 * link7_pivot2;
-            let link7_inertia1 = link7_pose2 * link7_pose2;
+            let link7_inertia0 = link7_pose1 * link7_pivot2;
+            let link7_inertia1 = link7_pose1 * link7_pose1;
             let link7_inertia2 = A::fma_f64(link7_pivot6, link7_inertia1, -0.00010833333333333334);
             let link7_inertia3 = A::fma_f64(-link7_pose3, link7_pivot4, link7_inertia0);
             let link7_inertia4 = link7_inertia0 + link7_inertia3;
@@ -369,7 +349,7 @@ impl Closed10 {
             let link6_pivot0 = 1.0 / link7_inertia5;
             // link7: inertia carried to the parent, M* (4.48)
             let link7_inertia6 = 0.0022500000000000003 * link6_sin0;
-            let link7_inertia7 = A::fma_f64(link7_pose2, link7_pivot6, -link7_inertia6);
+            let link7_inertia7 = A::fma_f64(link7_pose1, link7_pivot6, -link7_inertia6);
             let link7_inertia8 = A::fma_f64(link7_pose3, link7_pivot2, link7_inertia7);
             // link6: sine and cosine, rotation
             let link6_pose3 = 0.0022500000000000003 * link6_cos0;
@@ -382,91 +362,69 @@ impl Closed10 {
             let link6_pivot4 = A::fma_f64(link6_pivot0, link6_pivot3, link7_pivot4);
             // link7: momentum rate (4.36)
             let link7_pdot0 = link7_pivot6 + link7_pivot4;
-            // ground: loops and couplings
-            let ground_loop17 = 0.05 * link10_sin0;
-            let ground_loop18 = ground_loop17 + ground_loop12;
-            let ground_loop19 = ground_loop17 + ground_loop10;
-            let ground_loop20 = ground_loop18 - ground_loop19;
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot5 = link7_inertia8 * link7_inertia8;
             let link6_pivot6 = A::fma_f64(-link6_pivot0, link6_pivot5, link7_pivot6);
             // link6: inertia carried to the parent, M* (4.48)
-            let link6_inertia1 = A::fma_f64(link6_pose2, link6_pivot6, -link6_inertia0);
-            let link6_inertia2 = A::fma_f64(link6_pose1, link6_pivot2, link6_inertia1);
-            let link6_inertia3 = link6_pose2 * link6_pivot2;
-            // ground: loops and couplings
-            let ground_loop21 = 0.05 * link10_cos0;
-            let ground_loop22 = ground_loop21 - ground_loop16;
-            let ground_loop23 = ground_loop21 - ground_loop22;
-            // link6: inertia carried to the parent, M* (4.48)
-            let link6_inertia4 = link6_pose2 * link6_pose2;
+            let link6_inertia1 = A::fma_f64(link6_pose1, link6_pivot6, -link6_inertia0);
+            let link6_inertia2 = A::fma_f64(link6_pose2, link6_pivot2, link6_inertia1);
+            let link6_inertia3 = link6_pose1 * link6_pivot2;
+            let link6_inertia4 = link6_pose1 * link6_pose1;
             let link6_inertia5 = A::fma_f64(link6_pivot6, link6_inertia4, -0.00013333333333333337);
-            let link6_inertia6 = A::fma_f64(-link6_pose1, link6_pivot4, link6_inertia3);
+            let link6_inertia6 = A::fma_f64(-link6_pose2, link6_pivot4, link6_inertia3);
             let link6_inertia7 = link6_inertia3 + link6_inertia6;
-            let link6_inertia8 = A::fma_f64(link6_pose1, link6_inertia7, link6_inertia5);
+            let link6_inertia8 = link5_pose3 - link6_inertia6;
+            let link6_inertia9 = A::fma_f64(link6_pose2, link6_inertia7, link6_inertia5);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot0 = 1.0 / link6_inertia8;
-            // link10: U, Mj, k and the reduced inertia M' (4.44)
-            let link10_pivot0 = A::fma_f64(-30.0, ground_loop20, link10_sin0);
+            let link5_pivot0 = 1.0 / link6_inertia9;
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia19 = link10_cos0 * link10_cos0;
-            let link10_inertia20 = A::fma_f64(link10_sin0, link10_pivot0, link10_inertia19);
-            // link10: U, Mj, k and the reduced inertia M' (4.44)
-            let link10_pivot1 = A::fma_f64(30.0, ground_loop23, link10_cos0);
-            // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia21 = A::fma_f64(link10_cos0, link10_pivot1, link10_inertia3);
-            let link10_inertia22 = A::fma_f64(-link10_sin0, link10_pivot1, link10_inertia2);
-            let link10_inertia23 = A::fma_f64(-link10_cos0, link10_pivot0, link10_inertia2);
-            // link5: sine and cosine, rotation
-            let link5_pose3 = 0.0027500000000000007 * link5_cos0;
-            // link6: inertia carried to the parent, M* (4.48)
-            let link6_inertia9 = link5_pose3 - link6_inertia6;
-            // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia24 = link10_pose2 * link10_inertia20;
-            let link10_inertia25 = A::fma_f64(-link10_pose1, link10_inertia23, link10_inertia24);
-            let link10_inertia26 = link10_pose2 * link10_inertia22;
-            let link10_inertia27 = A::fma_f64(-link10_pose1, link10_inertia21, link10_inertia26);
+            let link10_inertia19 = 0.5 * link10_sin0;
+            let link10_inertia20 = link10_pose2 * link10_cos0;
+            let link10_inertia21 = A::fma_f64(-link10_pose1, link10_sin0, link10_inertia20);
+            let link10_inertia22 = 0.5 * link10_cos0;
+            let link10_inertia23 = link10_pose2 * link10_inertia19;
+            let link10_inertia24 = A::fma_f64(link10_pose1, link10_inertia22, link10_inertia23);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot1 = link6_inertia2 * link6_inertia9;
+            let link5_pivot1 = link6_inertia2 * link6_inertia8;
             let link5_pivot2 = A::fma_f64(link5_pivot0, link5_pivot1, link6_pivot2);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
-            let link9_pivot7 = link10_inertia17 * link10_inertia25;
-            let link9_pivot8 = A::fma_f64(-link9_pivot0, link9_pivot7, link10_inertia20);
-            let link9_pivot9 = link10_inertia17 * link10_inertia27;
-            let link9_pivot10 = A::fma_f64(-link9_pivot0, link9_pivot9, link10_inertia22);
+            let link9_pivot7 = link10_inertia17 * link10_inertia21;
+            let link9_pivot8 = A::fma_f64(-link9_pivot0, link9_pivot7, link10_cos0);
+            let link9_pivot9 = link10_inertia17 * link10_inertia24;
+            let link9_pivot10 = A::fma_f64(-link9_pivot0, link9_pivot9, link10_inertia19);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot3 = link6_inertia9 * link6_inertia9;
+            let link5_pivot3 = link6_inertia8 * link6_inertia8;
             let link5_pivot4 = A::fma_f64(link5_pivot0, link5_pivot3, link6_pivot4);
             // link6: momentum rate (4.36)
             let link6_pdot0 = link6_pivot6 + link6_pivot4;
             // link9: U, Mj, k and the reduced inertia M' (4.44)
-            let link9_pivot11 = link10_inertia18 * link10_inertia25;
-            let link9_pivot12 = A::fma_f64(-link9_pivot0, link9_pivot11, link10_inertia23);
+            let link9_pivot11 = link10_inertia18 * link10_inertia21;
+            let link9_pivot12 = A::fma_f64(-link9_pivot0, link9_pivot11, link10_sin0);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot5 = link6_inertia2 * link6_inertia2;
             let link5_pivot6 = A::fma_f64(-link5_pivot0, link5_pivot5, link6_pivot6);
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia1 = A::fma_f64(link5_pose2, link5_pivot6, -link5_inertia0);
-            let link5_inertia2 = A::fma_f64(link5_pose1, link5_pivot2, link5_inertia1);
+            let link5_inertia1 = A::fma_f64(link5_pose1, link5_pivot6, -link5_inertia0);
+            let link5_inertia2 = A::fma_f64(link5_pose2, link5_pivot2, link5_inertia1);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
-            let link9_pivot13 = link10_inertia18 * link10_inertia27;
-            let link9_pivot14 = A::fma_f64(-link9_pivot0, link9_pivot13, link10_inertia21);
+            let link9_pivot13 = link10_inertia18 * link10_inertia24;
+            let link9_pivot14 = A::fma_f64(link9_pivot0, link9_pivot13, link10_inertia22);
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia3 = link5_pose2 * link5_pivot2;
+            let link5_inertia3 = link5_pose1 * link5_pivot2;
             // link9: inertia carried to the parent, M* (4.48)
             let link9_inertia10 = link9_pose2 * link9_pivot8;
             let link9_inertia11 = A::fma_f64(-link9_pose3, link9_pivot12, link9_inertia10);
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia4 = link5_pose2 * link5_pose2;
+            let link5_inertia4 = link5_pose1 * link5_pose1;
             let link5_inertia5 = A::fma_f64(link5_pivot6, link5_inertia4, -0.00015833333333333338);
             // link9: inertia carried to the parent, M* (4.48)
             let link9_inertia12 = link9_pose2 * link9_pivot10;
-            let link9_inertia13 = A::fma_f64(-link9_pose3, link9_pivot14, link9_inertia12);
+            let link9_inertia13 = A::fma_f64(link9_pose3, link9_pivot14, link9_inertia12);
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia6 = A::fma_f64(-link5_pose1, link5_pivot4, link5_inertia3);
+            let link5_inertia6 = A::fma_f64(-link5_pose2, link5_pivot4, link5_inertia3);
             let link5_inertia7 = link5_inertia3 + link5_inertia6;
             let link5_inertia8 = link4_pose3 - link5_inertia6;
-            let link5_inertia9 = A::fma_f64(link5_pose1, link5_inertia7, link5_inertia5);
+            let link5_inertia9 = A::fma_f64(link5_pose2, link5_inertia7, link5_inertia5);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot0 = 1.0 / link5_inertia9;
             // link8: U, Mj, k and the reduced inertia M' (4.44)
@@ -477,18 +435,18 @@ impl Closed10 {
             let link8_pivot11 = link9_inertia9 * link9_inertia11;
             let link8_pivot12 = A::fma_f64(-link8_pivot0, link8_pivot11, link9_pivot12);
             let link8_pivot13 = link9_inertia9 * link9_inertia13;
-            let link8_pivot14 = A::fma_f64(-link8_pivot0, link8_pivot13, link9_pivot14);
+            let link8_pivot14 = A::fma_f64(link8_pivot0, link8_pivot13, link9_pivot14);
             // link8: inertia carried to the parent, M* (4.48)
             let link8_inertia10 = link8_pose2 * link8_pivot8;
             let link8_inertia11 = A::fma_f64(-link8_pose3, link8_pivot12, link8_inertia10);
             let link8_inertia12 = link8_pose2 * link8_pivot10;
-            let link8_inertia13 = A::fma_f64(-link8_pose3, link8_pivot14, link8_inertia12);
+            let link8_inertia13 = A::fma_f64(link8_pose3, link8_pivot14, link8_inertia12);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot1 = link5_inertia2 * link5_inertia8;
             let link4_pivot2 = A::fma_f64(link4_pivot0, link4_pivot1, link5_pivot2);
             // link10: momentum remainder D, D' (4.45, 4.49)
-            let link10_rest2 = link10_sin0 * link10_rest0;
-            let link10_rest3 = link10_cos0 * link10_rest0;
+            let link10_rest1 = link10_sin0 * link10_rest0;
+            let link10_rest2 = link10_cos0 * link10_rest0;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot7 = link8_inertia8 * link8_inertia11;
             let link7_pivot8 = A::fma_f64(-link7_pivot0, link7_pivot7, link8_pivot8);
@@ -500,12 +458,14 @@ impl Closed10 {
             // link5: momentum rate (4.36)
             let link5_pdot0 = link5_pivot6 + link5_pivot4;
             // link9: momentum remainder D, D' (4.45, 4.49)
-            let link9_rest0 = A::fma_f64(link10_pose1, link10_rest3, -p_8);
-            let link9_rest1 = A::fma_f64(link10_pose2, link10_rest2, p_9);
+            let link9_rest0 = A::fma_f64(link10_pose1, link10_rest2, -p_8);
+            let link9_rest1 = A::fma_f64(link10_pose2, link10_rest1, p_9);
             let link9_rest2 = link9_rest0 + link9_rest1;
             let link9_rest3 = link9_pivot0 * link9_rest2;
-            let link9_rest4 = A::fma_f64(-link10_inertia17, link9_rest3, link10_rest2);
-            let link9_rest5 = A::fma_f64(link10_inertia18, link9_rest3, link10_rest3);
+            let link9_rest4 = A::fma_f64(-link10_inertia17, link9_rest3, link10_rest1);
+            let link9_rest5 = A::fma_f64(link10_inertia18, link9_rest3, link10_rest2);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest1 = A::fma_f64(link10_inertia24, link9_rest3, -link1_rest0);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
             let link9_pivot15 = link10_inertia17 * link9_pivot0;
             let link9_pivot16 = link10_inertia18 * link9_pivot0;
@@ -516,27 +476,27 @@ impl Closed10 {
             let link4_pivot5 = link5_inertia2 * link5_inertia2;
             let link4_pivot6 = A::fma_f64(-link4_pivot0, link4_pivot5, link5_pivot6);
             // link4: inertia carried to the parent, M* (4.48)
-            let link4_inertia1 = A::fma_f64(link4_pose2, link4_pivot6, -link4_inertia0);
-            let link4_inertia2 = A::fma_f64(link4_pose1, link4_pivot2, link4_inertia1);
+            let link4_inertia1 = A::fma_f64(link4_pose1, link4_pivot6, -link4_inertia0);
+            let link4_inertia2 = A::fma_f64(link4_pose2, link4_pivot2, link4_inertia1);
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot13 = link8_inertia9 * link8_inertia13;
-            let link7_pivot14 = A::fma_f64(-link7_pivot0, link7_pivot13, link8_pivot14);
+            let link7_pivot14 = A::fma_f64(link7_pivot0, link7_pivot13, link8_pivot14);
             // link4: inertia carried to the parent, M* (4.48)
-            let link4_inertia3 = link4_pose2 * link4_pivot2;
+            let link4_inertia3 = link4_pose1 * link4_pivot2;
             // link7: inertia carried to the parent, M* (4.48)
-            let link7_inertia10 = link7_pose2 * link7_pivot8;
+            let link7_inertia10 = link7_pose1 * link7_pivot8;
             let link7_inertia11 = A::fma_f64(-link7_pose3, link7_pivot12, link7_inertia10);
             // link4: inertia carried to the parent, M* (4.48)
-            let link4_inertia4 = link4_pose2 * link4_pose2;
+            let link4_inertia4 = link4_pose1 * link4_pose1;
             let link4_inertia5 = A::fma_f64(link4_pivot6, link4_inertia4, -0.00018333333333333336);
             // link7: inertia carried to the parent, M* (4.48)
-            let link7_inertia12 = link7_pose2 * link7_pivot10;
-            let link7_inertia13 = A::fma_f64(-link7_pose3, link7_pivot14, link7_inertia12);
+            let link7_inertia12 = link7_pose1 * link7_pivot10;
+            let link7_inertia13 = A::fma_f64(link7_pose3, link7_pivot14, link7_inertia12);
             // link4: inertia carried to the parent, M* (4.48)
-            let link4_inertia6 = A::fma_f64(-link4_pose1, link4_pivot4, link4_inertia3);
+            let link4_inertia6 = A::fma_f64(-link4_pose2, link4_pivot4, link4_inertia3);
             let link4_inertia7 = link4_inertia3 + link4_inertia6;
             let link4_inertia8 = link3_pose3 - link4_inertia6;
-            let link4_inertia9 = A::fma_f64(link4_pose1, link4_inertia7, link4_inertia5);
+            let link4_inertia9 = A::fma_f64(link4_pose2, link4_inertia7, link4_inertia5);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot0 = 1.0 / link4_inertia9;
             // link6: U, Mj, k and the reduced inertia M' (4.44)
@@ -547,18 +507,20 @@ impl Closed10 {
             let link8_rest1 = A::fma_f64(link9_pose2, link9_rest4, p_8);
             let link8_rest2 = link8_rest0 + link8_rest1;
             let link8_rest3 = link8_pivot0 * link8_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest2 = A::fma_f64(link9_inertia13, link8_rest3, link1_rest1);
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot9 = link7_inertia8 * link7_inertia13;
             let link6_pivot10 = A::fma_f64(-link6_pivot0, link6_pivot9, link7_pivot10);
             let link6_pivot11 = link7_inertia9 * link7_inertia11;
             let link6_pivot12 = A::fma_f64(-link6_pivot0, link6_pivot11, link7_pivot12);
             let link6_pivot13 = link7_inertia9 * link7_inertia13;
-            let link6_pivot14 = A::fma_f64(-link6_pivot0, link6_pivot13, link7_pivot14);
+            let link6_pivot14 = A::fma_f64(link6_pivot0, link6_pivot13, link7_pivot14);
             // link6: inertia carried to the parent, M* (4.48)
-            let link6_inertia10 = link6_pose2 * link6_pivot8;
-            let link6_inertia11 = A::fma_f64(-link6_pose1, link6_pivot12, link6_inertia10);
-            let link6_inertia12 = link6_pose2 * link6_pivot10;
-            let link6_inertia13 = A::fma_f64(-link6_pose1, link6_pivot14, link6_inertia12);
+            let link6_inertia10 = link6_pose1 * link6_pivot8;
+            let link6_inertia11 = A::fma_f64(-link6_pose2, link6_pivot12, link6_inertia10);
+            let link6_inertia12 = link6_pose1 * link6_pivot10;
+            let link6_inertia13 = A::fma_f64(link6_pose2, link6_pivot14, link6_inertia12);
             // link8: momentum remainder D, D' (4.45, 4.49)
             let link8_rest4 = A::fma_f64(-link9_inertia8, link8_rest3, link9_rest4);
             // link8: U, Mj, k and the reduced inertia M' (4.44)
@@ -578,6 +540,8 @@ impl Closed10 {
             let link7_rest1 = A::fma_f64(link8_pose2, link8_rest4, p_7);
             let link7_rest2 = link7_rest0 + link7_rest1;
             let link7_rest3 = link7_pivot0 * link7_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest3 = A::fma_f64(link8_inertia13, link7_rest3, link1_rest2);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot9 = link6_inertia2 * link6_inertia13;
             let link5_pivot10 = A::fma_f64(-link5_pivot0, link5_pivot9, link6_pivot10);
@@ -587,33 +551,33 @@ impl Closed10 {
             // link4: momentum rate (4.36)
             let link4_pdot0 = link4_pivot6 + link4_pivot4;
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot11 = link6_inertia9 * link6_inertia11;
+            let link5_pivot11 = link6_inertia8 * link6_inertia11;
             let link5_pivot12 = A::fma_f64(-link5_pivot0, link5_pivot11, link6_pivot12);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot5 = link4_inertia2 * link4_inertia2;
             let link3_pivot6 = A::fma_f64(-link3_pivot0, link3_pivot5, link4_pivot6);
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia1 = A::fma_f64(link3_pose2, link3_pivot6, -link3_inertia0);
-            let link3_inertia2 = A::fma_f64(link3_pose1, link3_pivot2, link3_inertia1);
+            let link3_inertia1 = A::fma_f64(link3_pose1, link3_pivot6, -link3_inertia0);
+            let link3_inertia2 = A::fma_f64(link3_pose2, link3_pivot2, link3_inertia1);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot13 = link6_inertia9 * link6_inertia13;
-            let link5_pivot14 = A::fma_f64(-link5_pivot0, link5_pivot13, link6_pivot14);
+            let link5_pivot13 = link6_inertia8 * link6_inertia13;
+            let link5_pivot14 = A::fma_f64(link5_pivot0, link5_pivot13, link6_pivot14);
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia3 = link3_pose2 * link3_pivot2;
+            let link3_inertia3 = link3_pose1 * link3_pivot2;
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia10 = link5_pose2 * link5_pivot8;
-            let link5_inertia11 = A::fma_f64(-link5_pose1, link5_pivot12, link5_inertia10);
+            let link5_inertia10 = link5_pose1 * link5_pivot8;
+            let link5_inertia11 = A::fma_f64(-link5_pose2, link5_pivot12, link5_inertia10);
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia4 = link3_pose2 * link3_pose2;
+            let link3_inertia4 = link3_pose1 * link3_pose1;
             let link3_inertia5 = A::fma_f64(link3_pivot6, link3_inertia4, -0.00020833333333333335);
             // link5: inertia carried to the parent, M* (4.48)
-            let link5_inertia12 = link5_pose2 * link5_pivot10;
-            let link5_inertia13 = A::fma_f64(-link5_pose1, link5_pivot14, link5_inertia12);
+            let link5_inertia12 = link5_pose1 * link5_pivot10;
+            let link5_inertia13 = A::fma_f64(link5_pose2, link5_pivot14, link5_inertia12);
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia6 = A::fma_f64(-link3_pose1, link3_pivot4, link3_inertia3);
+            let link3_inertia6 = A::fma_f64(-link3_pose2, link3_pivot4, link3_inertia3);
             let link3_inertia7 = link3_inertia3 + link3_inertia6;
             let link3_inertia8 = link2_pose3 - link3_inertia6;
-            let link3_inertia9 = A::fma_f64(link3_pose1, link3_inertia7, link3_inertia5);
+            let link3_inertia9 = A::fma_f64(link3_pose2, link3_inertia7, link3_inertia5);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot0 = 1.0 / link3_inertia9;
             // link7: momentum remainder D, D' (4.45, 4.49)
@@ -629,21 +593,23 @@ impl Closed10 {
             let link4_pivot8 = A::fma_f64(-link4_pivot0, link4_pivot7, link5_pivot8);
             // link6: momentum remainder D, D' (4.45, 4.49)
             let link6_rest0 = A::fma_f64(link7_pose3, link7_rest5, -p_5);
-            let link6_rest1 = A::fma_f64(link7_pose2, link7_rest4, p_6);
+            let link6_rest1 = A::fma_f64(link7_pose1, link7_rest4, p_6);
             let link6_rest2 = link6_rest0 + link6_rest1;
             let link6_rest3 = link6_pivot0 * link6_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest4 = A::fma_f64(link7_inertia13, link6_rest3, link1_rest3);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot9 = link5_inertia2 * link5_inertia13;
             let link4_pivot10 = A::fma_f64(-link4_pivot0, link4_pivot9, link5_pivot10);
             let link4_pivot11 = link5_inertia8 * link5_inertia11;
             let link4_pivot12 = A::fma_f64(-link4_pivot0, link4_pivot11, link5_pivot12);
             let link4_pivot13 = link5_inertia8 * link5_inertia13;
-            let link4_pivot14 = A::fma_f64(-link4_pivot0, link4_pivot13, link5_pivot14);
+            let link4_pivot14 = A::fma_f64(link4_pivot0, link4_pivot13, link5_pivot14);
             // link4: inertia carried to the parent, M* (4.48)
-            let link4_inertia10 = link4_pose2 * link4_pivot8;
-            let link4_inertia11 = A::fma_f64(-link4_pose1, link4_pivot12, link4_inertia10);
-            let link4_inertia12 = link4_pose2 * link4_pivot10;
-            let link4_inertia13 = A::fma_f64(-link4_pose1, link4_pivot14, link4_inertia12);
+            let link4_inertia10 = link4_pose1 * link4_pivot8;
+            let link4_inertia11 = A::fma_f64(-link4_pose2, link4_pivot12, link4_inertia10);
+            let link4_inertia12 = link4_pose1 * link4_pivot10;
+            let link4_inertia13 = A::fma_f64(link4_pose2, link4_pivot14, link4_inertia12);
             // link6: momentum remainder D, D' (4.45, 4.49)
             let link6_rest4 = A::fma_f64(-link7_inertia8, link6_rest3, link7_rest4);
             // link6: U, Mj, k and the reduced inertia M' (4.44)
@@ -652,52 +618,40 @@ impl Closed10 {
             let link6_rest5 = A::fma_f64(link7_inertia9, link6_rest3, link7_rest5);
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot16 = link7_inertia9 * link6_pivot0;
-            // link10: U, Mj, k and the reduced inertia M' (4.44)
-            let link10_pivot2 = 120000.0 * ground_loop20;
-            let link10_pivot3 = 120000.0 * ground_loop23;
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot1 = link3_inertia2 * link3_inertia8;
             let link2_pivot2 = A::fma_f64(link2_pivot0, link2_pivot1, link3_pivot2);
             // link5: momentum remainder D, D' (4.45, 4.49)
-            let link5_rest0 = A::fma_f64(link6_pose1, link6_rest5, -p_4);
-            let link5_rest1 = A::fma_f64(link6_pose2, link6_rest4, p_5);
+            let link5_rest0 = A::fma_f64(link6_pose2, link6_rest5, -p_4);
+            let link5_rest1 = A::fma_f64(link6_pose1, link6_rest4, p_5);
             let link5_rest2 = link5_rest0 + link5_rest1;
             let link5_rest3 = link5_pivot0 * link5_rest2;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest5 = A::fma_f64(link6_inertia13, link5_rest3, link1_rest4);
             // link9: U, Mj, k and the reduced inertia M' (4.44)
-            let link9_pivot17 = link10_inertia25 * link9_pivot0;
-            let link9_pivot18 = link10_inertia27 * link9_pivot0;
+            let link9_pivot17 = link10_inertia21 * link9_pivot0;
+            let link9_pivot18 = link10_inertia24 * link9_pivot0;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot0 = A::fma_f64(link10_inertia24, link9_pivot18, -300.0);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot7 = link4_inertia2 * link4_inertia11;
             let link3_pivot8 = A::fma_f64(-link3_pivot0, link3_pivot7, link4_pivot8);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot0 = ground_loop20 * link10_pivot2;
-            let link1_pivot1 = A::fma_f64(link10_inertia25, link9_pivot17, -link1_pivot0);
-            // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot9 = link4_inertia2 * link4_inertia13;
             let link3_pivot10 = A::fma_f64(-link3_pivot0, link3_pivot9, link4_pivot10);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot2 = ground_loop23 * link10_pivot3;
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest0 = ground_loop23 * link10_rest1;
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot3 = A::fma_f64(link10_inertia27, link9_pivot18, -link1_pivot2);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest1 = A::fma_f64(link10_inertia27, link9_rest3, link1_rest0);
-            let link1_rest2 = A::fma_f64(link9_inertia13, link8_rest3, link1_rest1);
-            let link1_rest3 = A::fma_f64(link8_inertia13, link7_rest3, link1_rest2);
-            let link1_rest4 = A::fma_f64(link7_inertia13, link6_rest3, link1_rest3);
-            let link1_rest5 = A::fma_f64(link6_inertia13, link5_rest3, link1_rest4);
             // link8: U, Mj, k and the reduced inertia M' (4.44)
             let link8_pivot17 = link9_inertia11 * link8_pivot0;
             let link8_pivot18 = link9_inertia13 * link8_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot4 = A::fma_f64(link9_inertia11, link8_pivot17, link1_pivot1);
-            let link1_pivot5 = A::fma_f64(link9_inertia13, link8_pivot18, link1_pivot3);
+            let link1_pivot1 = A::fma_f64(link9_inertia13, link8_pivot18, link1_pivot0);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot11 = link4_inertia8 * link4_inertia11;
             let link3_pivot12 = A::fma_f64(-link3_pivot0, link3_pivot11, link4_pivot12);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot2 = link10_inertia21 * link9_pivot17;
+            let link1_pivot3 = A::fma_f64(link9_inertia11, link8_pivot17, link1_pivot2);
+            // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot13 = link4_inertia8 * link4_inertia13;
-            let link3_pivot14 = A::fma_f64(-link3_pivot0, link3_pivot13, link4_pivot14);
+            let link3_pivot14 = A::fma_f64(link3_pivot0, link3_pivot13, link4_pivot14);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot3 = link3_inertia2 * link2_pivot0;
             let link2_pivot4 = link3_inertia8 * link3_inertia8;
@@ -707,51 +661,51 @@ impl Closed10 {
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot6 = A::fma_f64(-link3_inertia2, link2_pivot3, link3_pivot6);
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia1 = link2_pose1 * link2_pivot2;
+            let link2_inertia1 = link2_pose0 * link2_pivot2;
             // link7: U, Mj, k and the reduced inertia M' (4.44)
             let link7_pivot17 = link8_inertia11 * link7_pivot0;
             let link7_pivot18 = link8_inertia13 * link7_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot6 = A::fma_f64(link8_inertia11, link7_pivot17, link1_pivot4);
-            let link1_pivot7 = A::fma_f64(link8_inertia13, link7_pivot18, link1_pivot5);
+            let link1_pivot4 = A::fma_f64(link8_inertia11, link7_pivot17, link1_pivot3);
+            let link1_pivot5 = A::fma_f64(link8_inertia13, link7_pivot18, link1_pivot1);
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia10 = link3_pose2 * link3_pivot8;
-            let link3_inertia11 = A::fma_f64(-link3_pose1, link3_pivot12, link3_inertia10);
+            let link3_inertia10 = link3_pose1 * link3_pivot8;
+            let link3_inertia11 = A::fma_f64(-link3_pose2, link3_pivot12, link3_inertia10);
             // link5: momentum remainder D, D' (4.45, 4.49)
             let link5_rest4 = A::fma_f64(-link6_inertia2, link5_rest3, link6_rest4);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
             let link5_pivot15 = link6_inertia2 * link5_pivot0;
             // link5: momentum remainder D, D' (4.45, 4.49)
-            let link5_rest5 = A::fma_f64(link6_inertia9, link5_rest3, link6_rest5);
+            let link5_rest5 = A::fma_f64(link6_inertia8, link5_rest3, link6_rest5);
             // link5: U, Mj, k and the reduced inertia M' (4.44)
-            let link5_pivot16 = link6_inertia9 * link5_pivot0;
+            let link5_pivot16 = link6_inertia8 * link5_pivot0;
             // link3: inertia carried to the parent, M* (4.48)
-            let link3_inertia12 = link3_pose2 * link3_pivot10;
-            let link3_inertia13 = A::fma_f64(-link3_pose1, link3_pivot14, link3_inertia12);
+            let link3_inertia12 = link3_pose1 * link3_pivot10;
+            let link3_inertia13 = A::fma_f64(link3_pose2, link3_pivot14, link3_inertia12);
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia2 = A::fma_f64(link2_pose1, link2_pivot2, link2_inertia1);
+            let link2_inertia2 = A::fma_f64(link2_pose0, link2_pivot2, link2_inertia1);
             // link2: momentum rate (4.36)
-            let link2_pdot0 = link2_pose0 * link2_pivot2;
+            let link2_pdot0 = link2_pose2 * link2_pivot2;
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia3 = A::fma_f64(-link2_pose0, link2_pivot5, link2_inertia2);
+            let link2_inertia3 = A::fma_f64(-link2_pose2, link2_pivot5, link2_inertia2);
             // link2: momentum rate (4.36)
             let link2_pdot1 = link2_pivot6 + link2_pivot5;
-            let link2_pdot2 = link2_pose0 * link2_pdot1;
+            let link2_pdot2 = link2_pose2 * link2_pdot1;
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia4 = link2_pose1 * link2_pose1;
+            let link2_inertia4 = link2_pose0 * link2_pose0;
             let link2_inertia5 = A::fma_f64(link2_pivot6, link2_inertia4, -0.00023333333333333333);
-            let link2_inertia6 = A::fma_f64(link2_pose0, link2_inertia3, link2_inertia5);
+            let link2_inertia6 = A::fma_f64(link2_pose2, link2_inertia3, link2_inertia5);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot8 = 1.0 / link2_inertia6;
+            let link1_pivot6 = 1.0 / link2_inertia6;
             // link6: U, Mj, k and the reduced inertia M' (4.44)
             let link6_pivot17 = link7_inertia11 * link6_pivot0;
             let link6_pivot18 = link7_inertia13 * link6_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot9 = A::fma_f64(link7_inertia11, link6_pivot17, link1_pivot6);
-            let link1_pivot10 = A::fma_f64(link7_inertia13, link6_pivot18, link1_pivot7);
+            let link1_pivot7 = A::fma_f64(link7_inertia11, link6_pivot17, link1_pivot4);
+            let link1_pivot8 = A::fma_f64(link7_inertia13, link6_pivot18, link1_pivot5);
             // link4: momentum remainder D, D' (4.45, 4.49)
-            let link4_rest0 = A::fma_f64(link5_pose1, link5_rest5, -p_3);
-            let link4_rest1 = A::fma_f64(link5_pose2, link5_rest4, p_4);
+            let link4_rest0 = A::fma_f64(link5_pose2, link5_rest5, -p_3);
+            let link4_rest1 = A::fma_f64(link5_pose1, link5_rest4, p_4);
             let link4_rest2 = link4_rest0 + link4_rest1;
             let link4_rest3 = link4_pivot0 * link4_rest2;
             // link1: momentum remainder D, D' (4.45, 4.49)
@@ -760,58 +714,30 @@ impl Closed10 {
             let link5_pivot17 = link6_inertia11 * link5_pivot0;
             let link5_pivot18 = link6_inertia13 * link5_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot11 = A::fma_f64(link6_inertia11, link5_pivot17, link1_pivot9);
-            let link1_pivot12 = A::fma_f64(link6_inertia13, link5_pivot18, link1_pivot10);
+            let link1_pivot9 = A::fma_f64(link6_inertia11, link5_pivot17, link1_pivot7);
+            let link1_pivot10 = A::fma_f64(link6_inertia13, link5_pivot18, link1_pivot8);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot7 = link3_inertia8 * link3_inertia11;
             let link2_pivot8 = A::fma_f64(-link2_pivot0, link2_pivot7, link3_pivot12);
             let link2_pivot9 = link3_inertia8 * link3_inertia13;
-            let link2_pivot10 = A::fma_f64(-link2_pivot0, link2_pivot9, link3_pivot14);
+            let link2_pivot10 = A::fma_f64(link2_pivot0, link2_pivot9, link3_pivot14);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot15 = link5_inertia11 * link4_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot13 = A::fma_f64(link5_inertia11, link4_pivot15, link1_pivot11);
+            let link1_pivot11 = A::fma_f64(link5_inertia11, link4_pivot15, link1_pivot9);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
             let link4_pivot16 = link5_inertia13 * link4_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot14 = A::fma_f64(link5_inertia13, link4_pivot16, link1_pivot12);
+            let link1_pivot12 = A::fma_f64(link5_inertia13, link4_pivot16, link1_pivot10);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot15 = link4_inertia11 * link3_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot15 = A::fma_f64(link4_inertia11, link3_pivot15, link1_pivot13);
+            let link1_pivot13 = A::fma_f64(link4_inertia11, link3_pivot15, link1_pivot11);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot11 = A::fma_f64(-link3_inertia11, link2_pivot3, link3_pivot8);
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia7 = link2_pose0 * link2_pivot8;
-            let link2_inertia8 = A::fma_f64(link2_pose1, link2_pivot11, -link2_inertia7);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot16 = ground_loop20 * link10_pivot3;
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest7 = ground_loop20 * link10_rest1;
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot17 = A::fma_f64(link10_inertia25, link9_pivot18, -link1_pivot16);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest8 = A::fma_f64(link10_inertia25, link9_rest3, link1_rest7);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot18 = A::fma_f64(link9_inertia11, link8_pivot18, link1_pivot17);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest9 = A::fma_f64(link9_inertia11, link8_rest3, link1_rest8);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot19 = A::fma_f64(link8_inertia11, link7_pivot18, link1_pivot18);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest10 = A::fma_f64(link8_inertia11, link7_rest3, link1_rest9);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot20 = A::fma_f64(link7_inertia11, link6_pivot18, link1_pivot19);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest11 = A::fma_f64(link7_inertia11, link6_rest3, link1_rest10);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot21 = A::fma_f64(link6_inertia11, link5_pivot18, link1_pivot20);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest12 = A::fma_f64(link6_inertia11, link5_rest3, link1_rest11);
-            // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot22 = A::fma_f64(link5_inertia11, link4_pivot16, link1_pivot21);
-            // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest13 = A::fma_f64(link5_inertia11, link4_rest3, link1_rest12);
+            let link2_inertia7 = link2_pose2 * link2_pivot8;
+            let link2_inertia8 = A::fma_f64(link2_pose0, link2_pivot11, -link2_inertia7);
             // link4: momentum remainder D, D' (4.45, 4.49)
             let link4_rest4 = A::fma_f64(-link5_inertia2, link4_rest3, link5_rest4);
             // link4: U, Mj, k and the reduced inertia M' (4.44)
@@ -822,39 +748,63 @@ impl Closed10 {
             // link3: U, Mj, k and the reduced inertia M' (4.44)
             let link3_pivot16 = link4_inertia13 * link3_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot23 = A::fma_f64(link4_inertia13, link3_pivot16, link1_pivot14);
-            let link1_pivot24 = A::fma_f64(link4_inertia11, link3_pivot16, link1_pivot22);
+            let link1_pivot14 = A::fma_f64(link4_inertia13, link3_pivot16, link1_pivot12);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot12 = A::fma_f64(-link3_inertia13, link2_pivot3, link3_pivot10);
             // link2: velocity and joint rate (4.40)
-            let link2_vel0 = link2_pose1 * link2_pivot3;
+            let link2_vel0 = link2_pose0 * link2_pivot3;
             // link2: inertia carried to the parent, M* (4.48)
-            let link2_inertia9 = link2_pose0 * link2_pivot10;
-            let link2_inertia10 = A::fma_f64(link2_pose1, link2_pivot12, -link2_inertia9);
+            let link2_inertia9 = link2_pose2 * link2_pivot10;
+            let link2_inertia10 = A::fma_f64(link2_pose0, link2_pivot12, link2_inertia9);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot13 = link3_inertia11 * link2_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot25 = A::fma_f64(link3_inertia11, link2_pivot13, link1_pivot15);
+            let link1_pivot15 = A::fma_f64(link3_inertia11, link2_pivot13, link1_pivot13);
+            let link1_pivot16 = link10_inertia21 * link9_pivot18;
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest7 = link10_inertia21 * link9_rest3;
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot17 = A::fma_f64(link9_inertia11, link8_pivot18, link1_pivot16);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest8 = A::fma_f64(link9_inertia11, link8_rest3, link1_rest7);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot18 = A::fma_f64(link8_inertia11, link7_pivot18, link1_pivot17);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest9 = A::fma_f64(link8_inertia11, link7_rest3, link1_rest8);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot19 = A::fma_f64(link7_inertia11, link6_pivot18, link1_pivot18);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest10 = A::fma_f64(link7_inertia11, link6_rest3, link1_rest9);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot20 = A::fma_f64(link6_inertia11, link5_pivot18, link1_pivot19);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest11 = A::fma_f64(link6_inertia11, link5_rest3, link1_rest10);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot21 = A::fma_f64(link5_inertia11, link4_pivot16, link1_pivot20);
+            // link1: momentum remainder D, D' (4.45, 4.49)
+            let link1_rest12 = A::fma_f64(link5_inertia11, link4_rest3, link1_rest11);
+            // link1: U, Mj, k and the reduced inertia M' (4.44)
+            let link1_pivot22 = A::fma_f64(link4_inertia11, link3_pivot16, link1_pivot21);
             // link3: momentum remainder D, D' (4.45, 4.49)
-            let link3_rest0 = A::fma_f64(link4_pose1, link4_rest5, -p_2);
-            let link3_rest1 = A::fma_f64(link4_pose2, link4_rest4, p_3);
+            let link3_rest0 = A::fma_f64(link4_pose2, link4_rest5, -p_2);
+            let link3_rest1 = A::fma_f64(link4_pose1, link4_rest4, p_3);
             let link3_rest2 = link3_rest0 + link3_rest1;
             let link3_rest3 = link3_pivot0 * link3_rest2;
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest14 = A::fma_f64(link4_inertia11, link3_rest3, link1_rest13);
-            let link1_rest15 = A::fma_f64(link4_inertia13, link3_rest3, link1_rest6);
+            let link1_rest13 = A::fma_f64(link4_inertia11, link3_rest3, link1_rest12);
+            let link1_rest14 = A::fma_f64(link4_inertia13, link3_rest3, link1_rest6);
             // link2: U, Mj, k and the reduced inertia M' (4.44)
             let link2_pivot14 = link3_inertia13 * link2_pivot0;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot26 = A::fma_f64(link3_inertia13, link2_pivot14, link1_pivot23);
-            let link1_pivot27 = A::fma_f64(link3_inertia11, link2_pivot14, link1_pivot24);
-            let link1_pivot28 = link2_inertia8 * link2_inertia8;
-            let link1_pivot29 = A::fma_f64(link1_pivot8, link1_pivot28, link1_pivot25);
-            let link1_pivot30 = link2_inertia10 * link2_inertia10;
-            let link1_pivot31 = A::fma_f64(link1_pivot8, link1_pivot30, link1_pivot26);
+            let link1_pivot23 = A::fma_f64(link3_inertia13, link2_pivot14, link1_pivot14);
+            let link1_pivot24 = A::fma_f64(link3_inertia11, link2_pivot14, link1_pivot22);
+            let link1_pivot25 = link2_inertia8 * link2_inertia8;
+            let link1_pivot26 = A::fma_f64(link1_pivot6, link1_pivot25, link1_pivot15);
+            let link1_pivot27 = link2_inertia10 * link2_inertia10;
+            let link1_pivot28 = A::fma_f64(link1_pivot6, link1_pivot27, link1_pivot23);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = link1_pivot29 - 1.0;
-            let ground_pivot1 = link1_pivot31 + ground_pivot0;
+            let ground_pivot0 = link1_pivot26 - 1.0;
+            let ground_pivot1 = link1_pivot28 + ground_pivot0;
             // link3: momentum remainder D, D' (4.45, 4.49)
             let link3_rest4 = A::fma_f64(-link4_inertia2, link3_rest3, link4_rest4);
             // link3: U, Mj, k and the reduced inertia M' (4.44)
@@ -863,101 +813,95 @@ impl Closed10 {
             // link3: momentum remainder D, D' (4.45, 4.49)
             let link3_rest5 = A::fma_f64(link4_inertia8, link3_rest3, link4_rest5);
             // link2: momentum remainder D, D' (4.45, 4.49)
-            let link2_rest0 = A::fma_f64(link3_pose1, link3_rest5, -p_1);
-            let link2_rest1 = A::fma_f64(link3_pose2, link3_rest4, p_2);
+            let link2_rest0 = A::fma_f64(link3_pose2, link3_rest5, -p_1);
+            let link2_rest1 = A::fma_f64(link3_pose1, link3_rest4, p_2);
             let link2_rest2 = link2_rest0 + link2_rest1;
             let link2_rest3 = link2_pivot0 * link2_rest2;
             let link2_rest4 = A::fma_f64(-link3_inertia2, link2_rest3, link3_rest4);
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest16 = A::fma_f64(link3_inertia11, link2_rest3, link1_rest14);
-            let link1_rest17 = A::fma_f64(link3_inertia13, link2_rest3, link1_rest15);
+            let link1_rest15 = A::fma_f64(link3_inertia11, link2_rest3, link1_rest13);
+            let link1_rest16 = A::fma_f64(link3_inertia13, link2_rest3, link1_rest14);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot2 = A::fma_f64(1e-10, ground_pivot1, link1_pivot29);
-            let ground_pivot3 = A::fma_f64(1e-10, ground_pivot1, link1_pivot31);
+            let ground_pivot2 = A::fma_f64(1e-10, ground_pivot1, link1_pivot26);
+            let ground_pivot3 = A::fma_f64(1e-10, ground_pivot1, link1_pivot28);
             let ground_pivot4 = 1e-10 * ground_pivot2;
             let ground_pivot5 = 1e-10 * ground_pivot3;
-            let ground_pivot6 = ::multibody::runtime::Scalar::reciprocal_above(-link1_pivot29, -ground_pivot4);
+            let ground_pivot6 = ::multibody::runtime::Scalar::reciprocal_above(-link1_pivot26, -ground_pivot4);
             // link2: momentum remainder D, D' (4.45, 4.49)
             let link2_rest5 = A::fma_f64(link3_inertia8, link2_rest3, link3_rest5);
             // link2: velocity and joint rate (4.40)
-            let link2_vel1 = link2_pose0 * link3_inertia8;
+            let link2_vel1 = link2_pose2 * link3_inertia8;
             let link2_vel2 = link2_pivot0 * link2_vel1;
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot32 = link2_inertia8 * link2_inertia10;
-            let link1_pivot33 = A::fma_f64(link1_pivot8, link1_pivot32, link1_pivot27);
+            let link1_pivot29 = link2_inertia8 * link2_inertia10;
+            let link1_pivot30 = A::fma_f64(link1_pivot6, link1_pivot29, link1_pivot24);
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest18 = A::fma_f64(link2_pose0, link2_rest5, -p_0);
-            let link1_rest19 = A::fma_f64(link2_pose1, link2_rest4, p_1);
-            let link1_rest20 = link1_rest18 + link1_rest19;
-            let link1_rest21 = link1_pivot8 * link1_rest20;
-            let link1_rest22 = A::fma_f64(link2_inertia8, link1_rest21, link1_rest16);
-            let link1_rest23 = A::fma_f64(link2_inertia10, link1_rest21, link1_rest17);
+            let link1_rest17 = A::fma_f64(link2_pose2, link2_rest5, -p_0);
+            let link1_rest18 = A::fma_f64(link2_pose0, link2_rest4, p_1);
+            let link1_rest19 = link1_rest17 + link1_rest18;
+            let link1_rest20 = link1_pivot6 * link1_rest19;
+            let link1_rest21 = A::fma_f64(link2_inertia8, link1_rest20, link1_rest15);
+            let link1_rest22 = A::fma_f64(link2_inertia10, link1_rest20, link1_rest16);
             // link1: U, Mj, k and the reduced inertia M' (4.44)
-            let link1_pivot34 = link2_inertia10 * link1_pivot8;
-            let link1_pivot35 = link2_inertia8 * link1_pivot8;
+            let link1_pivot31 = link2_inertia10 * link1_pivot6;
+            let link1_pivot32 = link2_inertia8 * link1_pivot6;
             // link1: momentum remainder D, D' (4.45, 4.49)
-            let link1_rest24 = ground_pivot6 * link1_rest22;
-            let link1_rest25 = A::fma_f64(link1_pivot33, link1_rest24, link1_rest23);
+            let link1_rest23 = ground_pivot6 * link1_rest21;
+            let link1_rest24 = A::fma_f64(link1_pivot30, link1_rest23, link1_rest22);
             // link1: velocity and joint rate (4.40)
-            let link1_vel0 = link1_pivot34 * link1_rest25;
+            let link1_vel0 = link1_pivot31 * link1_rest24;
             // link2: velocity and joint rate (4.40)
-            let link2_vel3 = link2_pivot14 * link1_rest25;
+            let link2_vel3 = link2_pivot14 * link1_rest24;
             // link3: velocity and joint rate (4.40)
-            let link3_vel0 = link3_pivot16 * link1_rest25;
+            let link3_vel0 = link3_pivot16 * link1_rest24;
             // link4: velocity and joint rate (4.40)
-            let link4_vel0 = link4_pivot16 * link1_rest25;
+            let link4_vel0 = link4_pivot16 * link1_rest24;
             // link5: velocity and joint rate (4.40)
-            let link5_vel0 = link5_pivot18 * link1_rest25;
+            let link5_vel0 = link5_pivot18 * link1_rest24;
             // link6: velocity and joint rate (4.40)
-            let link6_vel0 = link6_pivot18 * link1_rest25;
+            let link6_vel0 = link6_pivot18 * link1_rest24;
             // link7: velocity and joint rate (4.40)
-            let link7_vel0 = link7_pivot18 * link1_rest25;
+            let link7_vel0 = link7_pivot18 * link1_rest24;
             // link8: velocity and joint rate (4.40)
-            let link8_vel0 = link8_pivot18 * link1_rest25;
+            let link8_vel0 = link8_pivot18 * link1_rest24;
             // link9: velocity and joint rate (4.40)
-            let link9_vel0 = link9_pivot18 * link1_rest25;
+            let link9_vel0 = link9_pivot18 * link1_rest24;
             // link2: momentum rate (4.36)
-            let link2_pdot3 = link2_pivot10 * link1_rest25;
-            let link2_pdot4 = link2_pivot12 * link1_rest25;
+            let link2_pdot3 = link2_pivot10 * link1_rest24;
+            let link2_pdot4 = link2_pivot12 * link1_rest24;
             // link3: momentum rate (4.36)
-            let link3_pdot1 = link3_pivot14 * link1_rest25;
-            let link3_pdot2 = link3_pivot10 * link1_rest25;
+            let link3_pdot1 = link3_pivot14 * link1_rest24;
+            let link3_pdot2 = link3_pivot10 * link1_rest24;
             // link4: momentum rate (4.36)
-            let link4_pdot1 = link4_pivot14 * link1_rest25;
-            let link4_pdot2 = link4_pivot10 * link1_rest25;
+            let link4_pdot1 = link4_pivot14 * link1_rest24;
+            let link4_pdot2 = link4_pivot10 * link1_rest24;
             // link5: momentum rate (4.36)
-            let link5_pdot1 = link5_pivot14 * link1_rest25;
-            let link5_pdot2 = link5_pivot10 * link1_rest25;
+            let link5_pdot1 = link5_pivot14 * link1_rest24;
+            let link5_pdot2 = link5_pivot10 * link1_rest24;
             // link6: momentum rate (4.36)
-            let link6_pdot1 = link6_pivot14 * link1_rest25;
-            let link6_pdot2 = link6_pivot10 * link1_rest25;
+            let link6_pdot1 = link6_pivot14 * link1_rest24;
+            let link6_pdot2 = link6_pivot10 * link1_rest24;
             // link7: momentum rate (4.36)
-            let link7_pdot1 = link7_pivot14 * link1_rest25;
-            let link7_pdot2 = link7_pivot10 * link1_rest25;
+            let link7_pdot1 = link7_pivot14 * link1_rest24;
+            let link7_pdot2 = link7_pivot10 * link1_rest24;
             // link8: momentum rate (4.36)
-            let link8_pdot1 = link8_pivot14 * link1_rest25;
-            let link8_pdot2 = link8_pivot10 * link1_rest25;
+            let link8_pdot1 = link8_pivot14 * link1_rest24;
+            let link8_pdot2 = link8_pivot10 * link1_rest24;
             // link9: momentum rate (4.36)
-            let link9_pdot1 = link9_pivot14 * link1_rest25;
-            let link9_pdot2 = link9_pivot10 * link1_rest25;
-            // link10: velocity and joint rate (4.40)
-            let link10_vel0 = link10_pivot3 * link1_rest25;
-            // link10: momentum rate (4.36)
-            let link10_pdot0 = link10_pivot1 * link1_rest25;
+            let link9_pdot1 = link9_pivot14 * link1_rest24;
+            let link9_pdot2 = link9_pivot10 * link1_rest24;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot7 = link1_pivot33 * link1_pivot33;
-            let ground_pivot8 = link1_pivot33 * ground_pivot6;
-            let ground_pivot9 = A::fma_f64(ground_pivot6, ground_pivot7, link1_pivot31);
+            let ground_pivot7 = link1_pivot30 * link1_pivot30;
+            let ground_pivot8 = link1_pivot30 * ground_pivot6;
+            let ground_pivot9 = A::fma_f64(ground_pivot6, ground_pivot7, link1_pivot28);
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot8 * link1_rest25;
-            // ground: loops and couplings
-            let ground_loop24 = link10_sin0 * link1_rest25;
+            let ground_vel0 = ground_pivot8 * link1_rest24;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
             let ground_pivot10 = ::multibody::runtime::Scalar::reciprocal_above(-ground_pivot9, -ground_pivot5);
             // ground: velocity and joint rate (4.40)
-            let ground_vel1 = A::fma_f64(ground_pivot10, ground_vel0, link1_rest24);
+            let ground_vel1 = A::fma_f64(ground_pivot10, ground_vel0, link1_rest23);
             // link1: velocity and joint rate (4.40)
-            let link1_vel1 = A::fma_f64(ground_pivot10, link1_vel0, link1_rest21);
+            let link1_vel1 = A::fma_f64(ground_pivot10, link1_vel0, link1_rest20);
             // link2: velocity and joint rate (4.40)
             let link2_vel4 = A::fma_f64(ground_pivot10, link2_vel3, link2_rest3);
             // link3: velocity and joint rate (4.40)
@@ -971,7 +915,7 @@ impl Closed10 {
             // link7: velocity and joint rate (4.40)
             let link7_vel1 = A::fma_f64(ground_pivot10, link7_vel0, link7_rest3);
             // link1: velocity and joint rate (4.40)
-            let link1_vel2 = A::fma_f64(link1_pivot35, ground_vel1, link1_vel1);
+            let link1_vel2 = A::fma_f64(link1_pivot32, ground_vel1, link1_vel1);
             // link8: velocity and joint rate (4.40)
             let link8_vel1 = A::fma_f64(ground_pivot10, link8_vel0, link8_rest3);
             // link2: velocity and joint rate (4.40)
@@ -987,21 +931,21 @@ impl Closed10 {
             // link7: velocity and joint rate (4.40)
             let link7_vel2 = A::fma_f64(link7_pivot17, ground_vel1, link7_vel1);
             // link2: velocity and joint rate (4.40)
-            let link2_vel6 = link2_pose1 * link1_vel2;
-            let link2_vel7 = link2_pose0 * link1_vel2;
+            let link2_vel6 = link2_pose0 * link1_vel2;
+            let link2_vel7 = link2_pose2 * link1_vel2;
             let link2_vel8 = A::fma_f64(-link1_vel2, link2_vel0, link2_vel5);
             // link8: velocity and joint rate (4.40)
             let link8_vel2 = A::fma_f64(link8_pivot17, ground_vel1, link8_vel1);
             // link9: velocity and joint rate (4.40)
             let link9_vel1 = A::fma_f64(ground_pivot10, link9_vel0, link9_rest3);
             // link2: momentum rate (4.36)
-            let link2_pdot5 = A::fma_f64(-ground_pivot10, link2_pdot3, link2_rest5);
+            let link2_pdot5 = A::fma_f64(ground_pivot10, link2_pdot3, link2_rest5);
             let link2_pdot6 = A::fma_f64(-ground_pivot10, link2_pdot4, -link2_rest4);
             // link3: momentum rate (4.36)
-            let link3_pdot3 = A::fma_f64(-ground_pivot10, link3_pdot1, link3_rest5);
+            let link3_pdot3 = A::fma_f64(ground_pivot10, link3_pdot1, link3_rest5);
             let link3_pdot4 = A::fma_f64(-ground_pivot10, link3_pdot2, -link3_rest4);
             // link4: momentum rate (4.36)
-            let link4_pdot3 = A::fma_f64(-ground_pivot10, link4_pdot1, link4_rest5);
+            let link4_pdot3 = A::fma_f64(ground_pivot10, link4_pdot1, link4_rest5);
             // link2: velocity and joint rate (4.40)
             let link2_vel9 = A::fma_f64(link1_vel2, link2_vel2, link2_vel8);
             // link4: momentum rate (4.36)
@@ -1009,32 +953,29 @@ impl Closed10 {
             // link9: velocity and joint rate (4.40)
             let link9_vel2 = A::fma_f64(link9_pivot17, ground_vel1, link9_vel1);
             // link5: momentum rate (4.36)
-            let link5_pdot3 = A::fma_f64(-ground_pivot10, link5_pdot1, link5_rest5);
+            let link5_pdot3 = A::fma_f64(ground_pivot10, link5_pdot1, link5_rest5);
             let link5_pdot4 = A::fma_f64(-ground_pivot10, link5_pdot2, -link5_rest4);
             // link6: momentum rate (4.36)
-            let link6_pdot3 = A::fma_f64(-ground_pivot10, link6_pdot1, link6_rest5);
+            let link6_pdot3 = A::fma_f64(ground_pivot10, link6_pdot1, link6_rest5);
             let link6_pdot4 = A::fma_f64(-ground_pivot10, link6_pdot2, -link6_rest4);
             // link7: momentum rate (4.36)
-            let link7_pdot3 = A::fma_f64(-ground_pivot10, link7_pdot1, link7_rest5);
+            let link7_pdot3 = A::fma_f64(ground_pivot10, link7_pdot1, link7_rest5);
             // link3: velocity and joint rate (4.40)
-            let link3_vel3 = A::fma_f64(link3_pose2, link2_vel9, link2_vel6);
-            let link3_vel4 = A::fma_f64(link3_pose1, link2_vel9, link2_vel7);
+            let link3_vel3 = A::fma_f64(link3_pose1, link2_vel9, link2_vel6);
+            let link3_vel4 = A::fma_f64(link3_pose2, link2_vel9, link2_vel7);
             // link7: momentum rate (4.36)
             let link7_pdot4 = A::fma_f64(-ground_pivot10, link7_pdot2, -link7_rest4);
             // link8: momentum rate (4.36)
-            let link8_pdot3 = A::fma_f64(-ground_pivot10, link8_pdot1, link8_rest5);
+            let link8_pdot3 = A::fma_f64(ground_pivot10, link8_pdot1, link8_rest5);
             let link8_pdot4 = A::fma_f64(-ground_pivot10, link8_pdot2, -link8_rest4);
             // link9: momentum rate (4.36)
-            let link9_pdot3 = A::fma_f64(-ground_pivot10, link9_pdot1, link9_rest5);
+            let link9_pdot3 = A::fma_f64(ground_pivot10, link9_pdot1, link9_rest5);
             let link9_pdot4 = A::fma_f64(-ground_pivot10, link9_pdot2, -link9_rest4);
-            // link10: velocity and joint rate (4.40)
-            let link10_vel1 = A::fma_f64(-ground_pivot10, link10_vel0, link10_rest1);
-            // link3: velocity and joint rate (4.40)
-            let link3_vel5 = A::fma_f64(-link3_pivot17, link3_vel3, link3_vel2);
-            // ground: loops and couplings
-            let ground_loop25 = ground_pivot10 * ground_loop24;
             // link2: momentum rate (4.36)
             let link2_pdot7 = A::fma_f64(-link2_pivot8, ground_vel1, link2_pdot5);
+            // link3: velocity and joint rate (4.40)
+            let link3_vel5 = A::fma_f64(-link3_pivot17, link3_vel3, link3_vel2);
+            // link2: momentum rate (4.36)
             let link2_pdot8 = A::fma_f64(-link2_pivot11, ground_vel1, link2_pdot6);
             // link3: momentum rate (4.36)
             let link3_pdot5 = A::fma_f64(-link3_pivot12, ground_vel1, link3_pdot3);
@@ -1042,11 +983,11 @@ impl Closed10 {
             // link4: momentum rate (4.36)
             let link4_pdot5 = A::fma_f64(-link4_pivot12, ground_vel1, link4_pdot3);
             let link4_pdot6 = A::fma_f64(-link4_pivot8, ground_vel1, link4_pdot4);
-            // link3: velocity and joint rate (4.40)
-            let link3_vel6 = A::fma_f64(link3_pivot18, link3_vel4, link3_vel5);
             // link5: momentum rate (4.36)
             let link5_pdot5 = A::fma_f64(-link5_pivot12, ground_vel1, link5_pdot3);
             let link5_pdot6 = A::fma_f64(-link5_pivot8, ground_vel1, link5_pdot4);
+            // link3: velocity and joint rate (4.40)
+            let link3_vel6 = A::fma_f64(link3_pivot18, link3_vel4, link3_vel5);
             // link6: momentum rate (4.36)
             let link6_pdot5 = A::fma_f64(-link6_pivot12, ground_vel1, link6_pdot3);
             let link6_pdot6 = A::fma_f64(-link6_pivot8, ground_vel1, link6_pdot4);
@@ -1055,45 +996,36 @@ impl Closed10 {
             let link7_pdot6 = A::fma_f64(-link7_pivot8, ground_vel1, link7_pdot4);
             // link8: momentum rate (4.36)
             let link8_pdot5 = A::fma_f64(-link8_pivot12, ground_vel1, link8_pdot3);
-            // link4: velocity and joint rate (4.40)
-            let link4_vel3 = A::fma_f64(link4_pose2, link3_vel6, link3_vel3);
-            let link4_vel4 = A::fma_f64(link4_pose1, link3_vel6, link3_vel4);
-            // link8: momentum rate (4.36)
             let link8_pdot6 = A::fma_f64(-link8_pivot8, ground_vel1, link8_pdot4);
             // link9: momentum rate (4.36)
             let link9_pdot5 = A::fma_f64(-link9_pivot12, ground_vel1, link9_pdot3);
+            // link4: velocity and joint rate (4.40)
+            let link4_vel3 = A::fma_f64(link4_pose1, link3_vel6, link3_vel3);
+            let link4_vel4 = A::fma_f64(link4_pose2, link3_vel6, link3_vel4);
+            // link9: momentum rate (4.36)
             let link9_pdot6 = A::fma_f64(-link9_pivot8, ground_vel1, link9_pdot4);
-            // link10: velocity and joint rate (4.40)
-            let link10_vel2 = A::fma_f64(-link10_pivot2, ground_vel1, link10_vel1);
-            // ground: loops and couplings
-            let ground_loop26 = A::fma_f64(link10_cos0, ground_vel1, ground_loop25);
             // link2: momentum rate (4.36)
             let link2_pdot9 = A::fma_f64(link1_vel2, link2_pdot2, link2_pdot7);
-            // link4: velocity and joint rate (4.40)
-            let link4_vel5 = A::fma_f64(-link4_pivot17, link4_vel3, link4_vel2);
-            // link2: momentum rate (4.36)
             let link2_pdot10 = A::fma_f64(link1_vel2, link2_pdot0, link2_pdot8);
             // link3: momentum rate (4.36)
             let link3_pdot7 = A::fma_f64(link3_vel4, link3_pdot0, link3_pdot5);
             let link3_pdot8 = A::fma_f64(link3_pivot2, link3_vel4, link3_pdot6);
+            // link4: velocity and joint rate (4.40)
+            let link4_vel5 = A::fma_f64(-link4_pivot17, link4_vel3, link4_vel2);
             // link4: momentum rate (4.36)
             let link4_pdot7 = A::fma_f64(link4_vel4, link4_pdot0, link4_pdot5);
             let link4_pdot8 = A::fma_f64(link4_pivot2, link4_vel4, link4_pdot6);
-            // link10: momentum rate (4.36)
-            let link10_pdot1 = A::fma_f64(ground_pivot10, link10_pdot0, -link10_rest0);
             // link2: momentum rate (4.36)
             let link2_pdot11 = A::fma_f64(-link2_inertia1, link1_vel2, link2_pdot9);
-            // link4: velocity and joint rate (4.40)
-            let link4_vel6 = A::fma_f64(link4_pivot18, link4_vel4, link4_vel5);
             // link3: momentum rate (4.36)
             let link3_pdot9 = A::fma_f64(-link3_pivot2, link3_vel3, link3_pdot7);
+            // link4: velocity and joint rate (4.40)
+            let link4_vel6 = A::fma_f64(link4_pivot18, link4_vel4, link4_vel5);
             // link4: momentum rate (4.36)
             let link4_pdot9 = A::fma_f64(-link4_pivot2, link4_vel3, link4_pdot7);
-            // link10: momentum rate (4.36)
-            let link10_pdot2 = A::fma_f64(-link10_pivot0, ground_vel1, link10_pdot1);
             // link5: velocity and joint rate (4.40)
-            let link5_vel3 = A::fma_f64(link5_pose2, link4_vel6, link4_vel3);
-            let link5_vel4 = A::fma_f64(link5_pose1, link4_vel6, link4_vel4);
+            let link5_vel3 = A::fma_f64(link5_pose1, link4_vel6, link4_vel3);
+            let link5_vel4 = A::fma_f64(link5_pose2, link4_vel6, link4_vel4);
             let link5_vel5 = A::fma_f64(-link5_pivot15, link5_vel3, link5_vel2);
             // link5: momentum rate (4.36)
             let link5_pdot7 = A::fma_f64(link5_vel4, link5_pdot0, link5_pdot5);
@@ -1103,8 +1035,8 @@ impl Closed10 {
             // link5: momentum rate (4.36)
             let link5_pdot9 = A::fma_f64(-link5_pivot2, link5_vel3, link5_pdot7);
             // link6: velocity and joint rate (4.40)
-            let link6_vel3 = A::fma_f64(link6_pose2, link5_vel6, link5_vel3);
-            let link6_vel4 = A::fma_f64(link6_pose1, link5_vel6, link5_vel4);
+            let link6_vel3 = A::fma_f64(link6_pose1, link5_vel6, link5_vel3);
+            let link6_vel4 = A::fma_f64(link6_pose2, link5_vel6, link5_vel4);
             let link6_vel5 = A::fma_f64(-link6_pivot15, link6_vel3, link6_vel2);
             // link6: momentum rate (4.36)
             let link6_pdot7 = A::fma_f64(link6_vel4, link6_pdot0, link6_pdot5);
@@ -1114,7 +1046,7 @@ impl Closed10 {
             // link6: momentum rate (4.36)
             let link6_pdot9 = A::fma_f64(-link6_pivot2, link6_vel3, link6_pdot7);
             // link7: velocity and joint rate (4.40)
-            let link7_vel3 = A::fma_f64(link7_pose2, link6_vel6, link6_vel3);
+            let link7_vel3 = A::fma_f64(link7_pose1, link6_vel6, link6_vel3);
             let link7_vel4 = A::fma_f64(link7_pose3, link6_vel6, link6_vel4);
             let link7_vel5 = A::fma_f64(-link7_pivot15, link7_vel3, link7_vel2);
             // link7: momentum rate (4.36)
@@ -1147,34 +1079,17 @@ impl Closed10 {
             // link9: momentum rate (4.36)
             let link9_pdot9 = A::fma_f64(-link9_pivot2, link9_vel3, link9_pdot7);
             // link10: velocity and joint rate (4.40)
-            let link10_vel3 = A::fma_f64(link10_pose1, link9_vel6, link9_vel4);
-            let link10_vel4 = A::fma_f64(link10_pose2, link9_vel6, link9_vel3);
-            let link10_vel5 = link9_vel6 - link10_vel2;
-            // link9: velocity and joint rate (4.40)
-            let link9_vel7 = link8_vel6 - link9_vel6;
-            // link8: velocity and joint rate (4.40)
-            let link8_vel7 = link7_vel6 - link8_vel6;
-            // link7: velocity and joint rate (4.40)
-            let link7_vel7 = link6_vel6 - link7_vel6;
-            // link6: velocity and joint rate (4.40)
-            let link6_vel7 = link5_vel6 - link6_vel6;
-            // link5: velocity and joint rate (4.40)
-            let link5_vel7 = link4_vel6 - link5_vel6;
-            // link4: velocity and joint rate (4.40)
-            let link4_vel7 = link3_vel6 - link4_vel6;
-            // link3: velocity and joint rate (4.40)
-            let link3_vel7 = link2_vel9 - link3_vel6;
-            // link2: velocity and joint rate (4.40)
-            let link2_vel10 = link1_vel2 - link2_vel9;
+            let link10_vel1 = A::fma_f64(link10_pose1, link9_vel6, link9_vel4);
+            let link10_vel2 = A::fma_f64(link10_pose2, link9_vel6, link9_vel3);
             // link10: inertia carried to the parent, M* (4.48)
-            let link10_inertia28 = 0.00025 * link10_cos0;
-            let link10_inertia29 = link9_pose1 + link10_inertia28;
+            let link10_inertia25 = 0.00025 * link10_cos0;
+            let link10_inertia26 = link9_pose1 + link10_inertia25;
             // link9: inertia carried to the parent, M* (4.48)
-            let link9_inertia14 = link8_pose1 + link10_inertia29;
+            let link9_inertia14 = link8_pose1 + link10_inertia26;
             // link9: momentum rate (4.36)
-            let link9_pdot10 = 9.81 * link10_inertia29;
+            let link9_pdot10 = 9.81 * link10_inertia26;
             // link8: inertia carried to the parent, M* (4.48)
-            let link8_inertia14 = link7_pose1 + link9_inertia14;
+            let link8_inertia14 = link7_pose2 + link9_inertia14;
             // link8: momentum rate (4.36)
             let link8_pdot10 = 9.81 * link9_inertia14;
             // link9: momentum rate (4.36)
@@ -1199,8 +1114,6 @@ impl Closed10 {
             let link5_inertia14 = link4_pose3 + link6_inertia14;
             // link5: momentum rate (4.36)
             let link5_pdot10 = 9.81 * link6_inertia14;
-            // link9: momentum rate (4.36)
-            let link9_pdot13 = A::fma_f64(0.001, link9_vel7, link9_pdot12);
             // link6: momentum rate (4.36)
             let link6_pdot11 = A::fma_f64(link6_vel4, link6_pdot8, -link6_pdot10);
             // link7: momentum rate (4.36)
@@ -1209,8 +1122,6 @@ impl Closed10 {
             let link4_inertia14 = link3_pose3 + link5_inertia14;
             // link4: momentum rate (4.36)
             let link4_pdot10 = 9.81 * link5_inertia14;
-            // link8: momentum rate (4.36)
-            let link8_pdot13 = A::fma_f64(0.001, link8_vel7, link8_pdot12);
             // link5: momentum rate (4.36)
             let link5_pdot11 = A::fma_f64(link5_vel4, link5_pdot8, -link5_pdot10);
             // link6: momentum rate (4.36)
@@ -1219,8 +1130,6 @@ impl Closed10 {
             let link3_inertia14 = link2_pose3 + link4_inertia14;
             // link3: momentum rate (4.36)
             let link3_pdot10 = 9.81 * link4_inertia14;
-            // link7: momentum rate (4.36)
-            let link7_pdot13 = A::fma_f64(0.001, link7_vel7, link7_pdot12);
             // link4: momentum rate (4.36)
             let link4_pdot11 = A::fma_f64(link4_vel4, link4_pdot8, -link4_pdot10);
             // link5: momentum rate (4.36)
@@ -1229,48 +1138,79 @@ impl Closed10 {
             let link2_inertia11 = link3_inertia14 + link2_inertia0;
             // link2: momentum rate (4.36)
             let link2_pdot12 = 9.81 * link3_inertia14;
-            // link6: momentum rate (4.36)
-            let link6_pdot13 = A::fma_f64(0.001, link6_vel7, link6_pdot12);
             // link3: momentum rate (4.36)
             let link3_pdot11 = A::fma_f64(link3_vel4, link3_pdot8, -link3_pdot10);
-            // link10: velocity and joint rate (4.40)
-            let link10_vel6 = link10_cos0 * link10_vel3;
             // link1: momentum rate (4.36)
             let link1_pdot0 = 9.81 * link2_inertia11;
             // link4: momentum rate (4.36)
             let link4_pdot12 = A::fma_f64(link4_vel3, link4_pdot9, link4_pdot11);
-            // link10: momentum rate (4.36)
-            let link10_pdot3 = 0.0024525000000000003 * link10_cos0;
-            // link10: velocity and joint rate (4.40)
-            let link10_vel7 = link10_cos0 * link10_vel4;
             // link2: momentum rate (4.36)
             let link2_pdot13 = A::fma_f64(link2_vel7, link2_pdot10, -link2_pdot12);
-            // link5: momentum rate (4.36)
-            let link5_pdot13 = A::fma_f64(0.001, link5_vel7, link5_pdot12);
-            // link10: velocity and joint rate (4.40)
-            let link10_vel8 = A::fma_f64(link10_sin0, link10_vel4, link10_vel6);
             // link3: momentum rate (4.36)
             let link3_pdot12 = A::fma_f64(link3_vel3, link3_pdot9, link3_pdot11);
             // link1: momentum rate (4.36)
             let link1_pdot1 = A::fma_f64(0.001, link1_vel2, link1_pdot0);
-            // link4: momentum rate (4.36)
-            let link4_pdot13 = A::fma_f64(0.001, link4_vel7, link4_pdot12);
-            // link10: velocity and joint rate (4.40)
-            let link10_vel9 = A::fma_f64(-link10_sin0, link10_vel3, link10_vel7);
             // link2: momentum rate (4.36)
             let link2_pdot14 = A::fma_f64(link2_vel6, link2_pdot11, link2_pdot13);
             // link10: velocity and joint rate (4.40)
-            let link10_vel10 = A::fma_f64(-30.0, link10_vel8, -link10_vel5);
+            let link10_vel3 = 6000.0 * link1_rest24;
             // link10: momentum rate (4.36)
-            let link10_pdot4 = A::fma_f64(link10_vel8, ground_loop26, link10_pdot3);
-            let link10_pdot5 = A::fma_f64(0.0075, link10_vel8, link10_pdot2);
-            // link3: momentum rate (4.36)
-            let link3_pdot13 = A::fma_f64(0.001, link3_vel7, link3_pdot12);
+            let link10_pdot0 = 0.5 * link1_rest24;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel4 = A::fma_f64(ground_pivot10, link10_vel3, link10_vel0);
+            // link10: momentum rate (4.36)
+            let link10_pdot1 = A::fma_f64(-ground_pivot10, link10_pdot0, -link10_rest0);
+            // link10: velocity and joint rate (4.40)
+            let link10_vel5 = link10_cos0 * link10_vel1;
+            // link2: velocity and joint rate (4.40)
+            let link2_vel10 = link1_vel2 - link2_vel9;
+            // link3: velocity and joint rate (4.40)
+            let link3_vel7 = link2_vel9 - link3_vel6;
+            // link10: momentum rate (4.36)
+            let link10_pdot2 = 0.0024525000000000003 * link10_cos0;
+            // link4: velocity and joint rate (4.40)
+            let link4_vel7 = link3_vel6 - link4_vel6;
+            // link5: velocity and joint rate (4.40)
+            let link5_vel7 = link4_vel6 - link5_vel6;
+            // link6: velocity and joint rate (4.40)
+            let link6_vel7 = link5_vel6 - link6_vel6;
+            // link7: velocity and joint rate (4.40)
+            let link7_vel7 = link6_vel6 - link7_vel6;
             // link2: momentum rate (4.36)
             let link2_pdot15 = A::fma_f64(0.001, link2_vel10, link2_pdot14);
+            // link10: velocity and joint rate (4.40)
+            let link10_vel6 = link10_cos0 * link10_vel2;
+            let link10_vel7 = link9_vel6 - link10_vel4;
+            // link8: velocity and joint rate (4.40)
+            let link8_vel7 = link7_vel6 - link8_vel6;
+            // link10: velocity and joint rate (4.40)
+            let link10_vel8 = A::fma_f64(link10_sin0, link10_vel2, link10_vel5);
+            // link3: momentum rate (4.36)
+            let link3_pdot13 = A::fma_f64(0.001, link3_vel7, link3_pdot12);
+            // link9: velocity and joint rate (4.40)
+            let link9_vel7 = link8_vel6 - link9_vel6;
+            // link4: momentum rate (4.36)
+            let link4_pdot13 = A::fma_f64(0.001, link4_vel7, link4_pdot12);
+            // link5: momentum rate (4.36)
+            let link5_pdot13 = A::fma_f64(0.001, link5_vel7, link5_pdot12);
+            // link6: momentum rate (4.36)
+            let link6_pdot13 = A::fma_f64(0.001, link6_vel7, link6_pdot12);
+            // link7: momentum rate (4.36)
+            let link7_pdot13 = A::fma_f64(0.001, link7_vel7, link7_pdot12);
+            // link10: velocity and joint rate (4.40)
+            let link10_vel9 = A::fma_f64(-link10_sin0, link10_vel1, link10_vel6);
+            // link8: momentum rate (4.36)
+            let link8_pdot13 = A::fma_f64(0.001, link8_vel7, link8_pdot12);
+            // link10: velocity and joint rate (4.40)
+            let link10_vel10 = A::fma_f64(-30.0, link10_vel8, -link10_vel7);
             // link10: momentum rate (4.36)
-            let link10_pdot6 = A::fma_f64(0.001, link10_vel10, link10_pdot4);
-            let link10_pdot7 = A::fma_f64(link10_vel9, link10_pdot5, link10_pdot6);
+            let link10_pdot3 = A::fma_f64(ground_vel1, link10_vel8, link10_pdot2);
+            let link10_pdot4 = A::fma_f64(0.0075, link10_vel8, link10_pdot1);
+            // link9: momentum rate (4.36)
+            let link9_pdot13 = A::fma_f64(0.001, link9_vel7, link9_pdot12);
+            // link10: momentum rate (4.36)
+            let link10_pdot5 = A::fma_f64(0.001, link10_vel10, link10_pdot3);
+            let link10_pdot6 = A::fma_f64(link10_vel9, link10_pdot4, link10_pdot5);
             results[0][l] = link1_vel2;
             results[1][l] = -link2_vel10;
             results[2][l] = -link3_vel7;
@@ -1290,7 +1230,7 @@ impl Closed10 {
             results[16][l] = link7_pdot13;
             results[17][l] = link8_pdot13;
             results[18][l] = link9_pdot13;
-            results[19][l] = -link10_pdot7;
+            results[19][l] = -link10_pdot6;
         }
         qd.give(0, &results[0]);
         qd.give(1, &results[1]);

@@ -109,7 +109,7 @@
 //   [0..5] end: pin, link100 to the ground
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 6430 + 8319 + 101 = 14850; 0, 100
+//   rates: 5823 + 7312 + 101 = 13236; 0, 100
 
 /// Dynamics of `closed100` in canonical form: rates. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
@@ -549,14 +549,14 @@ impl Closed100 {
     }
 
     /// Rates of the state: `(q, p) → (q̇, ṗ)`.
-    /// 14850 operations: 6430 additions, 8319 multiplications, 101 divisions; apart: 0 square roots, 100 sine-cosine pairs.
+    /// 13236 operations: 5823 additions, 7312 multiplications, 101 divisions; apart: 0 square roots, 100 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 100], p: &[f64; 100], qd: &mut [f64; 100], pd: &mut [f64; 100]) {
         ::multibody::runtime::kernel::call::<Self, 0, _>((q, p, qd, pd,));
     }
 
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 44]);
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         let mut rows0 = [[[0.0; LANES]; 17]; 98];
         {
             let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 98]);
@@ -568,372 +568,240 @@ impl Closed100 {
             }
             let (sines0, cosines0) = ::multibody::runtime::trig::pairs_f64::<A, LANES, 98>(&angles0);
             for k in 0..98 {
-                rows0[k][0] = sines0[k];
-                rows0[k][1] = cosines0[k];
+                rows0[k][1] = sines0[k];
+                rows0[k][2] = cosines0[k];
             }
         }
         {
-            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
             for l in 0..LANES {
                 let ground_in0 = q.get(0, l);
                 let ground_in1 = q.get(99, l);
-                // link1: sine and cosine, rotation
-                let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::pair_f64::<A>(ground_in0);
+                let ground_in2 = p.get(99, l);
                 // link100: sine and cosine, rotation
                 let (link100_sin0, link100_cos0) = ::multibody::runtime::trig::pair_f64::<A>(ground_in1);
+                // link1: sine and cosine, rotation
+                let (link1_sin0, link1_cos0) = ::multibody::runtime::trig::pair_f64::<A>(ground_in0);
+                // link100: inertia carried to the parent, M* (4.48)
+                let link100_inertia0 = 0.00025 * link100_sin0;
+                let link100_inertia1 = 0.00025 * link100_cos0;
+                // link100: U, Mj, k and the reduced inertia M' (4.44)
+                let link100_pivot0 = 30.0 * link100_cos0;
+                // link100: momentum remainder D, D' (4.45, 4.49)
+                let link100_rest0 = 120000.0 * ground_in2;
+                // link100: U, Mj, k and the reduced inertia M' (4.44)
+                let link100_pivot1 = 30.0 * link100_sin0;
+                let link100_pivot2 = A::fma_f64(-1.5, link100_cos0, link100_cos0);
+                let link100_pivot3 = A::fma_f64(-1.5, link100_sin0, link100_sin0);
+                // link100: inertia carried to the parent, M* (4.48)
+                let link100_inertia2 = 0.05 * link100_sin0;
+                // link100: momentum remainder D, D' (4.45, 4.49)
+                let link100_rest1 = 6000.0 * ground_in2;
+                // link100: U, Mj, k and the reduced inertia M' (4.44)
+                let link100_pivot4 = link100_inertia0 * link100_pivot0;
+                let link100_pivot5 = link100_inertia1 * link100_pivot0;
+                // link100: momentum remainder D, D' (4.45, 4.49)
+                let link100_rest2 = link100_inertia1 * link100_rest0;
+                // link100: U, Mj, k and the reduced inertia M' (4.44)
+                let link100_pivot6 = link100_inertia0 * link100_pivot1;
+                // link100: inertia carried to the parent, M* (4.48)
+                let link100_inertia3 = 0.05 * link100_pivot2;
+                // link100: momentum remainder D, D' (4.45, 4.49)
+                let link100_rest3 = link100_inertia0 * link100_rest0;
+                // link100: inertia carried to the parent, M* (4.48)
+                let link100_inertia4 = 0.05 * link100_pivot4;
+                let link100_inertia5 = 0.05 * link100_pivot5;
+                let link100_inertia6 = 0.0025000000000000005 * link100_pivot5;
+                // link100: momentum remainder D, D' (4.45, 4.49)
+                let link100_rest4 = A::fma_f64(0.05, link100_rest2, ground_in2);
                 results[0][l] = link1_sin0;
                 results[1][l] = link1_cos0;
                 results[2][l] = link100_sin0;
                 results[3][l] = link100_cos0;
+                results[4][l] = link100_inertia0;
+                results[5][l] = link100_inertia1;
+                results[6][l] = link100_pivot1;
+                results[7][l] = link100_pivot0;
+                results[8][l] = link100_pivot6;
+                results[9][l] = link100_pivot4;
+                results[10][l] = link100_pivot5;
+                results[11][l] = link100_pivot3;
+                results[12][l] = link100_pivot2;
+                results[13][l] = link100_inertia4;
+                results[14][l] = link100_inertia5;
+                results[15][l] = link100_inertia6;
+                results[16][l] = link100_inertia2;
+                results[17][l] = link100_inertia3;
+                results[18][l] = link100_rest0;
+                results[19][l] = link100_rest3;
+                results[20][l] = link100_rest2;
+                results[21][l] = link100_rest1;
+                results[22][l] = link100_rest4;
             }
             kept[0] = results[0];
             kept[1] = results[1];
             kept[2] = results[2];
             kept[3] = results[3];
+            kept[4] = results[4];
+            kept[5] = results[5];
+            kept[6] = results[6];
+            kept[7] = results[7];
+            kept[8] = results[8];
+            kept[9] = results[9];
+            kept[10] = results[10];
+            kept[11] = results[11];
+            kept[12] = results[12];
+            kept[13] = results[13];
+            kept[14] = results[14];
+            kept[15] = results[15];
+            kept[16] = results[16];
+            kept[17] = results[17];
+            kept[18] = results[18];
+            kept[19] = results[19];
+            kept[20] = results[20];
+            kept[21] = results[21];
+            kept[22] = results[22];
         }
         {
             let mut carried0 = [0.0; LANES];
-            for l in 0..LANES { carried0[l] = kept[1][l]; }
+            for l in 0..LANES { carried0[l] = -kept[8][l]; }
             let mut carried1 = [0.0; LANES];
-            for l in 0..LANES { carried1[l] = -kept[0][l]; }
+            for l in 0..LANES { carried1[l] = -kept[9][l]; }
             let mut carried2 = [0.0; LANES];
-            for l in 0..LANES { carried2[l] = kept[0][l]; }
+            for l in 0..LANES { carried2[l] = -kept[10][l]; }
             let mut carried3 = [0.0; LANES];
-            for l in 0..LANES { carried3[l] = kept[1][l]; }
+            for l in 0..LANES { carried3[l] = -kept[13][l]; }
             let mut carried4 = [0.0; LANES];
+            for l in 0..LANES { carried4[l] = -kept[14][l]; }
             let mut carried5 = [0.0; LANES];
-            for k in 0..98 {
-                let row = &mut rows0[k];
-                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-                for l in 0..LANES {
-                    let ground_in0 = carried0[l];
-                    let ground_in1 = carried2[l];
-                    let link_in0 = row[1][l];
-                    let ground_in2 = carried1[l];
-                    let link_in1 = row[0][l];
-                    let ground_in3 = carried3[l];
-                    let ground_in4 = carried4[l];
-                    let ground_in5 = carried5[l];
-                    let link_loop0 = ground_in0 * link_in0;
-                    let link_loop1 = link_in0 * ground_in2;
-                    let link_loop2 = ground_in1 * link_in0;
-                    let link_loop3 = link_in0 * ground_in3;
-                    let link_loop4 = A::fma_f64(0.05, ground_in0, ground_in4);
-                    let link_loop5 = A::fma_f64(0.05, ground_in1, ground_in5);
-                    let link_loop6 = A::fma_f64(ground_in2, link_in1, link_loop0);
-                    let link_loop7 = A::fma_f64(-ground_in0, link_in1, link_loop1);
-                    let link_loop8 = A::fma_f64(link_in1, ground_in3, link_loop2);
-                    let link_loop9 = A::fma_f64(-ground_in1, link_in1, link_loop3);
-                    results[0][l] = link_loop6;
-                    results[1][l] = link_loop7;
-                    results[2][l] = link_loop8;
-                    results[3][l] = link_loop9;
-                    results[4][l] = link_loop4;
-                    results[5][l] = link_loop5;
-                }
-                carried0 = results[0];
-                carried1 = results[1];
-                carried2 = results[2];
-                carried3 = results[3];
-                carried4 = results[4];
-                carried5 = results[5];
-            }
-            kept[4] = carried0;
-            kept[5] = carried1;
-            kept[6] = carried2;
-            kept[7] = carried3;
-            kept[8] = carried4;
-            kept[9] = carried5;
-        }
-        {
-            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 27]);
-            for l in 0..LANES {
-                let link1_in0 = kept[4][l];
-                let link1_in1 = kept[8][l];
-                let link1_in2 = kept[6][l];
-                let link1_in3 = kept[9][l];
-                let link100_in0 = kept[3][l];
-                let link100_in1 = kept[2][l];
-                let link1_in4 = kept[5][l];
-                let link1_in5 = kept[7][l];
-                let ground_in0 = p.get(99, l);
-                // link100: loops and couplings
-                let link100_loop0 = link1_in2 * link100_in0;
-                let link100_loop1 = link100_in0 * link1_in5;
-                // ground: loops and couplings
-                let ground_loop0 = link1_in3 - 0.8358863185452141;
-                let ground_loop1 = link1_in1 - 4.1235566677677;
-                // link100: loops and couplings
-                let link100_loop2 = link1_in0 * link100_in0;
-                let link100_loop3 = link100_in0 * link1_in4;
-                // link100: inertia carried to the parent, M* (4.48)
-                let link100_inertia0 = 0.00025 * link100_in1;
-                let link100_inertia1 = 0.00025 * link100_in0;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot0 = 30.0 * link100_in0;
-                // link100: momentum remainder D, D' (4.45, 4.49)
-                let link100_rest0 = 120000.0 * ground_in0;
-                // link100: loops and couplings
-                let link100_loop4 = A::fma_f64(link100_in1, link1_in5, link100_loop0);
-                let link100_loop5 = A::fma_f64(-link1_in2, link100_in1, link100_loop1);
-                let link100_loop6 = A::fma_f64(link100_in1, link1_in4, link100_loop2);
-                let link100_loop7 = A::fma_f64(-link1_in0, link100_in1, link100_loop3);
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot1 = 30.0 * link100_in1;
-                let link100_pivot2 = link100_inertia0 * link100_pivot0;
-                let link100_pivot3 = link100_inertia1 * link100_pivot0;
-                let link100_pivot4 = link100_in1 * link100_loop4;
-                let link100_pivot5 = link100_in0 * link100_loop4;
-                // ground: loops and couplings
-                let ground_loop2 = link1_in2 + link100_loop4;
-                let ground_loop3 = link1_in0 - link100_loop5;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot6 = link100_in1 * link100_loop6;
-                let link100_pivot7 = link100_in0 * link100_loop6;
-                // link100: momentum remainder D, D' (4.45, 4.49)
-                let link100_rest1 = link100_inertia1 * link100_rest0;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot8 = link100_inertia0 * link100_pivot1;
-                // link100: inertia carried to the parent, M* (4.48)
-                let link100_inertia2 = 0.05 * link100_pivot2;
-                let link100_inertia3 = 0.05 * link100_pivot3;
-                // ground: loops and couplings
-                let ground_loop4 = link100_loop7 + ground_loop2;
-                let ground_loop5 = link100_loop6 + ground_loop3;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot9 = A::fma_f64(link100_in0, link100_loop5, link100_pivot4);
-                let link100_pivot10 = A::fma_f64(-link100_in1, link100_loop5, link100_pivot5);
-                let link100_pivot11 = A::fma_f64(-link100_in0, link100_loop7, -link100_pivot6);
-                let link100_pivot12 = A::fma_f64(-link100_in1, link100_loop7, link100_pivot7);
-                // ground: loops and couplings
-                let ground_loop6 = A::fma_f64(0.05, ground_loop4, ground_loop0);
-                let ground_loop7 = A::fma_f64(0.05, ground_loop5, ground_loop1);
-                // link100: inertia carried to the parent, M* (4.48)
-                let link100_inertia4 = 0.0025000000000000005 * link100_pivot3;
-                // link100: momentum remainder D, D' (4.45, 4.49)
-                let link100_rest2 = link100_inertia0 * link100_rest0;
-                let link100_rest3 = A::fma_f64(0.05, link100_rest1, ground_in0);
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot13 = A::fma_f64(ground_loop6, link100_pivot0, link100_pivot11);
-                let link100_pivot14 = 120000.0 * ground_loop6;
-                let link100_pivot15 = 120000.0 * ground_loop7;
-                let link100_pivot16 = A::fma_f64(ground_loop7, link100_pivot0, link100_pivot9);
-                let link100_pivot17 = A::fma_f64(ground_loop6, link100_pivot1, link100_pivot12);
-                let link100_pivot18 = A::fma_f64(-ground_loop7, link100_pivot1, link100_pivot10);
-                // link100: momentum remainder D, D' (4.45, 4.49)
-                let link100_rest4 = ground_loop6 * link100_rest0;
-                let link100_rest5 = ground_loop7 * link100_rest0;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot19 = ground_loop6 * link100_pivot14;
-                // link100: inertia carried to the parent, M* (4.48)
-                let link100_inertia5 = 0.05 * link100_pivot13;
-                // link100: U, Mj, k and the reduced inertia M' (4.44)
-                let link100_pivot20 = ground_loop6 * link100_pivot15;
-                let link100_pivot21 = ground_loop7 * link100_pivot15;
-                // link100: inertia carried to the parent, M* (4.48)
-                let link100_inertia6 = 0.05 * link100_pivot16;
-                results[0][l] = link100_inertia0;
-                results[1][l] = link100_inertia1;
-                results[2][l] = link100_pivot1;
-                results[3][l] = link100_pivot0;
-                results[4][l] = link100_pivot8;
-                results[5][l] = link100_pivot2;
-                results[6][l] = link100_pivot3;
-                results[7][l] = link100_pivot17;
-                results[8][l] = -link100_pivot13;
-                results[9][l] = link100_pivot14;
-                results[10][l] = link100_pivot19;
-                results[11][l] = link100_pivot15;
-                results[12][l] = link100_pivot20;
-                results[13][l] = link100_pivot18;
-                results[14][l] = link100_pivot16;
-                results[15][l] = link100_pivot21;
-                results[16][l] = link100_inertia2;
-                results[17][l] = link100_inertia3;
-                results[18][l] = link100_inertia4;
-                results[19][l] = -link100_inertia5;
-                results[20][l] = link100_inertia6;
-                results[21][l] = link100_rest0;
-                results[22][l] = link100_rest2;
-                results[23][l] = link100_rest1;
-                results[24][l] = link100_rest4;
-                results[25][l] = link100_rest5;
-                results[26][l] = link100_rest3;
-            }
-            kept[10] = results[0];
-            kept[11] = results[1];
-            kept[12] = results[2];
-            kept[13] = results[3];
-            kept[14] = results[4];
-            kept[15] = results[5];
-            kept[16] = results[6];
-            kept[17] = results[7];
-            kept[18] = results[8];
-            kept[19] = results[9];
-            kept[20] = results[10];
-            kept[21] = results[11];
-            kept[22] = results[12];
-            kept[23] = results[13];
-            kept[24] = results[14];
-            kept[25] = results[15];
-            kept[26] = results[16];
-            kept[27] = results[17];
-            kept[28] = results[18];
-            kept[29] = results[19];
-            kept[30] = results[20];
-            kept[31] = results[21];
-            kept[32] = results[22];
-            kept[33] = results[23];
-            kept[34] = results[24];
-            kept[35] = results[25];
-            kept[36] = results[26];
-        }
-        {
-            let mut carried0 = [0.0; LANES];
-            for l in 0..LANES { carried0[l] = -kept[14][l]; }
-            let mut carried1 = [0.0; LANES];
-            for l in 0..LANES { carried1[l] = -kept[15][l]; }
-            let mut carried2 = [0.0; LANES];
-            for l in 0..LANES { carried2[l] = -kept[16][l]; }
-            let mut carried3 = [0.0; LANES];
-            for l in 0..LANES { carried3[l] = -kept[26][l]; }
-            let mut carried4 = [0.0; LANES];
-            for l in 0..LANES { carried4[l] = -kept[27][l]; }
-            let mut carried5 = [0.0; LANES];
-            for l in 0..LANES { carried5[l] = -kept[28][l]; }
+            for l in 0..LANES { carried5[l] = -kept[15][l]; }
             let mut carried6 = [0.0; LANES];
-            for l in 0..LANES { carried6[l] = -kept[32][l]; }
+            for l in 0..LANES { carried6[l] = -kept[19][l]; }
             let mut carried7 = [0.0; LANES];
-            for l in 0..LANES { carried7[l] = kept[33][l]; }
+            for l in 0..LANES { carried7[l] = kept[20][l]; }
             let mut carried8 = [0.0; LANES];
-            for l in 0..LANES { carried8[l] = kept[36][l]; }
+            for l in 0..LANES { carried8[l] = kept[22][l]; }
             let mut carried9 = [0.0; LANES];
-            for l in 0..LANES { carried9[l] = kept[11][l]; }
+            for l in 0..LANES { carried9[l] = kept[5][l]; }
             let mut carried10 = [0.0; LANES];
-            for l in 0..LANES { carried10[l] = kept[10][l]; }
+            for l in 0..LANES { carried10[l] = kept[4][l]; }
             let mut carried11 = [0.0; LANES];
-            for l in 0..LANES { carried11[l] = -kept[17][l]; }
+            for l in 0..LANES { carried11[l] = kept[3][l]; }
             let mut carried12 = [0.0; LANES];
-            for l in 0..LANES { carried12[l] = -kept[18][l]; }
+            for l in 0..LANES { carried12[l] = kept[2][l]; }
             let mut carried13 = [0.0; LANES];
-            for l in 0..LANES { carried13[l] = -kept[29][l]; }
+            for l in 0..LANES { carried13[l] = kept[16][l]; }
             let mut carried14 = [0.0; LANES];
-            for l in 0..LANES { carried14[l] = -kept[23][l]; }
+            for l in 0..LANES { carried14[l] = -kept[11][l]; }
             let mut carried15 = [0.0; LANES];
-            for l in 0..LANES { carried15[l] = -kept[24][l]; }
+            for l in 0..LANES { carried15[l] = kept[12][l]; }
             let mut carried16 = [0.0; LANES];
-            for l in 0..LANES { carried16[l] = -kept[30][l]; }
+            for l in 0..LANES { carried16[l] = kept[17][l]; }
             let mut carried17 = [0.0; LANES];
-            for l in 0..LANES { carried17[l] = -kept[34][l]; }
             let mut carried18 = [0.0; LANES];
-            for l in 0..LANES { carried18[l] = kept[35][l]; }
+            for l in 0..LANES { carried18[l] = kept[21][l]; }
             let mut carried19 = [0.0; LANES];
-            for l in 0..LANES { carried19[l] = kept[20][l]; }
-            let mut carried20 = [0.0; LANES];
-            for l in 0..LANES { carried20[l] = kept[25][l]; }
+            let mut carried20 = [300.0; LANES];
             let mut carried21 = [0.0; LANES];
-            for l in 0..LANES { carried21[l] = -kept[20][l]; }
             let mut carried22 = [0.0; LANES];
-            for l in 0..LANES { carried22[l] = kept[22][l]; }
-            let mut carried23 = [0.0; LANES];
-            for l in 0..LANES { carried23[l] = -kept[25][l]; }
+            let mut carried23 = [-300.0; LANES];
             for k in (0..98).rev() {
                 let row = &mut rows0[k];
                 let table = &Self::RATES_TABLE0[k];
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 39]);
                 for l in 0..LANES {
                     let ground_in0 = table[0];
-                    let link_in0 = carried4[l];
-                    let ground_in1 = table[1];
-                    let link_in1 = carried5[l];
-                    let link_in2 = carried9[l];
-                    let link_in3 = carried0[l];
-                    let link_in4 = carried2[l];
-                    let link_in5 = row[0][l];
-                    let link_in6 = row[1][l];
-                    let link_in7 = carried1[l];
-                    let link_in8 = carried3[l];
-                    let link_in9 = carried11[l];
-                    let link_in10 = carried12[l];
-                    let link_in11 = carried14[l];
-                    let link_in12 = carried15[l];
-                    let link_in13 = carried13[l];
-                    let link_in14 = carried19[l];
-                    let link_in15 = carried21[l];
-                    let link_in16 = carried16[l];
-                    let link_in17 = carried22[l];
-                    let link_in18 = carried20[l];
-                    let link_in19 = carried23[l];
-                    let link_in20 = carried6[l];
-                    let link_in21 = carried7[l];
-                    let ground_in2 = p.get(1 + k, l);
-                    let link_in22 = carried8[l];
-                    let link_in23 = carried17[l];
-                    let link_in24 = carried18[l];
-                    let link_in25 = carried10[l];
-                    let link_inertia0 = link_in5 * link_in8;
-                    let link_inertia1 = link_in6 * link_in8;
-                    let link_loop0 = ground_in1 + link_in1;
-                    let link_inertia2 = link_in3 - link_in4;
-                    let link_pivot0 = link_in5 * link_in9;
-                    let link_pivot1 = link_in5 * link_in11;
-                    let link_inertia3 = link_in6 + link_in6;
-                    let link_loop1 = ground_in0 + link_in0;
-                    let link_rest0 = link_in5 * link_in20;
-                    let link_pivot2 = link_in6 * link_in9;
-                    let link_rest1 = ground_in2 - link_in22;
-                    let link_loop2 = ground_in0 + link_in2;
-                    let link_pivot3 = 1.0 / link_loop0;
-                    let link_inertia4 = link_inertia2 * link_in5;
-                    let link_inertia5 = A::fma_f64(-link_loop1, link_in6, link_inertia0);
-                    let link_inertia6 = A::fma_f64(link_loop1, link_in5, link_inertia1);
-                    let link_pivot4 = A::fma_f64(link_in6, link_in10, link_pivot0);
-                    let link_pivot5 = link_in6 * link_in11;
-                    let link_pivot6 = A::fma_f64(link_in6, link_in12, link_pivot1);
-                    let link_rest2 = link_in6 * link_in20;
-                    let link_inertia7 = A::fma_f64(-link_inertia3, link_in7, link_inertia4);
-                    let link_rest3 = A::fma_f64(link_in6, link_in21, link_rest0);
-                    let link_load0 = link_in5 * link_in25;
-                    let link_load1 = link_in6 * link_in25;
-                    let link_pivot7 = A::fma_f64(-link_in5, link_in10, link_pivot2);
-                    let link_pivot8 = A::fma_f64(-link_in5, link_in12, link_pivot5);
-                    let link_rest4 = A::fma_f64(-link_in5, link_in21, link_rest2);
-                    let link_inertia8 = link_in5 * link_inertia7;
-                    let link_pivot9 = A::fma_f64(link_in6, link_inertia7, link_in7);
-                    let link_load2 = A::fma_f64(link_loop2, link_in6, -link_load0);
-                    let link_load3 = A::fma_f64(link_loop2, link_in5, link_load1);
-                    let link_pivot10 = link_in4 + link_inertia8;
-                    let link_pivot11 = link_in3 - link_inertia8;
+                    let ground_in1 = carried4[l];
+                    let ground_in2 = table[1];
+                    let ground_in3 = carried5[l];
+                    let ground_in4 = carried9[l];
+                    let ground_in5 = carried0[l];
+                    let ground_in6 = carried2[l];
+                    let link_in0 = row[1][l];
+                    let link_in1 = row[2][l];
+                    let ground_in7 = carried1[l];
+                    let ground_in8 = carried3[l];
+                    let ground_in9 = carried11[l];
+                    let ground_in10 = carried12[l];
+                    let ground_in11 = carried14[l];
+                    let ground_in12 = carried15[l];
+                    let ground_in13 = carried13[l];
+                    let ground_in14 = carried16[l];
+                    let ground_in15 = carried6[l];
+                    let ground_in16 = carried7[l];
+                    let ground_in17 = p.get(1 + k, l);
+                    let ground_in18 = carried8[l];
+                    let ground_in19 = carried18[l];
+                    let ground_in20 = carried10[l];
+                    let ground_in21 = carried19[l];
+                    let ground_in22 = carried21[l];
+                    let ground_in23 = carried22[l];
+                    let ground_in24 = carried20[l];
+                    let ground_in25 = carried23[l];
+                    let ground_in26 = carried17[l];
+                    let link_inertia0 = link_in0 * ground_in8;
+                    let link_inertia1 = link_in1 * ground_in8;
+                    let link_pose0 = ground_in2 + ground_in3;
+                    let link_inertia2 = ground_in5 - ground_in6;
+                    let link_pivot0 = link_in0 * ground_in9;
+                    let link_pivot1 = link_in0 * ground_in11;
+                    let link_inertia3 = link_in1 + link_in1;
+                    let link_pose1 = ground_in0 + ground_in1;
+                    let link_rest0 = link_in0 * ground_in15;
+                    let link_pivot2 = link_in1 * ground_in9;
+                    let link_rest1 = ground_in17 - ground_in18;
+                    let link_pose2 = ground_in0 + ground_in4;
+                    let link_pivot3 = 1.0 / link_pose0;
+                    let link_inertia4 = link_inertia2 * link_in0;
+                    let link_inertia5 = A::fma_f64(-link_pose1, link_in1, link_inertia0);
+                    let link_inertia6 = A::fma_f64(link_pose1, link_in0, link_inertia1);
+                    let link_pivot4 = A::fma_f64(link_in1, ground_in10, link_pivot0);
+                    let link_pivot5 = link_in1 * ground_in11;
+                    let link_pivot6 = A::fma_f64(link_in1, ground_in12, link_pivot1);
+                    let link_rest2 = link_in1 * ground_in15;
+                    let link_inertia7 = A::fma_f64(-link_inertia3, ground_in7, link_inertia4);
+                    let link_rest3 = A::fma_f64(link_in1, ground_in16, link_rest0);
+                    let link_load0 = link_in0 * ground_in20;
+                    let link_load1 = link_in1 * ground_in20;
+                    let link_pivot7 = A::fma_f64(-link_in0, ground_in10, link_pivot2);
+                    let link_pivot8 = A::fma_f64(-link_in0, ground_in12, link_pivot5);
+                    let link_rest4 = A::fma_f64(-link_in0, ground_in16, link_rest2);
+                    let link_inertia8 = link_in0 * link_inertia7;
+                    let link_pivot9 = A::fma_f64(link_in1, link_inertia7, ground_in7);
+                    let link_load2 = A::fma_f64(link_pose2, link_in1, -link_load0);
+                    let link_load3 = A::fma_f64(link_pose2, link_in0, link_load1);
+                    let link_pivot10 = ground_in6 + link_inertia8;
+                    let link_pivot11 = ground_in5 - link_inertia8;
                     let link_rest5 = link_pivot3 * link_rest1;
                     let link_pivot12 = link_pivot3 * link_inertia5;
-                    let link_pivot13 = link_pivot3 * link_in13;
-                    let link_pivot14 = link_pivot3 * link_in16;
+                    let link_pivot13 = link_pivot3 * ground_in13;
+                    let link_pivot14 = link_pivot3 * ground_in14;
                     let link_pivot15 = link_pivot3 * link_inertia6;
                     let link_pivot16 = A::fma_f64(-link_inertia6, link_pivot12, link_pivot9);
                     let link_pivot17 = A::fma_f64(-link_inertia5, link_pivot12, link_pivot10);
-                    let link_pivot18 = A::fma_f64(link_in13, link_pivot12, link_pivot4);
-                    let link_pivot19 = A::fma_f64(link_in16, link_pivot12, link_pivot6);
+                    let link_pivot18 = A::fma_f64(ground_in13, link_pivot12, link_pivot4);
+                    let link_pivot19 = A::fma_f64(ground_in14, link_pivot12, link_pivot6);
                     let link_rest6 = A::fma_f64(-link_rest5, link_inertia5, link_rest3);
-                    let link_pivot20 = link_in13 * link_pivot13;
-                    let link_pivot21 = link_in16 * link_pivot14;
+                    let link_pivot20 = ground_in13 * link_pivot13;
+                    let link_pivot21 = ground_in14 * link_pivot14;
                     let link_pivot22 = A::fma_f64(-link_inertia6, link_pivot15, link_pivot11);
-                    let link_pivot23 = A::fma_f64(-link_in13, link_pivot14, link_in17);
-                    let link_rest7 = A::fma_f64(link_in13, link_rest5, link_in23);
-                    let link_rest8 = A::fma_f64(link_in16, link_rest5, link_in24);
-                    let link_pivot24 = A::fma_f64(link_in13, link_pivot15, link_pivot7);
-                    let link_pivot25 = A::fma_f64(link_in16, link_pivot15, link_pivot8);
+                    let link_rest7 = A::fma_f64(ground_in14, link_rest5, ground_in19);
+                    let link_pivot23 = A::fma_f64(-ground_in13, link_pivot14, ground_in23);
+                    let link_rest8 = A::fma_f64(ground_in13, link_rest5, ground_in26);
+                    let link_pivot24 = A::fma_f64(ground_in13, link_pivot15, link_pivot7);
+                    let link_pivot25 = A::fma_f64(ground_in14, link_pivot15, link_pivot8);
                     let link_inertia9 = 0.05 * link_pivot16;
-                    let link_pivot26 = link_pivot20 + link_in14;
-                    let link_pivot27 = link_in15 - link_pivot20;
+                    let link_pivot26 = link_pivot20 + ground_in21;
+                    let link_pivot27 = ground_in22 - link_pivot20;
                     let link_inertia10 = 0.05 * link_pivot17;
                     let link_inertia11 = 0.0025000000000000005 * link_pivot17;
-                    let link_pivot28 = link_pivot21 + link_in18;
-                    let link_pivot29 = link_in19 - link_pivot21;
+                    let link_pivot28 = link_pivot21 + ground_in24;
+                    let link_pivot29 = ground_in25 - link_pivot21;
                     let link_inertia12 = 0.05 * link_pivot18;
                     let link_inertia13 = 0.05 * link_pivot19;
                     let link_pdot0 = link_pivot22 - link_pivot17;
                     let link_rest9 = A::fma_f64(-link_rest5, link_inertia6, link_rest4);
-                    let link_rest10 = A::fma_f64(0.05, link_rest6, ground_in2);
+                    let link_rest10 = A::fma_f64(0.05, link_rest6, ground_in17);
                     results[0][l] = link_pivot22;
                     results[1][l] = -link_pivot16;
                     results[2][l] = link_pivot17;
@@ -951,15 +819,15 @@ impl Closed100 {
                     results[14][l] = link_pivot25;
                     results[15][l] = link_pivot19;
                     results[16][l] = link_inertia13;
-                    results[17][l] = link_rest7;
-                    results[18][l] = link_rest8;
+                    results[17][l] = link_rest8;
+                    results[18][l] = link_rest7;
                     results[19][l] = link_pivot26;
                     results[20][l] = link_pivot28;
                     results[21][l] = link_pivot27;
                     results[22][l] = link_pivot23;
                     results[23][l] = link_pivot29;
-                    results[24][l] = link_in25;
-                    results[25][l] = link_loop2;
+                    results[24][l] = ground_in20;
+                    results[25][l] = link_pose2;
                     results[26][l] = link_pivot13;
                     results[27][l] = link_pivot14;
                     results[28][l] = link_rest5;
@@ -998,7 +866,7 @@ impl Closed100 {
                 carried21 = results[21];
                 carried22 = results[22];
                 carried23 = results[23];
-                row[2] = results[24];
+                row[0] = results[24];
                 row[3] = results[25];
                 row[4] = results[26];
                 row[5] = results[27];
@@ -1014,39 +882,39 @@ impl Closed100 {
                 row[15] = results[37];
                 row[16] = results[38];
             }
-            kept[9] = carried5;
-            kept[8] = carried8;
-            kept[7] = carried9;
-            kept[6] = carried10;
-            kept[5] = carried13;
-            kept[4] = carried16;
-            kept[37] = carried17;
-            kept[38] = carried18;
-            kept[39] = carried19;
-            kept[40] = carried20;
-            kept[41] = carried21;
-            kept[42] = carried22;
-            kept[43] = carried23;
+            kept[23] = carried5;
+            kept[24] = carried8;
+            kept[25] = carried9;
+            kept[26] = carried10;
+            kept[27] = carried13;
+            kept[28] = carried16;
+            kept[29] = carried17;
+            kept[30] = carried18;
+            kept[31] = carried19;
+            kept[32] = carried20;
+            kept[33] = carried21;
+            kept[34] = carried22;
+            kept[35] = carried23;
         }
         {
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 7]);
             for l in 0..LANES {
-                let link100_in0 = kept[9][l];
-                let link100_in1 = kept[7][l];
-                let link100_in2 = kept[5][l];
-                let link100_in3 = kept[39][l];
-                let link100_in4 = kept[41][l];
-                let link100_in5 = kept[4][l];
-                let link100_in6 = kept[42][l];
-                let link100_in7 = kept[40][l];
-                let link100_in8 = kept[43][l];
+                let link100_in0 = kept[23][l];
+                let link100_in1 = kept[25][l];
+                let link100_in2 = kept[27][l];
+                let link100_in3 = kept[31][l];
+                let link100_in4 = kept[33][l];
+                let link100_in5 = kept[28][l];
+                let link100_in6 = kept[34][l];
+                let link100_in7 = kept[32][l];
+                let link100_in8 = kept[35][l];
                 let ground_in0 = p.get(0, l);
-                let link100_in9 = kept[8][l];
-                let link100_in10 = kept[37][l];
-                let link100_in11 = kept[38][l];
+                let link100_in9 = kept[24][l];
+                let link100_in10 = kept[29][l];
+                let link100_in11 = kept[30][l];
                 let link1_in0 = kept[0][l];
                 let link1_in1 = kept[1][l];
-                let link100_in12 = kept[6][l];
+                let link100_in12 = kept[26][l];
                 // link1: gravity and wrenches
                 let link1_load0 = 9.81 * link1_in1;
                 let link1_load1 = 9.81 * link1_in0;
@@ -1111,25 +979,25 @@ impl Closed100 {
             }
             qd.give(0, &results[0]);
             pd.give(0, &results[1]);
-            kept[36] = results[2];
-            kept[35] = results[3];
-            kept[34] = results[4];
-            kept[30] = results[5];
-            kept[29] = results[6];
+            kept[22] = results[2];
+            kept[21] = results[3];
+            kept[17] = results[4];
+            kept[16] = results[5];
+            kept[15] = results[6];
         }
         {
             let mut carried0 = [0.0; LANES];
             let mut carried1 = [0.0; LANES];
             let mut carried2 = [0.0; LANES];
-            for l in 0..LANES { carried2[l] = -kept[34][l]; }
+            for l in 0..LANES { carried2[l] = -kept[17][l]; }
             let mut carried3 = [0.0; LANES];
-            for l in 0..LANES { carried3[l] = -kept[30][l]; }
+            for l in 0..LANES { carried3[l] = -kept[16][l]; }
             let mut carried4 = [0.0; LANES];
-            for l in 0..LANES { carried4[l] = -kept[29][l]; }
+            for l in 0..LANES { carried4[l] = -kept[15][l]; }
             let mut carried5 = [0.0; LANES];
-            for l in 0..LANES { carried5[l] = kept[35][l]; }
+            for l in 0..LANES { carried5[l] = kept[21][l]; }
             let mut carried6 = [0.0; LANES];
-            for l in 0..LANES { carried6[l] = kept[36][l]; }
+            for l in 0..LANES { carried6[l] = kept[22][l]; }
             for k in 0..98 {
                 let row = &mut rows0[k];
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
@@ -1139,9 +1007,9 @@ impl Closed100 {
                     let link_in2 = carried5[l];
                     let link_in3 = row[5][l];
                     let link_in4 = carried6[l];
-                    let link_in5 = row[1][l];
+                    let link_in5 = row[2][l];
                     let link_in6 = carried3[l];
-                    let link_in7 = row[0][l];
+                    let link_in7 = row[1][l];
                     let link_in8 = carried4[l];
                     let link_in9 = row[10][l];
                     let link_in10 = row[11][l];
@@ -1150,38 +1018,38 @@ impl Closed100 {
                     let link_in13 = row[12][l];
                     let link_in14 = row[13][l];
                     let link_in15 = row[3][l];
-                    let link_in16 = row[2][l];
-                    let link_in17 = row[7][l];
-                    let link_in18 = carried0[l];
-                    let link_in19 = row[9][l];
-                    let link_in20 = carried1[l];
-                    let link_in21 = row[8][l];
-                    let link_in22 = row[6][l];
-                    let link_in23 = row[16][l];
+                    let ground_in0 = row[0][l];
+                    let link_in16 = row[7][l];
+                    let link_in17 = carried0[l];
+                    let link_in18 = row[9][l];
+                    let link_in19 = carried1[l];
+                    let link_in20 = row[8][l];
+                    let link_in21 = row[6][l];
+                    let link_in22 = row[16][l];
                     let link_load0 = link_in5 * link_in8;
-                    let link_vel0 = A::fma_f64(0.05, link_in0, -link_in20);
-                    let link_pdot0 = link_in18 * link_in19;
+                    let link_vel0 = A::fma_f64(0.05, link_in0, -link_in19);
+                    let link_pdot0 = link_in17 * link_in18;
                     let link_pdot1 = A::fma_f64(link_in4, link_in14, link_in12);
                     let link_vel1 = link_in3 * link_in4;
-                    let link_vel2 = A::fma_f64(link_in1, link_in2, -link_in22);
+                    let link_vel2 = A::fma_f64(link_in1, link_in2, -link_in21);
                     let link_load1 = link_in5 * link_in6;
                     let link_pdot2 = A::fma_f64(link_in4, link_in13, link_in11);
                     let link_load2 = A::fma_f64(-link_in6, link_in7, link_load0);
-                    let link_vel3 = link_in5 * link_in18;
+                    let link_vel3 = link_in5 * link_in17;
                     let link_pdot3 = A::fma_f64(link_in2, link_in10, link_pdot1);
-                    let link_pdot4 = A::fma_f64(link_vel0, link_in23, link_pdot0);
-                    let link_vel4 = A::fma_f64(-link_in17, link_in18, link_vel2);
-                    let link_vel5 = A::fma_f64(link_vel0, link_in21, link_vel1);
+                    let link_pdot4 = A::fma_f64(link_vel0, link_in22, link_pdot0);
+                    let link_vel4 = A::fma_f64(-link_in16, link_in17, link_vel2);
+                    let link_vel5 = A::fma_f64(link_vel0, link_in20, link_vel1);
                     let link_load3 = A::fma_f64(link_in7, link_in8, link_load1);
                     let link_pdot5 = A::fma_f64(link_in2, link_in9, link_pdot2);
                     let link_pdot6 = link_load2 * link_in15;
-                    let link_vel6 = link_in7 * link_in18;
+                    let link_vel6 = link_in7 * link_in17;
                     let link_vel7 = A::fma_f64(-link_in7, link_vel0, link_vel3);
                     let link_pdot7 = link_pdot3 + link_pdot4;
                     let link_vel8 = link_vel4 + link_vel5;
-                    let link_pdot8 = A::fma_f64(-link_in19, link_vel0, link_pdot5);
-                    let link_pdot9 = link_load3 * link_in16;
-                    let link_pdot10 = A::fma_f64(-link_in18, link_pdot7, link_pdot6);
+                    let link_pdot8 = A::fma_f64(-link_in18, link_vel0, link_pdot5);
+                    let link_pdot9 = link_load3 * ground_in0;
+                    let link_pdot10 = A::fma_f64(-link_in17, link_pdot7, link_pdot6);
                     let link_vel9 = A::fma_f64(link_in5, link_vel0, link_vel6);
                     let link_vel10 = link_in0 - link_vel8;
                     let link_pdot11 = A::fma_f64(-link_vel0, link_pdot8, -link_pdot9);
@@ -1207,74 +1075,70 @@ impl Closed100 {
                 qd.give(1 + k, &results[7]);
                 pd.give(1 + k, &results[8]);
             }
-            kept[43] = carried0;
-            kept[42] = carried1;
-            kept[41] = carried2;
-            kept[40] = carried3;
-            kept[39] = carried4;
-            kept[38] = carried5;
-            kept[37] = carried6;
+            kept[35] = carried0;
+            kept[34] = carried1;
+            kept[33] = carried2;
+            kept[32] = carried3;
+            kept[31] = carried4;
+            kept[30] = carried5;
+            kept[29] = carried6;
         }
         {
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
-                let link1_in0 = kept[41][l];
-                let link1_in1 = kept[42][l];
-                let link100_in0 = kept[12][l];
-                let link1_in2 = kept[43][l];
-                let link100_in1 = kept[13][l];
-                let link100_in2 = kept[31][l];
-                let link100_in3 = kept[19][l];
-                let link1_in3 = kept[38][l];
-                let link100_in4 = kept[21][l];
-                let link1_in4 = kept[37][l];
-                let link100_in5 = kept[3][l];
-                let link1_in5 = kept[39][l];
-                let link100_in6 = kept[2][l];
-                let link1_in6 = kept[40][l];
-                let link100_in7 = kept[17][l];
-                let link100_in8 = kept[18][l];
-                let link100_in9 = kept[32][l];
-                let link100_in10 = kept[33][l];
-                let link100_in11 = kept[23][l];
-                let link100_in12 = kept[24][l];
-                let link100_in13 = kept[14][l];
-                let link100_in14 = kept[16][l];
-                let link100_in15 = kept[15][l];
+                let link1_in0 = kept[33][l];
+                let link1_in1 = kept[34][l];
+                let link100_in0 = kept[6][l];
+                let link1_in2 = kept[35][l];
+                let link100_in1 = kept[7][l];
+                let link100_in2 = kept[18][l];
+                let link1_in3 = kept[29][l];
+                let link100_in3 = kept[3][l];
+                let link1_in4 = kept[31][l];
+                let link100_in4 = kept[2][l];
+                let link1_in5 = kept[32][l];
+                let link1_in6 = kept[30][l];
+                let link100_in5 = kept[19][l];
+                let link100_in6 = kept[20][l];
+                let link100_in7 = kept[11][l];
+                let link100_in8 = kept[12][l];
+                let link100_in9 = kept[8][l];
+                let link100_in10 = kept[10][l];
+                let link100_in11 = kept[9][l];
                 // link100: velocity and joint rate (4.40)
                 let link100_vel0 = A::fma_f64(0.05, link1_in0, -link1_in1);
-                let link100_vel1 = A::fma_f64(-link100_in4, link1_in4, link1_in0);
+                let link100_vel1 = A::fma_f64(-6000.0, link1_in3, link1_in0);
                 // link100: momentum rate (4.36)
-                let link100_pdot0 = link100_in13 - link100_in14;
-                // link100: velocity and joint rate (4.40)
-                let link100_vel2 = A::fma_f64(link100_in3, link1_in3, link100_in2);
+                let link100_pdot0 = link100_in9 - link100_in10;
                 // link100: gravity and wrenches
-                let link100_load0 = link100_in5 * link1_in5;
+                let link100_load0 = link100_in3 * link1_in4;
                 // link100: momentum rate (4.36)
-                let link100_pdot1 = A::fma_f64(link1_in4, link100_in11, link100_in9);
-                let link100_pdot2 = link1_in2 * link100_in15;
-                let link100_pdot3 = A::fma_f64(link1_in4, link100_in12, -link100_in10);
+                let link100_pdot1 = A::fma_f64(-link1_in3, link100_in7, -link100_in5);
                 // link100: velocity and joint rate (4.40)
-                let link100_vel3 = A::fma_f64(link100_in0, link1_in2, link100_vel1);
-                let link100_vel4 = A::fma_f64(link100_vel0, link100_in1, link100_vel2);
+                let link100_vel2 = A::fma_f64(link100_in0, link1_in2, link100_in2);
+                // link100: momentum rate (4.36)
+                let link100_pdot2 = link1_in2 * link100_in11;
+                let link100_pdot3 = A::fma_f64(link1_in3, link100_in8, link100_in6);
+                // link100: velocity and joint rate (4.40)
+                let link100_vel3 = A::fma_f64(link100_vel0, link100_in1, link100_vel1);
                 // link100: gravity and wrenches
-                let link100_load1 = A::fma_f64(-link100_in6, link1_in6, link100_load0);
+                let link100_load1 = A::fma_f64(-link100_in4, link1_in5, link100_load0);
                 // link100: momentum rate (4.36)
-                let link100_pdot4 = A::fma_f64(link1_in3, link100_in7, link100_pdot1);
-                let link100_pdot5 = A::fma_f64(link100_vel0, link100_pdot0, -link100_pdot2);
-                let link100_pdot6 = A::fma_f64(link1_in3, link100_in8, link100_pdot3);
-                let link100_pdot7 = 0.00025 * link100_load1;
+                let link100_pdot4 = A::fma_f64(link100_in3, link1_in6, link100_pdot1);
+                let link100_pdot5 = A::fma_f64(-link100_vel0, link100_pdot0, link100_pdot2);
+                let link100_pdot6 = A::fma_f64(link100_in4, link1_in6, link100_pdot3);
                 // link100: velocity and joint rate (4.40)
-                let link100_vel5 = link100_vel3 + link100_vel4;
+                let link100_vel4 = link100_vel2 + link100_vel3;
                 // link100: momentum rate (4.36)
-                let link100_pdot8 = A::fma_f64(link100_vel0, link100_in15, link100_pdot4);
-                let link100_pdot9 = link100_pdot6 + link100_pdot5;
-                let link100_pdot10 = 0.001 * link100_vel5;
-                let link100_pdot11 = A::fma_f64(link1_in2, link100_pdot9, link100_pdot7);
-                let link100_pdot12 = A::fma_f64(link100_vel0, link100_pdot8, -link100_pdot10);
+                let link100_pdot7 = A::fma_f64(-link100_vel0, link100_in11, link100_pdot4);
+                let link100_pdot8 = 0.00025 * link100_load1;
+                let link100_pdot9 = 0.001 * link100_vel4;
+                let link100_pdot10 = link100_pdot6 + link100_pdot5;
+                let link100_pdot11 = A::fma_f64(link1_in2, link100_pdot10, -link100_pdot8);
+                let link100_pdot12 = A::fma_f64(link100_vel0, link100_pdot7, link100_pdot9);
                 let link100_pdot13 = link100_pdot11 + link100_pdot12;
-                results[0][l] = link100_vel5;
-                results[1][l] = link100_pdot13;
+                results[0][l] = link100_vel4;
+                results[1][l] = -link100_pdot13;
             }
             qd.give(99, &results[0]);
             pd.give(99, &results[1]);

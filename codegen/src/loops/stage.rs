@@ -24,7 +24,7 @@ pub enum Way {
 /// comes first.
 pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
     match group {
-        Group::Correction => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        Group::Correction if constrained => Some(&[Way::Forth, Way::Back, Way::Forth]),
         Group::Settle => Some(&[Way::Back, Way::Forth, Way::Back]),
         Group::Accelerations if constrained => None,
         Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),

@@ -200,6 +200,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// What couplings add to the momentum of the freedom of node `i`.
+    pub(super) fn coupled_momentum(&self, i: usize, multipliers: &[S]) -> S {
+        let mut sum = S::zero();
+        for constraint in &self.tree.constraints {
+            let Bond::Coupling { terms, .. } = &constraint.bond else { continue };
+            for (_, ratio) in terms.iter().filter(|(node, _)| *node == i) {
+                sum = sum + *ratio * multipliers[constraint.first];
+            }
+        }
+        sum
+    }
+
     /// Pivot of row `r`, the shared `g`: negative, or zero where what is left of the row's diagonal is too little of what it
     /// was, or of what those of its constraint are together. The first says that it follows from rows before it, the second
     /// that its bodies cannot move along it. Where they can move along none of its rows, all of them are rounding, and small

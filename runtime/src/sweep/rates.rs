@@ -23,7 +23,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
-    /// node's own axis is known: `EᵀP* = p − armature · rate`.
+    /// node's own axis is known: `EᵀP* = p − armature · rate`, less what couplings hold of `p`.
     pub fn gather_momenta(&self, p: &[S], w: &mut Workspace<S>) {
         for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].gather) {
             self.trace.at(Some(i), Quantity::Momentum);
@@ -46,7 +46,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             };
             if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
                 if node.shared.is_none() || node.deferred {
-                    *total.get_mut(z) = p[v] - node.passive[0].armature * w.velocity.rate[w.first[i]];
+                    let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
+                    *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
                 }
             }
             let out = self.entering(&w.poses, i).rev().fold(total, |f, step| step.force(&f));
