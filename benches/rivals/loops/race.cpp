@@ -1,16 +1,15 @@
 // race MODELS LIBRARIES ROUNDS [MECHANISM ...]: checks and times accelerations of mechanisms with loops, one JSON line for each
 // contestant. LIBRARIES is a folder with ours_plain.so and ours_native.so.
 //
-// Pinocchio's: constraintDynamics, lcaba, and, where all loops go by the ground, constrainedABA (Popov-Vereshchagin's algorithm
-// with regularisation) and pv. Each runs with the fewest proximal iterations, and of these the regularisation, that bring the accelerations within
-// WANTED of a dense solution; mu = 0 where it allows it. Ours: accelerations, and rates of the canonical form.
+// Pinocchio's: constraintDynamics and lcaba (constrainedABA of 4.1 does not compile for rigid constraints). Each runs with the
+// fewest proximal iterations, and of these the regularisation, that bring the accelerations within WANTED of a dense solution;
+// mu = 0 where it allows it. Ours: accelerations, and rates of the canonical form.
 #include <pinocchio/algorithm/aba.hpp>
 #include <pinocchio/algorithm/constrained-dynamics.hpp>
 #include <pinocchio/algorithm/crba.hpp>
 #include <pinocchio/algorithm/jacobian.hpp>
 #include <pinocchio/algorithm/kinematics.hpp>
 #include <pinocchio/algorithm/loop-constrained-aba.hpp>
-#include <pinocchio/algorithm/pv.hpp>
 #include <pinocchio/algorithm/rnea.hpp>
 #include <pinocchio/constraints.hpp>
 
@@ -211,10 +210,6 @@ static void theirs(const Mechanism & m, const std::vector<State> & states, std::
     add("lcaba", false, [&](Data & data, LoopDatas &) { computeJointMinimalOrdering(model, data, m.loops); },
         [](const Model & model, Data & data, const State & s, const Loops & loops, LoopDatas & datas, ProximalSettings & settings)
             -> const VectorXd & { return lcaba(model, data, s.q, s.v, s.tau, loops, datas, settings); });
-    if (std::any_of(m.loops.begin(), m.loops.end(), [](const auto & loop) { return loop.joint2_id != 0; })) return;
-    add("constrainedABA", false, [&](Data & data, LoopDatas &) { initPvSolver(model, data, m.loops); },
-        [](const Model & model, Data & data, const State & s, const Loops & loops, LoopDatas & datas, ProximalSettings & settings)
-            -> const VectorXd & { return constrainedABA(model, data, s.q, s.v, s.tau, loops, datas, settings); });
 }
 
 static bool race(const std::string & name, const std::string & models, const std::string & libraries, int rounds)

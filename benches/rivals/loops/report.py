@@ -4,7 +4,7 @@ import json
 import statistics
 import sys
 
-THEIRS = ["constraintDynamics", "lcaba", "constrainedABA"]
+THEIRS = ["constraintDynamics", "lcaba"]
 OURS = [("ours_plain", "accelerations"), ("ours_plain", "rates"), ("ours_native", "accelerations"), ("ours_native", "rates")]
 # Off by more than this, a contestant is shown in brackets and nothing is compared with it.
 WANTED = 1e-10
@@ -17,7 +17,7 @@ def main(path):
     print("Ratios: medians over the rounds of ours to Pinocchio's fastest.\n")
     print("| mechanism | nv, rows: theirs | ours | " + " | ".join(THEIRS) + " | ours: q̈ (operations) | ours: q̇, ṗ (operations)"
           " | native: q̈ | native: q̇, ṗ | q̈ / fastest | q̇, ṗ / fastest | native: q̈ / fastest | native: q̇, ṗ / fastest |")
-    print("| --- " * 14 + "|")
+    print("| --- " * 13 + "|")
     notes = []
     for name in dict.fromkeys(r["mechanism"] for r in rows):
         at = {(r["contestant"], r["function"]): r for r in rows if r["mechanism"] == name}
