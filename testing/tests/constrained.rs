@@ -5,7 +5,7 @@ use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
-    close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Watch,
+    close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Steady, Watch,
 };
 use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
@@ -238,6 +238,12 @@ fn all_ways_lead_to_the_same_end() {
             println!("{name} {policy:?}: {errors:?}");
             assert!((errors[0] / errors[1]).log2() > 3.5, "{name} {policy:?}: {errors:?}");
         }
+        // Work that is always the same, with four evaluations a step.
+        let mut fixed = Bounded::new(&y, Rk4::new(&y), Hold::new(&y, Stabilisation::Mass, Effort::fixed(2)));
+        let mut steady = Bounded::new(&y, Rk4::new(&y), Steady::<_, 2>::new(&y));
+        let ends = (march(&mut y, &mut fixed, 200, end, &start), march(&mut y, &mut steady, 200, end, &start));
+        assert_eq!(ends.0, ends.1, "{name}");
+        assert_eq!(steady.statistics().evaluations, 800, "{name}");
         // Minimal coordinates.
         let errors = [200, 400].map(|steps| {
             let (mut q, mut p) = start.clone();

@@ -4,7 +4,7 @@
 #![allow(missing_docs)]
 
 use mbd_runtime::constrained::{close, Closing};
-use mbd_runtime::{Conjugate, Constrained, System};
+use mbd_runtime::{Conjugate, Constrained};
 
 /// Numbers from -1 to 1 (xorshift).
 struct Random(u64);
