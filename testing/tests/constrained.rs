@@ -531,7 +531,11 @@ fn nothing_is_allocated() {
 fn comparison() {
     let (mut y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
     let before = energy(&mut y, &start.0, &start.1);
-    let mut best = [(f64::INFINITY, 0.0, 0.0); 9];
+    let mut best = [(f64::INFINITY, 0.0, 0.0); 11];
+    // A tenth of the steps' rate; a weight of a thousand of the masses.
+    let text = four_bar("type = \"pin\"\naxis = [0, 1, 0]\ndecay = 100.0");
+    let mut braked = interpreter(&model(&text));
+    let mut soft = Interpreter::new(y.closed.tree().penalised(1e4, 100.0), braked.inputs.gravity);
     fn timed<Y, M>(y: &mut Y, mut method: M, start: &State) -> (f64, State)
     where
         Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
@@ -565,6 +569,11 @@ fn comparison() {
             let end = timed(&mut m, method, &(q, p));
             note(5 + k, end, &mut y);
         }
+        for (k, system) in [&mut braked, &mut soft].into_iter().enumerate() {
+            let method = held(system, Rk4::new(system), Stabilisation::Settle);
+            let end = timed(system, method, &start);
+            note(9 + k, end, &mut y);
+        }
         let method = Rattle::new(&y);
         let end = timed(&mut y, method, &start);
         note(7, end, &mut y);
@@ -572,8 +581,19 @@ fn comparison() {
         let end = timed(&mut y, method, &start);
         note(8, end, &mut y);
     }
-    let names =
-        ["none", "settle", "mass", "gradient", "partition", "minimal", "minimal settled", "rattle", "index two"];
+    let names = [
+        "none",
+        "settle",
+        "mass",
+        "gradient",
+        "partition",
+        "minimal",
+        "minimal settled",
+        "rattle",
+        "index two",
+        "decay",
+        "penalty",
+    ];
     for (name, (time, drift, lost)) in names.iter().zip(best) {
         let ratio = time / best[0].0;
         println!("{name:16} {:6.2} us/step, {ratio:5.2}, drift {drift:.1e}, energy {lost:.1e}", time * 1e6);
