@@ -3,7 +3,7 @@
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::model::Model;
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::runtime::{Interpreter, System};
+use multibody::runtime::Interpreter;
 
 use crate::cli::{Failure, Outcome};
 
@@ -23,22 +23,19 @@ pub fn read(text: &str) -> Outcome<Mechanism> {
     let params = plan.default_params();
     let gravity = plan.gravity(&params);
     let system = Interpreter::new(plan.tree(&params), gravity);
-    let q = start(&model, &system);
+    let q = start(&model, &plan);
     Ok(Mechanism { system, q })
 }
 
 /// The starts of the file; forks of trees open by 0.3 rad to both sides.
-fn start(model: &Model, system: &Interpreter<f64>) -> Vec<f64> {
-    let mut q = system.neutral();
+fn start(model: &Model, plan: &Plan) -> Vec<f64> {
+    let mut q = plan.start();
     for (q, joint) in q.iter_mut().zip(&model.joints) {
         match joint.name.as_str() {
             name if name.ends_with("left") => *q = 0.3,
             name if name.ends_with("right") => *q = -0.3,
             _ => {}
         }
-    }
-    for start in &model.starts {
-        q[start.joint] = start.q[0];
     }
     q
 }
