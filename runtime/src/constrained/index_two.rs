@@ -1,5 +1,6 @@
 //! Radau IIA on the equations with multipliers.
 
+use super::ends::Ends;
 use super::rows::{add_forces, worst};
 use super::split::Parted;
 use super::ConstraintError;
@@ -44,8 +45,7 @@ where
     qd: Y::Coordinates,
     work: Y::Momenta,
     size: (f64, f64),
-    rates: [Point<Y>; 2],
-    known: [bool; 2],
+    ends: Ends<Y>,
 }
 
 /// By cofactors: the matrix of the method is far from singular.
@@ -88,8 +88,7 @@ where
             qd: system.neutral(),
             work: system.rest(),
             size: (0.0, 0.0),
-            rates: [point(), point()],
-            known: [false; 2],
+            ends: Ends::new(system),
         }
     }
 
@@ -213,7 +212,7 @@ where
     }
 
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        self.known = [false; 2];
+        self.ends.forget();
         self.field.load(system, t, q, p)
     }
 
@@ -224,7 +223,7 @@ where
         h: Y::Scalar,
         _scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.known[1] = false;
+        self.ends.forget_end();
         let [_, _, end] = &self.lambda;
         // Multipliers go on from the end of the last step.
         let usable = worst(end.as_ref()).1.is_finite();
@@ -248,26 +247,16 @@ where
     }
 
     fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        let [rate, zero] = &mut self.rates;
-        if !self.known[0] {
-            zero.clear();
-            self.field.rates(system, t, zero, rate);
-            self.known = [true, false];
-        }
-        &self.rates[0]
+        self.ends.start(&mut self.field, system, t)
     }
 
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.known[1] {
-            self.field.rates(system, t + h, &self.delta, &mut self.rates[1]);
-            self.known[1] = true;
-        }
-        &self.rates[1]
+        self.ends.end(&mut self.field, system, t + h, &self.delta)
     }
 
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
         self.field.advance(system, t, &self.delta)?;
-        self.known = [false; 2];
+        self.ends.forget();
         self.statistics.steps += 1;
         Ok(())
     }
@@ -275,11 +264,11 @@ where
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.start_rate(system, t);
         self.end_rate(system, t, h);
-        hermite(h, theta, &self.delta, [&self.rates[0], &self.rates[1]], out);
+        hermite(h, theta, &self.delta, self.ends.both(), out);
     }
 
     fn corrected(&mut self) {
-        self.known[1] = false;
+        self.ends.forget_end();
     }
 
     fn statistics(&self) -> Statistics {

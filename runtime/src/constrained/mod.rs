@@ -33,6 +33,7 @@ mod boundary;
 mod close;
 #[cfg(feature = "alloc")]
 mod dense;
+mod ends;
 mod error;
 mod hold;
 mod index_two;

@@ -1,5 +1,6 @@
 //! RATTLE for any Hamiltonian.
 
+use super::ends::Ends;
 use super::rows::{add_forces, worst};
 use super::split::Parted;
 use super::ConstraintError;
@@ -44,8 +45,7 @@ where
     other: Y::Momenta,
     work: [Y::Momenta; 2],
     qd: Y::Coordinates,
-    rates: [Point<Y>; 2],
-    known: [bool; 2],
+    ends: Ends<Y>,
 }
 
 impl<Y> Rattle<Y>
@@ -73,8 +73,7 @@ where
             other: system.rest(),
             work: [system.rest(), system.rest()],
             qd: system.neutral(),
-            rates: [point(), point()],
-            known: [false; 2],
+            ends: Ends::new(system),
         }
     }
 
@@ -194,7 +193,7 @@ where
     }
 
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        self.known = [false; 2];
+        self.ends.forget();
         self.field.load(system, t, q, p)
     }
 
@@ -206,7 +205,7 @@ where
         _scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
         let wrong = |error| StepError::Constraint { time: t.to_f64(), error };
-        self.known[1] = false;
+        self.ends.forget_end();
         self.field.chart().base(system, &mut self.start.0, &mut self.start.1);
         system.closure(&self.start.0, &mut self.rows[0], &mut self.entries);
         if !worst(self.lambda.as_ref()).1.is_finite() {
@@ -236,26 +235,16 @@ where
     }
 
     fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        let [rate, zero] = &mut self.rates;
-        if !self.known[0] {
-            zero.clear();
-            self.field.rates(system, t, zero, rate);
-            self.known = [true, false];
-        }
-        &self.rates[0]
+        self.ends.start(&mut self.field, system, t)
     }
 
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.known[1] {
-            self.field.rates(system, t + h, &self.delta, &mut self.rates[1]);
-            self.known[1] = true;
-        }
-        &self.rates[1]
+        self.ends.end(&mut self.field, system, t + h, &self.delta)
     }
 
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
         self.field.advance(system, t, &self.delta)?;
-        self.known = [false; 2];
+        self.ends.forget();
         self.statistics.steps += 1;
         Ok(())
     }
@@ -263,11 +252,11 @@ where
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.start_rate(system, t);
         self.end_rate(system, t, h);
-        hermite(h, theta, &self.delta, [&self.rates[0], &self.rates[1]], out);
+        hermite(h, theta, &self.delta, self.ends.both(), out);
     }
 
     fn corrected(&mut self) {
-        self.known[1] = false;
+        self.ends.forget_end();
     }
 
     fn statistics(&self) -> Statistics {
