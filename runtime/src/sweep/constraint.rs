@@ -6,9 +6,8 @@
 //! the tree. Where the paths have met the columns are no longer zero, although the wrenches cancel there: so they cannot
 //! stop there before they are eliminated.
 
-use super::newton::ClassicMotion;
 use super::{Inputs, Quantity, Sweeps, Trace};
-use crate::spatial::{add3, cross, Force, Mat3, Motion, Vec3};
+use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
 use crate::tree::{Bond, Constraint, Cut, Shared, Source, Tree, TreeFrame};
 use crate::workspace::{Factor, Poses, Relative, Workspace};
@@ -32,7 +31,7 @@ impl<S: Scalar> Constraint<S> {
     }
 
     /// Whether row `k` is the derivative of a condition on positions.
-    fn holonomic(&self, k: usize) -> bool {
+    pub(super) fn holonomic(&self, k: usize) -> bool {
         match &self.bond {
             Bond::Cut(cut) => cut.closure.holonomic(k),
             Bond::Coupling { .. } => true,
@@ -40,7 +39,7 @@ impl<S: Scalar> Constraint<S> {
     }
 
     /// Its rows.
-    fn range(&self) -> core::ops::Range<usize> {
+    pub(super) fn range(&self) -> core::ops::Range<usize> {
         self.first..self.first + self.slots.len()
     }
 }
@@ -305,7 +304,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Motion of a frame in its own axes, after a velocity sweep.
-    fn frame_motion(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> Motion<S> {
+    pub(super) fn frame_motion(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> Motion<S> {
         let outer = frame.node.map_or(Motion::zero(), |i| w.velocity.omega[i]);
         self.on_body(&w.poses, frame).fold(outer, |m, step| step.motion(&m))
     }
@@ -477,83 +476,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             pivots[r] = x * (w.factor.shared[g].rho * -x);
         }
     }
-
-    /// Multipliers `λ` at given velocities.
-    pub fn multipliers(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S], lambda: &mut [S]) {
-        self.accelerations(q, v, u, w, a);
-        lambda.copy_from_slice(&w.constraints.multipliers);
-    }
-
-    /// What the accelerations of a reference motion leave to be done by the rows, in
-    /// [`crate::workspace::Constraints::rhs`]: the negative of `Eᵀ dΩ_rel/dt + ĖᵀΩ_rel`, and Baumgarte's terms. After
-    /// [`Sweeps::newton`].
-    pub(super) fn row_accelerations(&self, v: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        if self.tree.constraints.is_empty() {
-            return;
-        }
-        self.velocity_kinematics(v, u.drive_v, w);
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            self.trace.at(None, Quantity::Constraint);
-            match &constraint.bond {
-                Bond::Cut(cut) => self.cut_accelerations(index, constraint, cut, u, w),
-                Bond::Coupling { terms, .. } => {
-                    let sum = |of: &[S]| terms.iter().fold(S::zero(), |sum, (i, ratio)| sum + *ratio * of[w.first[*i]]);
-                    let (rate, rate2) = (sum(&w.velocity.rate), sum(&w.newton.reference));
-                    self.put_acceleration(constraint, 0, rate, rate2, w);
-                }
-            }
-        }
-    }
-
-    fn put_acceleration(&self, constraint: &Constraint<S>, k: usize, rate: S, rate2: S, w: &mut Workspace<S>) {
-        let r = constraint.first + k;
-        let held = match constraint.decay {
-            Some(decay) if constraint.holonomic(k) => {
-                (decay + decay) * rate + decay * decay * w.constraints.rows[r].residual
-            }
-            _ => S::zero(),
-        };
-        w.constraints.rhs[r] = -(rate2 + held);
-    }
-
-    fn cut_accelerations(
-        &self,
-        index: usize,
-        constraint: &Constraint<S>,
-        cut: &Cut<S>,
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-    ) {
-        let at = w.constraints.relative[index];
-        let [va, vb] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
-        let [aa, ab] = [&cut.a, &cut.b].map(|frame| {
-            let mut m = match frame.node {
-                Some(i) => ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] },
-                None => ClassicMotion { spin: [S::zero(); 3], alpha: [S::zero(); 3], accel: u.gravity.map(|g| -g) },
-            };
-            self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
-            m
-        });
-        let rel = less(&vb, &at.motion(&va));
-        let rates = cut.closure.direction_rates(&at, &rel);
-        // Derivatives of the components of Ω_rel, from accelerations of the origins as vectors.
-        let (spin, alpha) = (at.turned(va.ang), at.turned(aa.alpha));
-        let carried = add3(cross(alpha, at.d), cross(spin, add3(rel.lin, cross(spin, at.d))));
-        let a_origin = add3(at.turned(aa.accel), carried);
-        let along = cross(vb.ang, rel.lin);
-        let lin: Vec3<S> = core::array::from_fn(|k| ab.accel[k] - a_origin[k] - along[k]);
-        let gyro = cross(vb.ang, spin);
-        let ang: Vec3<S> = core::array::from_fn(|k| ab.alpha[k] - alpha[k] + gyro[k]);
-        let change = Motion { lin, ang };
-        for k in 0..constraint.slots.len() {
-            let e = w.constraints.rows[constraint.first + k].e;
-            self.put_acceleration(constraint, k, e.dot(&rel), e.dot(&change) + rates[k].dot(&rel), w);
-        }
-    }
 }
 
 /// Difference of two motions.
-fn less<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
+pub(super) fn less<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
     let minus = |a: Vec3<S>, b: Vec3<S>| core::array::from_fn(|k| a[k] - b[k]);
     Motion { lin: minus(a.lin, b.lin), ang: minus(a.ang, b.ang) }
 }

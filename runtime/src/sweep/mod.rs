@@ -13,6 +13,7 @@ mod acceleration;
 mod articulate;
 mod closure;
 mod constraint;
+mod constraint_acceleration;
 mod derivatives;
 mod factor;
 mod inverse;

@@ -35,10 +35,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub fn newton_node(&self, i: usize, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Velocity);
-        let mut m = match node.parent {
-            Some(p) => ClassicMotion { spin: w.newton.spin[p], alpha: w.newton.alpha[p], accel: w.newton.accel[p] },
-            None => ClassicMotion { spin: [S::zero(); 3], alpha: [S::zero(); 3], accel: u.gravity.map(|g| -g) },
-        };
+        let mut m = self.classic_motion(node.parent, u, w);
         self.place(i).iter().chain(w.poses.joint[i].placing()).for_each(|step| m.carry(step));
         // A slide along the axis of a turn is made after it, where `B` is that of the body.
         let steps = w.poses.joint[i].own();
@@ -70,6 +67,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         late.into_iter().for_each(|k| m.carry(&steps[k]));
         (w.newton.spin[i], w.newton.alpha[i], w.newton.accel[i]) = (m.spin, m.alpha, m.accel);
+    }
+
+    /// Motion of a node after [`Sweeps::newton_node`], or of the ground.
+    pub(super) fn classic_motion(&self, node: Option<usize>, u: &Inputs<S>, w: &Workspace<S>) -> ClassicMotion<S> {
+        match node {
+            Some(i) => ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] },
+            None => ClassicMotion { spin: [S::zero(); 3], alpha: [S::zero(); 3], accel: u.gravity.map(|g| -g) },
+        }
     }
 
     /// Wrench that the body of node `i` needs for its motion, less the external one, in [`Workspace::force`].
