@@ -7,18 +7,12 @@
 #[cfg(feature = "diffsol")]
 pub mod diffsol;
 
+#[cfg(feature = "codegen")]
 pub use mbd_codegen as codegen;
+#[cfg(feature = "macros")]
 #[doc(hidden)]
 pub use mbd_macros as macros;
 pub use mbd_runtime as runtime;
-
-// Generated code of the scenes names its runtime from outside.
-#[cfg(feature = "bench")]
-extern crate self as multibody;
-
-#[cfg(feature = "scenes")]
-#[doc(hidden)]
-pub mod scenes;
 
 /// Makes a type from the description of a mechanism.
 ///
@@ -81,6 +75,7 @@ pub mod scenes;
 ///
 /// Compile time grows with the model, in `cargo check` too. Large ones, more than some twenty velocities, are better
 /// generated once into a file.
+#[cfg(feature = "macros")]
 #[macro_export]
 macro_rules! mbd_model {
     ($($argument:tt)*) => {

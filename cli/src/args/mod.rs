@@ -1,0 +1,563 @@
+//! Arguments of all commands, and the help that teaches them.
+
+mod values;
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use multibody::codegen::import::{Base, ImportOptions};
+use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
+use multibody::runtime::constrained::Stabilisation;
+use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
+
+pub use values::type_name;
+
+const ABOUT: &str = "Symbolic code generator for multibody dynamics in Hamilton's canonical form.
+
+A model (`.toml`, or `.urdf` of a robot) is a tree of rigid bodies and joints. Its state is q, the coordinates, and p, the
+momenta; mbd turns it into straight-line Rust that computes (q, p) -> (q', p') and whatever else is asked for, and skips what
+the scene does not need. The same equations also run without any generated code, in the interpreter.
+
+Without a command, mbd takes you on a tour of a real robot; it takes a few seconds and writes mbd-tour.svg.";
+
+const EXAMPLES: &str = "Examples:
+  mbd                                                 the tour
+  mbd check robot.urdf                                is the file sound, and what is in it?
+  mbd count robot.urdf --base floating                what does each sweep cost?
+  mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
+  mbd simulate models/double_pendulum.toml            ten seconds, as CSV and as a picture
+  mbd eval robot.urdf --input states.json             numbers out, to compare with other programs
+  mbd explain robot.urdf --after frames               what the generator saw
+
+Findings, notices and progress go to standard error, results to standard output.
+Exit status: 0 done, 1 a finding or a failure, 2 wrong arguments.";
+
+/// The command line.
+#[derive(Parser)]
+#[command(name = "mbd", version, about = "Symbolic code generator for multibody dynamics", long_about = ABOUT, after_help = EXAMPLES)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+/// What to do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Read models and say what is wrong with them, or what is in them
+    Check(CheckArgs),
+    /// Count the operations of every output, sweep by sweep
+    Count(CountArgs),
+    /// Generate Rust
+    Generate(GenerateArgs),
+    /// Evaluate states from a JSON file with the interpreter
+    Eval(EvalArgs),
+    /// Simulate with the interpreter; write a CSV file and a plot
+    Simulate(SimulateArgs),
+    /// Show what the generator made of a model on the way
+    Explain(ExplainArgs),
+}
+
+/// How the file is read.
+#[derive(Args, Clone, Copy)]
+pub struct ImportArgs {
+    /// How a URDF's root hangs on the ground; a TOML model says so itself
+    #[arg(long, value_enum, default_value_t = BaseArg::Fixed)]
+    pub base: BaseArg,
+    /// Gravity in ground axes, m/s², instead of the file's; a URDF states none and gets 0,0,-9.81
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
+    pub gravity: Option<[f64; 3]>,
+}
+
+impl ImportArgs {
+    /// As the readers take it.
+    pub fn import(&self) -> ImportOptions {
+        let base = match self.base {
+            BaseArg::Fixed => Base::Fixed,
+            BaseArg::Floating => Base::Floating,
+            BaseArg::Planar => Base::Planar,
+        };
+        ImportOptions { base, gravity: self.gravity }
+    }
+}
+
+/// A model and how it is read.
+#[derive(Args)]
+pub struct ModelArgs {
+    /// Description of the mechanism, `.toml` or `.urdf`
+    pub model: PathBuf,
+    #[command(flatten)]
+    pub import: ImportArgs,
+    /// Bodies on which an external wrench acts, in body axes, beside those the model names; with commas between
+    #[arg(long = "wrench", value_name = "LIST", value_delimiter = ',')]
+    pub wrenches: Vec<String>,
+}
+
+/// Attachment of the root.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BaseArg {
+    /// Welded to the ground
+    Fixed,
+    /// Free in space, seven coordinates
+    Floating,
+    /// Sliding and turning on the ground's x-y plane
+    Planar,
+}
+
+const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
+  rates          (q, p) -> (q', p'); makes the type a `System` that integrators take
+  velocities     (q, p) -> v
+  momenta        (q, v) -> p
+  energy         (q, p) -> kinetic and potential energy
+  accelerations  (q, v) -> v'
+  reactions      (q, v) -> wrench transmitted by every joint
+  mass_matrix    q -> M
+  frames         (q, v) -> placements and velocities of bodies and frames
+  inverse_dynamics (q, v, v') -> tau
+  bias           (q, v) -> h, with M v' + h = tau
+  jacobians      q -> Jacobians of bodies and frames
+  drifts         (q, v) -> accelerations of bodies and frames at v' = 0
+  derivatives    (q, p) -> v, p' and their derivatives with respect to q and p
+  momentum_derivatives
+                 (q, v) -> p, p' and their derivatives with respect to q and v
+  parameter_derivatives
+                 (q, p) -> derivatives of v and p' with respect to parameters
+Of models with loops or couplings (they get these beside the defaults):
+  closure        q -> residuals of the constraints, and their Jacobian
+  settle         (q, p) -> v, momenta freed of multipliers, multipliers sigma
+  correction     q -> residuals, Newton's step onto closed positions, its pivots
+  multipliers    (q, v) -> forces of the constraints
+such models have no `momentum_derivatives`.";
+
+/// What code is generated.
+#[derive(Args)]
+pub struct CodeArgs {
+    /// What to compute, with commas between, or `all`
+    #[arg(long, long_help = OUTPUTS_HELP, value_delimiter = ',', value_parser = outputs, value_name = "LIST", default_value = "rates,momenta,energy")]
+    pub outputs: Vec<OutputList>,
+    /// Number type
+    #[arg(long, value_enum, default_value_t = ScalarArg::F64)]
+    pub scalar: ScalarArg,
+    /// Whether operations may be rewritten for speed, or give the interpreter's bits
+    #[arg(long, value_enum, default_value_t = ArithmeticArg::of(Arithmetic::default()))]
+    pub arithmetic: ArithmeticArg,
+    /// How joints are eliminated: in the form that is fastest by the cost model, in the one with the fewest operations, or
+    /// one by one. `mbd count` shows the candidates
+    #[arg(long, value_enum, default_value_t = FormsArg::Fastest)]
+    pub forms: FormsArg,
+    /// Loops over runs of like links, or straight-line code
+    #[arg(long, value_enum, default_value_t = LoopsArg::Auto)]
+    pub loops: LoopsArg,
+    /// No joint forces: they are zero and cost nothing
+    #[arg(long)]
+    pub no_efforts: bool,
+    /// Name of the generated type [default: from the name of the model]
+    #[arg(long, value_name = "TYPE", value_parser = type_name)]
+    pub name: Option<String>,
+    /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Each change is told
+    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
+    pub snap: f64,
+    /// Frames and bodies of the outputs `frames`, `jacobians`, `drifts`, with commas between [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    pub frames: Vec<String>,
+    /// Longer bodies are written in blocks of this many statements
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub chunk: u32,
+}
+
+/// One item of `--outputs`: a group, or all of them.
+#[derive(Clone)]
+pub struct OutputList(pub Vec<Group>);
+
+impl CodeArgs {
+    /// The outputs, each once.
+    pub fn groups(&self) -> Vec<Group> {
+        let mut groups = Vec::new();
+        for group in self.outputs.iter().flat_map(|o| &o.0) {
+            if !groups.contains(group) {
+                groups.push(*group);
+            }
+        }
+        groups
+    }
+
+    /// How the structure is chosen.
+    pub fn plan_options(&self) -> PlanOptions {
+        self.options("").searches()
+    }
+
+    /// As the generator takes it; `model` is the name of the model.
+    pub fn options(&self, model: &str) -> Options {
+        Options {
+            type_name: self.name.clone().unwrap_or_else(|| camel_case(model)),
+            outputs: self.groups(),
+            precision: self.scalar.precision(),
+            efforts: !self.no_efforts,
+            frames: self.frames.clone(),
+            plan: PlanOptions {
+                snap: self.snap,
+                forms: self.forms.forms(),
+                loops: self.loops.loops(),
+                ..PlanOptions::default()
+            },
+            chunk: self.chunk as usize,
+            arithmetic: self.arithmetic.arithmetic(),
+            ..Options::default()
+        }
+    }
+}
+
+/// Elimination.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormsArg {
+    /// Least time for one state
+    Fastest,
+    /// Fewest operations
+    Fewest,
+    /// One by one
+    Single,
+}
+
+impl FormsArg {
+    fn forms(self) -> Forms {
+        match self {
+            FormsArg::Fastest => Forms::Fastest,
+            FormsArg::Fewest => Forms::Fewest,
+            FormsArg::Single => Forms::Single,
+        }
+    }
+}
+
+/// Rewriting of generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ArithmeticArg {
+    /// The interpreter's operations, bit for bit
+    Exact,
+    /// Fewer operations, in an order that processors like; errors are no larger
+    Fast,
+}
+
+impl ArithmeticArg {
+    fn of(arithmetic: Arithmetic) -> ArithmeticArg {
+        match arithmetic {
+            Arithmetic::Exact => ArithmeticArg::Exact,
+            Arithmetic::Fast => ArithmeticArg::Fast,
+        }
+    }
+
+    fn arithmetic(self) -> Arithmetic {
+        match self {
+            ArithmeticArg::Exact => Arithmetic::Exact,
+            ArithmeticArg::Fast => Arithmetic::Fast,
+        }
+    }
+}
+
+/// Loops in generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LoopsArg {
+    /// Where a run of like links is long enough to gain by it
+    Auto,
+    /// Wherever links repeat
+    Always,
+    /// Straight-line code throughout
+    Never,
+}
+
+impl LoopsArg {
+    fn loops(self) -> Loops {
+        match self {
+            LoopsArg::Auto => Loops::Auto,
+            LoopsArg::Always => Loops::Always,
+            LoopsArg::Never => Loops::Never,
+        }
+    }
+}
+
+/// Number type of generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScalarArg {
+    F64,
+    F32,
+}
+
+impl ScalarArg {
+    fn precision(self) -> Precision {
+        match self {
+            ScalarArg::F64 => Precision::F64,
+            ScalarArg::F32 => Precision::F32,
+        }
+    }
+}
+
+/// `mbd check`.
+#[derive(Args)]
+#[command(
+    after_help = "Every finding names file, line and column and says what to do; all findings of a file come at once.
+
+With --generated, every file that manifest.toml in that directory lists is generated anew and compared with what is there:
+put it into your continuous integration, so that generated code never falls behind its model."
+)]
+pub struct CheckArgs {
+    /// Descriptions of mechanisms, `.toml` or `.urdf`
+    #[arg(required_unless_present = "generated")]
+    pub models: Vec<PathBuf>,
+    #[command(flatten)]
+    pub import: ImportArgs,
+    /// Check the generated files of a directory with a manifest.toml instead
+    #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "generated", conflicts_with = "models")]
+    pub generated: Option<PathBuf>,
+    /// Write what --generated finds missing or stale
+    #[arg(long, requires = "generated")]
+    pub update: bool,
+}
+
+/// `mbd count`.
+#[derive(Args)]
+#[command(
+    after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine stand
+apart. Below each output stand the sweeps it consists of; what a sweep shares with an earlier one is counted there.
+For serial chains of three or more pins on a fixed base, published formulas stand beside."
+)]
+pub struct CountArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    #[command(flatten)]
+    pub code: CodeArgs,
+    /// Show every elimination form that was tried, not only the best of each branch
+    #[arg(long)]
+    pub candidates: bool,
+    /// The same as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `mbd generate`.
+#[derive(Args)]
+#[command(
+    after_help = "The code depends on the runtime alone: no allocation, no std. Its header says where every coordinate stands and what each
+function costs. The same model and options give the same bytes everywhere.
+
+In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
+file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."
+)]
+pub struct GenerateArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    #[command(flatten)]
+    pub code: CodeArgs,
+    /// Path of the runtime in the generated code
+    #[arg(long, value_name = "PATH", default_value = DEFAULT_RUNTIME, value_parser = rust_path)]
+    pub runtime: String,
+    /// File to write instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// Where a user of the crate `multibody` finds the runtime.
+pub const DEFAULT_RUNTIME: &str = "::multibody::runtime";
+
+/// `mbd eval`.
+#[derive(Args)]
+#[command(after_help = "Input:   {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..]}, ..]}
+Output:  {\"states\": [{\"p\": [..], \"qd\": [..], \"pd\": [..], \"qdd\": [..], \"kinetic\": T, \"potential\": V, \"M\": [[..], ..]}, ..]}
+
+`tau` may be left out (zeros). docs/eval-json.md describes further inputs (wrenches, prescribed motions, gravity,
+parameters), the layouts, and every output. Unlike the other commands, eval takes all numbers of the file exactly as they
+stand (--snap 0), for comparison with programs that do the same.")]
+pub struct EvalArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// States, JSON; `-` for standard input
+    #[arg(short, long, value_name = "FILE")]
+    pub input: PathBuf,
+    /// Order and form of the numbers, in and out
+    #[arg(long, value_enum, default_value_t = LayoutArg::Mbd)]
+    pub layout: LayoutArg,
+    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
+    pub outputs: Vec<Quantity>,
+    /// Angles this close to right angles are taken as exact, rad
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
+    pub snap: f64,
+    /// File to write instead of standard output
+    #[arg(short = 'o', long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+}
+
+/// Layout of states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LayoutArg {
+    /// This program's: joints depth first, children in file order; angles; quaternions x, y, z, w
+    Mbd,
+    /// Pinocchio's: children in alphabetical order; continuous and planar joints as cosine and sine
+    Pinocchio,
+    /// MuJoCo's: quaternions w, x, y, z; linear velocity of a floating base in outer axes
+    Mujoco,
+}
+
+/// Output of `mbd eval`, under its name in the JSON.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Quantity {
+    #[value(name = "p")]
+    Momenta,
+    #[value(name = "qd")]
+    CoordinateRates,
+    #[value(name = "pd")]
+    MomentumRates,
+    #[value(name = "qdd")]
+    Accelerations,
+    #[value(name = "kinetic")]
+    Kinetic,
+    #[value(name = "potential")]
+    Potential,
+    #[value(name = "M")]
+    MassMatrix,
+    #[value(name = "h")]
+    Bias,
+    #[value(name = "tau")]
+    InverseDynamics,
+    #[value(name = "phi")]
+    Residuals,
+    #[value(name = "lambda")]
+    Multipliers,
+}
+
+/// `mbd simulate`.
+#[derive(Args)]
+#[command(
+    after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints stay where they are, dampers and springs of the
+model act.
+
+Steps are chosen by their error (--tolerance) with Verner's method of order 9, unless --method says otherwise; with --step
+they are all the same, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
+equal times, between the steps by dense output.
+
+The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
+floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
+neutral where it states none; loops are closed from there (from --q, if given) without moving what is `held`. Velocities then
+follow from those of the `held` joints; where none is held they become the nearest that the loops allow.
+
+Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
+largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."
+)]
+pub struct SimulateArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Length of the simulation, s
+    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
+    pub time: f64,
+    /// Method [default: verner9, with --step rk4]
+    #[arg(long, value_name = "NAME", value_parser = methods())]
+    pub method: Option<String>,
+    /// Error that a step may have, rad or m; of momenta relative to their size [default: 1e-9]
+    #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "step")]
+    pub tolerance: Option<f64>,
+    /// Choose steps by the errors of the coordinates alone, not of the momenta
+    #[arg(long, conflicts_with = "step")]
+    pub partial: bool,
+    /// Put every step back on the energy of the start; for motion that neither gains nor loses any. The error of the motion
+    /// hardly changes
+    #[arg(long)]
+    pub project: bool,
+    /// Step, s, always the same; shortened if the time is no multiple of it
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub step: Option<f64>,
+    /// Initial coordinates, with commas between
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub q: Option<Vec<f64>>,
+    /// Initial velocities, with commas between
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
+    pub v: Option<Vec<f64>>,
+    /// Leave the dampers of the model out
+    #[arg(long)]
+    pub no_damping: bool,
+    /// Angles this close to right angles are taken as exact, rad
+    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
+    pub snap: f64,
+    /// Table to write [default: NAME.csv in the current directory]
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Plot to write [default: NAME.svg in the current directory]
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Rows of the table after that of the start, at equal times [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub rows: Option<u64>,
+    /// Time from one row of the table to the next, s
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
+    pub every: Option<f64>,
+    /// How loops are kept closed
+    #[arg(long, value_enum, default_value_t = HoldArg::Mass)]
+    pub hold: HoldArg,
+    /// Picture of the motion to write, an SVG: the mechanism at several instants, the last one darkest
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
+    pub view: Option<[f64; 3]>,
+    /// Bodies or frames whose paths are drawn, with commas between
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
+    pub trace: Vec<String>,
+    /// Number of instants that are drawn
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub strobes: u16,
+}
+
+/// How loops are kept closed; see `multibody::runtime::constrained`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum HoldArg {
+    /// Not at all: multipliers add up in the momenta, positions drift
+    None,
+    /// Momenta are freed of multipliers after every step, positions drift by the error of the method
+    Settle,
+    /// Positions are put back after every step too, least in the metric of the mass matrix
+    Mass,
+    /// The same, by displacements of least norm
+    Gradient,
+    /// The same, by dependent coordinates alone
+    Partition,
+}
+
+impl HoldArg {
+    /// As the runtime takes it.
+    pub fn stabilisation(self) -> Stabilisation {
+        match self {
+            HoldArg::None => Stabilisation::None,
+            HoldArg::Settle => Stabilisation::Settle,
+            HoldArg::Mass => Stabilisation::Mass,
+            HoldArg::Gradient => Stabilisation::Gradient,
+            HoldArg::Partition => Stabilisation::Partition,
+        }
+    }
+}
+
+/// `mbd explain`.
+#[derive(Args)]
+#[command(
+    after_help = "frames    the tree the sweeps run on: which bodies have been merged, the screws from joint to joint, the zeros in the inertias
+trace     operations the sweeps made on symbols, and how many of them any output needs
+simplify  the program itself, one operation a line, under the body and quantity it belongs to
+schedule  its order: parts, values alive at once, longest chain of operations
+
+Rewriting happens while the sweeps run (0 + x, 1 x, 0 x, signs, constants, equal operations), so that what a sweep makes is
+simplified already: `trace` counts the operations that survived this, and `simplify` shows those that are also needed."
+)]
+pub struct ExplainArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Stage to show
+    #[arg(long, value_enum, default_value_t = Stage::Frames)]
+    pub after: Stage,
+    #[command(flatten)]
+    pub code: CodeArgs,
+}
+
+/// Stage of the generator.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Stage {
+    Frames,
+    Trace,
+    Simplify,
+    Schedule,
+}

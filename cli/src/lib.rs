@@ -1,0 +1,96 @@
+//! The command `mbd`: every subcommand takes its arguments and a writer, and returns what went wrong.
+//!
+//! This library serves the executable and the project's own experiments; its interface may change in any release. Programs use
+//! `multibody`.
+
+mod args;
+mod check;
+mod count;
+mod eval;
+mod explain;
+mod generate;
+mod loops;
+mod motion;
+mod output;
+mod picture;
+pub mod plot;
+mod rivals;
+mod simulate;
+mod source;
+mod stale;
+mod timed;
+mod tour;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+
+pub use output::{note, write_file};
+
+/// Why a command stopped.
+#[derive(Debug)]
+pub enum Failure {
+    /// What and where, and what to do about it.
+    Message(String, String),
+    /// The findings are on standard error already.
+    Shown,
+    /// Nobody reads standard output any more.
+    Pipe,
+}
+
+impl Failure {
+    /// A message with help.
+    pub fn new(what: impl Into<String>, help: impl Into<String>) -> Failure {
+        Failure::Message(what.into(), help.into())
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(e: std::io::Error) -> Self {
+        match e.kind() {
+            std::io::ErrorKind::BrokenPipe => Failure::Pipe,
+            _ => Failure::new(format!("cannot write to standard output: {e}"), "is the disk full?"),
+        }
+    }
+}
+
+/// Result of a command.
+pub type Outcome<T = ()> = Result<T, Failure>;
+
+/// The command `mbd`: reads the arguments and runs the subcommand.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    reported(|out| run(arguments.command, out))
+}
+
+/// Runs a command on standard output and reports its failure on standard error. Exit status 0: done; 1: findings or a failure.
+pub fn reported(command: impl FnOnce(&mut dyn Write) -> Outcome) -> ExitCode {
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let result = command(&mut out).and_then(|()| Ok(out.flush()?));
+    match result {
+        Ok(()) | Err(Failure::Pipe) => ExitCode::SUCCESS,
+        Err(failure) => {
+            // What was said before comes before the reason why it ended.
+            let _ = out.flush();
+            if let Failure::Message(what, help) = failure {
+                note(format_args!("error: {what}\n  help: {help}"));
+            }
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
+    match command {
+        None => tour::run(out),
+        Some(Command::Check(a)) => check::run(&a, out),
+        Some(Command::Count(a)) => count::run(&a, out),
+        Some(Command::Generate(a)) => generate::run(&a, out),
+        Some(Command::Eval(a)) => eval::run(&a, out),
+        Some(Command::Simulate(a)) => simulate::run(&a, out),
+        Some(Command::Explain(a)) => explain::run(&a, out),
+    }
+}

@@ -1,0 +1,202 @@
+//! `mbd check --generated`: committed code against its models.
+
+use std::collections::BTreeSet;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use multibody::codegen::import::{Base, ImportOptions};
+use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::{self, Arithmetic, Group, Loops, Options, Precision};
+use serde::Deserialize;
+
+use super::args::{type_name, DEFAULT_RUNTIME};
+use super::generate::{self, shown};
+use super::output::{note, write_file};
+use super::{source, Failure, Outcome};
+
+/// `manifest.toml`: what the directory holds. Paths are relative to it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    /// Path of the runtime in the generated code.
+    runtime: Option<String>,
+    file: Vec<Entry>,
+}
+
+/// One generated file; options not given are those of `mbd generate`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    /// Name of the file.
+    file: String,
+    /// File of the model.
+    model: PathBuf,
+    #[serde(rename = "type")]
+    type_name: String,
+    outputs: Vec<String>,
+    base: Option<String>,
+    gravity: Option<[f64; 3]>,
+    scalar: Option<String>,
+    arithmetic: Option<String>,
+    forms: Option<String>,
+    loops: Option<String>,
+    efforts: Option<bool>,
+    frames: Option<Vec<String>>,
+    snap: Option<f64>,
+    chunk: Option<usize>,
+}
+
+const MANIFEST: &str = "manifest.toml";
+
+/// Compares every file of the manifest with what the generator makes now, and `mod.rs` with the list of them.
+pub fn run(directory: &Path, update: bool, out: &mut dyn Write) -> Outcome {
+    let path = directory.join(MANIFEST);
+    let manifest = read(&path)?;
+    let mut wanted = Vec::new();
+    for entry in &manifest.file {
+        let runtime = manifest.runtime.as_deref().unwrap_or(DEFAULT_RUNTIME);
+        wanted.push((entry.file.clone(), content(directory, &path, entry, runtime)?));
+    }
+    wanted.push(("mod.rs".to_string(), modules(&manifest)));
+    let mut stale = 0;
+    for (file, content) in &wanted {
+        let path = directory.join(file);
+        let Some(difference) = difference(&path, content) else { continue };
+        if update {
+            write_file(&path, content)?;
+            writeln!(out, "{}: written", path.display())?;
+        } else {
+            stale += 1;
+            note(format_args!("{}{difference}", path.display()));
+        }
+    }
+    stale += strays(directory, &wanted)?;
+    if stale > 0 {
+        let help = format!("`mbd check --generated {} --update` writes them anew", directory.display());
+        return Err(Failure::new(format!("{stale} of the generated files are stale"), help));
+    }
+    Ok(writeln!(out, "{}: {} generated files, all fresh", directory.display(), wanted.len())?)
+}
+
+fn read(path: &Path) -> Outcome<Manifest> {
+    let text = source::read(path)?;
+    toml::from_str(&text).map_err(|e| {
+        let before = &text[..e.span().map_or(0, |s| s.start.min(text.len()))];
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+        let message = e.message().lines().next().unwrap_or_default().to_string();
+        note(format_args!("{}:{line}:{column}: error: {message}\n  help: {KEYS}", path.display()));
+        Failure::Shown
+    })
+}
+
+const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
+                    `base`, `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
+
+/// What a file should hold.
+fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
+    let wrong = |what: String| {
+        Failure::new(format!("{}: `{}`: {what}", manifest.display(), entry.file), "correct the entry in the manifest")
+    };
+    if module(&entry.file).is_none() {
+        return Err(wrong("the name of the file must be a module's, such as `robot.rs`".into()));
+    }
+    let group = |name: &String| Group::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
+    let base = match entry.base.as_deref() {
+        None | Some("fixed") => Base::Fixed,
+        Some("floating") => Base::Floating,
+        Some("planar") => Base::Planar,
+        Some(other) => return Err(wrong(format!("`{other}` is no base"))),
+    };
+    let precision = match entry.scalar.as_deref() {
+        None | Some("f64") => Precision::F64,
+        Some("f32") => Precision::F32,
+        Some(other) => return Err(wrong(format!("`{other}` is no number type"))),
+    };
+    let default = Options::default();
+    let arithmetic = match entry.arithmetic.as_deref() {
+        None => default.arithmetic,
+        Some("exact") => Arithmetic::Exact,
+        Some("fast") => Arithmetic::Fast,
+        Some(other) => return Err(wrong(format!("`{other}` is no arithmetic"))),
+    };
+    let forms = match entry.forms.as_deref() {
+        None => Forms::default(),
+        Some(name) => {
+            *Forms::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
+        }
+    };
+    let loops = match entry.loops.as_deref() {
+        None => Loops::default(),
+        Some(name) => {
+            let found = Loops::ALL.iter().find(|l| l.name() == name);
+            *found.ok_or_else(|| wrong(format!("`loops` is auto, always or never, not `{name}`")))?
+        }
+    };
+    let options = Options {
+        type_name: type_name(&entry.type_name).map_err(wrong)?,
+        outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
+        precision,
+        arithmetic,
+        efforts: entry.efforts.unwrap_or(true),
+        frames: entry.frames.clone().unwrap_or_default(),
+        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms, loops, ..PlanOptions::default() },
+        runtime: runtime.to_string(),
+        source: shown(&entry.model),
+        chunk: entry.chunk.unwrap_or(default.chunk).max(1),
+    };
+    let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
+    Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
+}
+
+/// Module of a file, if it can be one.
+fn module(file: &str) -> Option<&str> {
+    let name = file.strip_suffix(".rs")?;
+    let word = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
+    (word && name.starts_with(|c: char| c.is_ascii_lowercase()) && name != "mod").then_some(name)
+}
+
+fn modules(manifest: &Manifest) -> String {
+    let mut text = "//! Generated by mbd: one module for each file of `manifest.toml`.\n".to_string();
+    for entry in &manifest.file {
+        let name = module(&entry.file).unwrap_or_default();
+        let model = shown(&entry.model);
+        text += &format!("\n/// From {model}.\npub mod {name};\n");
+    }
+    text
+}
+
+/// First difference of a file from what it should hold, as it is shown after its name.
+fn difference(path: &Path, wanted: &str) -> Option<String> {
+    let Ok(bytes) = std::fs::read(path) else { return Some(": error: the file is missing or cannot be read".into()) };
+    if bytes == wanted.as_bytes() {
+        return None;
+    }
+    let found = String::from_utf8_lossy(&bytes);
+    let (mut theirs, mut ours) = (found.lines(), wanted.lines());
+    for line in 1.. {
+        match (theirs.next(), ours.next()) {
+            (None, None) => break,
+            (a, b) if a == b => {}
+            (a, b) => {
+                let show = |l: Option<&str>| l.map_or("the end of the file".to_string(), |l| format!("`{}`", l.trim()));
+                return Some(format!(":{line}:1: error: stale: {} should be {}", show(a), show(b)));
+            }
+        }
+    }
+    Some(": error: stale: line ends differ".into())
+}
+
+/// Number of Rust files that the manifest does not know, each told.
+fn strays(directory: &Path, wanted: &[(String, String)]) -> Outcome<usize> {
+    let known: BTreeSet<&str> = wanted.iter().map(|(f, _)| f.as_str()).collect();
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    names.retain(|n| n.ends_with(".rs") && !known.contains(n.as_str()));
+    names.sort_unstable();
+    for name in &names {
+        let path = directory.join(name);
+        note(format_args!("{}: error: not in {MANIFEST}\n  help: add it to the manifest or delete it", path.display()));
+    }
+    Ok(names.len())
+}

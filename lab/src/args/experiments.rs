@@ -1,0 +1,51 @@
+//! Arguments of `mbd-lab experiments`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+/// `mbd-lab experiments`.
+#[derive(Args)]
+#[command(
+    after_help = "docs/experiments.md says what is measured and how. The interpreter runs everything; with the generated code that
+ordinary builds leave out, `scaling` times that too. At the root of the repository:
+  cargo run --release -p mbd-lab --features generated -- experiments scaling --out figures"
+)]
+pub struct ExperimentsArgs {
+    #[command(subcommand)]
+    pub experiment: Experiment,
+}
+
+/// Which experiment.
+#[derive(Subcommand)]
+pub enum Experiment {
+    /// Momenta against accelerations on a closed loop: tables 7.1 to 7.4, figures 7.9 to 7.15
+    Biped(BipedArgs),
+    /// Time of an evaluation over the number of links, open, branched, closed: figures 7.4 to 7.6
+    Scaling(ScalingArgs),
+}
+
+/// `mbd-lab experiments biped`.
+#[derive(Args)]
+pub struct BipedArgs {
+    /// Directory for the figures; without it there are only tables
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Leave out the runs that take longest
+    #[arg(long)]
+    pub quick: bool,
+    /// Steps of 1 ms of the run with projection; a million takes minutes
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    pub steps: u64,
+}
+
+/// `mbd-lab experiments scaling`.
+#[derive(Args)]
+pub struct ScalingArgs {
+    /// Directory for the figures; without it there are only tables
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Few and small mechanisms, short rounds
+    #[arg(long)]
+    pub quick: bool,
+}

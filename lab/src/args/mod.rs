@@ -1,0 +1,24 @@
+//! Arguments of `mbd-lab`.
+
+#[cfg_attr(not(feature = "generated"), allow(dead_code))]
+pub mod bench;
+pub mod experiments;
+
+use clap::{Parser, Subcommand};
+
+/// The command line.
+#[derive(Parser)]
+#[command(name = "mbd-lab", version, about = "Experiments of the thesis, and benches of the integrators")]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Repeat the experiments of the thesis's chapter 7
+    Experiments(experiments::ExperimentsArgs),
+    /// Measure integrators: work against error, long runs, stress
+    Bench(bench::BenchArgs),
+}

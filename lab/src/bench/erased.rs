@@ -1,0 +1,183 @@
+//! A system whose type is not known, so that every method is compiled once for all scenes.
+
+use crate::scenes::{Dynamics, Scene};
+use multibody::runtime::system::Group;
+use multibody::runtime::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Interpreter, Real, System};
+
+/// What a scene is asked for, on slices.
+trait Calls<S> {
+    fn rates(&mut self, t: S, q: &[S], p: &[S], qd: &mut [S], pd: &mut [S]);
+    fn coordinate_rates(&mut self, q: &[S], v: &[S], qd: &mut [S]);
+    fn energy(&mut self, q: &[S], p: &[S]) -> (S, S);
+    fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]);
+    fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]);
+}
+
+/// A system with room for one state in its own form.
+struct Held<Y: System> {
+    y: Y,
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    qd: Y::Coordinates,
+    pd: Y::Momenta,
+}
+
+impl<Y: Dynamics> Held<Y> {
+    fn take(&mut self, q: &[Y::Scalar], p: &[Y::Scalar]) {
+        self.q.as_mut().copy_from_slice(q);
+        self.p.as_mut().copy_from_slice(p);
+    }
+}
+
+impl<Y: Dynamics> Calls<Y::Scalar> for Held<Y> {
+    fn rates(&mut self, t: Y::Scalar, q: &[Y::Scalar], p: &[Y::Scalar], qd: &mut [Y::Scalar], pd: &mut [Y::Scalar]) {
+        self.take(q, p);
+        self.y.state_rates(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
+        qd.copy_from_slice(self.qd.as_ref());
+        pd.copy_from_slice(self.pd.as_ref());
+    }
+
+    fn coordinate_rates(&mut self, q: &[Y::Scalar], v: &[Y::Scalar], qd: &mut [Y::Scalar]) {
+        self.take(q, v);
+        self.y.coordinate_rates(&self.q, &self.p, &mut self.qd);
+        qd.copy_from_slice(self.qd.as_ref());
+    }
+
+    fn energy(&mut self, q: &[Y::Scalar], p: &[Y::Scalar]) -> (Y::Scalar, Y::Scalar) {
+        self.take(q, p);
+        self.y.state_energy(&self.q, &self.p)
+    }
+
+    fn accelerations(&mut self, q: &[Y::Scalar], v: &[Y::Scalar], a: &mut [Y::Scalar]) {
+        self.take(q, v);
+        self.y.state_accelerations(&self.q, &self.p, &mut self.pd);
+        a.copy_from_slice(self.pd.as_ref());
+    }
+
+    fn momenta(&mut self, q: &[Y::Scalar], v: &[Y::Scalar], p: &mut [Y::Scalar]) {
+        self.take(q, v);
+        self.y.state_momenta(&self.q, &self.p, &mut self.pd);
+        p.copy_from_slice(self.pd.as_ref());
+    }
+}
+
+/// The four blocks of derivatives, row by row.
+type Rows<'a, S> = [&'a mut [Vec<S>]; 4];
+
+/// Rates of velocities and momenta and their derivatives, on slices.
+type Derivatives<S> = Box<dyn FnMut(S, &[S], &[S], &mut [S], &mut [S], Rows<'_, S>)>;
+
+fn derivatives<Y: Dynamics + Differentiable + 'static>(mut y: Y) -> Derivatives<Y::Scalar> {
+    let (mut q, mut p, mut v, mut pd) = (y.neutral(), y.rest(), y.rest(), y.rest());
+    let mut blocks = [y.square(), y.square(), y.square(), y.square()];
+    Box::new(move |t, q_, p_, v_, pd_, rows| {
+        q.as_mut().copy_from_slice(q_);
+        p.as_mut().copy_from_slice(p_);
+        let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &mut blocks;
+        y.rate_derivatives(t, &q, &p, &mut v, &mut pd, Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp });
+        v_.copy_from_slice(v.as_ref());
+        pd_.copy_from_slice(pd.as_ref());
+        for (to, from) in rows.into_iter().zip(&blocks) {
+            for (to, from) in to.iter_mut().zip(from.as_ref()) {
+                to.copy_from_slice(from.as_ref());
+            }
+        }
+    })
+}
+
+/// Any scene's system.
+pub struct Erased<S: Real> {
+    calls: std::cell::RefCell<Box<dyn Calls<S>>>,
+    interpreter: Interpreter<S>,
+    /// Generated ones, else the interpreter's.
+    derivatives: Option<Derivatives<S>>,
+}
+
+impl<S: Real + 'static> Erased<S> {
+    /// The scene's interpreter.
+    pub fn interpreted(scene: &Scene) -> Self {
+        Self::new(scene, scene.interpreter::<S>())
+    }
+
+    /// Some system of the scene.
+    pub fn new<Y: Dynamics<Scalar = S> + 'static>(scene: &Scene, y: Y) -> Self {
+        let held = Held { q: y.neutral(), p: y.rest(), qd: y.neutral(), pd: y.rest(), y };
+        let calls = std::cell::RefCell::new(Box::new(held) as Box<dyn Calls<S>>);
+        Erased { calls, interpreter: scene.interpreter(), derivatives: None }
+    }
+
+    /// With derivatives of another instance of it.
+    pub fn with_derivatives<Y: Dynamics<Scalar = S> + Differentiable + 'static>(self, y: Y) -> Self {
+        Erased { derivatives: Some(derivatives(y)), ..self }
+    }
+}
+
+impl<S: Real + 'static> System for Erased<S> {
+    type Scalar = S;
+    type Coordinates = Vec<S>;
+    type Momenta = Vec<S>;
+
+    fn neutral(&self) -> Vec<S> {
+        self.interpreter.neutral()
+    }
+
+    fn rest(&self) -> Vec<S> {
+        self.interpreter.rest()
+    }
+
+    fn groups(&self) -> &[Group] {
+        self.interpreter.groups()
+    }
+
+    fn state_rates(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+        self.calls.get_mut().rates(t, q, p, qd, pd);
+    }
+
+    fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {
+        self.calls.borrow_mut().coordinate_rates(q, v, qd);
+    }
+}
+
+impl<S: Real + 'static> Energetic for Erased<S> {
+    fn state_energy(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
+        self.calls.get_mut().energy(q, p)
+    }
+}
+
+impl<S: Real + 'static> Accelerated for Erased<S> {
+    fn state_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
+        self.calls.get_mut().accelerations(q, v, a);
+    }
+}
+
+impl<S: Real + 'static> Conjugate for Erased<S> {
+    fn state_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
+        self.calls.get_mut().momenta(q, v, p);
+    }
+}
+
+impl<S: Real + 'static> Differentiable for Erased<S> {
+    type Square = Vec<Vec<S>>;
+
+    fn square(&self) -> Vec<Vec<S>> {
+        self.interpreter.square()
+    }
+
+    fn rate_derivatives(
+        &mut self,
+        t: S,
+        q: &Vec<S>,
+        p: &Vec<S>,
+        v: &mut Vec<S>,
+        pd: &mut Vec<S>,
+        blocks: Blocks<'_, Vec<Vec<S>>>,
+    ) {
+        match &mut self.derivatives {
+            None => self.interpreter.rate_derivatives(t, q, p, v, pd, blocks),
+            Some(derivatives) => {
+                let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = blocks;
+                derivatives(t, q, p, v, pd, [dv_dq, dv_dp, dpd_dq, dpd_dp]);
+            }
+        }
+    }
+}

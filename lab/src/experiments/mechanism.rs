@@ -1,0 +1,41 @@
+//! From the text of a model to a system at its start.
+
+use multibody::codegen::import::{load, ImportOptions};
+use multibody::codegen::model::Model;
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::Interpreter;
+
+use mbd_cli::{Failure, Outcome};
+
+/// A mechanism whose joints have one freedom each.
+pub struct Mechanism {
+    /// Its equations.
+    pub system: Interpreter<f64>,
+    /// Coordinates at the start; loops are closed but for the digits of the file.
+    pub q: Vec<f64>,
+}
+
+/// Reads a model file that this program wrote or brings along.
+pub fn read(text: &str) -> Outcome<Mechanism> {
+    let (model, findings) = load("model.toml", text, &ImportOptions::default());
+    let model = model.ok_or_else(|| Failure::new(findings.to_string(), "report this: the model is built in"))?;
+    let plan = Plan::new(&model, PlanOptions::default());
+    let params = plan.default_params();
+    let gravity = plan.gravity(&params);
+    let system = Interpreter::new(plan.tree(&params), gravity);
+    let q = start(&model, &plan);
+    Ok(Mechanism { system, q })
+}
+
+/// The starts of the file; forks of trees open by 0.3 rad to both sides.
+fn start(model: &Model, plan: &Plan) -> Vec<f64> {
+    let mut q = plan.start();
+    for (q, joint) in q.iter_mut().zip(&model.joints) {
+        match joint.name.as_str() {
+            name if name.ends_with("left") => *q = 0.3,
+            name if name.ends_with("right") => *q = -0.3,
+            _ => {}
+        }
+    }
+    q
+}

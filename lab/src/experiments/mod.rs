@@ -1,0 +1,45 @@
+//! `mbd-lab experiments`: chapter 7 of the thesis again, beside its numbers. What its text leaves open is settled in
+//! `docs/experiments.md`.
+
+mod biped;
+mod clock;
+mod forms;
+mod mechanism;
+mod plain;
+mod scaling;
+mod study;
+mod tables;
+mod thesis;
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::args::experiments::{Experiment, ExperimentsArgs};
+use mbd_cli::plot::{self, Panel};
+use mbd_cli::write_file;
+use mbd_cli::{Failure, Outcome};
+
+/// Runs the experiment.
+pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
+    match &args.experiment {
+        Experiment::Biped(args) => biped::run(args, out),
+        Experiment::Scaling(args) => scaling::run(args, out),
+    }
+}
+
+/// Makes the directory of the figures, before hours of work find out that it cannot be made.
+fn directory(path: Option<&Path>) -> Outcome {
+    let Some(path) = path else { return Ok(()) };
+    std::fs::create_dir_all(path)
+        .map_err(|e| Failure::new(format!("cannot make `{}`: {e}", path.display()), "name another directory"))
+}
+
+/// Draws a figure and says where it is.
+fn figure(out: &mut dyn Write, directory: &Path, name: &str, title: &str, x: &str, panels: &[Panel]) -> Outcome {
+    let picture = plot::svg_over(title, x, panels)
+        .map_err(|e| Failure::new(format!("cannot draw `{name}`: {e}"), "look at the tables"))?;
+    let path = directory.join(format!("{name}.svg"));
+    write_file(&path, &picture)?;
+    writeln!(out, "figure: {}", path.display())?;
+    Ok(())
+}

@@ -1,0 +1,39 @@
+//! What benchmarks ask of a system, by one name for the interpreter and for generated code.
+
+use std::fmt::Debug;
+
+use super::Scene;
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::{Accelerated, Conjugate, Energetic, Interpreter, Scalar};
+
+/// A system with energy, accelerations and momenta.
+pub trait Dynamics: Energetic + Accelerated + Conjugate {}
+
+impl<Y: Energetic + Accelerated + Conjugate> Dynamics for Y {}
+
+impl Scene {
+    /// The interpreter of its model, in any number type.
+    pub fn interpreter<S: Scalar + Debug>(&self) -> Interpreter<S> {
+        let plan = Plan::new(&self.model, PlanOptions::default());
+        let params = plan.default_params();
+        let gravity = plan.gravity(&params).map(S::constant);
+        let params: Vec<S> = params.into_iter().map(S::constant).collect();
+        Interpreter::new(plan.tree(&params), gravity)
+    }
+
+    /// Coordinates and momenta at the start, of a system made from its model.
+    pub fn start<Y: Dynamics>(&self, system: &mut Y) -> (Y::Coordinates, Y::Momenta) {
+        let (mut q, mut v) = (system.neutral(), system.rest());
+        fill(q.as_mut(), &self.q);
+        fill(v.as_mut(), &self.v);
+        let mut p = system.rest();
+        system.state_momenta(&q, &v, &mut p);
+        (q, p)
+    }
+}
+
+fn fill<S: Scalar>(out: &mut [S], from: &[f64]) {
+    for (out, x) in out.iter_mut().zip(from) {
+        *out = S::constant(*x);
+    }
+}

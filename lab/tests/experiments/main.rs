@@ -1,0 +1,235 @@
+//! The thesis's biped by every way of computing it, and the command that repeats its experiments.
+
+mod biped;
+#[path = "../../../cli/tests/command/mod.rs"]
+mod command;
+
+use std::path::Path;
+
+use biped::{absolute, relative, Biped, Vector};
+use command::{files, folder, good, out, read, run_in};
+use mbd_lab::scenes::experiments;
+use multibody::codegen::import::{load, ImportOptions};
+use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::constrained::Minimal;
+use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
+use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
+
+const END: f64 = 0.85;
+
+/// The model as it is shipped, closed.
+fn shipped() -> (Interpreter<f64>, Vec<f64>) {
+    let text = read(Path::new(command::ROOT), "models/biped.toml");
+    let (model, findings) = load("biped.toml", &text, &ImportOptions::default());
+    let model = model.unwrap_or_else(|| panic!("{findings}"));
+    assert!(findings.0.is_empty(), "{findings}");
+    let plan = Plan::new(&model, PlanOptions::default());
+    let params = plan.default_params();
+    let system = Interpreter::new(plan.tree(&params), plan.gravity(&params));
+    let mut q = system.neutral();
+    model.starts.iter().for_each(|s| q[s.joint] = s.q[0]);
+    assert_eq!(q[..3], [1.7, -0.7, 0.3]);
+    // The dependent angles of the file have three digits.
+    let closed = relative(&Biped::new().theta);
+    for k in 3..5 {
+        assert!((q[k] - closed[k]).abs() < 1e-3, "{q:?} {closed:?}");
+        q[k] = closed[k];
+    }
+    (system, q)
+}
+
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).fold(0.0, |m, (a, b)| (a - b).abs().max(m))
+}
+
+/// Angles of the joints at the end by the equations that are written down by hand.
+fn by_hand() -> Vector {
+    let mut biped = Biped::new();
+    let (mut q, mut v) = (biped.neutral(), biped.rest());
+    let (theta, omega) = biped.whole(&q, &v);
+    let start = biped.energy(&theta, &omega);
+    let mut method = Verner9::new(&biped);
+    let steps = 1700;
+    for k in 0..steps {
+        let h = END / f64::from(steps);
+        method.step(&mut biped, f64::from(k) * h, h, &mut q, &mut v).expect("a step");
+    }
+    let (theta, omega) = biped.whole(&q, &v);
+    assert!((biped.energy(&theta, &omega) - start).abs() < 1e-11);
+    relative(&theta)
+}
+
+fn energy(
+    system: &mut impl Energetic<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+    q: &Vec<f64>,
+    p: &Vec<f64>,
+) -> f64 {
+    let (kinetic, potential) = system.state_energy(q, p);
+    kinetic + potential
+}
+
+#[test]
+fn every_way_leads_to_the_same_end() {
+    let reference = by_hand();
+    let (mut system, start) = shipped();
+    let steps = 1700;
+    let h = END / f64::from(steps);
+
+    // Method 1: augmented momenta, multipliers begun anew at every step.
+    let (mut q, mut p, mut v, mut sigma) = (start.clone(), system.rest(), system.rest(), system.zero_rows());
+    let mut method = Verner9::new(&system);
+    let before = energy(&mut system, &q, &p);
+    for k in 0..steps {
+        method.step(&mut system, f64::from(k) * h, h, &mut q, &mut p).expect("a step");
+        system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+        assert!((energy(&mut system, &q, &p) - before).abs() < 1e-10);
+    }
+    assert!(apart(&q, &reference) < 1e-9, "method 1: {q:?} {reference:?}");
+
+    // Method 2: minimal coordinates, dependents chosen and changed by the library; then those of the thesis throughout.
+    for thesis in [false, true] {
+        let (mut q, mut p) = (start.clone(), system.rest());
+        let minimal = Minimal::new(system.clone(), &mut q, &mut p).expect("closed");
+        let mut minimal = if thesis { minimal.with_ratio(f64::INFINITY) } else { minimal };
+        if thesis {
+            minimal.choose_among(&[3, 4], &mut q, &mut p).expect("a choice of the thesis");
+        }
+        let mut method = Verner9::new(&minimal);
+        for k in 0..steps {
+            let t = f64::from(k) * h;
+            method.step(&mut minimal, t, h, &mut q, &mut p).expect("a step");
+            minimal.watch(t + h, &q, Some(&mut p)).expect("dependents");
+            assert!((energy(&mut minimal, &q, &p) - before).abs() < 1e-10);
+        }
+        minimal.close(&mut q).expect("closed");
+        assert!(apart(&q, &reference) < 1e-9, "method 2, {thesis}: {q:?} {reference:?}");
+        assert!(thesis == (minimal.switches().0 == 0), "{:?}", minimal.switches());
+    }
+
+    // The acceleration form, its index reduced.
+    let mut form = AccelerationForm::new(system);
+    let (mut q, mut v) = (start, form.rest());
+    let mut method = Verner9::new(&form);
+    for k in 0..steps {
+        method.step(&mut form, f64::from(k) * h, h, &mut q, &mut v).expect("a step");
+    }
+    assert!(apart(&q, &reference) < 1e-9, "accelerations: {q:?} {reference:?}");
+    assert!((energy(&mut form, &q, &v) - before).abs() < 1e-10);
+}
+
+/// Largest opening of the loop over the motion with classical steps of 1 ms.
+fn drift<Y>(
+    system: &mut Y,
+    q: &[f64],
+    gap: impl Fn(&[f64]) -> f64,
+    mut after: impl FnMut(&mut Y, &mut Vec<f64>, &mut Vec<f64>),
+) -> f64
+where
+    Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
+{
+    let (mut q, mut p, mut worst) = (q.to_vec(), system.rest(), 0.0_f64);
+    let mut method = Rk4::new(system);
+    for k in 0..850 {
+        method.step(system, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p).expect("a step");
+        after(system, &mut q, &mut p);
+        worst = worst.max(gap(&q));
+    }
+    worst
+}
+
+#[test]
+fn momenta_drift_less_than_accelerations_and_projection_stops_it() {
+    let gap = |q: &[f64]| {
+        let q: &Vector = q.try_into().expect("five angles");
+        Biped::residual(&absolute(q)).iter().fold(0.0, |m: f64, r| m.max(r.abs()))
+    };
+    let (mut system, q) = shipped();
+    let (mut v, mut sigma, mut pivots) = (system.rest(), system.zero_rows(), system.zero_rows());
+    let settled = drift(&mut system, &q, gap, |system, q, p| system.settle(0.0, q, p, &mut v, &mut sigma));
+    let projected = drift(&mut system, &q, gap, |system, q, p| {
+        system.settle(0.0, q, p, &mut v, &mut sigma);
+        // Two steps of Newton's method: the first one leaves the square of 1e-8.
+        for _ in 0..2 {
+            system.correction(q, &mut sigma, &mut v, &mut pivots);
+            q.iter_mut().zip(&v).for_each(|(q, dq)| *q += dq);
+        }
+    });
+    let accelerated = drift(&mut AccelerationForm::new(system), &q, gap, |_, _, _| ());
+    assert!(accelerated > 30.0 * settled, "{accelerated:e} {settled:e}");
+    assert!(projected <= 1e-13, "{projected:e}");
+}
+
+/// The momenta of the method's start are those of its velocities.
+#[test]
+fn the_start_is_at_rest() {
+    let (mut system, q) = shipped();
+    let mut p = system.rest();
+    let v = system.rest();
+    system.state_momenta(&q, &v, &mut p);
+    assert!(p.iter().all(|p| *p == 0.0));
+}
+
+/// Cells of the rows of a table under a title that begin with a name.
+fn cells(text: &str, title: &str, first: &str) -> Vec<String> {
+    let table = text.split("### ").find(|t| t.starts_with(title)).unwrap_or_else(|| panic!("no `{title}` in\n{text}"));
+    let row = table.lines().find(|l| l.starts_with(&format!("| {first}")));
+    let row = row.unwrap_or_else(|| panic!("no `{first}` in\n{table}"));
+    row.split('|').map(|c| c.trim().to_string()).collect()
+}
+
+/// The number at the start of a cell.
+fn number(cell: &str) -> f64 {
+    cell.split_whitespace().next().and_then(|w| w.parse().ok()).unwrap_or_else(|| panic!("no number: {cell}"))
+}
+
+#[test]
+fn the_command_repeats_the_biped() {
+    let folder = folder("experiments_biped");
+    let output = good(run_in(&folder, &["experiments", "biped", "--quick", "--out", "figures"]));
+    let text = out(&output);
+    for way in ["minimal coordinates, momenta", "augmented momenta", "accelerations, index reduced"] {
+        let row = cells(text, "Coordinates", way);
+        assert!(number(&row[7]) < 1e-9 && number(&row[8]) < 1e-10, "{row:?}");
+    }
+    // The thesis's truncation errors, which nothing but the equations and the method decide, within what it rounds them to and
+    // the 10 % that experiments differ by.
+    for (step, errors) in [("0.005", [4.3e-8, 3.9e-8]), ("0.001", [1.4e-11, 1.3e-11])] {
+        let row = cells(text, "Table 7.1", step);
+        for (cell, theirs) in row[4..6].iter().zip(errors) {
+            assert!((number(cell) / theirs - 1.0).abs() < 0.15, "{row:?}");
+        }
+    }
+    for (tolerance, [accelerations, hamilton]) in [("1e-5", [457.0, 320.0]), ("1e-6", [661.0, 434.0])] {
+        let row = cells(text, "Table 7.2", tolerance);
+        assert!((number(&row[5]) / accelerations - 1.0).abs() < 0.07, "{row:?}");
+        assert!((number(&row[6]) / hamilton - 1.0).abs() < 0.07, "{row:?}");
+    }
+    assert!(number(&cells(text, "Drift", "Runge-Kutta 4")[4]) > 30.0);
+    let names = files(&folder.join("figures"));
+    let wanted = ["10", "11", "12", "13", "14", "15", "9"].map(|n| format!("figure_7_{n}.svg"));
+    assert_eq!(names, wanted);
+    for name in names {
+        assert!(read(&folder.join("figures"), &name).starts_with("<svg"));
+    }
+}
+
+/// Files of chains, of which generated code is kept, are what the functions write that every other number of links comes from.
+#[test]
+fn model_files_are_as_written() {
+    let folder = Path::new(command::ROOT).join("models/experiments");
+    for (name, links) in [("closed10.toml", 10), ("closed100.toml", 100)] {
+        assert!(read(&folder, name) == experiments::closed(links, "pin", false), "{name}");
+    }
+}
+
+#[test]
+fn the_command_measures_scaling() {
+    let folder = folder("experiments_scaling");
+    let output = good(run_in(&folder, &["experiments", "scaling", "--quick", "--out", "figures"]));
+    let text = out(&output);
+    assert_eq!(cells(text, "Figure 7.6", "30").len(), 6);
+    assert!(number(&cells(text, "Figures 7.5", "10")[2]) > 1000.0);
+    assert!(number(&cells(text, "Four-bars", "4")[2]) > 0.0);
+    assert_eq!(files(&folder.join("figures")), ["figure_7_4.svg", "figure_7_5.svg", "figure_7_6.svg", "loops.svg"]);
+}
