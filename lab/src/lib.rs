@@ -4,6 +4,8 @@ mod args;
 #[cfg(feature = "generated")]
 mod bench;
 mod experiments;
+#[cfg(feature = "generated")]
+pub mod generated;
 pub mod scenes;
 
 use std::io::Write;

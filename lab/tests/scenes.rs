@@ -102,7 +102,7 @@ fn the_tree_forks_where_the_thesis_says() {
 mod generated {
     use std::fmt::Debug;
 
-    use mbd_lab::scenes::generated::{
+    use mbd_lab::generated::{
         visit_differentiable_f32, visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable,
     };
     use mbd_lab::scenes::Dynamics;

@@ -212,7 +212,7 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
 /// Generated code beside the interpreter, rounds of all systems in turn.
 #[cfg(feature = "generated")]
 fn code(effort: &Effort) -> Outcome<String> {
-    use crate::scenes::generated::visit_chain;
+    use crate::generated::visit_chain;
     note(format_args!("generated code"));
     let systems = [("open", 10), ("open", 50), ("open", 100), ("tree", 150), ("closed", 10), ("closed", 100)];
     let (mut mechanisms, mut generated) = (Vec::new(), Vec::new());
@@ -246,7 +246,7 @@ struct Repeated<'a> {
 }
 
 #[cfg(feature = "generated")]
-impl crate::scenes::generated::VisitRates for Repeated<'_> {
+impl crate::generated::VisitRates for Repeated<'_> {
     type Out = Box<dyn FnMut()>;
     fn visit<Y: System<Scalar = f64> + 'static>(self, mut system: Y) -> Box<dyn FnMut()> {
         let (mut q, mut p, mut qd, mut pd) = (system.neutral(), system.rest(), system.neutral(), system.rest());

@@ -8,10 +8,6 @@ pub mod experiments;
 mod list;
 mod text;
 
-/// Code of the scenes that the benchmarks run generated; see `generated/scenes/manifest.toml`.
-#[cfg(feature = "generated")]
-pub mod generated;
-
 pub use dynamics::Dynamics;
 
 use std::borrow::Cow;

@@ -8,7 +8,6 @@ use std::path::Path;
 
 use biped::{absolute, relative, Biped, Vector};
 use command::{files, folder, good, out, read, run_in};
-use mbd_lab::scenes::experiments;
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::constrained::Minimal;
@@ -211,15 +210,6 @@ fn the_command_repeats_the_biped() {
     assert_eq!(names, wanted);
     for name in names {
         assert!(read(&folder.join("figures"), &name).starts_with("<svg"));
-    }
-}
-
-/// Files of chains, of which generated code is kept, are what the functions write that every other number of links comes from.
-#[test]
-fn model_files_are_as_written() {
-    let folder = Path::new(command::ROOT).join("models/experiments");
-    for (name, links) in [("closed10.toml", 10), ("closed100.toml", 100)] {
-        assert!(read(&folder, name) == experiments::closed(links, "pin", false), "{name}");
     }
 }
 
