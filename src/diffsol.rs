@@ -19,7 +19,7 @@
 //! }
 //!
 //! let mut pendulum = DoublePendulum::new();
-//! let (mut q, mut p) = (pendulum.neutral(), pendulum.rest());
+//! let (mut q, mut p) = (pendulum.neutral(), pendulum.zero_momenta());
 //! q[0] = 1.0;
 //! let solver = Diffsol { method: Stiff::Bdf, absolute: 1e-8, relative: 1e-8, ..Diffsol::default() };
 //! let statistics = solver.run(&mut pendulum, 0.0, 1.0, &mut q, &mut p, |_, _, _| {})?;
@@ -240,11 +240,11 @@ struct Equation<'s, Y: Differentiable<Scalar = f64>> {
 
 impl<'s, Y: Differentiable<Scalar = f64>> Equation<'s, Y> {
     fn new(system: &'s mut Y) -> Self {
-        let (q, p) = (system.neutral(), system.rest());
+        let (q, p) = (system.neutral(), system.zero_momenta());
         let n = q.as_ref().len() + p.as_ref().len();
         Equation {
             quaternions: system.quaternions().collect(),
-            plain: system.groups().is_empty(),
+            plain: system.lie_joints().is_empty(),
             qd: q.clone(),
             pd: p.clone(),
             q,
@@ -278,7 +278,7 @@ impl<'s, Y: Differentiable<Scalar = f64>> Equation<'s, Y> {
 
     fn rates(&mut self, t: f64, y: &[f64], out: &mut [f64]) {
         self.take(y);
-        self.system.state_rates(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
+        self.system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
         self.evaluations += 1;
         let (qd, pd) = out.split_at_mut(self.q.as_ref().len());
         qd.copy_from_slice(self.qd.as_ref());

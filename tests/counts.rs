@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 use multibody::codegen::generate::trace;
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::Model;
-use multibody::codegen::plan::{Forms, Plan, PlanOptions};
-use multibody::codegen::{Arithmetic, Group, Options};
+use multibody::codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use multibody::codegen::{Arithmetic, Output, Options};
 use multibody::runtime::sweep::Quantity;
 
 const ARITHMETIC: [Arithmetic; 2] = [Arithmetic::Exact, Arithmetic::Fast];
@@ -39,12 +39,12 @@ enum Scope {
 }
 
 /// Operations of the rates without joint forces, exact and fast.
-fn rates(model: &Model, forms: Forms, scope: Scope) -> [usize; 2] {
+fn rates(model: &Model, forms: EliminationStrategy, scope: Scope) -> [usize; 2] {
     let plan_options = PlanOptions { forms, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
     let plan = Plan::new(model, plan_options);
     ARITHMETIC.map(|arithmetic| {
         let options = Options { plan: plan_options, efforts: false, arithmetic, ..Options::default() };
-        let program = trace(&plan, Group::Rates, &options).expect("rates").program;
+        let program = trace(&plan, Output::Rates, &options).expect("rates").program;
         let outside = |what| scope == Scope::Core && matches!(what, Quantity::Pose | Quantity::Rate);
         program.counts_where(|&(_, what)| !outside(what)).total()
     })
@@ -107,7 +107,7 @@ fn general_quadruped(gravity: Option<[f64; 3]>) -> Model {
 fn general_chains_stay_below_the_best_known() {
     for (n, best_known) in [(2, [59, 83]), (3, [220, 261]), (6, [1037, 1126]), (7, [1380, 1485]), (10, [2327, 2564])] {
         for (k, gravity) in [NO_GRAVITY, None].into_iter().enumerate() {
-            let counts = rates(&general_chain(n, gravity), Forms::Fewest, Scope::Core);
+            let counts = rates(&general_chain(n, gravity), EliminationStrategy::Fewest, Scope::Core);
             let what = format!("general chain of {n}, {} gravity", ["without", "with"][k]);
             check(&what, Some(best_known[k]), [best_known[k] + best_known[k] / 100, best_known[k]], counts);
         }
@@ -118,7 +118,7 @@ fn general_chains_stay_below_the_best_known() {
 fn a_general_quadruped_stays_below_the_best_known() {
     for (k, gravity) in [NO_GRAVITY, None].into_iter().enumerate() {
         let best_known = [3465, 3747][k];
-        let counts = rates(&general_quadruped(gravity), Forms::Fewest, Scope::Core);
+        let counts = rates(&general_quadruped(gravity), EliminationStrategy::Fewest, Scope::Core);
         check(
             &format!("general quadruped, {} gravity", ["without", "with"][k]),
             Some(best_known),
@@ -146,7 +146,7 @@ fn real_robots_stay_below_the_best_known() {
     ];
     for (name, base, best_known, limits) in rows {
         for (k, gravity) in [NO_GRAVITY, None].into_iter().enumerate() {
-            let counts = rates(&file(name, base, gravity), Forms::Fewest, Scope::All);
+            let counts = rates(&file(name, base, gravity), EliminationStrategy::Fewest, Scope::All);
             check(&format!("{name}, {} gravity", ["without", "with"][k]), best_known[k], limits[k], counts);
         }
     }
@@ -164,7 +164,7 @@ fn what_is_generated_by_default_stays_below_its_limits() {
         ("solo12.urdf", Base::Floating, [2177, 2073]),
         ("g1.urdf", Base::Floating, [6646, 6559]),
     ] {
-        check(&format!("{name}, default"), None, limits, rates(&file(name, base, None), Forms::default(), Scope::All));
+        check(&format!("{name}, default"), None, limits, rates(&file(name, base, None), EliminationStrategy::default(), Scope::All));
     }
 }
 
@@ -175,7 +175,7 @@ fn joint_forces_cost_one_addition_each_at_most() {
         let plan = Plan::new(&model, PlanOptions::default());
         let [with, without] = [true, false].map(|efforts| {
             let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
-            trace(&plan, Group::Rates, &options).expect("rates").program.counts().total()
+            trace(&plan, Output::Rates, &options).expect("rates").program.counts().total()
         });
         // A first joint with a vertical axis has no momentum rate but its force: nothing to add it to.
         assert!(with - without == nv || with - without == nv - 1, "{name}: {}", with - without);
@@ -199,7 +199,7 @@ fn derivatives_stay_below_their_limits() {
     ] {
         let model = self::file(file, base, None);
         let plan = Plan::new(&model, PlanOptions::default());
-        let program = trace(&plan, Group::Derivatives, &Options::default()).expect("derivatives").program;
+        let program = trace(&plan, Output::Derivatives, &Options::default()).expect("derivatives").program;
         let count = program.counts().total();
         println!("{file}: {count}");
         assert!(count <= limit, "{file}: {count} operations, at most {limit}");

@@ -20,7 +20,7 @@ fn midpoint<M: Differentiable<Scalar = f64>>(
     let n = p.as_ref().len();
     let (q0, p0) = (q.clone(), p.clone());
     let [mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp] = [m.square(), m.square(), m.square(), m.square()];
-    let (mut v, mut pd) = (m.rest(), m.rest());
+    let (mut v, mut pd) = (m.zero_momenta(), m.zero_momenta());
     let mut residuals = Vec::new();
     for _ in 0..6 {
         let (mut q_mid, mut p_mid) = (q.clone(), p.clone());

@@ -18,7 +18,7 @@ impl Scene {
         let (model, findings) = read("scene.toml", text);
         let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
-        let mut p = i.rest();
+        let mut p = i.zero_momenta();
         i.momenta(q, v, &mut p);
         Scene { i, q: q.to_vec(), p, time }
     }

@@ -111,7 +111,7 @@ macro_rules! output {
         let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
         $system.rates(&q, &p, &mut qd, &mut pd);
         let (mut v, mut qd2, mut pd2) = ([0.0; NV], [0.0; NQ], [0.0; NV]);
-        $interpreter.rates_into(&q, &p, &mut v, &mut qd2, &mut pd2);
+        $interpreter.rates(&q, &p, &mut v, &mut qd2, &mut pd2);
         same("qd", state, &qd, &qd2);
         same("pd", state, &pd, &pd2);
         $system.coordinate_rates(&q, &v, &mut qd);
@@ -175,9 +175,9 @@ macro_rules! output {
     (drifts, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
         let count = $interpreter.tree().frames.len();
         let (mut ours, mut theirs) = ([[0.0; 6]; 3], vec![[0.0; 6]; count]);
-        $system.drifts(&$given.q, &$given.v, (&mut ours[..count]).try_into().expect("at most three frames"));
-        $interpreter.drifts(&$given.q, &$given.v, &mut theirs);
-        same("drifts", $given.state, &ours[..count].concat(), &theirs.concat());
+        $system.bias_accelerations(&$given.q, &$given.v, (&mut ours[..count]).try_into().expect("at most three frames"));
+        $interpreter.bias_accelerations(&$given.q, &$given.v, &mut theirs);
+        same("bias_accelerations", $given.state, &ours[..count].concat(), &theirs.concat());
     };
     (frames, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
         let count = $interpreter.tree().frames.len();

@@ -120,7 +120,7 @@ macro_rules! compare {
                 let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
                 let (mut v2, mut qd2, mut pd2) = (vec![0.0; NV], vec![0.0; NQ], vec![0.0; NV]);
                 made.rates(&q, &p, &mut qd, &mut pd);
-                interpreter.rates_into(&q, &p, &mut v2, &mut qd2, &mut pd2);
+                interpreter.rates(&q, &p, &mut v2, &mut qd2, &mut pd2);
                 assert_eq!(bits(&qd), bits(&qd2), "qd, state {seed}");
                 assert_eq!(bits(&pd), bits(&pd2), "pd, state {seed}");
 

@@ -82,8 +82,8 @@ fn closed(plan: &Plan) -> (Interpreter<f64>, Vec<f64>) {
 /// Number of independent rows of `Φ`, by elimination with complete pivoting: nothing of the mechanism's own.
 fn rank(interpreter: &mut Interpreter<f64>, q: &[f64]) -> usize {
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    interpreter.closure(&q.to_vec(), &mut residual, &mut entries);
-    let nv = interpreter.rest().len();
+    interpreter.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
+    let nv = interpreter.zero_momenta().len();
     let row = |row: &multibody::runtime::system::Row| {
         let mut dense = vec![0.0; nv];
         (row.first..row.first + row.len).for_each(|e| dense[interpreter.entry_columns()[e]] += entries[e]);
@@ -130,8 +130,8 @@ fn they_close_and_have_the_mobility_that_mechanics_says() {
         assert_eq!(plan.dims.rows, case.rows, "{}", case.name);
         let independent = plan.dims.nv - case.mobility;
         assert_eq!(rank(&mut interpreter, &q), independent, "{}: rank of the rows", case.name);
-        let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.rest(), interpreter.zero_rows());
-        interpreter.correction(&q, &mut residual, &mut dq, &mut pivots);
+        let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
+        interpreter.position_correction(&q, &mut residual, &mut dq, &mut pivots);
         let used = pivots.iter().filter(|p| **p != 0.0).count();
         assert_eq!(used, independent, "{}: rows that are not left out: {pivots:?}", case.name);
     }
@@ -140,7 +140,7 @@ fn they_close_and_have_the_mobility_that_mechanics_says() {
 /// Rates of the rows at velocities, largest.
 fn broken(interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> f64 {
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    interpreter.closure(&q.to_vec(), &mut residual, &mut entries);
+    interpreter.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
     let columns = interpreter.entry_columns();
     let rate = |row: &multibody::runtime::system::Row| {
         (row.first..row.first + row.len).map(|e| entries[e] * v[columns[e]]).sum::<f64>()
@@ -153,10 +153,10 @@ fn they_keep_their_loops_and_their_energy() {
     for case in &CASES {
         let plan = plan(case.name);
         let (mut system, q) = closed(&plan);
-        let (mut v, mut p, mut sigma) = (system.rest(), system.rest(), system.zero_rows());
+        let (mut v, mut p, mut sigma) = (system.zero_momenta(), system.zero_momenta(), system.zero_rows());
         v[case.thrown.0] = case.thrown.1;
         system.momenta(&q, &v, &mut p);
-        system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+        system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
         let tolerance = 1e-9;
         let start =
             catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(tolerance)), compensated: false };
@@ -174,7 +174,7 @@ fn they_keep_their_loops_and_their_energy() {
             driver.state(&system, &mut q, &mut p);
             let (kinetic, potential) = energy(&mut system, &q, &p);
             (scale, worst) = (scale.max(kinetic), worst.max((kinetic + potential - before).abs()));
-            system.closure(&q, &mut residual, &mut entries);
+            system.constraint_residuals(&q, &mut residual, &mut entries);
             open = residual.iter().fold(open, |m, x| m.max(x.abs()));
             system.velocities(&q, &p, &mut v);
             let size = v.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
@@ -202,9 +202,9 @@ fn they_keep_their_loops_and_their_energy() {
 fn a_parallelogram_passes_its_change_points() {
     let plan = plan("fourbar_equal");
     let (mut system, mut q) = closed(&plan);
-    let (mut v, mut p, mut sigma) = (vec![6.0, 0.0, 0.0], system.rest(), system.zero_rows());
+    let (mut v, mut p, mut sigma) = (vec![6.0, 0.0, 0.0], system.zero_momenta(), system.zero_rows());
     system.momenta(&q, &v, &mut p);
-    system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = sum(system.energy(&q, &p));
     let start = catalogue::Start { q: &q.clone(), p: &p.clone(), step: Step::Fixed(0.002), compensated: false };
@@ -232,7 +232,7 @@ fn a_parallelogram_passes_its_change_points() {
 fn a_change_point_takes_no_energy() {
     let plan = plan("fourbar_equal");
     let (mut system, mut q) = closed(&plan);
-    let (mut v, mut p) = (vec![0.1; 3], system.rest());
+    let (mut v, mut p) = (vec![0.1; 3], system.zero_momenta());
     complete(&mut system, 0.0, &q, &mut v, &[true], 1e-9).expect("velocities");
     system.momenta(&q, &v, &mut p);
     let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
@@ -286,9 +286,9 @@ fn the_bicycle_rides_as_published() {
     let plan = plan("bicycle");
     let (mut system, q) = closed(&plan);
     let mut v = vec![5.0, 0.0, 0.0, 1e-3, 0.0, 0.0, 5.0 / 0.3, 0.0, 5.0 / 0.35];
-    let (mut p, mut sigma) = (system.rest(), system.zero_rows());
+    let (mut p, mut sigma) = (system.zero_momenta(), system.zero_rows());
     system.momenta(&q, &v, &mut p);
-    system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     let start = catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(1e-11)), compensated: false };
     let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
     let mut driver =

@@ -122,7 +122,7 @@ fn check(name: &str) {
         // The reference's own momenta in, so that errors do not add up.
         layout.v_from(&q, &numbers(&state["p"]), &mut p);
         let (mut v2, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
-        interpreter.rates_into(&q, &p, &mut v2, &mut qd, &mut pd);
+        interpreter.rates(&q, &p, &mut v2, &mut qd, &mut pd);
         worst.compare("v", &ours(&v2), &numbers(&state["v"]));
         worst.compare("pd", &ours(&pd), &numbers(&state["pd"]));
         let mut qd_there = vec![0.0; their_nq];

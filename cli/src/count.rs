@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use multibody::codegen::emit::quantity;
-use multibody::codegen::generate::{trace, GroupProgram};
+use multibody::codegen::generate::{trace, OutputProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
-use multibody::codegen::plan::{Candidate, Forms, Plan, PlanOptions};
+use multibody::codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
 use multibody::codegen::symbolic::Counts;
-use multibody::codegen::{Arithmetic, Group, Options};
+use multibody::codegen::{Arithmetic, Output, Options};
 use serde_json::json;
 
 use super::args::CountArgs;
@@ -19,7 +19,7 @@ use super::{source, Outcome};
 /// Counts of one output.
 pub struct OutputCounts {
     /// Which.
-    pub group: Group,
+    pub group: Output,
     /// All of it.
     pub counts: Counts,
     /// By sweep.
@@ -28,7 +28,7 @@ pub struct OutputCounts {
 
 /// One output in one arithmetic, on the processor that schedules are made for.
 struct Speed {
-    group: Group,
+    group: Output,
     arithmetic: Arithmetic,
     counts: Counts,
     instructions: usize,
@@ -116,20 +116,20 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
 }
 
 /// Elimination forms that were tried: the best of every branch, or all.
-fn candidates(plan: &Plan, forms: Forms, all: bool, out: &mut dyn Write) -> Outcome {
+fn candidates(plan: &Plan, forms: EliminationStrategy, all: bool, out: &mut dyn Write) -> Outcome {
     let mut rest = &plan.candidates[..];
     while let Some(first) = rest.first() {
         let n = rest.iter().take_while(|c| c.branch == first.branch).count();
         let mut branch: Vec<&Candidate> = rest[..n].iter().collect();
         rest = &rest[n..];
         let key = |c: &Candidate| match forms {
-            Forms::Fastest => c.cost.cycles(),
+            EliminationStrategy::Fastest => c.cost.cycles(),
             _ => c.cost.operations as f64,
         };
         branch.sort_by(|a, b| key(a).total_cmp(&key(b)).then(b.taken.cmp(&a.taken)));
         let [from, to] = first.branch.map(|k| plan.nodes[k].name.as_str());
         let why = match forms {
-            Forms::Fastest => "fewest cycles for one state",
+            EliminationStrategy::Fastest => "fewest cycles for one state",
             _ => "fewest operations",
         };
         let alone = if plan.nodes.len() > first.nodes { ", of this branch alone" } else { "" };
@@ -176,7 +176,7 @@ pub fn all(plan: &Plan, options: &Options) -> Outcome<Vec<OutputCounts>> {
     options.outputs.iter().map(|&g| Ok(of_program(&trace(plan, g, options).map_err(generate::failure)?))).collect()
 }
 
-fn of_program(group: &GroupProgram) -> OutputCounts {
+fn of_program(group: &OutputProgram) -> OutputCounts {
     let program = &group.program;
     let quantities: BTreeSet<_> = program.steps.iter().map(|(_, _, (_, what))| *what).collect();
     let sweeps = quantities.into_iter().map(|q| (quantity(q).1, program.counts_where(|label| label.1 == q)));
@@ -185,7 +185,7 @@ fn of_program(group: &GroupProgram) -> OutputCounts {
 }
 
 /// The table of counts, with a row for each sweep of the outputs in `detailed`.
-pub fn table(counts: &[OutputCounts], detailed: &[Group], out: &mut dyn Write) -> Outcome {
+pub fn table(counts: &[OutputCounts], detailed: &[Output], out: &mut dyn Write) -> Outcome {
     let names = counts.iter().filter(|c| detailed.contains(&c.group)).flat_map(|c| c.sweeps.iter().map(|s| s.0));
     let wide = names.map(|n| n.chars().count() + 2).max().unwrap_or(0).max(16);
     let mut row = |name: &str, numbers: [&str; 6]| {
@@ -209,7 +209,7 @@ pub fn table(counts: &[OutputCounts], detailed: &[Group], out: &mut dyn Write) -
 
 /// Published formulas beside the rates of a serial chain of pins; nothing for other mechanisms.
 pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outcome {
-    let rates = counts.iter().find(|c| c.group == Group::Rates);
+    let rates = counts.iter().find(|c| c.group == Output::Rates);
     let (Some(n), Some(rates)) = (chain_of_pins(plan), rates) else { return Ok(()) };
     let ours = rates.counts.total();
     writeln!(out, "\nForward dynamics of {n} pins in a row, beside published formulas (upper bounds for any such chain, whereas the")?;
@@ -224,7 +224,7 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
 }
 
 /// Differences of one output with parts of the scene left out.
-fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
+fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
     let total = |plan: &Plan, options: &Options| -> Outcome<usize> {
         Ok(trace(plan, group, options).map_err(generate::failure)?.program.counts().total())
     };
@@ -255,7 +255,7 @@ fn parts(plan: &Plan, options: &Options, group: Group) -> Outcome<Vec<Part>> {
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
     let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
-    let single = Plan::new(&plan.model, PlanOptions { forms: Forms::Single, ..options.searches() });
+    let single = Plan::new(&plan.model, PlanOptions { forms: EliminationStrategy::Single, ..options.searches() });
     part(FORMS, total(&single, options)?.saturating_sub(here), true);
     Ok(parts)
 }

@@ -85,8 +85,8 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
             return Err(does_not_close(path, plan, interpreter, &q, error, free));
         }
     };
-    let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.rest(), interpreter.zero_rows());
-    interpreter.correction(&q, &mut residual, &mut dq, &mut pivots);
+    let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
+    interpreter.position_correction(&q, &mut residual, &mut dq, &mut pivots);
     let rows = interpreter.rows();
     let bonds: Vec<Bond> = (0..plan.model.constraints.len())
         .map(|k| {
@@ -121,9 +121,9 @@ pub fn velocities(
             Err(_) => {}
         }
     }
-    let (mut p, mut sigma) = (interpreter.rest(), interpreter.zero_rows());
+    let (mut p, mut sigma) = (interpreter.zero_momenta(), interpreter.zero_rows());
     interpreter.momenta(&q, &v.clone(), &mut p);
-    interpreter.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    interpreter.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     Ok(v)
 }
 
@@ -141,7 +141,7 @@ fn does_not_close(
         return Failure::new(what, "look for very large numbers in the model and its start");
     };
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    interpreter.closure(&q.to_vec(), &mut residual, &mut entries);
+    interpreter.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
     let mut open: Vec<(usize, f64, usize)> = Vec::new();
     for k in 0..plan.model.constraints.len() {
         let own = interpreter.rows().iter().enumerate().filter(|(_, row)| row.constraint == k);
@@ -184,7 +184,7 @@ fn unit(model: &Model, k: usize, at: usize) -> &'static str {
     let first_angle = match &model.constraints[k].kind {
         ConstraintKind::Coupling { terms, .. } => {
             let slides =
-                terms.iter().filter(|(j, _)| matches!(model.joints[*j].kind, JointKind::Slider { .. })).count();
+                terms.iter().filter(|(j, _)| matches!(model.joints[*j].kind, JointKind::Prismatic { .. })).count();
             return match slides {
                 0 => "rad",
                 n if n == terms.len() => "m",
@@ -193,7 +193,7 @@ fn unit(model: &Model, k: usize, at: usize) -> &'static str {
         }
         ConstraintKind::Loop { kind, .. } => match kind {
             LoopKind::Planar { .. } => 1,
-            LoopKind::Slider { .. } | LoopKind::Cylindrical { .. } => 2,
+            LoopKind::Prismatic { .. } | LoopKind::Cylindrical { .. } => 2,
             LoopKind::Helical { .. } if at == 4 => return "m",
             LoopKind::Helical { .. } => 2,
             _ => 3,
@@ -275,10 +275,10 @@ pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &
     }
     let q = q.to_vec();
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    let (mut p, mut allowed, mut sigma) = (interpreter.rest(), interpreter.rest(), interpreter.zero_rows());
+    let (mut p, mut allowed, mut sigma) = (interpreter.zero_momenta(), interpreter.zero_momenta(), interpreter.zero_rows());
     interpreter.momenta(&q, v, &mut p);
-    interpreter.settle(0.0, &q, &mut p, &mut allowed, &mut sigma);
-    interpreter.closure(&q, &mut residual, &mut entries);
+    interpreter.project_momenta(0.0, &q, &mut p, &mut allowed, &mut sigma);
+    interpreter.constraint_residuals(&q, &mut residual, &mut entries);
     let mut worst = vec![[0.0_f64; 2]; plan.model.constraints.len()];
     let columns = interpreter.entry_columns();
     for (row, residual) in interpreter.rows().iter().zip(&residual) {

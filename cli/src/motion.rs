@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
-use multibody::runtime::constrained::{Boundary, ConstraintError, Effort, Hold, Stabilisation};
+use multibody::runtime::constrained::{PostStep, ConstraintError, Effort, Hold, Stabilisation};
 use multibody::runtime::integrate::catalogue::{self, Drive, Start};
-use multibody::runtime::integrate::{Projection, Statistics, Step, StepError};
+use multibody::runtime::integrate::{EnergyProjection, Statistics, Step, StepError};
 use multibody::runtime::interp::RankLoss;
 use multibody::runtime::{Constrained, Interpreter};
 
@@ -135,7 +135,7 @@ impl Observer {
     fn end(&mut self, t: f64, q: &[f64], p: &[f64], kept: bool) {
         let Observer { interpreter, record, residual, entries, .. } = self;
         if !residual.is_empty() {
-            interpreter.closure(&q.to_vec(), residual, entries);
+            interpreter.constraint_residuals(&q.to_vec(), residual, entries);
             record.drift.left = record.drift.left.max(loops::largest(interpreter.rows(), residual));
         }
         let (kinetic, potential) = self.interpreter.energy(q, p);
@@ -154,7 +154,7 @@ struct Keeper {
     met: Rc<RefCell<Drift>>,
 }
 
-impl Boundary<Timed> for Keeper {
+impl PostStep<Timed> for Keeper {
     fn close(
         &mut self,
         system: &mut Timed,
@@ -191,7 +191,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     if bound {
         // Velocities that the loops allow, nearest in the metric of the mass matrix.
         let mut v = v.clone();
-        interpreter.settle(0.0, &q, &mut p, &mut v, &mut residual);
+        interpreter.project_momenta(0.0, &q, &mut p, &mut v, &mut residual);
     }
     let (kinetic, potential) = interpreter.energy(&q, &p);
     let mut observer = Observer {
@@ -219,7 +219,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let made =
         made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
     let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
-    let mut projection = settings.project.then(|| Projection::new(&mut system, &q, &p, 3));
+    let mut projection = settings.project.then(|| EnergyProjection::new(&mut system, &q, &p, 3));
     observer.end(0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
     let clock = Instant::now();
@@ -239,7 +239,7 @@ fn go(
     driver: &mut dyn Drive<Timed>,
     system: &mut Timed,
     settings: &Settings,
-    projection: &mut Option<Projection<Timed>>,
+    projection: &mut Option<EnergyProjection<Timed>>,
     observer: &mut Observer,
 ) -> Result<(), StepError> {
     let (time, every) = (settings.time, settings.every);

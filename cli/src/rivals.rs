@@ -3,7 +3,7 @@
 //! J. Naudet, *Forward Dynamics of Multibody Systems: A Recursive Hamiltonian Approach* (2005), table 4.1: additions and
 //! multiplications for a chain of `n ≥ 3` bodies with pin joints, given there as upper bounds.
 
-use multibody::codegen::model::{JointKind, Motion};
+use multibody::codegen::model::{JointKind, JointMotion};
 use multibody::codegen::plan::Plan;
 
 /// One formula, `a n − b`.
@@ -39,7 +39,7 @@ impl Rival {
 pub fn chain_of_pins(plan: &Plan) -> Option<usize> {
     let serial = plan.nodes.iter().enumerate().all(|(k, node)| node.parent == k.checked_sub(1));
     let pins = plan.model.joints.iter().all(|j| {
-        let pin = matches!(j.kind, JointKind::Pin { .. }) && j.motion == Motion::Free;
+        let pin = matches!(j.kind, JointKind::Revolute { .. }) && j.motion == JointMotion::Free;
         pin || j.kind == JointKind::Fixed
     });
     (serial && pins && plan.nodes.len() >= 3).then_some(plan.nodes.len())

@@ -246,11 +246,11 @@ pub fn default_start(plan: &Plan) -> Vec<f64> {
     for slot in &plan.slots {
         let Some(Source::State { q: at, .. }) = slot.at else { continue };
         match plan.model.joints[slot.joint].kind {
-            JointKind::Pin { .. } | JointKind::Helical { .. } => {
+            JointKind::Revolute { .. } | JointKind::Helical { .. } => {
                 q[at] = angle;
                 angle = -angle;
             }
-            JointKind::Slider { .. } => q[at] = 0.05,
+            JointKind::Prismatic { .. } => q[at] = 0.05,
             _ => {}
         }
     }
@@ -316,8 +316,8 @@ fn units(plan: &Plan) -> Vec<&'static str> {
     let free = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::State { .. })));
     free.flat_map(|slot| -> &'static [&'static str] {
         match plan.model.joints[slot.joint].kind {
-            JointKind::Pin { .. } | JointKind::Helical { .. } => &["rad"],
-            JointKind::Slider { .. } => &["m"],
+            JointKind::Revolute { .. } | JointKind::Helical { .. } => &["rad"],
+            JointKind::Prismatic { .. } => &["m"],
             JointKind::Cylindrical { .. } => &["m", "rad"],
             JointKind::Universal { .. } => &["rad", "rad"],
             JointKind::Planar { .. } => &["m", "m", "rad"],

@@ -5,8 +5,8 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{self, Arithmetic, Group, Loops, Options, Precision};
+use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::{self, Arithmetic, Output, RolledCode, Options, Precision};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
@@ -101,7 +101,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
     if module(&entry.file).is_none() {
         return Err(wrong("the name of the file must be a module's, such as `robot.rs`".into()));
     }
-    let group = |name: &String| Group::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
+    let group = |name: &String| Output::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
     let base = match entry.base.as_deref() {
         None | Some("fixed") => Base::Fixed,
         Some("floating") => Base::Floating,
@@ -121,15 +121,15 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         Some(other) => return Err(wrong(format!("`{other}` is no arithmetic"))),
     };
     let forms = match entry.forms.as_deref() {
-        None => Forms::default(),
+        None => EliminationStrategy::default(),
         Some(name) => {
-            *Forms::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
+            *EliminationStrategy::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
         }
     };
     let loops = match entry.loops.as_deref() {
-        None => Loops::default(),
+        None => RolledCode::default(),
         Some(name) => {
-            let found = Loops::ALL.iter().find(|l| l.name() == name);
+            let found = RolledCode::ALL.iter().find(|l| l.name() == name);
             *found.ok_or_else(|| wrong(format!("`loops` is auto, always or never, not `{name}`")))?
         }
     };

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use multibody::runtime::system::{Group, Row};
+use multibody::runtime::system::{LieJoint, Row};
 use multibody::runtime::{Blocks, Constrained, Differentiable, Energetic, Interpreter, System};
 
 /// Time that calls of one kind take.
@@ -62,7 +62,7 @@ impl Timed {
 }
 
 impl Energetic for Timed {
-    fn state_energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
+    fn energies(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
         self.inner.energy(q, p)
     }
 }
@@ -75,15 +75,15 @@ impl System for Timed {
     fn neutral(&self) -> Vec<f64> {
         self.inner.neutral()
     }
-    fn rest(&self) -> Vec<f64> {
-        self.inner.rest()
+    fn zero_momenta(&self) -> Vec<f64> {
+        self.inner.zero_momenta()
     }
-    fn groups(&self) -> &[Group] {
-        self.inner.groups()
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.inner.lie_joints()
     }
-    fn state_rates(&mut self, t: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
+    fn rates_at(&mut self, t: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
         let Timed { inner, rates, output, .. } = self;
-        rates[usize::from(*output)].time(|| inner.state_rates(t, q, p, qd, pd));
+        rates[usize::from(*output)].time(|| inner.rates_at(t, q, p, qd, pd));
     }
     fn coordinate_rates(&self, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>) {
         self.inner.coordinate_rates(q, v, qd);
@@ -106,16 +106,16 @@ impl Constrained for Timed {
     fn entry_columns(&self) -> &[usize] {
         self.inner.entry_columns()
     }
-    fn closure(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
-        self.inner.closure(q, residual, jacobian);
+    fn constraint_residuals(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
+        self.inner.constraint_residuals(q, residual, jacobian);
     }
-    fn settle(&mut self, t: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
+    fn project_momenta(&mut self, t: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
         let Timed { inner, constraints, output, .. } = self;
-        constraints[usize::from(*output)].time(|| inner.settle(t, q, p, v, sigma));
+        constraints[usize::from(*output)].time(|| inner.project_momenta(t, q, p, v, sigma));
     }
-    fn correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
+    fn position_correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
         let Timed { inner, constraints, output, .. } = self;
-        constraints[usize::from(*output)].time(|| inner.correction(q, residual, dq, pivots));
+        constraints[usize::from(*output)].time(|| inner.position_correction(q, residual, dq, pivots));
     }
     fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
         self.inner.multipliers(t, q, v, lambda);

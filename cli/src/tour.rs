@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::codegen::{Group, Options};
+use multibody::codegen::{Output, Options};
 use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;
@@ -87,7 +87,7 @@ fn plan() -> Outcome<Plan> {
 }
 
 fn counts(plan: &Plan, out: &mut dyn Write) -> Outcome {
-    use Group::{Accelerations, Energy, MassMatrix, Momenta, Rates, Velocities};
+    use Output::{Accelerations, Energy, MassMatrix, Momenta, Rates, Velocities};
     let outputs = vec![Rates, Velocities, Momenta, Energy, Accelerations, MassMatrix];
     let options = Options { outputs, ..Options::default() };
     let counts = count::all(plan, &options)?;
@@ -131,7 +131,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
         interpreter.inputs.tau.copy_from_slice(&s.tau);
         let (mut a, mut b, mut c, mut d, mut v) = (zero, zero, zero, zero, zero);
         Ur5::rates(generated, &s.q, &s.p, &mut a, &mut b);
-        interpreter.rates_into(&s.q, &s.p, &mut v, &mut c, &mut d);
+        interpreter.rates(&s.q, &s.p, &mut v, &mut c, &mut d);
         same(k, "rates", &[a, b].concat(), &[c, d].concat())?;
         generated.velocities(&s.q, &s.p, &mut a);
         same(k, "velocities", &a, &v)?;
@@ -226,7 +226,7 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
         black_box((&qd, &pd));
     });
     let slow = timed(30, &mut |s| {
-        interpreter.rates_into(black_box(&s.q), black_box(&s.p), &mut v, &mut qd, &mut pd);
+        interpreter.rates(black_box(&s.q), black_box(&s.p), &mut v, &mut qd, &mut pd);
         black_box((&qd, &pd));
     });
     writeln!(out, "5. Evaluations of (q, p) -> (q', p') in a second, one after the other, on one core:")?;

@@ -2,13 +2,13 @@
 //! through here.
 
 use crate::emit;
-use crate::loops::looped;
+use crate::rolled::rolled;
 use crate::model::Model;
-pub use crate::options::{Arithmetic, Group, Loops, Options, Precision};
+pub use crate::options::{Arithmetic, Output, RolledCode, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Counts, Operand, Output};
+use crate::symbolic::{Counts, Operand, ProgramResult};
 use crate::trace::coordinate_map;
-pub use crate::trace::{chosen_frames, trace, GroupProgram, InputArray};
+pub use crate::trace::{chosen_frames, trace, OutputProgram, InputArray};
 
 /// Generated code and what is known about it.
 #[derive(Clone, Debug)]
@@ -16,7 +16,7 @@ pub struct Generated {
     /// Rust source: one type with its functions.
     pub source: String,
     /// Operations of each function.
-    pub counts: Vec<(Group, Counts)>,
+    pub counts: Vec<(Output, Counts)>,
     /// What was changed on the way.
     pub notices: Vec<String>,
 }
@@ -29,8 +29,8 @@ pub struct Generated {
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
     let options = &options.of_model(model);
     let plan = Plan::new(model, options.searches());
-    let groups = options.outputs.iter().map(|&g| match looped(&plan, g, options) {
-        Some(program) => Ok(GroupProgram::looped(program)),
+    let groups = options.outputs.iter().map(|&g| match rolled(&plan, g, options) {
+        Some(program) => Ok(OutputProgram::rolled(program)),
         None => trace(&plan, g, options),
     });
     let groups = groups.collect::<Result<Vec<_>, String>>()?;
@@ -42,7 +42,7 @@ pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
 }
 
 /// Refuses infinities, which no literal can state, and with them models that divide by zero whatever the state is.
-fn finite(plan: &Plan, group: &GroupProgram, precision: Precision) -> Result<(), String> {
+fn finite(plan: &Plan, group: &OutputProgram, precision: Precision) -> Result<(), String> {
     let fits = |x: f64| match precision {
         Precision::F64 => x.is_finite(),
         Precision::F32 => (x as f32).is_finite(),
@@ -59,7 +59,7 @@ fn finite(plan: &Plan, group: &GroupProgram, precision: Precision) -> Result<(),
             ));
         }
     }
-    match group.program.outputs.iter().any(|o| matches!(o, Output::Const(x) if !fits(*x))) {
+    match group.program.outputs.iter().any(|o| matches!(o, ProgramResult::Const(x) if !fits(*x))) {
         true => Err(format!("`{name}` has a result that is always infinite: is there a freedom without inertia?")),
         false => Ok(()),
     }

@@ -17,7 +17,7 @@ pub fn pinocchio(plan: &Plan) -> Layout {
             JointKind::Planar { .. } => Form::PlanarCosSin,
             JointKind::Spherical => Form::Quaternion,
             JointKind::Floating => Form::Floating,
-            JointKind::Pin { .. } if joint.unbounded => Form::CosSin,
+            JointKind::Revolute { .. } if joint.unbounded => Form::CosSin,
             kind => Form::Same { n: kind.nv() },
         }
     })

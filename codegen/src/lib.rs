@@ -6,7 +6,7 @@ pub mod emit;
 pub mod generate;
 pub mod import;
 pub mod layout;
-pub mod loops;
+pub mod rolled;
 pub mod model;
 pub mod options;
 pub mod plan;
@@ -14,4 +14,4 @@ pub mod symbolic;
 pub mod trace;
 pub mod wide;
 
-pub use generate::{generate, Arithmetic, Generated, Group, Loops, Options, Precision};
+pub use generate::{generate, Arithmetic, Generated, Output, RolledCode, Options, Precision};

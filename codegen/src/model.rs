@@ -87,12 +87,12 @@ pub struct Body {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKind {
     /// One turn.
-    Pin {
+    Revolute {
         /// Axis of rotation.
         axis: [f64; 3],
     },
     /// One slide.
-    Slider {
+    Prismatic {
         /// Direction of sliding.
         axis: [f64; 3],
     },
@@ -131,7 +131,7 @@ impl JointKind {
     pub fn nq(&self) -> usize {
         match self {
             JointKind::Fixed => 0,
-            JointKind::Pin { .. } | JointKind::Slider { .. } | JointKind::Helical { .. } => 1,
+            JointKind::Revolute { .. } | JointKind::Prismatic { .. } | JointKind::Helical { .. } => 1,
             JointKind::Cylindrical { .. } | JointKind::Universal { .. } => 2,
             JointKind::Planar { .. } => 3,
             JointKind::Spherical => 4,
@@ -151,7 +151,7 @@ impl JointKind {
 
 /// Where a joint's coordinates come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Motion {
+pub enum JointMotion {
     /// From the state.
     Free,
     /// From inputs: position, rate and acceleration (a rheonomic drive).
@@ -183,7 +183,7 @@ pub struct Joint {
     /// A pin without limits that other programs may store as cosine and sine; changes nothing here.
     pub unbounded: bool,
     /// Source of the coordinates.
-    pub motion: Motion,
+    pub motion: JointMotion,
     /// Viscous damping per freedom, N m s/rad or N s/m.
     pub damping: Vec<Value>,
     /// Spring stiffness per freedom.
@@ -247,12 +247,12 @@ pub struct Mount {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoopKind {
     /// As a pin would: leaves one turn.
-    Pin {
+    Revolute {
         /// Axis of rotation.
         axis: [f64; 3],
     },
     /// Leaves one slide.
-    Slider {
+    Prismatic {
         /// Direction of sliding.
         axis: [f64; 3],
     },
@@ -337,8 +337,8 @@ impl LoopKind {
     /// Its name in descriptions.
     pub fn word(&self) -> &'static str {
         match self {
-            LoopKind::Pin { .. } => "pin",
-            LoopKind::Slider { .. } => "slider",
+            LoopKind::Revolute { .. } => "pin",
+            LoopKind::Prismatic { .. } => "slider",
             LoopKind::Cylindrical { .. } => "cylindrical",
             LoopKind::Helical { .. } => "helical",
             LoopKind::Universal { .. } => "universal",

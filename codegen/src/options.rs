@@ -44,7 +44,7 @@ impl Arithmetic {
 
 /// Where generated code takes loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Loops {
+pub enum RolledCode {
     /// Over runs of like links that are long enough to gain by it, branch by branch.
     #[default]
     Auto,
@@ -54,23 +54,23 @@ pub enum Loops {
     Never,
 }
 
-impl Loops {
+impl RolledCode {
     /// All of them.
-    pub const ALL: [Loops; 3] = [Loops::Auto, Loops::Always, Loops::Never];
+    pub const ALL: [RolledCode; 3] = [RolledCode::Auto, RolledCode::Always, RolledCode::Never];
 
     /// Its name in options.
     pub fn name(self) -> &'static str {
         match self {
-            Loops::Auto => "auto",
-            Loops::Always => "always",
-            Loops::Never => "never",
+            RolledCode::Auto => "auto",
+            RolledCode::Always => "always",
+            RolledCode::Never => "never",
         }
     }
 }
 
 /// What generated code can compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Group {
+pub enum Output {
     /// `(q, p) → (q̇, ṗ)`; makes the type a `System`.
     Rates,
     /// `(q, p) → v`.
@@ -94,7 +94,7 @@ pub enum Group {
     /// `q →` Jacobians of frames.
     Jacobians,
     /// `(q, v) →` accelerations of frames at `v̇ = 0`.
-    Drifts,
+    BiasAccelerations,
     /// `(q, p) →` velocities, momentum rates, and their derivatives with respect to coordinates and momenta; with the
     /// rates, makes the type `Differentiable`.
     Derivatives,
@@ -103,81 +103,81 @@ pub enum Group {
     /// `(q, p) →` derivatives of velocities and momentum rates with respect to the parameters.
     ParameterDerivatives,
     /// `q →` residuals of the constraints and the entries of `Φ`.
-    Closure,
+    ConstraintResiduals,
     /// `(q, p) →` velocities, momenta freed of multipliers, multipliers `σ`.
-    Settle,
+    ProjectMomenta,
     /// `q →` residuals of the constraints, Newton's step onto the closed positions, and its pivots.
-    Correction,
+    PositionCorrection,
     /// `(q, v) → λ`; with the rates and the three before it, makes the type `Constrained`.
     Multipliers,
 }
 
-impl Group {
+impl Output {
     /// Those of every mechanism.
-    pub const ALL: [Group; 15] = [
-        Group::Rates,
-        Group::Velocities,
-        Group::Momenta,
-        Group::Energy,
-        Group::Accelerations,
-        Group::Reactions,
-        Group::MassMatrix,
-        Group::Frames,
-        Group::InverseDynamics,
-        Group::Bias,
-        Group::Jacobians,
-        Group::Drifts,
-        Group::Derivatives,
-        Group::MomentumDerivatives,
-        Group::ParameterDerivatives,
+    pub const ALL: [Output; 15] = [
+        Output::Rates,
+        Output::Velocities,
+        Output::Momenta,
+        Output::Energy,
+        Output::Accelerations,
+        Output::Reactions,
+        Output::MassMatrix,
+        Output::Frames,
+        Output::InverseDynamics,
+        Output::Bias,
+        Output::Jacobians,
+        Output::BiasAccelerations,
+        Output::Derivatives,
+        Output::MomentumDerivatives,
+        Output::ParameterDerivatives,
     ];
 
     /// Those that mechanisms with constraints have besides.
-    pub const CONSTRAINED: [Group; 4] = [Group::Closure, Group::Settle, Group::Correction, Group::Multipliers];
+    pub const CONSTRAINED: [Output; 4] = [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
 
     /// Both.
-    pub fn every() -> impl Iterator<Item = Group> + Clone {
-        Group::ALL.into_iter().chain(Group::CONSTRAINED)
+    pub fn every() -> impl Iterator<Item = Output> + Clone {
+        Output::ALL.into_iter().chain(Output::CONSTRAINED)
     }
 
     /// Name of the generated function, and of the output in options.
     pub fn name(self) -> &'static str {
         match self {
-            Group::Rates => "rates",
-            Group::Velocities => "velocities",
-            Group::Momenta => "momenta",
-            Group::Energy => "energy",
-            Group::Accelerations => "accelerations",
-            Group::Reactions => "reactions",
-            Group::MassMatrix => "mass_matrix",
-            Group::Frames => "frames",
-            Group::InverseDynamics => "inverse_dynamics",
-            Group::Bias => "bias",
-            Group::Jacobians => "jacobians",
-            Group::Drifts => "drifts",
-            Group::Derivatives => "derivatives",
-            Group::MomentumDerivatives => "momentum_derivatives",
-            Group::ParameterDerivatives => "parameter_derivatives",
-            Group::Closure => "closure",
-            Group::Settle => "settle",
-            Group::Correction => "correction",
-            Group::Multipliers => "multipliers",
+            Output::Rates => "rates",
+            Output::Velocities => "velocities",
+            Output::Momenta => "momenta",
+            Output::Energy => "energy",
+            Output::Accelerations => "accelerations",
+            Output::Reactions => "reactions",
+            Output::MassMatrix => "mass_matrix",
+            Output::Frames => "frames",
+            Output::InverseDynamics => "inverse_dynamics",
+            Output::Bias => "bias",
+            Output::Jacobians => "jacobians",
+            Output::BiasAccelerations => "bias_accelerations",
+            Output::Derivatives => "derivatives",
+            Output::MomentumDerivatives => "momentum_derivatives",
+            Output::ParameterDerivatives => "parameter_derivatives",
+            Output::ConstraintResiduals => "constraint_residuals",
+            Output::ProjectMomenta => "project_momenta",
+            Output::PositionCorrection => "position_correction",
+            Output::Multipliers => "multipliers",
         }
     }
 
     /// Whether it has one result for each chosen frame.
     pub fn of_frames(self) -> bool {
-        matches!(self, Group::Frames | Group::Jacobians | Group::Drifts)
+        matches!(self, Output::Frames | Output::Jacobians | Output::BiasAccelerations)
     }
 
     /// Whether mechanisms with constraints lack it.
     pub fn of_trees(self) -> bool {
-        self == Group::MomentumDerivatives
+        self == Output::MomentumDerivatives
     }
 
     /// The group of a name.
-    pub fn from_name(name: &str) -> Option<Group> {
-        Group::every().find(|g| g.name() == name)
+    pub fn from_name(name: &str) -> Option<Output> {
+        Output::every().find(|g| g.name() == name)
     }
 }
 
@@ -187,12 +187,12 @@ pub struct Options {
     /// Name of the generated type.
     pub type_name: String,
     /// What it computes.
-    pub outputs: Vec<Group>,
+    pub outputs: Vec<Output>,
     /// Its numbers.
     pub precision: Precision,
     /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
     pub efforts: bool,
-    /// Names of the frames of [`Group::Frames`], [`Group::Jacobians`] and [`Group::Drifts`]; empty means all.
+    /// Names of the frames of [`Output::Frames`], [`Output::Jacobians`] and [`Output::BiasAccelerations`]; empty means all.
     pub frames: Vec<String>,
     /// How the structure is chosen.
     pub plan: PlanOptions,
@@ -207,28 +207,28 @@ pub struct Options {
 }
 
 impl Options {
-    /// What is computed unless something else is asked for; and, where there are constraints, [`Group::CONSTRAINED`].
-    pub const OUTPUTS: [Group; 3] = [Group::Rates, Group::Momenta, Group::Energy];
+    /// What is computed unless something else is asked for; and, where there are constraints, [`Output::CONSTRAINED`].
+    pub const OUTPUTS: [Output; 3] = [Output::Rates, Output::Momenta, Output::Energy];
 
     /// The options for a model: where the outputs are [`Options::OUTPUTS`] or all of them, one with constraints also gets
-    /// [`Group::CONSTRAINED`], and not what such models lack.
+    /// [`Output::CONSTRAINED`], and not what such models lack.
     pub fn of_model(&self, model: &Model) -> Options {
         let mut options = self.clone();
         let asked =
-            |groups: &[Group]| groups.len() == self.outputs.len() && groups.iter().all(|g| self.outputs.contains(g));
-        if !model.constraints.is_empty() && (asked(&Options::OUTPUTS) || asked(&Group::ALL)) {
+            |groups: &[Output]| groups.len() == self.outputs.len() && groups.iter().all(|g| self.outputs.contains(g));
+        if !model.constraints.is_empty() && (asked(&Options::OUTPUTS) || asked(&Output::ALL)) {
             options.outputs.retain(|g| !g.of_trees());
-            options.outputs.extend(Group::CONSTRAINED);
+            options.outputs.extend(Output::CONSTRAINED);
         }
         options
     }
 
     /// [`Options::plan`] without the searches that no output asks for.
     pub fn searches(&self) -> PlanOptions {
-        let asked = |groups: &[Group]| self.outputs.iter().any(|g| groups.contains(g));
+        let asked = |groups: &[Output]| self.outputs.iter().any(|g| groups.contains(g));
         PlanOptions {
-            accelerations: self.plan.accelerations && asked(&[Group::Accelerations, Group::Reactions]),
-            mass_matrix: self.plan.mass_matrix && asked(&[Group::MassMatrix]),
+            accelerations: self.plan.accelerations && asked(&[Output::Accelerations, Output::Reactions]),
+            mass_matrix: self.plan.mass_matrix && asked(&[Output::MassMatrix]),
             ..self.plan
         }
     }

@@ -8,9 +8,9 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use crate::loops::LoopProgram;
+use crate::rolled::RolledProgram;
 use crate::model::Gravity;
-use crate::options::{Group, Options, Precision};
+use crate::options::{Output, Options, Precision};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Counts, Expr, Graph, Program};
 
@@ -27,21 +27,21 @@ pub struct InputArray {
 
 /// Program of one output group.
 #[derive(Clone, Debug)]
-pub struct GroupProgram {
+pub struct OutputProgram {
     /// Which.
-    pub group: Group,
+    pub group: Output,
     /// Input arrays, numbered through.
     pub inputs: Vec<InputArray>,
     /// The program; empty where the group is in loop form.
     pub program: Program,
     /// The group in loop form.
-    pub loops: Option<LoopProgram>,
+    pub loops: Option<RolledProgram>,
 }
 
-impl GroupProgram {
+impl OutputProgram {
     /// A group in loop form.
-    pub fn looped(loops: LoopProgram) -> GroupProgram {
-        GroupProgram {
+    pub fn rolled(loops: RolledProgram) -> OutputProgram {
+        OutputProgram {
             group: loops.group,
             inputs: loops.inputs.clone(),
             program: Program::default(),
@@ -51,7 +51,7 @@ impl GroupProgram {
 
     /// Operations that are executed.
     pub fn counts(&self) -> Counts {
-        self.loops.as_ref().map_or_else(|| self.program.counts(), LoopProgram::counts)
+        self.loops.as_ref().map_or_else(|| self.program.counts(), RolledProgram::counts)
     }
 }
 
@@ -63,7 +63,7 @@ pub(crate) struct Symbols<'g> {
 }
 
 /// What a group is given, as symbols.
-pub(crate) struct Given<'g> {
+pub(crate) struct SymbolicInputs<'g> {
     /// Input arrays, numbered through.
     pub arrays: Vec<InputArray>,
     /// Coordinates.
@@ -84,23 +84,23 @@ pub(crate) struct Given<'g> {
     pub gravity: [Expr<'g>; 3],
 }
 
-impl<'g> Given<'g> {
+impl<'g> SymbolicInputs<'g> {
     /// Symbols for the inputs of a group.
-    pub fn new(graph: &'g Graph, plan: &Plan, group: Group, options: &Options) -> Given<'g> {
+    pub fn new(graph: &'g Graph, plan: &Plan, group: Output, options: &Options) -> SymbolicInputs<'g> {
         let mut symbols = Symbols { graph, arrays: Vec::new(), next: 0 };
         let dims = plan.dims;
         let q = symbols.array("q", dims.nq);
         let second = match group {
-            Group::Rates
-            | Group::Velocities
-            | Group::Energy
-            | Group::Derivatives
-            | Group::ParameterDerivatives
-            | Group::Settle => symbols.array("p", dims.nv),
-            Group::MassMatrix | Group::Jacobians | Group::Closure | Group::Correction => Vec::new(),
+            Output::Rates
+            | Output::Velocities
+            | Output::Energy
+            | Output::Derivatives
+            | Output::ParameterDerivatives
+            | Output::ProjectMomenta => symbols.array("p", dims.nv),
+            Output::MassMatrix | Output::Jacobians | Output::ConstraintResiduals | Output::PositionCorrection => Vec::new(),
             _ => symbols.array("v", dims.nv),
         };
-        let third = if group == Group::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
+        let third = if group == Output::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
         let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
         let drive_q = symbols.array("self.drive_q", dims.drive_q);
         let drive_v = symbols.array("self.drive_v", dims.drive_v);
@@ -119,7 +119,7 @@ impl<'g> Given<'g> {
             }
         };
         let drive = [drive_q, drive_v, drive_a];
-        Given { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
+        SymbolicInputs { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
     }
 
     /// As the sweeps take it.
@@ -149,10 +149,10 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Strin
 }
 
 /// Whether a model has an output.
-fn has(plan: &Plan, group: Group) -> Result<(), String> {
+fn has(plan: &Plan, group: Output) -> Result<(), String> {
     let (name, constrained) = (group.name(), !plan.constraints.is_empty());
     let model = &plan.model.name;
-    if Group::CONSTRAINED.contains(&group) && !constrained {
+    if Output::CONSTRAINED.contains(&group) && !constrained {
         return Err(format!("`{name}` is an output of mechanisms with loops or couplings, and `{model}` has none"));
     }
     if group.of_trees() && constrained {
@@ -173,32 +173,32 @@ pub(crate) fn tolerance(precision: Precision) -> f64 {
 ///
 /// # Errors
 /// An unknown frame name in the options, or an output that the model does not have, as a message.
-pub fn trace(plan: &Plan, group: Group, options: &Options) -> Result<GroupProgram, String> {
+pub fn trace(plan: &Plan, group: Output, options: &Options) -> Result<OutputProgram, String> {
     has(plan, group)?;
     let graph = Graph::default();
-    let given = Given::new(&graph, plan, group, options);
+    let given = SymbolicInputs::new(&graph, plan, group, options);
     let mut physical: Tree<Expr> = plan.tree(&given.params);
     physical.tolerance = Expr::Const(tolerance(options.precision));
     let tree = physical.regrouped();
     let frames = chosen_frames(plan, options)?;
     let state = [given.q.as_slice(), &given.second, &given.third];
     let outputs = match group {
-        Group::Derivatives | Group::ParameterDerivatives if !plan.constraints.is_empty() => {
+        Output::Derivatives | Output::ParameterDerivatives if !plan.constraints.is_empty() => {
             directional::derivatives(&graph, plan, group, &given, tree.tolerance)
         }
-        Group::ParameterDerivatives => {
+        Output::ParameterDerivatives => {
             parameter_derivatives(&graph, plan, &tree, &given.q, &given.second, &given.params, &given.inputs())
         }
         _ => run(&graph, [&tree, &physical], group, state, &given.inputs(), &frames),
     };
     let program = passes::run(Program::new(&graph, &outputs), options.arithmetic, options.plan.forms);
-    Ok(GroupProgram { group, inputs: given.arrays, program, loops: None })
+    Ok(OutputProgram { group, inputs: given.arrays, program, loops: None })
 }
 
 fn run<'g>(
     graph: &'g Graph,
     [tree, physical]: [&Tree<Expr<'g>>; 2],
-    group: Group,
+    group: Output,
     [q, second, third]: [&[Expr<'g>]; 3],
     inputs: &Inputs<Expr<'g>>,
     frames: &[usize],
@@ -209,61 +209,61 @@ fn run<'g>(
     let zeros = |n: usize| vec![Expr::zero(); n];
     let mut v = zeros(dims.nv);
     match group {
-        Group::Rates => {
+        Output::Rates => {
             let (mut qd, mut pd) = (zeros(dims.nq), zeros(dims.nv));
             sweeps.rates(q, second, inputs, &mut w, &mut v, &mut qd, &mut pd);
             qd.extend(pd);
             qd
         }
-        Group::Velocities => {
+        Output::Velocities => {
             sweeps.velocities(q, second, inputs, &mut w, &mut v);
             v
         }
-        Group::Momenta => {
+        Output::Momenta => {
             sweeps.momenta(q, second, inputs, &mut w, &mut v);
             v
         }
-        Group::Energy => {
+        Output::Energy => {
             let (kinetic, potential) = sweeps.energy(q, second, inputs, &mut w, &mut v);
             vec![kinetic, potential]
         }
-        Group::Accelerations => {
+        Output::Accelerations => {
             let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
             sweeps.accelerations(q, second, inputs, &mut w, &mut v);
             v
         }
-        Group::Reactions => {
+        Output::Reactions => {
             let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
             sweeps.accelerations(q, second, inputs, &mut w, &mut v);
             let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
             Sweeps { tree: physical, trace: graph }.reactions(q, second, &v, inputs, &mut w, &mut out);
             out.concat()
         }
-        Group::InverseDynamics => {
+        Output::InverseDynamics => {
             sweeps.inverse_dynamics(q, second, third, inputs, &mut w, &mut v);
             v
         }
-        Group::Bias => {
+        Output::Bias => {
             sweeps.bias(q, second, inputs, &mut w, &mut v);
             v
         }
-        Group::Jacobians => {
+        Output::Jacobians => {
             let mut out = zeros(6 * dims.nv * frames.len());
             sweeps.jacobians(q, inputs, &mut w, frames.iter().map(|&k| &tree.frames[k]), &mut out);
             out
         }
-        Group::Drifts => {
+        Output::BiasAccelerations => {
             let mut out = vec![[Expr::zero(); 6]; frames.len()];
             let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut out);
-            sweeps.drifts(q, second, inputs, &mut w, pairs);
+            sweeps.bias_accelerations(q, second, inputs, &mut w, pairs);
             out.concat()
         }
-        Group::MassMatrix => {
+        Output::MassMatrix => {
             let mut m = zeros(dims.nv * dims.nv);
             sweeps.mass_matrix(q, inputs, &mut w, &mut m);
             m
         }
-        Group::Frames => {
+        Output::Frames => {
             let mut states = vec![FrameState::ground(); frames.len()];
             let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut states);
             sweeps.frame_states(q, second, inputs, &mut w, pairs);
@@ -273,39 +273,39 @@ fn run<'g>(
             let velocities = states.iter().flat_map(|s| motion(s.velocity));
             rotations.into_iter().chain(positions).chain(velocities).collect()
         }
-        Group::Derivatives => {
+        Output::Derivatives => {
             let mut d = Derivatives::new(tree);
             sweeps.derivatives(q, second, inputs, &mut w, &mut d);
             [d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp].concat()
         }
-        Group::MomentumDerivatives => {
+        Output::MomentumDerivatives => {
             let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
             sweeps.momentum_derivatives(q, second, inputs, &mut w, &mut d, &mut out);
             [out.p, out.pd, out.dp_dq, out.dp_dv, out.dpd_dq, out.dpd_dv].concat()
         }
-        Group::Closure => {
+        Output::ConstraintResiduals => {
             let (mut phi, mut entries) = (zeros(dims.rows), zeros(tree.entry_columns().len()));
-            sweeps.closure(q, inputs, &mut w, &mut phi, &mut entries);
+            sweeps.constraint_residuals(q, inputs, &mut w, &mut phi, &mut entries);
             [phi, entries].concat()
         }
-        Group::Settle => {
+        Output::ProjectMomenta => {
             let (mut freed, mut sigma) = (zeros(dims.nv), zeros(dims.rows));
-            sweeps.settle(q, second, inputs, &mut w, &mut v, &mut freed, &mut sigma);
+            sweeps.project_momenta(q, second, inputs, &mut w, &mut v, &mut freed, &mut sigma);
             [v, freed, sigma].concat()
         }
-        Group::Correction => {
+        Output::PositionCorrection => {
             let (mut phi, mut pivots) = (zeros(dims.rows), zeros(dims.rows));
-            sweeps.correction(q, inputs, &mut w, &mut phi, &mut v, &mut pivots);
+            sweeps.position_correction(q, inputs, &mut w, &mut phi, &mut v, &mut pivots);
             [phi, v, pivots].concat()
         }
-        Group::Multipliers => {
+        Output::Multipliers => {
             let mut lambda = zeros(dims.rows);
             let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
             sweeps.multipliers(q, second, inputs, &mut w, &mut v, &mut lambda);
             lambda
         }
         // Needs the plan: see `parameter_derivatives`.
-        Group::ParameterDerivatives => Vec::new(),
+        Output::ParameterDerivatives => Vec::new(),
     }
 }
 
@@ -343,7 +343,7 @@ fn parameter_derivatives<'g>(
 }
 
 /// Program of `q̇ = N(q) v`.
-pub(crate) fn coordinate_map(plan: &Plan) -> GroupProgram {
+pub(crate) fn coordinate_map(plan: &Plan) -> OutputProgram {
     let graph = Graph::default();
     let mut symbols = Symbols { graph: &graph, arrays: Vec::new(), next: 0 };
     let q = symbols.array("q", plan.dims.nq);
@@ -352,5 +352,5 @@ pub(crate) fn coordinate_map(plan: &Plan) -> GroupProgram {
     let tree: Tree<Expr> = plan.tree(&params);
     let mut qd = vec![Expr::zero(); plan.dims.nq];
     Sweeps { tree: &tree, trace: &graph }.coordinate_rates(&q, &v, &mut qd);
-    GroupProgram { group: Group::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd), loops: None }
+    OutputProgram { group: Output::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd), loops: None }
 }

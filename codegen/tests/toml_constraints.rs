@@ -1,4 +1,4 @@
-//! Loops, couplings and starts of valid TOML models.
+//! RolledCode, couplings and starts of valid TOML models.
 
 use mbd_codegen::import::raw::LoopType;
 use mbd_codegen::import::toml::read;
@@ -37,8 +37,8 @@ fn every_type_is_read() {
     let m = clean(ALL);
     let lead = Value::Param(0);
     for (name, kind) in [
-        ("close", LoopKind::Pin { axis: [0.0, 0.0, 2.0] }),
-        ("guide", LoopKind::Slider { axis: X }),
+        ("close", LoopKind::Revolute { axis: [0.0, 0.0, 2.0] }),
+        ("guide", LoopKind::Prismatic { axis: X }),
         ("tubes", LoopKind::Cylindrical { axis: Z }),
         ("screw", LoopKind::Helical { axis: Y, pitch: lead }),
         ("shaft", LoopKind::Universal { axes: [X, Y] }),

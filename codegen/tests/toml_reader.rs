@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Gravity, JointKind, Model, Motion, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{Gravity, JointKind, Model, JointMotion, Placement, Rotation, Value, WrenchAxes};
 
 const EVERYTHING: &str = include_str!("everything.toml");
 const C: fn(f64) -> Value = Value::Const;
@@ -64,17 +64,17 @@ fn joints_are_read() {
     let m = clean(EVERYTHING);
     let joint = |name: &str| m.joints.iter().find(|j| j.name == name).expect("a joint of that name");
     let ankle = joint("ankle");
-    assert_eq!(ankle.kind, JointKind::Pin { axis: [0.0, 1.0, 0.0] });
+    assert_eq!(ankle.kind, JointKind::Revolute { axis: [0.0, 1.0, 0.0] });
     assert_eq!(ankle.placement.xyz, [C(0.0), C(0.0), C(-0.4)]);
     assert_eq!(ankle.placement.rotation, Rotation::AxisAngle { axis: [0.0, 0.0, 2.0], angle: Value::Param(1) });
     assert_eq!((ankle.damping[0], ankle.stiffness[0]), (C(0.1), Value::Param(3)));
     assert_eq!((ankle.rest[0], ankle.armature[0]), (C(FRAC_PI_4), C(0.01)));
     assert_eq!(joint("root").damping, [1.0, 1.0, 1.0, 2.0, 2.0, 2.0].map(C));
     assert_eq!(joint("root").placement, Placement::IDENTITY);
-    assert_eq!(joint("slide").motion, Motion::Prescribed);
+    assert_eq!(joint("slide").motion, JointMotion::Prescribed);
     assert_eq!(joint("hip").placement.rotation, Rotation::Rpy([C(0.0), C(PI), Value::Param(1)]));
     // The leader is an index into the final order.
-    assert_eq!(joint("axle").motion, Motion::Mimic { leader: 6, ratio: C(-2.0), offset: C(30f64.to_radians()) });
+    assert_eq!(joint("axle").motion, JointMotion::Mimic { leader: 6, ratio: C(-2.0), offset: C(30f64.to_radians()) });
     assert_eq!(joint("cardan").kind, JointKind::Universal { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]] });
     assert_eq!(joint("cardan").rest, [10f64.to_radians(), 20f64.to_radians()].map(C));
     assert_eq!(joint("socket").armature, [C(0.001); 3]);
@@ -83,7 +83,7 @@ fn joints_are_read() {
     assert_eq!(joint("table").rest[..2], [0.1, 0.2].map(C));
     assert!((joint("table").rest[2].constant().expect("a constant") - FRAC_PI_6).abs() < 1e-15);
     assert_eq!(joint("table").stiffness, [C(5.0); 3]);
-    assert_eq!(joint("sleeve").motion, Motion::Free);
+    assert_eq!(joint("sleeve").motion, JointMotion::Free);
 }
 
 const ONE: &str = "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\n";
@@ -93,8 +93,8 @@ fn defaults() {
     let m = clean(ONE);
     assert_eq!(m.name, "robot_arm_2");
     assert_eq!(m.gravity, Gravity::Constant([C(0.0), C(0.0), C(-9.81)]));
-    assert_eq!(m.joints[0].kind, JointKind::Pin { axis: [0.0, 0.0, 1.0] });
-    assert_eq!((m.joints[0].parent, m.joints[0].motion), (None, Motion::Free));
+    assert_eq!(m.joints[0].kind, JointKind::Revolute { axis: [0.0, 0.0, 1.0] });
+    assert_eq!((m.joints[0].parent, m.joints[0].motion), (None, JointMotion::Free));
     assert_eq!(clean(&format!("gravity = 'input'\n{ONE}")).gravity, Gravity::Input);
     assert_eq!(clean(&ONE.replace("child", "parent = 'ground'\nchild")).joints[0].parent, None);
     assert_eq!(clean(&ONE.replace("mass = 1", "mass = 0x1_0")).bodies[0].mass, C(16.0));

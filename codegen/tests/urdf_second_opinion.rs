@@ -2,7 +2,7 @@
 //! nearest `f64`, so the comparison is exact.
 
 use mbd_codegen::import::{urdf, Base, ImportOptions};
-use mbd_codegen::model::{Body, Joint, JointKind, Model, Motion, Placement, Rotation, Value};
+use mbd_codegen::model::{Body, Joint, JointKind, Model, JointMotion, Placement, Rotation, Value};
 use std::path::{Path, PathBuf};
 use urdf_rs::JointType;
 
@@ -87,8 +87,8 @@ fn compare_pose(what: &str, ours: &Placement, pose: &urdf_rs::Pose) {
 fn compare_joint(what: &str, ours: &Joint, joint: &urdf_rs::Joint, model: &Model) {
     let axis = joint.axis.xyz.0;
     let kind = match joint.joint_type {
-        JointType::Revolute | JointType::Continuous => JointKind::Pin { axis },
-        JointType::Prismatic => JointKind::Slider { axis },
+        JointType::Revolute | JointType::Continuous => JointKind::Revolute { axis },
+        JointType::Prismatic => JointKind::Prismatic { axis },
         JointType::Planar => JointKind::Planar { normal: axis },
         JointType::Floating => JointKind::Floating,
         JointType::Spherical => JointKind::Spherical,
@@ -105,12 +105,12 @@ fn compare_joint(what: &str, ours: &Joint, joint: &urdf_rs::Joint, model: &Model
         assert_eq!(ours.damping, [Value::Const(damping)], "{what}");
     }
     let motion = match &joint.mimic {
-        Some(mimic) if kind.nv() == 1 => Motion::Mimic {
+        Some(mimic) if kind.nv() == 1 => JointMotion::Mimic {
             leader: model.joints.iter().position(|j| j.name == mimic.joint).expect("the leader"),
             ratio: Value::Const(mimic.multiplier.unwrap_or(1.0)),
             offset: Value::Const(mimic.offset.unwrap_or(0.0)),
         },
-        _ => Motion::Free,
+        _ => JointMotion::Free,
     };
     assert_eq!(ours.motion, motion, "{what}");
 }

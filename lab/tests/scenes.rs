@@ -22,7 +22,7 @@ fn names_are_unique_and_find_their_scenes() {
 fn starts_fit_their_models_and_their_expectations() {
     for s in scenes::all() {
         let mut system = s.interpreter::<f64>();
-        assert_eq!((s.q.len(), s.v.len()), (system.neutral().len(), system.rest().len()), "{}", s.name);
+        assert_eq!((s.q.len(), s.v.len()), (system.neutral().len(), system.zero_momenta().len()), "{}", s.name);
         for at in system.quaternions() {
             let norm: f64 = s.q[at..at + 4].iter().map(|x| x * x).sum();
             assert_eq!(norm, 1.0, "{}", s.name);
@@ -47,7 +47,7 @@ fn starts_fit_their_models_and_their_expectations() {
 /// Change of the energy in ten steps of RK4, relative to the largest kinetic energy.
 fn first_steps(s: &Scene, system: &mut Interpreter<f64>) -> Result<f64, String> {
     let (mut q, mut p) = s.start(system);
-    let start = system.state_energy(&q, &p);
+    let start = system.energies(&q, &p);
     let finite = start.0.is_finite() && start.0 >= 0.0 && start.1.is_finite();
     assert!(finite || s.expect == Expect::Stops, "{}: {start:?}", s.name);
     let (mut change, mut largest) = (0.0_f64, start.0);
@@ -55,7 +55,7 @@ fn first_steps(s: &Scene, system: &mut Interpreter<f64>) -> Result<f64, String> 
     for k in 0..10 {
         let t = f64::from(k) * s.rk4_step;
         rk4.step(system, t, s.rk4_step, &mut q, &mut p).map_err(|e| e.to_string())?;
-        let (kinetic, potential) = system.state_energy(&q, &p);
+        let (kinetic, potential) = system.energies(&q, &p);
         change = change.max((kinetic + potential - start.0 - start.1).abs());
         largest = largest.max(kinetic);
     }
@@ -174,17 +174,17 @@ mod generated {
 
     fn all<Y: Dynamics<Scalar: Double>>(states: &[State], mut system: Y) -> Results {
         let mut results = Vec::new();
-        let (mut q, mut v, mut p) = (system.neutral(), system.rest(), system.rest());
+        let (mut q, mut v, mut p) = (system.neutral(), system.zero_momenta(), system.zero_momenta());
         for state in states {
             fill(q.as_mut(), &state[0]);
             fill(v.as_mut(), &state[1]);
-            let (mut qd, mut pd, mut a) = (system.neutral(), system.rest(), system.rest());
-            system.state_momenta(&q, &v, &mut p);
-            system.state_accelerations(&q, &v, &mut a);
+            let (mut qd, mut pd, mut a) = (system.neutral(), system.zero_momenta(), system.zero_momenta());
+            system.conjugate_momenta(&q, &v, &mut p);
+            system.generalized_accelerations(&q, &v, &mut a);
             results.push(("momenta", doubles(p.as_ref())));
             fill(p.as_mut(), &state[2]);
-            system.state_rates(Y::Scalar::zero(), &q, &p, &mut qd, &mut pd);
-            let (kinetic, potential) = system.state_energy(&q, &p);
+            system.rates_at(Y::Scalar::zero(), &q, &p, &mut qd, &mut pd);
+            let (kinetic, potential) = system.energies(&q, &p);
             results.push(("qd", doubles(qd.as_ref())));
             results.push(("pd", doubles(pd.as_ref())));
             results.push(("energy", doubles(&[kinetic, potential])));
@@ -195,11 +195,11 @@ mod generated {
 
     fn derivatives<Y: Dynamics<Scalar: Double> + Differentiable>(states: &[State], mut system: Y) -> Results {
         let mut results = Vec::new();
-        let (mut q, mut p) = (system.neutral(), system.rest());
+        let (mut q, mut p) = (system.neutral(), system.zero_momenta());
         for state in states {
             fill(q.as_mut(), &state[0]);
             fill(p.as_mut(), &state[2]);
-            let (mut v, mut pd) = (system.rest(), system.rest());
+            let (mut v, mut pd) = (system.zero_momenta(), system.zero_momenta());
             let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| system.square());
             let blocks = Blocks { dv_dq: &mut a, dv_dp: &mut b, dpd_dq: &mut c, dpd_dp: &mut d };
             system.rate_derivatives(Y::Scalar::zero(), &q, &p, &mut v, &mut pd, blocks);

@@ -2,8 +2,8 @@
 
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
-use mbd_codegen::plan::Forms;
-use mbd_codegen::{Arithmetic, Group, Loops, Options, Precision};
+use mbd_codegen::plan::EliminationStrategy;
+use mbd_codegen::{Arithmetic, Output, RolledCode, Options, Precision};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
 use crate::literal;
@@ -158,11 +158,11 @@ impl Args {
                 self.options.arithmetic = choice("arithmetic", value, &choices)?;
             }
             "forms" => {
-                let choices = Forms::ALL.map(|f| (f.name(), f));
+                let choices = EliminationStrategy::ALL.map(|f| (f.name(), f));
                 self.options.plan.forms = choice("forms", value, &choices)?;
             }
             "loops" => {
-                let choices = Loops::ALL.map(|l| (l.name(), l));
+                let choices = RolledCode::ALL.map(|l| (l.name(), l));
                 self.options.plan.loops = choice("loops", value, &choices)?;
             }
             "base" => {
@@ -268,12 +268,12 @@ fn elements(key: &str, value: &[TokenTree], example: &str) -> Result<Vec<Vec<Tok
     }
 }
 
-fn outputs(value: &[TokenTree]) -> Result<Vec<Group>, Message> {
+fn outputs(value: &[TokenTree]) -> Result<Vec<Output>, Message> {
     let mut chosen = Vec::new();
     for element in elements("outputs", value, "[rates, energy]")? {
         let written: String = element.iter().map(|t| t.to_string()).collect();
-        let names = || Group::every().map(Group::name);
-        let Some(group) = Group::from_name(&written) else {
+        let names = || Output::every().map(Output::name);
+        let Some(group) = Output::from_name(&written) else {
             let help = did_you_mean(&written, names(), || format!("the outputs are {}", list_all(names())));
             return Err(Message::new(place(&element), format!("unknown output {}", quote(&written)), help));
         };

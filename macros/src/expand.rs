@@ -6,7 +6,7 @@ use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::import::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
-use mbd_codegen::{generate, Group};
+use mbd_codegen::{generate, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
 
 use crate::args::{self, Args, Name, Source};
@@ -172,7 +172,7 @@ fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut
     }
     // Whoever names frames wants them.
     if !args.frames.is_empty() && !args.options.outputs.iter().any(|g| g.of_frames()) {
-        args.options.outputs.push(Group::Frames);
+        args.options.outputs.push(Output::Frames);
     }
     let Some(model) = model else { return };
     let names = || model.bodies.iter().map(|b| b.name.as_str()).chain(model.frames.iter().map(|f| f.name.as_str()));

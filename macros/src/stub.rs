@@ -44,13 +44,13 @@ pub fn source(options: &Options) -> String {
         ("inverse_dynamics", "q v a tau"),
         ("bias", "q v h"),
         ("jacobians", "q jacobian"),
-        ("drifts", "q v drift"),
+        ("bias_accelerations", "q v drift"),
         ("derivatives", "q p v pd dv_dq dv_dp dpd_dq dpd_dp"),
         ("momentum_derivatives", "q v p pd dp_dq dp_dv dpd_dq dpd_dv"),
         ("parameter_derivatives", "q p dv_dparams dpd_dparams"),
-        ("closure", "q residual jacobian"),
-        ("settle", "q p v freed sigma"),
-        ("correction", "q residual dq pivots"),
+        ("constraint_residuals", "q residual jacobian"),
+        ("project_momenta", "q p v freed sigma"),
+        ("position_correction", "q residual dq pivots"),
         ("multipliers", "q v lambda"),
     ]
     .into_iter()
@@ -98,19 +98,19 @@ pub fn source(options: &Options) -> String {
             type Coordinates = {array};
             type Momenta = {array};
             fn neutral(&self) -> {array} {{ [0.0; {LENGTH}] }}
-            fn rest(&self) -> {array} {{ [0.0; {LENGTH}] }}
-            fn groups(&self) -> &[{rt}::system::Group] {{ &[] }}
-            fn state_rates(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
+            fn zero_momenta(&self) -> {array} {{ [0.0; {LENGTH}] }}
+            fn lie_joints(&self) -> &[{rt}::system::LieJoint] {{ &[] }}
+            fn rates_at(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _qd: &mut {array}, _pd: &mut {array}) {{}}
             fn coordinate_rates(&self, _q: &{array}, _v: &{array}, _qd: &mut {array}) {{}}
         }}
         impl {rt}::Energetic for {name} {{
-            fn state_energy(&mut self, _q: &{array}, _p: &{array}) -> ({t}, {t}) {{ (0.0, 0.0) }}
+            fn energies(&mut self, _q: &{array}, _p: &{array}) -> ({t}, {t}) {{ (0.0, 0.0) }}
         }}
         impl {rt}::Conjugate for {name} {{
-            fn state_momenta(&mut self, _q: &{array}, _v: &{array}, _p: &mut {array}) {{}}
+            fn conjugate_momenta(&mut self, _q: &{array}, _v: &{array}, _p: &mut {array}) {{}}
         }}
         impl {rt}::Accelerated for {name} {{
-            fn state_accelerations(&mut self, _q: &{array}, _v: &{array}, _a: &mut {array}) {{}}
+            fn generalized_accelerations(&mut self, _q: &{array}, _v: &{array}, _a: &mut {array}) {{}}
         }}
         impl {rt}::Differentiable for {name} {{
             type Square = [{array}; {LENGTH}];
@@ -124,9 +124,9 @@ pub fn source(options: &Options) -> String {
             fn zero_entries(&self) -> {array} {{ [0.0; {LENGTH}] }}
             fn rows(&self) -> &[{rt}::system::Row] {{ &[] }}
             fn entry_columns(&self) -> &[usize] {{ &[] }}
-            fn closure(&mut self, _q: &{array}, _residual: &mut {array}, _jacobian: &mut {array}) {{}}
-            fn settle(&mut self, _t: {t}, _q: &{array}, _p: &mut {array}, _v: &mut {array}, _sigma: &mut {array}) {{}}
-            fn correction(&mut self, _q: &{array}, _residual: &mut {array}, _dq: &mut {array}, _pivots: &mut {array}) {{}}
+            fn constraint_residuals(&mut self, _q: &{array}, _residual: &mut {array}, _jacobian: &mut {array}) {{}}
+            fn project_momenta(&mut self, _t: {t}, _q: &{array}, _p: &mut {array}, _v: &mut {array}, _sigma: &mut {array}) {{}}
+            fn position_correction(&mut self, _q: &{array}, _residual: &mut {array}, _dq: &mut {array}, _pivots: &mut {array}) {{}}
             fn multipliers(&mut self, _t: {t}, _q: &{array}, _v: &{array}, _lambda: &mut {array}) {{}}
         }}"
     )

@@ -13,7 +13,7 @@ fn a_step_without_std() {
     use mbd_runtime::integrate::{Rk4, Stepper};
     use mbd_runtime::System;
     let mut pendulum = made::DoublePendulum::new();
-    let (mut q, mut p) = ([0.5, 0.0], pendulum.rest());
+    let (mut q, mut p) = ([0.5, 0.0], pendulum.zero_momenta());
     let before: f32 = pendulum.energy(&q, &p).iter().sum();
     assert!(Rk4::new(&pendulum).step(&mut pendulum, 0.0, 1e-2, &mut q, &mut p).is_ok());
     let after: f32 = pendulum.energy(&q, &p).iter().sum();

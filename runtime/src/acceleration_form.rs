@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::system::{Accelerated, Conjugate, Energetic, Group, System};
+use crate::system::{Accelerated, Conjugate, Energetic, LieJoint, System};
 
 /// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] at whose place of momenta velocities stand, so that
 /// every integrator runs it. Against [`System`] itself it shows what momenta are good for.
@@ -13,13 +13,13 @@ use crate::system::{Accelerated, Conjugate, Energetic, Group, System};
 pub struct AccelerationForm<Y> {
     /// The mechanism, with its inputs.
     pub system: Y,
-    groups: Vec<Group>,
+    groups: Vec<LieJoint>,
 }
 
 impl<Y: System> AccelerationForm<Y> {
     /// Of a mechanism.
     pub fn new(system: Y) -> Self {
-        let groups = system.groups().iter().map(|g| Group { momenta: false, ..*g }).collect();
+        let groups = system.lie_joints().iter().map(|g| LieJoint { momenta: false, ..*g }).collect();
         AccelerationForm { system, groups }
     }
 }
@@ -33,16 +33,16 @@ impl<Y: Accelerated> System for AccelerationForm<Y> {
         self.system.neutral()
     }
 
-    fn rest(&self) -> Y::Momenta {
-        self.system.rest()
+    fn zero_momenta(&self) -> Y::Momenta {
+        self.system.zero_momenta()
     }
 
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &self.groups
     }
 
     /// Velocities stand for `p`, accelerations for `pd`.
-    fn state_rates(
+    fn rates_at(
         &mut self,
         _t: Y::Scalar,
         q: &Y::Coordinates,
@@ -51,7 +51,7 @@ impl<Y: Accelerated> System for AccelerationForm<Y> {
         a: &mut Y::Momenta,
     ) {
         self.system.coordinate_rates(q, v, qd);
-        self.system.state_accelerations(q, v, a);
+        self.system.generalized_accelerations(q, v, a);
     }
 
     fn coordinate_rates(&self, q: &Y::Coordinates, v: &Y::Momenta, qd: &mut Y::Coordinates) {
@@ -61,9 +61,9 @@ impl<Y: Accelerated> System for AccelerationForm<Y> {
 
 impl<Y: Accelerated + Conjugate + Energetic> Energetic for AccelerationForm<Y> {
     /// By way of the momenta.
-    fn state_energy(&mut self, q: &Y::Coordinates, v: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
-        let mut p = self.system.rest();
-        self.system.state_momenta(q, v, &mut p);
-        self.system.state_energy(q, &p)
+    fn energies(&mut self, q: &Y::Coordinates, v: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
+        let mut p = self.system.zero_momenta();
+        self.system.conjugate_momenta(q, v, &mut p);
+        self.system.energies(q, &p)
     }
 }

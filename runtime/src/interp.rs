@@ -11,7 +11,7 @@ use directions::DualRun;
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
 use crate::system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic};
-use crate::system::{Group, GroupKind, Real, Row, System};
+use crate::system::{LieJoint, LieGroup, Real, Row, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -62,7 +62,7 @@ pub struct Interpreter<S> {
     /// Inputs of the next call.
     pub inputs: InputValues<S>,
     v: Vec<S>,
-    groups: Vec<Group>,
+    groups: Vec<LieJoint>,
     rows: Vec<Row>,
     entry_columns: Vec<usize>,
     neutral: Vec<S>,
@@ -82,12 +82,12 @@ impl<S: Scalar> Interpreter<S> {
         let mut neutral = vec![o; dims.nq];
         for node in &tree.nodes {
             let kind = match node.kind {
-                Kind::Spherical => GroupKind::Rotation,
-                Kind::Floating => GroupKind::Pose,
-                Kind::Planar => GroupKind::Plane,
+                Kind::Spherical => LieGroup::SO3,
+                Kind::Floating => LieGroup::SE3,
+                Kind::Planar => LieGroup::SE2,
                 _ => continue,
             };
-            let group = |q, v| Group::new(kind, q, v);
+            let group = |q, v| LieJoint::new(kind, q, v);
             match node.source {
                 Source::State { q, v } => {
                     groups.push(group(q, v));
@@ -131,7 +131,7 @@ impl<S: Scalar> Interpreter<S> {
     }
 
     /// `(q, p) → (v, q̇, ṗ)`.
-    pub fn rates_into(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
+    pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.rates(q, p, &self.inputs.view(), &mut self.work, v, qd, pd);
     }
@@ -192,10 +192,10 @@ impl<S: Scalar> Interpreter<S> {
     /// `(q, v) →` acceleration `[linear; angular]` of every frame of [`Tree::frames`] at `v̇ = 0`, in its own axes: that of
     /// the origin as the ground sees it, and angular; the frame accelerates by `J v̇` more. In ground axes, with the
     /// rotation on both halves, it is `J̇ v` of the Jacobian in ground axes. Prescribed motions are included.
-    pub fn drifts(&mut self, q: &[S], v: &[S], out: &mut [[S; 6]]) {
+    pub fn bias_accelerations(&mut self, q: &[S], v: &[S], out: &mut [[S; 6]]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
-        sweeps.drifts(q, v, &self.inputs.view(), &mut self.work, frames);
+        sweeps.bias_accelerations(q, v, &self.inputs.view(), &mut self.work, frames);
     }
 
     /// `q → M`, `nv × nv`, row by row.
@@ -205,7 +205,7 @@ impl<S: Scalar> Interpreter<S> {
     }
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
-    pub fn momentum_derivatives_into(
+    pub fn momentum_derivatives(
         &mut self,
         q: &[S],
         v: &[S],
@@ -218,7 +218,7 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `v`, `ṗ` and their derivatives with respect to `q` and `p`. `d` is [`Derivatives::new`] of
     /// [`Interpreter::tree`].
-    pub fn derivatives_into(&mut self, q: &[S], p: &[S], d: &mut Derivatives<S>) {
+    pub fn derivatives(&mut self, q: &[S], p: &[S], d: &mut Derivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.derivatives(q, p, &self.inputs.view(), &mut self.work, d);
     }
@@ -258,7 +258,7 @@ impl<S: Real> Interpreter<S> {
     pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.prepare(q, &self.inputs.view(), &mut self.work, false);
-        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.shared) {
+        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.unknown) {
             (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
             _ => None,
         });
@@ -266,9 +266,9 @@ impl<S: Real> Interpreter<S> {
         let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));
         let shared = self
             .tree
-            .shared
+            .unknowns
             .iter()
-            .zip(&self.work.factor.shared)
+            .zip(&self.work.factor.unknown_pivots)
             .filter_map(|(s, pivot)| Some((s.velocity()?, pivot.rho)));
         // A zero pivot spoils those inboard of it: it is the one to name.
         let mut spoiled = None;
@@ -304,15 +304,15 @@ impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
         self.neutral.clone()
     }
 
-    fn rest(&self) -> Vec<S> {
+    fn zero_momenta(&self) -> Vec<S> {
         vec![S::zero(); self.tree.dims.nv]
     }
 
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &self.groups
     }
 
-    fn state_rates(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+    fn rates_at(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.rates(q, p, &self.inputs.view(), &mut self.work, &mut self.v, qd, pd);
     }
@@ -323,19 +323,19 @@ impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
 }
 
 impl<S: Scalar + core::fmt::Debug> Energetic for Interpreter<S> {
-    fn state_energy(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
+    fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
         self.energy(q, p)
     }
 }
 
 impl<S: Scalar + core::fmt::Debug> Conjugate for Interpreter<S> {
-    fn state_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
+    fn conjugate_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
         self.momenta(q, v, p);
     }
 }
 
 impl<S: Scalar + core::fmt::Debug> Accelerated for Interpreter<S> {
-    fn state_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
+    fn generalized_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
         self.accelerations(q, v, a);
     }
 }
@@ -360,20 +360,20 @@ impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
         &self.entry_columns
     }
 
-    fn closure(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
+    fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.closure(q, &self.inputs.view(), &mut self.work, residual, jacobian);
+        sweeps.constraint_residuals(q, &self.inputs.view(), &mut self.work, residual, jacobian);
     }
 
-    fn settle(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
+    fn project_momenta(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         self.v.copy_from_slice(p);
-        sweeps.settle(q, &self.v, &self.inputs.view(), &mut self.work, v, p, sigma);
+        sweeps.project_momenta(q, &self.v, &self.inputs.view(), &mut self.work, v, p, sigma);
     }
 
-    fn correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
+    fn position_correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.correction(q, &self.inputs.view(), &mut self.work, residual, dq, pivots);
+        sweeps.position_correction(q, &self.inputs.view(), &mut self.work, residual, dq, pivots);
     }
 
     fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
@@ -406,7 +406,7 @@ impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
             return;
         }
         let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
-        self.derivatives_into(q, p, &mut d);
+        self.derivatives(q, p, &mut d);
         v.copy_from_slice(&d.v);
         pd.copy_from_slice(&d.pd);
         let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = derivatives;

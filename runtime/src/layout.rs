@@ -5,7 +5,7 @@
 
 use alloc::vec::Vec;
 
-use crate::spatial::{quaternion_matrix, Step};
+use crate::spatial::{quaternion_matrix, ElementaryTransform};
 use crate::system::Real;
 
 /// How another program stores the coordinates of one joint.
@@ -147,7 +147,7 @@ impl Layout {
             let (_, _, n) = part.form.sizes();
             copy(there, part.v.1, here, part.v.0, n);
             if part.form == Form::FloatingWorld {
-                turn(q, part, &mut here[part.v.0..], Step::vector);
+                turn(q, part, &mut here[part.v.0..], ElementaryTransform::vector);
             }
         }
     }
@@ -158,16 +158,16 @@ impl Layout {
             let (_, _, n) = part.form.sizes();
             copy(here, part.v.0, there, part.v.1, n);
             if part.form == Form::FloatingWorld {
-                turn(q, part, &mut there[part.v.1..], Step::vector_back);
+                turn(q, part, &mut there[part.v.1..], ElementaryTransform::vector_back);
             }
         }
     }
 }
 
 /// Turns the first three numbers between body and outer axes of a floating joint.
-fn turn<S: Real>(q: &[S], part: &Part, x: &mut [S], by: impl Fn(&Step<S>, [S; 3]) -> [S; 3]) {
+fn turn<S: Real>(q: &[S], part: &Part, x: &mut [S], by: impl Fn(&ElementaryTransform<S>, [S; 3]) -> [S; 3]) {
     let at = part.q.0 + 3;
-    let step = Step::Rotate(quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]));
+    let step = ElementaryTransform::Rotate(quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]));
     let turned = by(&step, [x[0], x[1], x[2]]);
     x[..3].copy_from_slice(&turned);
 }

@@ -74,15 +74,15 @@ pub trait System {
     /// The neutral configuration: zeros and unit quaternions.
     fn neutral(&self) -> Self::Coordinates;
     /// Zero momenta.
-    fn rest(&self) -> Self::Momenta;
+    fn zero_momenta(&self) -> Self::Momenta;
     /// Joints whose coordinates or momenta are more than numbers to be added to, in the order of the state.
-    fn groups(&self) -> &[Group];
+    fn lie_joints(&self) -> &[LieJoint];
     /// Index into `q` of the first component of every unit quaternion.
     fn quaternions(&self) -> impl Iterator<Item = usize> {
-        self.groups().iter().filter_map(Group::quaternion)
+        self.lie_joints().iter().filter_map(LieJoint::quaternion)
     }
     /// Rates of the state at time `t` (s): `q̇` and `ṗ`.
-    fn state_rates(
+    fn rates_at(
         &mut self,
         t: Self::Scalar,
         q: &Self::Coordinates,
@@ -96,9 +96,9 @@ pub trait System {
 
 /// A joint whose state lies on a Lie group: where it stands, and of which kind it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Group {
+pub struct LieJoint {
     /// Kind.
-    pub kind: GroupKind,
+    pub kind: LieGroup,
     /// Index of its first coordinate.
     pub q: usize,
     /// Index of its first velocity and momentum.
@@ -109,46 +109,46 @@ pub struct Group {
 
 /// Kind of group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GroupKind {
+pub enum LieGroup {
     /// A rotation: unit quaternion; angular velocity in body axes.
-    Rotation,
+    SO3,
     /// A position in outer axes and a rotation; linear and angular velocity in body axes.
-    Pose,
+    SE3,
     /// Two positions in outer axes and an angle; linear velocity in body axes.
-    Plane,
+    SE2,
 }
 
-impl GroupKind {
+impl LieGroup {
     /// Numbers of coordinates and velocities.
     pub const fn sizes(self) -> (usize, usize) {
         match self {
-            GroupKind::Rotation => (4, 3),
-            GroupKind::Pose => (7, 6),
-            GroupKind::Plane => (3, 3),
+            LieGroup::SO3 => (4, 3),
+            LieGroup::SE3 => (7, 6),
+            LieGroup::SE2 => (3, 3),
         }
     }
 
     /// How many coordinates, from the first on, are positions or angles that displacements are added to.
     pub const fn positions(self) -> usize {
         match self {
-            GroupKind::Rotation => 0,
-            GroupKind::Pose | GroupKind::Plane => 3,
+            LieGroup::SO3 => 0,
+            LieGroup::SE3 | LieGroup::SE2 => 3,
         }
     }
 }
 
-impl Group {
+impl LieJoint {
     /// A joint in canonical form.
-    pub const fn new(kind: GroupKind, q: usize, v: usize) -> Self {
-        Group { kind, q, v, momenta: true }
+    pub const fn new(kind: LieGroup, q: usize, v: usize) -> Self {
+        LieJoint { kind, q, v, momenta: true }
     }
 
     /// Index into `q` of the first component of its quaternion.
     pub const fn quaternion(&self) -> Option<usize> {
         match self.kind {
-            GroupKind::Rotation => Some(self.q),
-            GroupKind::Pose => Some(self.q + 3),
-            GroupKind::Plane => None,
+            LieGroup::SO3 => Some(self.q),
+            LieGroup::SE3 => Some(self.q + 3),
+            LieGroup::SE2 => None,
         }
     }
 }
@@ -156,19 +156,19 @@ impl Group {
 /// A [`System`] whose energy is known.
 pub trait Energetic: System {
     /// Kinetic and potential energy, J.
-    fn state_energy(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> (Self::Scalar, Self::Scalar);
+    fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> (Self::Scalar, Self::Scalar);
 }
 
 /// A mechanism that gives the momenta of given velocities.
 pub trait Conjugate: System {
     /// `(q, v) → p`.
-    fn state_momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
+    fn conjugate_momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
 }
 
 /// A mechanism that gives accelerations at given velocities.
 pub trait Accelerated: System {
     /// `(q, v) → v̇`.
-    fn state_accelerations(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
+    fn generalized_accelerations(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
 }
 
 /// A [`System`] that gives the derivatives of its rates as well.
@@ -248,10 +248,10 @@ pub trait Constrained: System {
     /// Velocity index of every entry of `Φ`.
     fn entry_columns(&self) -> &[usize];
     /// Residuals `φ(q)` of the positions (m, rad; zero for rows that are not holonomic) and the entries of `Φ(q)`.
-    fn closure(&mut self, q: &Self::Coordinates, residual: &mut Self::Rows, jacobian: &mut Self::Entries);
+    fn constraint_residuals(&mut self, q: &Self::Coordinates, residual: &mut Self::Rows, jacobian: &mut Self::Entries);
     /// Velocities `v` and multipliers `σ` of a state, and its momenta freed of them: `p := p⁺ − Φᵀσ = M v`, which is the
     /// mass-orthogonal projection onto `Φ v = b`.
-    fn settle(
+    fn project_momenta(
         &mut self,
         t: Self::Scalar,
         q: &Self::Coordinates,
@@ -262,7 +262,7 @@ pub trait Constrained: System {
     /// One step of Newton's method onto the closed positions, least in the metric of the mass matrix: residuals `φ(q)`,
     /// displacement `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ` (`nv` numbers, body axes where velocities have them), and the pivots of
     /// `Φ M⁻¹Φᵀ`, zero for rows that were left out as redundant.
-    fn correction(
+    fn position_correction(
         &mut self,
         q: &Self::Coordinates,
         residual: &mut Self::Rows,

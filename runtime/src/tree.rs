@@ -8,16 +8,16 @@ mod map;
 
 use alloc::vec::Vec;
 
-use crate::spatial::{Force, Motion, RigidInertia, Step, Vec3};
+use crate::spatial::{Force, Motion, RigidInertia, ElementaryTransform, Vec3};
 use crate::Scalar;
 
 /// What a node's joint can do, seen in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind<S> {
     /// Turn about z.
-    Pin,
+    Revolute,
     /// Slide along z.
-    Slider,
+    Prismatic,
     /// Turn about z with a slide of `pitch` m per radian.
     Helical {
         /// Metres per radian.
@@ -35,7 +35,7 @@ impl<S: Scalar> Kind<S> {
     /// Coordinates the node reads.
     pub fn nq(&self) -> usize {
         match self {
-            Kind::Pin | Kind::Slider | Kind::Helical { .. } => 1,
+            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => 1,
             Kind::Planar => 3,
             Kind::Spherical => 4,
             Kind::Floating => 7,
@@ -54,8 +54,8 @@ impl<S: Scalar> Kind<S> {
     /// Column `k` of the joint matrix `E`.
     pub fn axis(&self, k: usize) -> Freedom<S> {
         match self {
-            Kind::Pin => Freedom::Unit(5),
-            Kind::Slider => Freedom::Unit(2),
+            Kind::Revolute => Freedom::Unit(5),
+            Kind::Prismatic => Freedom::Unit(2),
             Kind::Helical { pitch } => Freedom::Screw(*pitch),
             Kind::Planar => Freedom::Unit([0, 1, 5][k]),
             Kind::Spherical => Freedom::Unit(3 + k),
@@ -153,7 +153,7 @@ pub struct Node<S> {
     /// Parent node, `None` for the ground. Parents come before children.
     pub parent: Option<usize>,
     /// Constant steps from the parent frame to the joint.
-    pub place: Vec<Step<S>>,
+    pub place: Vec<ElementaryTransform<S>>,
     /// Joint.
     pub kind: Kind<S>,
     /// Coordinates.
@@ -173,17 +173,17 @@ pub struct Node<S> {
     /// Passive elements, one for each freedom.
     pub passive: Vec<Passive<S>>,
     /// Coordinate shared by several nodes, or solved at another node: index into [`Tree::shared`].
-    pub shared: Option<usize>,
+    pub unknown: Option<usize>,
     /// The coordinate is this node's alone, only solved further inboard (with others, as a block).
     pub deferred: bool,
     /// Eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is divided by does not
     /// wait for the turn. Joints about or along z only.
-    pub parent_side: bool,
+    pub before_joint: bool,
     /// The node frame does not turn with the joint: a pin whose children are all pins about parallel axes, placed by
     /// shifts alone. The body turns in it, by the sum of the angles since the last frame that turned.
-    pub unturned: bool,
+    pub non_rotating: bool,
     /// Momentum rate from the accumulated momentum `P*` instead of a quadratic form of the velocity.
-    pub gather: bool,
+    pub accumulates_momentum: bool,
     /// Shared coordinates whose columns are not carried further inward, because the screws of all freedoms inboard that
     /// they meet are carried out to this node.
     pub ends: Vec<usize>,
@@ -203,7 +203,7 @@ pub struct TreeFrame<S> {
     /// Node, `None` for the ground.
     pub node: Option<usize>,
     /// Steps from the node frame.
-    pub place: Vec<Step<S>>,
+    pub place: Vec<ElementaryTransform<S>>,
 }
 
 /// Axes of an external wrench.
@@ -228,19 +228,19 @@ pub struct TreeWrench<S> {
 
 /// What a column that stays open while the backward sweep goes on inward stands for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shared {
+pub enum Unknown {
     /// A coordinate, by its velocity index: shared by several joints, or solved at another node.
     Velocity(usize),
     /// The multiplier of a constraint, by its row.
     Row(usize),
 }
 
-impl Shared {
+impl Unknown {
     /// The velocity index of a coordinate.
     pub fn velocity(self) -> Option<usize> {
         match self {
-            Shared::Velocity(v) => Some(v),
-            Shared::Row(_) => None,
+            Unknown::Velocity(v) => Some(v),
+            Unknown::Row(_) => None,
         }
     }
 }
@@ -250,9 +250,9 @@ impl Shared {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Closure<S> {
     /// Leaves a turn about z.
-    Pin,
+    Revolute,
     /// Leaves a slide along z.
-    Slider,
+    Prismatic,
     /// Leaves both.
     Cylindrical,
     /// Leaves a screw about z.
@@ -355,7 +355,7 @@ pub struct Tree<S> {
     /// Number of coordinates, velocities, prescribed positions, prescribed rates.
     pub dims: Dims,
     /// Coordinates shared by several nodes, and multipliers of constraints.
-    pub shared: Vec<Shared>,
+    pub unknowns: Vec<Unknown>,
     /// Those of them whose members meet only at the ground.
     pub solve_at_ground: Vec<usize>,
     /// First moment of bodies that regrouping has moved to the ground, kg m.
@@ -430,8 +430,8 @@ impl<S: Scalar> Tree<S> {
         }
         for i in (0..tree.nodes.len()).rev() {
             let moved = match tree.nodes[i].kind {
-                Kind::Pin => regroup_pin(&mut tree.nodes[i].inertia),
-                Kind::Slider => {
+                Kind::Revolute => regroup_pin(&mut tree.nodes[i].inertia),
+                Kind::Prismatic => {
                     let mut moved = RigidInertia::zero();
                     core::mem::swap(&mut moved.inertia, &mut tree.nodes[i].inertia.inertia);
                     moved
@@ -447,8 +447,8 @@ impl<S: Scalar> Tree<S> {
             let z = crate::spatial::Axis::Z;
             let mut m = moved.articulated();
             match tree.nodes[i].kind {
-                Kind::Pin => m = Step::Shift { axis: z, r: tree.nodes[i].slide }.inertia(&m),
-                Kind::Slider => m = phase_step(&tree.nodes[i]).inertia(&m),
+                Kind::Revolute => m = ElementaryTransform::Shift { axis: z, r: tree.nodes[i].slide }.inertia(&m),
+                Kind::Prismatic => m = phase_step(&tree.nodes[i]).inertia(&m),
                 _ => {}
             }
             for step in tree.nodes[i].place.iter().rev() {
@@ -465,9 +465,9 @@ impl<S: Scalar> Tree<S> {
 }
 
 /// The constant turn of a slider about its axis.
-fn phase_step<S: Scalar>(node: &Node<S>) -> Step<S> {
+fn phase_step<S: Scalar>(node: &Node<S>) -> ElementaryTransform<S> {
     let (s, c) = quarter_turn(node.phase.sin_cos(), node.quarter);
-    Step::Turn { axis: crate::spatial::Axis::Z, c, s }
+    ElementaryTransform::Turn { axis: crate::spatial::Axis::Z, c, s }
 }
 
 /// Sine and cosine after `quarter` more right angles, exact.

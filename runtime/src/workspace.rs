@@ -4,7 +4,7 @@ use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, RigidInertia, Step, Vec3};
+use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, RigidInertia, ElementaryTransform, Vec3};
 use crate::tree::Tree;
 use crate::Scalar;
 
@@ -43,15 +43,15 @@ impl<S: Scalar> Poses<S> {
 
 impl<S: Scalar> TurnedBody<S> {
     /// From the frame to the body's axes.
-    pub fn step(&self) -> Step<S> {
-        Step::Turn { axis: crate::spatial::Axis::Z, c: self.c, s: self.s }
+    pub fn step(&self) -> ElementaryTransform<S> {
+        ElementaryTransform::Turn { axis: crate::spatial::Axis::Z, c: self.c, s: self.s }
     }
 }
 
 /// At most four steps, kept in place.
 #[derive(Clone, Copy, Debug)]
 pub struct JointSteps<S> {
-    steps: [Step<S>; 4],
+    steps: [ElementaryTransform<S>; 4],
     len: usize,
     placing: usize,
 }
@@ -59,33 +59,33 @@ pub struct JointSteps<S> {
 impl<S: Scalar> JointSteps<S> {
     /// No steps.
     pub fn new() -> Self {
-        JointSteps { steps: [Step::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0, placing: 0 }
+        JointSteps { steps: [ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0, placing: 0 }
     }
 
     /// Replaces the steps; those beyond four are dropped.
-    pub fn set(&mut self, steps: &[Step<S>]) {
+    pub fn set(&mut self, steps: &[ElementaryTransform<S>]) {
         self.set_with(0, steps);
     }
 
     /// The same where the first `placing` steps stand for the constant placement.
-    pub fn set_with(&mut self, placing: usize, steps: &[Step<S>]) {
+    pub fn set_with(&mut self, placing: usize, steps: &[ElementaryTransform<S>]) {
         self.placing = placing;
         self.len = steps.len().min(4);
         self.steps[..self.len].copy_from_slice(&steps[..self.len]);
     }
 
     /// The steps, parent to child.
-    pub fn get(&self) -> &[Step<S>] {
+    pub fn get(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.len]
     }
 
     /// Those that stand for the constant placement.
-    pub fn placing(&self) -> &[Step<S>] {
+    pub fn placing(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.placing.min(self.len)]
     }
 
     /// The joint's own.
-    pub fn own(&self) -> &[Step<S>] {
+    pub fn own(&self) -> &[ElementaryTransform<S>] {
         &self.steps[self.placing.min(self.len)..self.len]
     }
 }
@@ -117,7 +117,7 @@ pub struct Factor<S> {
     /// Pivots of the nodes' own freedoms, in node order.
     pub pivots: Vec<Pivot<S>>,
     /// Pivots of shared coordinates.
-    pub shared: Vec<Pivot<S>>,
+    pub unknown_pivots: Vec<Pivot<S>>,
     /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
     pub columns: Vec<Force<S>>,
     /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Node::screws`] asks for it, at
@@ -128,7 +128,7 @@ pub struct Factor<S> {
     /// `E · F_h` of every freedom with every open coordinate, at `freedom · shared + h`.
     pub cross: Vec<S>,
     /// The same for shared coordinates with one another.
-    pub shared_cross: Vec<S>,
+    pub unknown_cross: Vec<S>,
     /// Diagonal of `Φ M⁻¹Φᵀ` of every multiplier, before other multipliers are taken out of it; with the nodes of one
     /// constraint's cycle as far as they are done.
     pub whole: Vec<S>,
@@ -186,11 +186,11 @@ pub struct Solution<S> {
     /// `(p − d) / Mj` of every freedom; the prescribed rate where there is one.
     pub e: Vec<S>,
     /// The same for shared coordinates.
-    pub shared_e: Vec<S>,
+    pub unknown_e: Vec<S>,
     /// Rate of every freedom of every node.
     pub rate: Vec<S>,
     /// Rate of every shared coordinate.
-    pub shared_rate: Vec<S>,
+    pub unknown_rate: Vec<S>,
     /// `Ω̂_i`: motion of the node frame before its own freedoms.
     pub hat: Vec<Motion<S>>,
     /// `Ω_i`.
@@ -264,7 +264,7 @@ impl<S: Scalar> Workspace<S> {
     /// Room for a tree: the only allocation there is.
     pub fn new(tree: &Tree<S>) -> Self {
         let n = tree.nodes.len();
-        let g = tree.shared.len().max(tree.for_accelerations().shared.len());
+        let g = tree.unknowns.len().max(tree.for_accelerations().unknowns.len());
         let mut first = Vec::with_capacity(n + 1);
         let mut f = 0;
         for node in &tree.nodes {
@@ -278,9 +278,9 @@ impl<S: Scalar> Workspace<S> {
         let solution = Solution {
             d: vec![Force::zero(); n],
             e: vec![o; f],
-            shared_e: vec![o; g],
+            unknown_e: vec![o; g],
             rate: vec![o; f],
-            shared_rate: vec![o; g],
+            unknown_rate: vec![o; g],
             hat: vec![Motion::zero(); n],
             omega: vec![Motion::zero(); n],
         };
@@ -290,12 +290,12 @@ impl<S: Scalar> Workspace<S> {
             factor: Factor {
                 m: vec![ArticulatedInertia::zero(); n],
                 pivots: vec![pivot; f],
-                shared: vec![pivot; g],
+                unknown_pivots: vec![pivot; g],
                 columns: vec![Force::zero(); g * n],
                 screws: vec![Motion::zero(); g * n],
                 gram: vec![o; g * g],
                 cross: vec![o; f * g],
-                shared_cross: vec![o; g * g],
+                unknown_cross: vec![o; g * g],
                 whole: vec![o; g],
                 later: later(tree),
             },
@@ -339,7 +339,7 @@ impl<S: Scalar> Workspace<S> {
 
 /// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it then.
 fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
-    let mut meets = vec![BTreeSet::new(); tree.shared.len()];
+    let mut meets = vec![BTreeSet::new(); tree.unknowns.len()];
     let mut join = |all: &[usize]| {
         for &g in all {
             meets[g].extend(all.iter().copied().filter(|&h| h != g));
@@ -348,7 +348,7 @@ fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
     let mut order = Vec::new();
     for node in tree.nodes.iter().rev() {
         let open = node.solve_after.iter().chain(&node.open).chain(&node.ends);
-        join(&open.chain(&node.shared).copied().collect::<Vec<_>>());
+        join(&open.chain(&node.unknown).copied().collect::<Vec<_>>());
         order.extend(node.solve_before.iter().chain(&node.solve_after).copied());
     }
     order.extend(&tree.solve_at_ground);

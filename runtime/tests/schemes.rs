@@ -4,17 +4,17 @@ use mbd_runtime::integrate::{
     Chart, Composition, Doubled, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling,
     Stepper, Symmetric, Tolerances,
 };
-use mbd_runtime::system::{Group, GroupKind};
+use mbd_runtime::system::{LieJoint, LieGroup};
 use mbd_runtime::System;
 
 /// An ordinary coordinate, a rotation, a pose, a planar joint: for charts alone.
 #[derive(Clone, Debug)]
-struct Kinds([Group; 3]);
+struct Kinds([LieJoint; 3]);
 
 impl Kinds {
     fn new(momenta: bool) -> Self {
-        let group = |kind, q, v| Group { momenta, ..Group::new(kind, q, v) };
-        Kinds([group(GroupKind::Rotation, 1, 1), group(GroupKind::Pose, 5, 4), group(GroupKind::Plane, 12, 10)])
+        let group = |kind, q, v| LieJoint { momenta, ..LieJoint::new(kind, q, v) };
+        Kinds([group(LieGroup::SO3, 1, 1), group(LieGroup::SE3, 5, 4), group(LieGroup::SE2, 12, 10)])
     }
 }
 
@@ -28,13 +28,13 @@ impl System for Kinds {
         (q[4], q[11]) = (1.0, 1.0);
         q
     }
-    fn rest(&self) -> [f64; 14] {
+    fn zero_momenta(&self) -> [f64; 14] {
         [0.0; 14]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &self.0
     }
-    fn state_rates(&mut self, _t: f64, _q: &[f64; 16], _p: &[f64; 14], _qd: &mut [f64; 16], _pd: &mut [f64; 14]) {}
+    fn rates_at(&mut self, _t: f64, _q: &[f64; 16], _p: &[f64; 14], _qd: &mut [f64; 16], _pd: &mut [f64; 14]) {}
     fn coordinate_rates(&self, _q: &[f64; 16], _v: &[f64; 14], _qd: &mut [f64; 16]) {}
 }
 
@@ -59,7 +59,7 @@ fn displacements_one_after_the_other() {
     let seed = &mut 1;
     for momenta in [true, false].repeat(50) {
         let system = Kinds::new(momenta);
-        let (mut q, mut p) = (system.neutral(), system.rest());
+        let (mut q, mut p) = (system.neutral(), system.zero_momenta());
         q.iter_mut().chain(&mut p).for_each(|x| *x += 0.5 * random(seed));
         for at in [1, 8] {
             let norm = q[at..at + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -109,13 +109,13 @@ impl System for Swing {
     fn neutral(&self) -> [f64; 2] {
         [0.0; 2]
     }
-    fn rest(&self) -> [f64; 2] {
+    fn zero_momenta(&self) -> [f64; 2] {
         [0.0; 2]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
-    fn state_rates(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
         let inertia = 1.0 + q[1] * q[1];
         *qd = [p[0] / inertia, p[1]];
         *pd = [q[0].sin() * (q[1] - 1.0), p[0] * p[0] * q[1] / (inertia * inertia) - q[0].cos() - 8.0 * q[1]];
@@ -224,13 +224,13 @@ fn semi_implicit_euler_is_symplectic_where_the_hamiltonian_is_separable() {
         fn neutral(&self) -> [f64; 1] {
             [0.0]
         }
-        fn rest(&self) -> [f64; 1] {
+        fn zero_momenta(&self) -> [f64; 1] {
             [0.0]
         }
-        fn groups(&self) -> &[Group] {
+        fn lie_joints(&self) -> &[LieJoint] {
             &[]
         }
-        fn state_rates(&mut self, _t: f64, q: &[f64; 1], p: &[f64; 1], qd: &mut [f64; 1], pd: &mut [f64; 1]) {
+        fn rates_at(&mut self, _t: f64, q: &[f64; 1], p: &[f64; 1], qd: &mut [f64; 1], pd: &mut [f64; 1]) {
             (*qd, *pd) = (*p, [-q[0]]);
         }
         fn coordinate_rates(&self, _q: &[f64; 1], v: &[f64; 1], qd: &mut [f64; 1]) {

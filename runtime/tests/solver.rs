@@ -470,7 +470,7 @@ fn double_double() {
     let mut solver = adaptive(&mut y, method, 1e-27, (&[W::constant(2.0)], &[W::zero()]));
     solver.run(&mut y, period).expect("a run");
     assert_eq!(solver.time(), period);
-    let (mut q, mut p) = (y.neutral(), y.rest());
+    let (mut q, mut p) = (y.neutral(), y.zero_momenta());
     solver.state(&y, &mut q, &mut p);
     let (q, p) = ((q[0] - W::constant(2.0)).to_f64(), p[0].to_f64());
     println!("{q:e} {p:e} in {} steps", solver.statistics().steps);

@@ -3,9 +3,9 @@
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::PlanOptions;
-use mbd_codegen::{Group, Loops};
+use mbd_codegen::{Output, RolledCode};
 
-use crate::random::{random_model, Knobs, Rng};
+use crate::random::{random_model, Distribution, Rng};
 
 /// Number of trees: as many as compile in well under a minute.
 pub const TREES: u64 = 44;
@@ -25,11 +25,11 @@ pub fn tree(k: u64) -> (Model, Options) {
     let options = Options {
         arithmetic: Arithmetic::Exact,
         type_name: "Tree".to_string(),
-        outputs: Group::ALL.to_vec(),
+        outputs: Output::ALL.to_vec(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
         efforts: rng.chance(0.8),
         plan: PlanOptions {
-            loops: if k < FIRST_CHAIN { Loops::Auto } else { Loops::Always },
+            loops: if k < FIRST_CHAIN { RolledCode::Auto } else { RolledCode::Always },
             ..PlanOptions::default()
         },
         ..Options::default()
@@ -37,17 +37,17 @@ pub fn tree(k: u64) -> (Model, Options) {
     if k >= FIRST_CHAIN {
         return (random_model(seed, &chain(k - FIRST_CHAIN)), options);
     }
-    (random_model(seed, &Knobs::everything(seed, 2 + k as usize % 4)), options)
+    (random_model(seed, &Distribution::everything(seed, 2 + k as usize % 4)), options)
 }
 
 /// Chains of pins, of pins in right angles with springs and dampers, of ball joints, and of pins again.
-fn chain(k: u64) -> Knobs {
+fn chain(k: u64) -> Distribution {
     let n = 7 - k as usize;
     let mut kinds = [0.0; 9];
     kinds[if k == 2 { 6 } else { 0 }] = 1.0;
-    let plain = Knobs { bodies: (n, n), taper: 1.0, kinds, ..Knobs::default() };
+    let plain = Distribution { bodies: (n, n), taper: 1.0, kinds, ..Distribution::default() };
     match k {
-        1 => Knobs { skew: 0.0, damping: 1.0, springs: 1.0, armature: 1.0, gravity: [0.0, 0.0, 1.0], ..plain },
+        1 => Distribution { skew: 0.0, damping: 1.0, springs: 1.0, armature: 1.0, gravity: [0.0, 0.0, 1.0], ..plain },
         _ => plain,
     }
 }

@@ -2,7 +2,7 @@
 
 use mbd_codegen::model::{JointKind, Model, Rotation, Value};
 
-use crate::random::{random_model, Knobs, Rng};
+use crate::random::{random_model, Distribution, Rng};
 use crate::value;
 
 /// A chain of `n` pins, general in every number.
@@ -12,8 +12,8 @@ pub fn general(seed: u64, n: usize) -> Model {
 
 /// The same, masses and lengths `taper` times those of the link before.
 pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
-    let knobs = Knobs { bodies: (n, n), taper, gravity: [0.0, 1.0, 0.0], ..Knobs::default() };
-    let mut model = random_model(seed, &knobs);
+    let distribution = Distribution { bodies: (n, n), taper, gravity: [0.0, 1.0, 0.0], ..Distribution::default() };
+    let mut model = random_model(seed, &distribution);
     // Identity placements happen one time in six; here nothing may be aligned.
     for (k, joint) in model.joints.iter_mut().enumerate() {
         if joint.placement.rotation == Rotation::NONE {
@@ -27,7 +27,7 @@ pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
 pub fn planar(seed: u64, n: usize) -> Model {
     let mut model = general(seed, n);
     for joint in &mut model.joints {
-        joint.kind = JointKind::Pin { axis: [0.0, 0.0, 1.0] };
+        joint.kind = JointKind::Revolute { axis: [0.0, 0.0, 1.0] };
         joint.placement.rotation = Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(0.4)]);
         joint.placement.xyz[2] = Value::ZERO;
     }
@@ -52,7 +52,7 @@ pub fn rods(seed: u64, n: usize, thin: f64) -> Model {
     let mut model = general(seed, n);
     for k in 0..n {
         let joint = &mut model.joints[k];
-        joint.kind = JointKind::Pin { axis: if k % 2 == 0 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] } };
+        joint.kind = JointKind::Revolute { axis: if k % 2 == 0 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] } };
         joint.placement.xyz = [0.0, 0.0, if k == 0 { 0.0 } else { 1.0 }].map(Value::Const);
         let body = &mut model.bodies[joint.child];
         body.mass = Value::ONE;
@@ -92,7 +92,7 @@ pub fn ill_conditioned() -> Vec<(String, Model)> {
 pub fn nearly_parallel(seed: u64, n: usize, angle: f64) -> Model {
     let (mut model, mut rng) = (general(seed, n), Rng::new(seed, 7));
     for joint in &mut model.joints {
-        joint.kind = JointKind::Pin { axis: [rng.around(angle), rng.around(angle), 1.0] };
+        joint.kind = JointKind::Revolute { axis: [rng.around(angle), rng.around(angle), 1.0] };
         joint.placement.rotation = Rotation::Rpy([rng.around(angle), rng.around(angle), 0.4].map(Value::Const));
     }
     model

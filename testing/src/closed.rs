@@ -1,16 +1,16 @@
 //! Random trees with constraints that are closed exactly in a given state.
 
 use mbd_codegen::model::{
-    Constraint, ConstraintKind, JointKind, LoopKind, Model, Motion, Mount, Param, Placement, Rotation, Value,
+    Constraint, ConstraintKind, JointKind, LoopKind, Model, JointMotion, Mount, Param, Placement, Rotation, Value,
 };
-use mbd_codegen::options::Loops;
-use mbd_codegen::plan::{Forms, Plan, PlanOptions, DEFAULT_SNAP};
+use mbd_codegen::options::RolledCode;
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions, DEFAULT_SNAP};
 use mbd_runtime::spatial::{add3, dot3, scale3, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
 
 use crate::kkt::{across, mounted, rank, unit, Pose, Rows};
-use crate::random::{random_model, rotation_matrix, Knobs, Rng};
+use crate::random::{random_model, rotation_matrix, Distribution, Rng};
 use crate::state::{random_state, State};
 use crate::value;
 
@@ -18,7 +18,7 @@ use crate::value;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopKnobs {
     /// The tree.
-    pub tree: Knobs,
+    pub tree: Distribution,
     /// Pins and slides of one plane only: loops closed by whole joints have redundant rows.
     pub planar: bool,
     /// Smallest and largest number of constraints.
@@ -41,7 +41,7 @@ impl LoopKnobs {
     /// Spatial trees of pins with loops of every kind.
     pub fn plain() -> LoopKnobs {
         LoopKnobs {
-            tree: Knobs { bodies: (3, 8), ..Knobs::default() },
+            tree: Distribution { bodies: (3, 8), ..Distribution::default() },
             planar: false,
             count: (1, 3),
             ground: 0.6,
@@ -57,10 +57,10 @@ impl LoopKnobs {
     pub fn everything(seed: u64, bodies: usize) -> LoopKnobs {
         let mut rng = Rng::new(seed, 5);
         let planar = rng.chance(0.25);
-        let mut tree = Knobs::everything(seed, bodies);
+        let mut tree = Distribution::everything(seed, bodies);
         tree.bodies.0 = 2.min(bodies);
         if planar {
-            tree = Knobs { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
+            tree = Distribution { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
             // Axes that are made parallel may leave a body without mass motions that nothing feels.
             tree.massless = 0.0;
         }
@@ -81,7 +81,7 @@ impl LoopKnobs {
     }
 }
 
-/// A mechanism with constraints, and a state where they are closed. The same for the same seed and knobs.
+/// A mechanism with constraints, and a state where they are closed. The same for the same seed and distribution.
 #[derive(Clone, Debug)]
 pub struct LoopSystem {
     /// Seed.
@@ -96,29 +96,29 @@ pub struct LoopSystem {
 
 /// A random mechanism that can still move: `Φ` has fewer independent rows than there are velocities. Where drives and loops
 /// contradict one another, the drives stand still.
-pub fn random_loops(seed: u64, knobs: &LoopKnobs) -> LoopSystem {
+pub fn random_loops(seed: u64, distribution: &LoopKnobs) -> LoopSystem {
     for attempt in 0..1000 {
-        if let Some(system) = attempted(seed, attempt, knobs) {
+        if let Some(system) = attempted(seed, attempt, distribution) {
             return system;
         }
     }
-    panic!("seed {seed}: no mechanism with these knobs can move: {knobs:?}")
+    panic!("seed {seed}: no mechanism with these distribution can move: {distribution:?}")
 }
 
-fn attempted(seed: u64, attempt: u64, knobs: &LoopKnobs) -> Option<LoopSystem> {
+fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSystem> {
     let own = seed.wrapping_add(attempt << 32);
-    let mut tree = random_model(own, &knobs.tree);
+    let mut tree = random_model(own, &distribution.tree);
     tree.name = format!("loops{seed}");
     let mut rng = Rng::new(own, 6);
-    if knobs.planar {
+    if distribution.planar {
         flatten(&mut tree, &mut rng);
     }
     let open = Plan::new(&tree, PLAIN);
     let mut state = random_state(&open, own);
     let mut frames = vec![FrameState::ground(); open.frames.len()];
     state.interpreter(&open).frames(&state.q, &state.v, &mut frames);
-    let mut closer = Closer { rng, knobs, model: tree, open: &open, state: &mut state, frames };
-    let count = knobs.count.0 + closer.rng.below(knobs.count.1 - knobs.count.0 + 1);
+    let mut closer = Closer { rng, distribution, model: tree, open: &open, state: &mut state, frames };
+    let count = distribution.count.0 + closer.rng.below(distribution.count.1 - distribution.count.0 + 1);
     for _ in 0..count {
         closer.add();
     }
@@ -140,10 +140,10 @@ fn attempted(seed: u64, attempt: u64, knobs: &LoopKnobs) -> Option<LoopSystem> {
 /// One joint after the other: neither the search for a form nor what it finds is part of a reference.
 const PLAIN: PlanOptions = PlanOptions {
     snap: DEFAULT_SNAP,
-    forms: Forms::Single,
+    forms: EliminationStrategy::Single,
     accelerations: false,
     mass_matrix: false,
-    loops: Loops::Never,
+    loops: RolledCode::Never,
 };
 
 /// Rows with less left of them than this are dependent on others.
@@ -154,9 +154,9 @@ fn flatten(model: &mut Model, rng: &mut Rng) {
     let z = [0.0, 0.0, 1.0];
     for joint in &mut model.joints {
         match &mut joint.kind {
-            JointKind::Pin { axis } => *axis = scale3(rng.pick(&[1.0, -1.0, 2.0]), z),
+            JointKind::Revolute { axis } => *axis = scale3(rng.pick(&[1.0, -1.0, 2.0]), z),
             JointKind::Planar { normal } => *normal = z,
-            JointKind::Slider { axis } => *axis = flat_direction(rng),
+            JointKind::Prismatic { axis } => *axis = flat_direction(rng),
             _ => {}
         }
         let angle = if rng.chance(0.3) { 0.0 } else { rng.around(3.0) };
@@ -196,7 +196,7 @@ fn described(r: &Mat3<f64>) -> Rotation {
 /// Adds constraints to a model in a state.
 struct Closer<'a> {
     rng: Rng,
-    knobs: &'a LoopKnobs,
+    distribution: &'a LoopKnobs,
     model: Model,
     open: &'a Plan,
     state: &'a mut State,
@@ -206,7 +206,7 @@ struct Closer<'a> {
 impl Closer<'_> {
     /// A constant, or a parameter that has this value in the state.
     fn value(&mut self, x: f64) -> Value {
-        if !self.rng.chance(self.knobs.tree.params) {
+        if !self.rng.chance(self.distribution.tree.params) {
             return Value::Const(x);
         }
         let k = self.model.params.len();
@@ -216,14 +216,14 @@ impl Closer<'_> {
     }
 
     fn add(&mut self) {
-        let kind = if self.rng.chance(self.knobs.coupling) { self.coupling() } else { self.closed_loop() };
+        let kind = if self.rng.chance(self.distribution.coupling) { self.coupling() } else { self.closed_loop() };
         let Some(kind) = kind else { return };
-        let decay = if self.rng.chance(self.knobs.decay) { self.rng.range(0.5, 20.0) } else { 0.0 };
+        let decay = if self.rng.chance(self.distribution.decay) { self.rng.range(0.5, 20.0) } else { 0.0 };
         let decay = if decay == 0.0 { Value::ZERO } else { self.value(decay) };
         let name = |n: usize| format!("loop{n}");
         let n = self.model.constraints.len();
         self.model.constraints.push(Constraint { name: name(n), kind: kind.clone(), decay });
-        if self.rng.chance(self.knobs.twice) {
+        if self.rng.chance(self.distribution.twice) {
             self.model.constraints.push(Constraint { name: name(n + 1), kind, decay });
         }
     }
@@ -231,7 +231,7 @@ impl Closer<'_> {
     fn coupling(&mut self) -> Option<ConstraintKind> {
         let single = |j: &usize| {
             let joint = &self.model.joints[*j];
-            joint.kind.nv() == 1 && joint.motion == Motion::Free
+            joint.kind.nv() == 1 && joint.motion == JointMotion::Free
         };
         let mut can: Vec<usize> = (0..self.model.joints.len()).filter(single).collect();
         let n = (2 + self.rng.below(2)).min(can.len());
@@ -265,7 +265,7 @@ impl Closer<'_> {
         let (a, b) = (path(a), path(b));
         let only = |x: &[usize], y: &[usize]| x.iter().copied().filter(|j| !y.contains(j)).collect::<Vec<_>>();
         let moves = |j: &usize| match self.model.joints[*j].motion {
-            Motion::Prescribed => 0,
+            JointMotion::Prescribed => 0,
             _ => self.model.joints[*j].kind.nv(),
         };
         only(&a, &b).iter().chain(&only(&b, &a)).map(moves).sum()
@@ -275,15 +275,15 @@ impl Closer<'_> {
         let n = self.model.bodies.len();
         let kind = self.kind();
         for _ in 0..20 {
-            let ground = self.rng.chance(self.knobs.ground);
+            let ground = self.rng.chance(self.distribution.ground);
             let mut ends = [Some(self.rng.below(n)), if ground { None } else { Some(self.rng.below(n)) }];
             if self.rng.chance(0.5) {
                 ends.swap(0, 1);
             }
             let free = self.between(ends[0], ends[1]);
             // In a plane at most three rows count.
-            let needed = if self.knobs.planar { rows(&kind).min(3) } else { rows(&kind) };
-            if free == 0 || (free <= needed && !self.rng.chance(self.knobs.locked)) {
+            let needed = if self.distribution.planar { rows(&kind).min(3) } else { rows(&kind) };
+            if free == 0 || (free <= needed && !self.rng.chance(self.distribution.locked)) {
                 continue;
             }
             let first = Mount { body: ends[0], placement: self.placement() };
@@ -299,7 +299,7 @@ impl Closer<'_> {
         let xyz: [f64; 3] = std::array::from_fn(|_| self.rng.around(0.4));
         let xyz = xyz.map(|x| self.value(x));
         let angle = self.rng.around(3.0);
-        if self.knobs.planar {
+        if self.distribution.planar {
             return Placement { xyz, rotation: Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(angle)]) };
         }
         if self.rng.chance(0.4) {
@@ -330,7 +330,7 @@ impl Closer<'_> {
 
     /// Any direction: in a plane that of its normal.
     fn direction(&mut self) -> Vec3<f64> {
-        if self.knobs.planar {
+        if self.distribution.planar {
             return [0.0, 0.0, self.rng.pick(&[1.0, -1.0, 2.0])];
         }
         if self.rng.chance(0.4) {
@@ -348,7 +348,7 @@ impl Closer<'_> {
 
     /// Any direction: in a plane one of it.
     fn sideways(&mut self) -> Vec3<f64> {
-        if self.knobs.planar {
+        if self.distribution.planar {
             flat_direction(&mut self.rng)
         } else {
             self.direction()
@@ -357,9 +357,9 @@ impl Closer<'_> {
 
     fn kind(&mut self) -> LoopKind {
         let length = self.rng.range(0.2, 0.8);
-        match self.rng.weighted(&self.knobs.kinds) {
-            0 => LoopKind::Pin { axis: self.direction() },
-            1 => LoopKind::Slider { axis: self.sideways() },
+        match self.rng.weighted(&self.distribution.kinds) {
+            0 => LoopKind::Revolute { axis: self.direction() },
+            1 => LoopKind::Prismatic { axis: self.sideways() },
             2 => LoopKind::Cylindrical { axis: self.direction() },
             3 => {
                 let pitch = self.rng.range(0.05, 0.3) * self.rng.pick(&[1.0, -1.0]);
@@ -403,8 +403,8 @@ impl Closer<'_> {
             add3(scale3(s.rng.around(0.6), x), scale3(s.rng.around(0.6), y))
         };
         match *kind {
-            LoopKind::Pin { axis } => (about(axis, angle), [0.0; 3]),
-            LoopKind::Slider { axis } => (none, along(axis, slide)),
+            LoopKind::Revolute { axis } => (about(axis, angle), [0.0; 3]),
+            LoopKind::Prismatic { axis } => (none, along(axis, slide)),
             LoopKind::Cylindrical { axis } => (about(axis, angle), along(axis, slide)),
             LoopKind::Helical { axis, pitch } => (about(axis, angle), along(axis, num(pitch) * angle)),
             LoopKind::Universal { axes: [a, b] } => {
@@ -445,7 +445,7 @@ impl Closer<'_> {
 pub fn rows(kind: &LoopKind) -> usize {
     match kind {
         LoopKind::Fixed => 6,
-        LoopKind::Pin { .. } | LoopKind::Slider { .. } | LoopKind::Helical { .. } => 5,
+        LoopKind::Revolute { .. } | LoopKind::Prismatic { .. } | LoopKind::Helical { .. } => 5,
         LoopKind::Cylindrical { .. } | LoopKind::Universal { .. } => 4,
         LoopKind::Planar { .. } | LoopKind::Spherical | LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } => {
             3

@@ -99,8 +99,8 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
     let parallel = |n: Vec3<f64>| across(n).map(|m| dot3(a.direction(m), b.direction(unit(n)))).to_vec();
     let length = |x: Vec3<S>| dot3(x, x).sqrt();
     match *kind {
-        LoopKind::Pin { axis } => [d.to_vec(), parallel(axis)].concat(),
-        LoopKind::Slider { axis } => [across_offset(axis), turned(a, b)].concat(),
+        LoopKind::Revolute { axis } => [d.to_vec(), parallel(axis)].concat(),
+        LoopKind::Prismatic { axis } => [across_offset(axis), turned(a, b)].concat(),
         LoopKind::Cylindrical { axis } => [across_offset(axis), parallel(axis)].concat(),
         LoopKind::Helical { axis, pitch } => {
             // The angle as seen by two directions across the axis; its difference to that of the slide, by its sine.
@@ -154,8 +154,8 @@ pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S
     let e = |k: usize| std::array::from_fn::<f64, 3, _>(|i| f64::from(u8::from(i == k)));
     let turning = || (0..3).map(|k| between(a.direction(e((k + 1) % 3)), b.direction(e(k)))).collect::<Vec<S>>();
     match *kind {
-        LoopKind::Pin { axis } => [v.to_vec(), parallel(axis)].concat(),
-        LoopKind::Slider { axis } => [across_rate(axis), turning()].concat(),
+        LoopKind::Revolute { axis } => [v.to_vec(), parallel(axis)].concat(),
+        LoopKind::Prismatic { axis } => [across_rate(axis), turning()].concat(),
         LoopKind::Cylindrical { axis } => [across_rate(axis), parallel(axis)].concat(),
         LoopKind::Helical { axis, pitch } => {
             let screw = along(unit(axis)) - num(pitch) * dot3(a.direction(unit(axis)), w);

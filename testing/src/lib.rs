@@ -9,7 +9,7 @@ pub mod random;
 pub mod state;
 pub mod toml;
 
-use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, Motion, Placement, Rotation, Value};
+use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, JointMotion, Placement, Rotation, Value};
 
 /// A number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {
@@ -48,7 +48,7 @@ pub fn substituted(model: &Model, params: &[f64]) -> Model {
         if let JointKind::Helical { pitch, .. } = &mut joint.kind {
             of(pitch);
         }
-        if let Motion::Mimic { ratio, offset, .. } = &mut joint.motion {
+        if let JointMotion::Mimic { ratio, offset, .. } = &mut joint.motion {
             of(ratio);
             of(offset);
         }

@@ -1,6 +1,6 @@
 //! Newton and Euler, body by body: what the sweeps must agree with, from the motion of frames alone.
 
-use mbd_codegen::model::{JointKind, Model, Motion};
+use mbd_codegen::model::{JointKind, Model, JointMotion};
 use mbd_codegen::plan::{Plan, Rigid};
 use mbd_runtime::spatial::{add3, cross, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
@@ -63,7 +63,7 @@ pub fn twice_kinetic(model: &Model, params: &[f64], body: usize, at: &FrameState
 /// Model joint whose coordinates a joint follows in the end, factor and offset.
 pub fn leader(model: &Model, params: &[f64], joint: usize) -> (usize, f64, f64) {
     match model.joints[joint].motion {
-        Motion::Mimic { leader: next, ratio, offset } => {
+        JointMotion::Mimic { leader: next, ratio, offset } => {
             let (end, r, o) = leader(model, params, next);
             let ratio = value(ratio, params);
             (end, ratio * r, ratio * o + value(offset, params))
@@ -117,8 +117,8 @@ pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
     let both = |l: Vec3<f64>, a: Vec3<f64>| [l[0], l[1], l[2], a[0], a[1], a[2]];
     let o = [0.0; 3];
     match *kind {
-        JointKind::Pin { axis } => vec![both(o, unit(axis))],
-        JointKind::Slider { axis } => vec![both(unit(axis), o)],
+        JointKind::Revolute { axis } => vec![both(o, unit(axis))],
+        JointKind::Prismatic { axis } => vec![both(unit(axis), o)],
         JointKind::Cylindrical { axis } => vec![both(unit(axis), o), both(o, unit(axis))],
         JointKind::Helical { axis, pitch } => {
             vec![both(unit(axis).map(|x| x * value(pitch, params)), unit(axis))]

@@ -61,7 +61,7 @@ pub fn random_state(plan: &Plan, seed: u64) -> State {
 
 fn coordinates(rng: &mut Rng, kind: JointKind, q: &mut [f64]) {
     let turns: &[usize] = match kind {
-        JointKind::Slider { .. } => &[],
+        JointKind::Prismatic { .. } => &[],
         JointKind::Cylindrical { .. } => &[1],
         JointKind::Planar { .. } => &[2],
         _ => &[0, 1],

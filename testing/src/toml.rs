@@ -4,7 +4,7 @@ mod constraints;
 
 use std::fmt::Write;
 
-use mbd_codegen::model::{Gravity, Joint, JointKind, Model, Motion, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{Gravity, Joint, JointKind, Model, JointMotion, Placement, Rotation, Value, WrenchAxes};
 
 /// Order in which joints are written; the reader puts them depth first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,8 +148,8 @@ impl Writer<'_> {
         out.push_str("\n[[joint]]\n");
         line(out, "name", quoted(&joint.name));
         let (kind, axis, axis2) = match joint.kind {
-            JointKind::Pin { axis } => ("pin", Some(axis), None),
-            JointKind::Slider { axis } => ("slider", Some(axis), None),
+            JointKind::Revolute { axis } => ("pin", Some(axis), None),
+            JointKind::Prismatic { axis } => ("slider", Some(axis), None),
             JointKind::Cylindrical { axis } => ("cylindrical", Some(axis), None),
             JointKind::Helical { axis, .. } => ("helical", Some(axis), None),
             JointKind::Universal { axes } => ("universal", Some(axes[0]), Some(axes[1])),
@@ -176,13 +176,13 @@ impl Writer<'_> {
         }
         self.freedoms(out, "damping", &joint.damping, false);
         self.freedoms(out, "stiffness", &joint.stiffness, false);
-        let turns = matches!(joint.kind, JointKind::Pin { .. } | JointKind::Helical { .. });
+        let turns = matches!(joint.kind, JointKind::Revolute { .. } | JointKind::Helical { .. });
         self.freedoms(out, "rest", &joint.rest, turns);
         self.freedoms(out, "armature", &joint.armature, false);
         match joint.motion {
-            Motion::Free => {}
-            Motion::Prescribed => line(out, "motion", quoted("prescribed")),
-            Motion::Mimic { leader, ratio, offset } => {
+            JointMotion::Free => {}
+            JointMotion::Prescribed => line(out, "motion", quoted("prescribed")),
+            JointMotion::Mimic { leader, ratio, offset } => {
                 let leader = quoted(&self.model.joints[leader].name);
                 let (ratio, offset) = (self.number(ratio, false), self.number(offset, turns));
                 line(out, "mimic", format!("{{ joint = {leader}, ratio = {ratio}, offset = {offset} }}"));

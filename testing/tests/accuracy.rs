@@ -12,21 +12,21 @@ mod wide;
 use mbd_codegen::generate::trace;
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
-use mbd_codegen::{Arithmetic, Group, Options};
+use mbd_codegen::{Arithmetic, Output, Options};
 use mbd_runtime::Scalar;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 use wide::{inputs, model, Errors, Spread, Wide, MODELS};
 
 /// Compares one output of a plan on many states; gives the ratios of the medians and of the worst errors.
-fn compare(name: &str, plan: &Plan, group: Group, states: u64) -> Spread {
+fn compare(name: &str, plan: &Plan, group: Output, states: u64) -> Spread {
     let program = |arithmetic| {
         let options = Options { arithmetic, ..Options::default() };
         trace(plan, group, &options).unwrap_or_else(|e| panic!("{name}: {e}"))
     };
     let (exact, fast) = (program(Arithmetic::Exact), program(Arithmetic::Fast));
     let parts = match group {
-        Group::Rates => vec![0..plan.dims.nq, plan.dims.nq..exact.program.outputs.len()],
+        Output::Rates => vec![0..plan.dims.nq, plan.dims.nq..exact.program.outputs.len()],
         _ => vec![0..exact.program.outputs.len(); 1],
     };
     // Errors of the exact program, of the fast one with fused operations, and without; part by part.
@@ -70,7 +70,7 @@ fn compare(name: &str, plan: &Plan, group: Group, states: u64) -> Spread {
     worst
 }
 
-fn check(name: &str, plan: &Plan, group: Group, states: u64) {
+fn check(name: &str, plan: &Plan, group: Output, states: u64) {
     let times = compare(name, plan, group, states);
     assert!(times.within_limits(), "{name}, {}: errors are {times:.2?} times as large", group.name());
 }
@@ -79,16 +79,16 @@ fn check(name: &str, plan: &Plan, group: Group, states: u64) {
 fn rates_of_the_models() {
     for (file, base) in MODELS {
         let states = if base == Base::Floating { 400 } else { 1000 };
-        check(file, &Plan::new(&model(file, base), Options::default().plan), Group::Rates, states);
+        check(file, &Plan::new(&model(file, base), Options::default().plan), Output::Rates, states);
     }
 }
 
 #[test]
 fn every_output_of_random_trees() {
     for seed in 0..20 {
-        let model = random_model(seed, &Knobs::everything(seed, 6));
+        let model = random_model(seed, &Distribution::everything(seed, 6));
         let plan = Plan::new(&model, Options::default().plan);
-        for group in Group::ALL {
+        for group in Output::ALL {
             check(&format!("tree {seed}"), &plan, group, 1000);
         }
     }

@@ -3,12 +3,12 @@
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Ab6, Abm12, Direction, Events, Gauss12, ImplicitMidpoint, Outcome, Projection, Radau5, Rk4, Rodas5P, Solver, Step,
+    Ab6, Abm12, Direction, Events, Gauss12, ImplicitMidpoint, Outcome, EnergyProjection, Radau5, Rk4, Rodas5P, Solver, Step,
     StepError, Stepper, Tolerances, Tsit5, VariableAdams, Verner9, Watch,
 };
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::Interpreter;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 
 #[test]
@@ -19,7 +19,7 @@ fn the_counter_counts() {
 #[test]
 fn nothing_is_allocated_after_construction() {
     for seed in 0..200 {
-        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let plan = Plan::new(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let (nq, nv) = (plan.dims.nq, plan.dims.nv);
@@ -36,18 +36,18 @@ fn nothing_is_allocated_after_construction() {
         let (mut rank, mut step) = (Ok(()), Ok(()));
         let all = measure(|| {
             i.momenta(&s.q, &s.v, &mut p);
-            i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+            i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
             i.velocities(&s.q, &p, &mut v);
             energy = i.energy(&s.q, &p);
             i.accelerations(&s.q, &s.v, &mut a);
             i.reactions(&s.q, &s.v, &mut a, &mut reactions);
             i.mass_matrix(&s.q, &mut m);
-            i.derivatives_into(&s.q, &p, &mut derivatives);
+            i.derivatives(&s.q, &p, &mut derivatives);
             i.frames(&s.q, &s.v, &mut frames);
             i.inverse_dynamics(&s.q, &s.v, &a, &mut tau);
             i.bias(&s.q, &s.v, &mut tau);
             i.jacobians(&s.q, &mut jacobians);
-            i.drifts(&s.q, &s.v, &mut drifts);
+            i.bias_accelerations(&s.q, &s.v, &mut drifts);
             rank = i.check_rank(&s.q);
             p_stepped.copy_from_slice(&p);
             step = rk4.step(&mut i, 0.0, 1e-4, &mut q, &mut p_stepped);
@@ -76,8 +76,8 @@ impl Events<Interpreter<f64>, 2> for Back {
 #[test]
 fn nor_do_runs_with_events_allocate() {
     fn run<M: Stepper<Interpreter<f64>>>(seed: u64, method: impl Fn(&Interpreter<f64>) -> M) {
-        let knobs = Knobs { bodies: (3, 4), armature: 0.5, ..Knobs::default() };
-        let plan = Plan::new(&random_model(seed, &knobs), Default::default());
+        let distribution = Distribution { bodies: (3, 4), armature: 0.5, ..Distribution::default() };
+        let plan = Plan::new(&random_model(seed, &distribution), Default::default());
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
@@ -119,7 +119,7 @@ fn second_step<M: Stepper<Interpreter<f64>>>(i: &mut Interpreter<f64>, mut metho
 #[test]
 fn implicit_steps_allocate_nothing() {
     for seed in 0..40 {
-        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let plan = Plan::new(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; plan.dims.nv];
@@ -138,13 +138,13 @@ fn implicit_steps_allocate_nothing() {
 #[test]
 fn multistep_methods_allocate_nothing() {
     for seed in 0..20 {
-        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let plan = Plan::new(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let (mut q, mut p) = (s.q.clone(), vec![0.0; plan.dims.nv]);
         i.momenta(&s.q, &s.v, &mut p);
         let (mut ab, mut abm, variable) = (Ab6::compensated(&i), Abm12::new(&i), VariableAdams::new(&i));
-        let mut projection = Projection::new(&mut i, &q, &p, 1);
+        let mut projection = EnergyProjection::new(&mut i, &q, &p, 1);
         let step = Step::Adaptive(Tolerances::new(1e-4));
         let mut solver = Solver::new(&mut i, variable, step, 0.0, &q, &p).expect("a start");
         let mut results = Ok(());

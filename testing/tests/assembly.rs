@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use mbd_codegen::import::{load, ImportOptions};
-use mbd_codegen::{generate, Group, Options, Precision};
+use mbd_codegen::{generate, Output, Options, Precision};
 
 /// Runs the compiler that built this test, or the first on the path.
 fn rustc(arguments: &[&str], source: &Path, folder: &Path) {
@@ -32,7 +32,7 @@ fn source(model: &str, name: &str, precision: Precision) -> String {
     let options = Options {
         type_name: "Arm".to_string(),
         runtime: "mbd_runtime".to_string(),
-        outputs: vec![Group::Rates],
+        outputs: vec![Output::Rates],
         precision,
         ..Options::default()
     };

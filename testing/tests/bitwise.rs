@@ -8,11 +8,11 @@ mod common;
 use std::collections::HashMap;
 
 use common::Emitted;
-use mbd_codegen::generate::{generate, Arithmetic, Group, Options};
+use mbd_codegen::generate::{generate, Arithmetic, Output, Options};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
 use mbd_runtime::{Interpreter, System};
-use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
 
@@ -28,13 +28,13 @@ impl Case {
     fn new(seed: u64) -> Case {
         // Most trees are small, some have up to twelve bodies.
         let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
-        let model = random_model(seed, &Knobs::everything(seed, size));
+        let model = random_model(seed, &Distribution::everything(seed, size));
         let mut rng = Rng::new(seed, 4);
         // Derivatives are long: of the larger trees every fourth has them.
         let derivatives = size <= 4 || seed.is_multiple_of(4);
         let options = Options {
             arithmetic: Arithmetic::Exact,
-            outputs: Group::ALL.into_iter().filter(|g| derivatives || *g < Group::Derivatives).collect(),
+            outputs: Output::ALL.into_iter().filter(|g| derivatives || *g < Output::Derivatives).collect(),
             efforts: rng.chance(0.8),
             ..Options::default()
         };
@@ -72,22 +72,22 @@ impl Case {
     /// Derivatives; the parameter blocks column by column.
     fn compare_derivatives(&self, s: &State, p: &[f64], i: &mut Interpreter<f64>, inputs: &HashMap<String, Vec<f64>>) {
         let mut d = Derivatives::new(i.tree());
-        i.derivatives_into(&s.q, p, &mut d);
-        let emitted = self.emitted.run(Group::Derivatives.name(), inputs);
+        i.derivatives(&s.q, p, &mut d);
+        let emitted = self.emitted.run(Output::Derivatives.name(), inputs);
         self.compare("v beside derivatives", &emitted["v"], &d.v);
         self.compare("pd beside derivatives", &emitted["pd"], &d.pd);
         for (name, block) in [("dv_dq", &d.dv_dq), ("dv_dp", &d.dv_dp), ("dpd_dq", &d.dpd_dq), ("dpd_dp", &d.dpd_dp)] {
             self.compare(name, &emitted[name], block);
         }
         let mut at = MomentumDerivatives::new(i.tree());
-        i.momentum_derivatives_into(&s.q, &s.v, &mut Derivatives::new(i.tree()), &mut at);
-        let emitted = self.emitted.run(Group::MomentumDerivatives.name(), inputs);
+        i.momentum_derivatives(&s.q, &s.v, &mut Derivatives::new(i.tree()), &mut at);
+        let emitted = self.emitted.run(Output::MomentumDerivatives.name(), inputs);
         for (name, block) in [("p", &at.p), ("pd", &at.pd), ("dp_dq", &at.dp_dq), ("dp_dv", &at.dp_dv)] {
             self.compare(name, &emitted[name], block);
         }
         self.compare("dpd_dq", &emitted["dpd_dq"], &at.dpd_dq);
         self.compare("dpd_dv", &emitted["dpd_dv"], &at.dpd_dv);
-        let emitted = self.emitted.run(Group::ParameterDerivatives.name(), inputs);
+        let emitted = self.emitted.run(Output::ParameterDerivatives.name(), inputs);
         let n = s.params.len();
         for k in 0..n {
             let (column, _) = parameter(&self.plan, s, i, &s.q, &d, k);
@@ -109,50 +109,50 @@ impl Case {
         let mut p = vec![0.0; nv];
         i.momenta(&s.q, &s.v, &mut p);
         let inputs = self.inputs(&s, &p);
-        let run = |group: Group| self.emitted.run(group.name(), &inputs);
-        self.compare("momenta", &run(Group::Momenta)["p"], &p);
+        let run = |group: Output| self.emitted.run(group.name(), &inputs);
+        self.compare("momenta", &run(Output::Momenta)["p"], &p);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
-        i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
-        let rates = run(Group::Rates);
+        i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
+        let rates = run(Output::Rates);
         self.compare("qd", &rates["qd"], &qd);
         self.compare("pd", &rates["pd"], &pd);
         let map = self.emitted.run("coordinate_rates", &inputs);
         i.coordinate_rates(&s.q, &s.v, &mut qd);
         self.compare("coordinate rates", &map["qd"], &qd);
         i.velocities(&s.q, &p, &mut v);
-        self.compare("velocities", &run(Group::Velocities)["v"], &v);
+        self.compare("velocities", &run(Output::Velocities)["v"], &v);
         let (kinetic, potential) = i.energy(&s.q, &p);
-        self.compare("energy", &run(Group::Energy)["result"], &[kinetic, potential]);
+        self.compare("energy", &run(Output::Energy)["result"], &[kinetic, potential]);
         let mut a = vec![0.0; nv];
         i.accelerations(&s.q, &s.v, &mut a);
-        self.compare("accelerations", &run(Group::Accelerations)["a"], &a);
+        self.compare("accelerations", &run(Output::Accelerations)["a"], &a);
         let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];
         i.reactions(&s.q, &s.v, &mut a, &mut wrenches);
-        self.compare("reactions", &run(Group::Reactions)["reactions"], &wrenches.concat());
+        self.compare("reactions", &run(Output::Reactions)["reactions"], &wrenches.concat());
         let mut m = vec![0.0; nv * nv];
         i.mass_matrix(&s.q, &mut m);
-        self.compare("mass matrix", &run(Group::MassMatrix)["m"], &m);
+        self.compare("mass matrix", &run(Output::MassMatrix)["m"], &m);
         let n = self.plan.frames.len();
         let (mut tau, mut h) = (vec![0.0; nv], vec![0.0; nv]);
         i.inverse_dynamics(&s.q, &s.v, &a, &mut tau);
         let mut given = inputs.clone();
         given.insert("a".to_string(), a.clone());
-        let emitted = self.emitted.run(Group::InverseDynamics.name(), &given);
+        let emitted = self.emitted.run(Output::InverseDynamics.name(), &given);
         self.compare("inverse dynamics", &emitted["tau"], &tau);
         i.bias(&s.q, &s.v, &mut h);
-        self.compare("bias", &run(Group::Bias)["h"], &h);
+        self.compare("bias", &run(Output::Bias)["h"], &h);
         let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
         i.jacobians(&s.q, &mut jacobians);
-        self.compare("jacobians", &run(Group::Jacobians)["jacobian"], &jacobians);
-        i.drifts(&s.q, &s.v, &mut drifts);
-        self.compare("drifts", &run(Group::Drifts)["drift"], &drifts.concat());
+        self.compare("jacobians", &run(Output::Jacobians)["jacobian"], &jacobians);
+        i.bias_accelerations(&s.q, &s.v, &mut drifts);
+        self.compare("bias_accelerations", &run(Output::BiasAccelerations)["drift"], &drifts.concat());
         if self.derivatives {
             self.compare_derivatives(&s, &p, &mut i, &inputs);
         }
         let mut frames = vec![FrameState::ground(); n];
         i.frames(&s.q, &s.v, &mut frames);
         let all = |f: &dyn Fn(&FrameState<f64>) -> Vec<f64>| frames.iter().flat_map(f).collect::<Vec<f64>>();
-        let emitted = run(Group::Frames);
+        let emitted = run(Output::Frames);
         self.compare("rotations", &emitted["rotation"], &all(&|f| f.rotation.concat()));
         self.compare("positions", &emitted["position"], &all(&|f| f.position.to_vec()));
         self.compare("frame velocities", &emitted["velocity"], &all(&|f| [f.velocity.lin, f.velocity.ang].concat()));

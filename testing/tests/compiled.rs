@@ -109,8 +109,8 @@ mod batch {
                 let (mut jacobian, mut drift) = ([[[0.0; NV]; 6]; $frames], [[0.0; 6]; $frames]);
                 tree.jacobians(&q, &mut jacobian);
                 results.push(("jacobians", numbers(&jacobian.concat().concat())));
-                tree.drifts(&q, &v, &mut drift);
-                results.push(("drifts", numbers(&drift.concat())));
+                tree.bias_accelerations(&q, &v, &mut drift);
+                results.push(("bias_accelerations", numbers(&drift.concat())));
                 // Lanes and batches have the bits of single states. Neighbouring states differ.
                 const STATES: usize = 21;
                 let state = |s: usize| {
@@ -179,7 +179,7 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     let mut results = Vec::new();
     i.momenta(&q, &v, &mut out);
     results.push(("p", back(&out)));
-    i.rates_into(&q, &p, &mut out, &mut qd, &mut pd);
+    i.rates(&q, &p, &mut out, &mut qd, &mut pd);
     results.push(("qd", back(&qd)));
     results.push(("pd", back(&pd)));
     i.velocities(&q, &p, &mut out);
@@ -194,14 +194,14 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     i.mass_matrix(&q, &mut m);
     results.push(("M", back(&m)));
     let mut d = Derivatives::new(i.tree());
-    i.derivatives_into(&q, &p, &mut d);
+    i.derivatives(&q, &p, &mut d);
     results.push(("v beside derivatives", back(&d.v)));
     results.push(("pd beside derivatives", back(&d.pd)));
     for (name, block) in [("dv_dq", &d.dv_dq), ("dv_dp", &d.dv_dp), ("dpd_dq", &d.dpd_dq), ("dpd_dp", &d.dpd_dp)] {
         results.push((name, back(block)));
     }
     let mut at = MomentumDerivatives::new(i.tree());
-    i.momentum_derivatives_into(&q, &v, &mut Derivatives::new(&i.tree().clone()), &mut at);
+    i.momentum_derivatives(&q, &v, &mut Derivatives::new(&i.tree().clone()), &mut at);
     results.push(("p beside derivatives", back(&at.p)));
     results.push(("pd beside derivatives, given v", back(&at.pd)));
     let blocks = [("dp_dq", &at.dp_dq), ("dp_dv", &at.dp_dv), ("dpd_dq, given v", &at.dpd_dq), ("dpd_dv", &at.dpd_dv)];
@@ -230,8 +230,8 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     let (mut jacobians, mut drifts) = (of(&vec![0.0; 6 * n * v.len()]), vec![[S::zero(); 6]; n]);
     i.jacobians(&q, &mut jacobians);
     results.push(("jacobians", back(&jacobians)));
-    i.drifts(&q, &v, &mut drifts);
-    results.push(("drifts", back(&drifts.concat())));
+    i.bias_accelerations(&q, &v, &mut drifts);
+    results.push(("bias_accelerations", back(&drifts.concat())));
     results
 }
 

@@ -5,7 +5,7 @@ use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
-    close, complete, Bounded, Closing, Effort, Hold, IndexTwo, Minimal, Rattle, Split, Stabilisation, Steady, Watch,
+    close, complete, WithPostStep, Closing, Effort, Hold, RadauIndex2, CoordinatePartition, Rattle, OpenAndClosed, Stabilisation, Steady, Repartition,
 };
 use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
@@ -144,31 +144,31 @@ fn interpreter(model: &Model) -> Mechanism {
     plan.interpreter(&[])
 }
 
-fn split(text: &str) -> Split<Mechanism, Mechanism> {
+fn split(text: &str) -> OpenAndClosed<Mechanism, Mechanism> {
     let closed = model(text);
     let mut open = closed.clone();
     open.constraints.clear();
-    Split { open: interpreter(&open), closed: interpreter(&closed) }
+    OpenAndClosed { open: interpreter(&open), closed: interpreter(&closed) }
 }
 
 /// A closed state: coordinates near a guess, velocities near others.
-fn state(y: &mut Split<Mechanism, Mechanism>, q: &[f64], v: &[f64], held: &[bool]) -> State {
+fn state(y: &mut OpenAndClosed<Mechanism, Mechanism>, q: &[f64], v: &[f64], held: &[bool]) -> State {
     let (mut q, mut v, mut p) = (q.to_vec(), v.to_vec(), vec![0.0; v.len()]);
     let closed = close(y, &mut q, &Closing { held, ..Closing::default() }).unwrap();
     let met = complete(y, 0.0, &q, &mut v, &[], 1e-12).unwrap();
     assert!(closed.residual < 1e-14 && met.residual < 1e-13, "{closed:?} {met:?}");
-    y.open.state_momenta(&q, &v, &mut p);
+    y.open.conjugate_momenta(&q, &v, &mut p);
     (q, p)
 }
 
-fn crank(pin: &str) -> (Split<Mechanism, Mechanism>, State) {
+fn crank(pin: &str) -> (OpenAndClosed<Mechanism, Mechanism>, State) {
     let mut y = split(&four_bar(pin));
     // The rocker is the last joint of the file, and of the state.
     let start = state(&mut y, &[-1.5, 1.0, -2.0], &[5.0, 0.0, 0.0], &[true]);
     (y, start)
 }
 
-fn plate() -> (Split<Mechanism, Mechanism>, State) {
+fn plate() -> (OpenAndClosed<Mechanism, Mechanism>, State) {
     let mut y = split(PLATE);
     let start = state(&mut y, &[0.1, 0.05, 0.0, 0.1, 0.0, 0.1, 1.0], &[0.5, 0.3, 0.0, 0.0, 0.2, 1.0], &[]);
     (y, start)
@@ -176,12 +176,12 @@ fn plate() -> (Split<Mechanism, Mechanism>, State) {
 
 fn off<Y: Constrained<Scalar = f64>>(y: &mut Y, q: &Y::Coordinates) -> f64 {
     let (mut residual, mut entries) = (y.zero_rows(), y.zero_entries());
-    y.closure(q, &mut residual, &mut entries);
+    y.constraint_residuals(q, &mut residual, &mut entries);
     residual.as_ref().iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
 fn energy<Y: Energetic<Scalar = f64>>(y: &mut Y, q: &Y::Coordinates, p: &Y::Momenta) -> f64 {
-    let (kinetic, potential) = y.state_energy(q, p);
+    let (kinetic, potential) = y.energies(q, p);
     kinetic + potential
 }
 
@@ -201,8 +201,8 @@ fn held<Y: Constrained<Scalar = f64>, M: Stepper<Y>>(
     y: &Y,
     method: M,
     policy: Stabilisation,
-) -> Bounded<Y, M, Hold<Y>> {
-    Bounded::new(y, method, Hold::new(y, policy, Effort::default()))
+) -> WithPostStep<Y, M, Hold<Y>> {
+    WithPostStep::new(y, method, Hold::new(y, policy, Effort::default()))
 }
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
@@ -223,7 +223,7 @@ fn all_ways_lead_to_the_same_end() {
         println!("{name}: rank {:?} of {} rows", fine.boundary.rank(), y.rows().len());
         for policy in [
             Stabilisation::None,
-            Stabilisation::Settle,
+            Stabilisation::Momenta,
             Stabilisation::Mass,
             Stabilisation::Gradient,
             Stabilisation::Partition,
@@ -231,7 +231,7 @@ fn all_ways_lead_to_the_same_end() {
             let errors = [200, 400].map(|steps| {
                 let mut method = held(&y, Rk4::new(&y), policy);
                 let state = march(&mut y, &mut method, steps, end, &start);
-                let closes = !matches!(policy, Stabilisation::None | Stabilisation::Settle);
+                let closes = !matches!(policy, Stabilisation::None | Stabilisation::Momenta);
                 assert!(!closes || off(&mut y, &state.0) < 1e-13, "{name} {policy:?}");
                 apart(&state.0, &reference.0)
             });
@@ -239,16 +239,16 @@ fn all_ways_lead_to_the_same_end() {
             assert!((errors[0] / errors[1]).log2() > 3.5, "{name} {policy:?}: {errors:?}");
         }
         // Work that is always the same, with four evaluations a step.
-        let mut fixed = Bounded::new(&y, Rk4::new(&y), Hold::new(&y, Stabilisation::Mass, Effort::fixed(2)));
-        let mut steady = Bounded::new(&y, Rk4::new(&y), Steady::<_, 2>::new(&y));
+        let mut fixed = WithPostStep::new(&y, Rk4::new(&y), Hold::new(&y, Stabilisation::Mass, Effort::fixed(2)));
+        let mut steady = WithPostStep::new(&y, Rk4::new(&y), Steady::<_, 2>::new(&y));
         let ends = (march(&mut y, &mut fixed, 200, end, &start), march(&mut y, &mut steady, 200, end, &start));
         assert_eq!(ends.0, ends.1, "{name}");
         assert_eq!(steady.statistics().evaluations, 800, "{name}");
         // Minimal coordinates.
         let errors = [200, 400].map(|steps| {
             let (mut q, mut p) = start.clone();
-            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let mut method = Bounded::new(&m, Rk4::new(&m), Watch::default());
+            let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let mut method = WithPostStep::new(&m, Rk4::new(&m), Repartition::default());
             let state = march(&mut m, &mut method, steps, end, &(q, p));
             assert!(off(&mut y, &state.0) < 1e-13);
             println!("{name} minimal: {} switches", m.switches().0);
@@ -266,7 +266,7 @@ fn all_ways_lead_to_the_same_end() {
         println!("{name} rattle: {errors:?}");
         assert!((errors[0] / errors[1] - 4.0).abs() < 0.4, "{name}: {errors:?}");
         let errors = [50, 100].map(|steps| {
-            let mut method = held(&y, IndexTwo::new(&y), Stabilisation::Mass);
+            let mut method = held(&y, RadauIndex2::new(&y), Stabilisation::Mass);
             let state = march(&mut y, &mut method, steps, end, &start);
             assert!(off(&mut y, &state.0) < 1e-13);
             apart(&state.0, &reference.0)
@@ -349,8 +349,8 @@ fn rolling() {
         assert!(off(&mut y, &q) < 1e-13 && lost < 1e-8, "{policy:?} {lost:e}");
     }
     let (mut q, mut p) = start;
-    let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
-    let method = Bounded::new(&m, Dop853::new(&m), Watch::default());
+    let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
+    let method = WithPostStep::new(&m, Dop853::new(&m), Repartition::default());
     let step = Step::Adaptive(Tolerances::new(1e-11));
     let mut solver = Solver::new(&mut m, method, step, 0.0, &q, &p).unwrap();
     solver.run(&mut m, 2.0).unwrap_or_else(|e| panic!("{e} {:?}", m.trouble()));
@@ -368,12 +368,12 @@ fn rolling_for_long() {
     let (s, c) = (0.1_f64.sin(), 0.1_f64.cos());
     let mut q = vec![0.0, 0.0, 0.49, s, 0.0, 0.0, c];
     close(&mut y, &mut q, &Closing::default()).unwrap();
-    let (mut v, mut p) = (vec![1.5, 0.0, 0.0, 0.0, 3.0, 0.5], y.rest());
-    y.state_momenta(&q, &v, &mut p);
+    let (mut v, mut p) = (vec![1.5, 0.0, 0.0, 0.0, 3.0, 0.5], y.zero_momenta());
+    y.conjugate_momenta(&q, &v, &mut p);
     let (mut sigma, mut gap, mut phi) = (y.zero_rows(), y.zero_rows(), y.zero_entries());
-    y.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    y.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     let whole = |y: &mut Interpreter<f64>, q: &Vec<f64>, p: &Vec<f64>| {
-        let (kinetic, potential) = y.state_energy(q, p);
+        let (kinetic, potential) = y.energies(q, p);
         kinetic + potential
     };
     let before = whole(&mut y, &q, &p);
@@ -382,8 +382,8 @@ fn rolling_for_long() {
     for k in 0..100_000 {
         method.step(&mut y, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p).unwrap();
         if k % 100 == 99 {
-            y.settle(0.0, &q, &mut p, &mut v, &mut sigma);
-            y.closure(&q, &mut gap, &mut phi);
+            y.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
+            y.constraint_residuals(&q, &mut gap, &mut phi);
             for (row, gap) in y.rows().iter().zip(&gap) {
                 let rate: f64 = (row.first..row.first + row.len).map(|k| phi[k] * v[y.entry_columns()[k]]).sum();
                 off = off.max(rate.abs()).max(gap.abs());
@@ -422,8 +422,8 @@ fn past_the_change_point() {
         assert!(worst < 5e-9 && drift < 1e-13, "{name}: {worst:e} {drift:e}");
         for settle in [false, true] {
             let (mut q, mut p) = start.clone();
-            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = Bounded::new(&m, Dop853::new(&m), Watch { settle });
+            let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let method = WithPostStep::new(&m, Dop853::new(&m), Repartition { settle });
             let mut solver = Solver::new(&mut m, method, step, 0.0, &q, &p).unwrap();
             let mut worst = 0.0_f64;
             while solver.time() < 3.0 {
@@ -447,17 +447,17 @@ fn single_precision() {
     let mut y: Interpreter<f32> = Interpreter::new(plan.tree(&[]), [0.0, 0.0, -9.81]);
     let single = |x: &[f64]| x.iter().map(|x| *x as f32).collect::<Vec<f32>>();
     let (mut q, mut p) = (single(&q), single(&p));
-    let (kinetic, potential) = y.state_energy(&q, &p);
+    let (kinetic, potential) = y.energies(&q, &p);
     let before = kinetic + potential;
     let hold = Hold::new(&y, Stabilisation::Mass, Effort::fixed(1));
-    let mut method = Bounded::new(&y, Rk4::compensated(&y), hold);
+    let mut method = WithPostStep::new(&y, Rk4::compensated(&y), hold);
     let (mut residual, mut entries, mut worst) = (y.zero_rows(), y.zero_entries(), 0.0_f32);
     for k in 0..10_000_u16 {
         method.step(&mut y, f32::from(k) * 1e-3, 1e-3, &mut q, &mut p).unwrap();
-        y.closure(&q, &mut residual, &mut entries);
+        y.constraint_residuals(&q, &mut residual, &mut entries);
         worst = residual.iter().fold(worst, |m, x| m.max(x.abs()));
     }
-    let (kinetic, potential) = y.state_energy(&q, &p);
+    let (kinetic, potential) = y.energies(&q, &p);
     println!("drift {worst:e}, energy {:e} of {before}", kinetic + potential - before);
     // Angles of up to 60 rad: an epsilon of theirs is 4e-6.
     assert!(worst < 2e-5, "{worst:e}");
@@ -480,7 +480,7 @@ fn long_run() {
         for k in 0..n {
             method.step(&mut y, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p).unwrap();
             if k % 10 == 0 {
-                y.closure(&q, &mut residual, &mut entries);
+                y.constraint_residuals(&q, &mut residual, &mut entries);
                 worst = residual.iter().fold(worst, |m, x| m.max(x.abs()));
             }
         }
@@ -507,18 +507,18 @@ fn nothing_is_allocated() {
         });
         assert_eq!(found.count_total, 0, "{name}");
     }
-    for policy in [Stabilisation::Settle, Stabilisation::Mass, Stabilisation::Gradient, Stabilisation::Partition] {
+    for policy in [Stabilisation::Momenta, Stabilisation::Mass, Stabilisation::Gradient, Stabilisation::Partition] {
         let method = held(&y, Rk4::new(&y), policy);
         check("held", &mut y, method, &start);
     }
     let method = Rattle::new(&y);
     check("rattle", &mut y, method, &start);
-    let method = IndexTwo::new(&y);
+    let method = RadauIndex2::new(&y);
     check("radau", &mut y, method, &start);
     for settle in [false, true] {
         let (mut q, mut p) = start.clone();
-        let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap().with_ratio(1.1);
-        let method = Bounded::new(&m, Rk4::new(&m), Watch { settle });
+        let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap().with_ratio(1.1);
+        let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { settle });
         check("minimal", &mut m, method, &(q, p));
         assert!(m.switches().0 > 0);
     }
@@ -547,13 +547,13 @@ fn comparison() {
     }
     let policies = [
         Stabilisation::None,
-        Stabilisation::Settle,
+        Stabilisation::Momenta,
         Stabilisation::Mass,
         Stabilisation::Gradient,
         Stabilisation::Partition,
     ];
     for _ in 0..15 {
-        let mut note = |k: usize, (time, end): (f64, State), y: &mut Split<Mechanism, Mechanism>| {
+        let mut note = |k: usize, (time, end): (f64, State), y: &mut OpenAndClosed<Mechanism, Mechanism>| {
             let lost = (energy(y, &end.0, &end.1) - before).abs();
             best[k] = (best[k].0.min(time), off(y, &end.0), lost);
         };
@@ -564,26 +564,26 @@ fn comparison() {
         }
         for (k, settle) in [false, true].into_iter().enumerate() {
             let (mut q, mut p) = start.clone();
-            let mut m = Minimal::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = Bounded::new(&m, Rk4::new(&m), Watch { settle });
+            let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
+            let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { settle });
             let end = timed(&mut m, method, &(q, p));
             note(5 + k, end, &mut y);
         }
         for (k, system) in [&mut braked, &mut soft].into_iter().enumerate() {
-            let method = held(system, Rk4::new(system), Stabilisation::Settle);
+            let method = held(system, Rk4::new(system), Stabilisation::Momenta);
             let end = timed(system, method, &start);
             note(9 + k, end, &mut y);
         }
         let method = Rattle::new(&y);
         let end = timed(&mut y, method, &start);
         note(7, end, &mut y);
-        let method = IndexTwo::new(&y);
+        let method = RadauIndex2::new(&y);
         let end = timed(&mut y, method, &start);
         note(8, end, &mut y);
     }
     let names = [
         "none",
-        "settle",
+        "project_momenta",
         "mass",
         "gradient",
         "partition",

@@ -8,10 +8,10 @@ mod common;
 use std::collections::HashMap;
 
 use common::Emitted;
-use mbd_codegen::generate::{generate, Arithmetic, Group, Options};
+use mbd_codegen::generate::{generate, Arithmetic, Output, Options};
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
-use mbd_codegen::Loops;
+use mbd_codegen::RolledCode;
 use mbd_runtime::{Accelerated, Constrained, Dual, Interpreter, Scalar, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::random::Rng;
@@ -34,20 +34,20 @@ impl Case {
         let mut rng = Rng::new(seed, 8);
         let derivatives = seed.is_multiple_of(4);
         let mut outputs = vec![
-            Group::Rates,
-            Group::Momenta,
-            Group::Energy,
-            Group::Velocities,
-            Group::Accelerations,
-            Group::Reactions,
+            Output::Rates,
+            Output::Momenta,
+            Output::Energy,
+            Output::Velocities,
+            Output::Accelerations,
+            Output::Reactions,
         ];
-        outputs.extend(Group::CONSTRAINED);
+        outputs.extend(Output::CONSTRAINED);
         if derivatives {
-            outputs.extend([Group::Derivatives, Group::ParameterDerivatives]);
+            outputs.extend([Output::Derivatives, Output::ParameterDerivatives]);
         }
         let mut options =
             Options { arithmetic: Arithmetic::Exact, outputs, efforts: rng.chance(0.7), ..Options::default() };
-        options.plan.loops = Loops::Never;
+        options.plan.loops = RolledCode::Never;
         let plan = Plan::new(&system.model, options.searches());
         system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
         let source = generate(&system.model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
@@ -87,43 +87,43 @@ impl Case {
 
     fn check(&self) {
         let (s, inputs) = (&self.state, self.inputs());
-        let run = |group: Group| self.emitted.run(group.name(), &inputs);
+        let run = |group: Output| self.emitted.run(group.name(), &inputs);
         let mut i = s.interpreter(&self.plan);
         let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
-        i.rates_into(&s.q, &self.p, &mut v, &mut qd, &mut pd);
-        let rates = run(Group::Rates);
+        i.rates(&s.q, &self.p, &mut v, &mut qd, &mut pd);
+        let rates = run(Output::Rates);
         self.compare("qd", &rates["qd"], &qd);
         self.compare("pd", &rates["pd"], &pd);
-        self.compare("velocities", &run(Group::Velocities)["v"], &v);
+        self.compare("velocities", &run(Output::Velocities)["v"], &v);
         i.momenta(&s.q, &s.v, &mut v);
-        self.compare("momenta", &run(Group::Momenta)["p"], &v);
+        self.compare("momenta", &run(Output::Momenta)["p"], &v);
         let (kinetic, potential) = i.energy(&s.q, &self.p);
-        self.compare("energy", &run(Group::Energy)["result"], &[kinetic, potential]);
-        i.state_accelerations(&s.q, &s.v, &mut v);
-        self.compare("accelerations", &run(Group::Accelerations)["a"], &v);
+        self.compare("energy", &run(Output::Energy)["result"], &[kinetic, potential]);
+        i.generalized_accelerations(&s.q, &s.v, &mut v);
+        self.compare("accelerations", &run(Output::Accelerations)["a"], &v);
         let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];
         i.reactions(&s.q, &s.v, &mut v, &mut wrenches);
-        self.compare("reactions", &run(Group::Reactions)["reactions"], &wrenches.concat());
+        self.compare("reactions", &run(Output::Reactions)["reactions"], &wrenches.concat());
         let (mut rows, mut entries) = (i.zero_rows(), i.zero_entries());
-        i.closure(&s.q, &mut rows, &mut entries);
-        let closure = run(Group::Closure);
+        i.constraint_residuals(&s.q, &mut rows, &mut entries);
+        let closure = run(Output::ConstraintResiduals);
         self.compare("residual", &closure["residual"], &rows);
         self.compare("jacobian", &closure["jacobian"], &entries);
         let mut freed = self.p.clone();
-        i.settle(0.0, &s.q, &mut freed, &mut v, &mut rows);
-        let settle = run(Group::Settle);
+        i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
+        let settle = run(Output::ProjectMomenta);
         self.compare("settled v", &settle["v"], &v);
         self.compare("freed", &settle["freed"], &freed);
         self.compare("sigma", &settle["sigma"], &rows);
         let mut pivots = i.zero_rows();
-        i.correction(&s.q, &mut rows, &mut v, &mut pivots);
-        let correction = run(Group::Correction);
+        i.position_correction(&s.q, &mut rows, &mut v, &mut pivots);
+        let correction = run(Output::PositionCorrection);
         self.compare("residual of the correction", &correction["residual"], &rows);
         self.compare("dq", &correction["dq"], &v);
         self.compare("pivots", &correction["pivots"], &pivots);
         i.multipliers(0.0, &s.q, &s.v, &mut rows);
-        self.compare("lambda", &run(Group::Multipliers)["lambda"], &rows);
+        self.compare("lambda", &run(Output::Multipliers)["lambda"], &rows);
         if self.derivatives {
             self.compare_derivatives(&inputs, [&rates["qd"], &rates["pd"]]);
         }
@@ -147,7 +147,7 @@ impl Case {
         let zeros = |n| vec![Dual::zero(); n];
         let (mut v, mut qd, mut pd) = (zeros(q.len()), zeros(q.len()), zeros(p.len()));
         v.truncate(p.len());
-        i.rates_into(q, p, &mut v, &mut qd, &mut pd);
+        i.rates(q, p, &mut v, &mut qd, &mut pd);
         [v, pd]
     }
 
@@ -158,7 +158,7 @@ impl Case {
         let unit = |n: usize, k: usize| (0..n).map(|j| f64::from(u8::from(j == k))).collect::<Vec<f64>>();
         let (q, p, params) = (fixed(&s.q), fixed(&self.p), fixed(&s.params));
         let (nq, nv, np) = (s.q.len(), s.v.len(), s.params.len());
-        let given = self.emitted.run(Group::Derivatives.name(), inputs);
+        let given = self.emitted.run(Output::Derivatives.name(), inputs);
         self.compare("pd beside derivatives", &given["pd"], pd);
         let column =
             |name: &str, k: usize, n: usize| given[name].iter().skip(k).step_by(n).copied().collect::<Vec<_>>();
@@ -174,7 +174,7 @@ impl Case {
             self.compare("dv_dp", &column("dv_dp", k, nv), &du(&v));
             self.compare("dpd_dp", &column("dpd_dp", k, nv), &du(&pd));
         }
-        let given = self.emitted.run(Group::ParameterDerivatives.name(), inputs);
+        let given = self.emitted.run(Output::ParameterDerivatives.name(), inputs);
         for k in 0..np {
             let [v, pd] = self.along(&q, &p, &moving(&s.params, &unit(np, k)));
             let column = |name: &str| given[name].iter().skip(k).step_by(np).copied().collect::<Vec<_>>();
@@ -218,11 +218,11 @@ fn outputs_follow_the_model() {
         generate(model, &options).map(|g| g.source.contains("::Constrained for Model"))
     };
     assert_eq!(traits(&closed, Options::OUTPUTS.to_vec()), Ok(true));
-    assert_eq!(traits(&closed, Group::ALL.to_vec()), Ok(true));
-    assert_eq!(traits(&closed, vec![Group::Rates]), Ok(false));
-    assert_eq!(traits(&open, Group::ALL.to_vec()), Ok(false));
-    let refused = traits(&open, vec![Group::Settle]).expect_err("a tree has none");
-    assert!(refused.contains("`settle` is an output of mechanisms with loops"), "{refused}");
-    let refused = traits(&closed, vec![Group::MomentumDerivatives]).expect_err("they do not know the loops");
+    assert_eq!(traits(&closed, Output::ALL.to_vec()), Ok(true));
+    assert_eq!(traits(&closed, vec![Output::Rates]), Ok(false));
+    assert_eq!(traits(&open, Output::ALL.to_vec()), Ok(false));
+    let refused = traits(&open, vec![Output::ProjectMomenta]).expect_err("a tree has none");
+    assert!(refused.contains("`project_momenta` is an output of mechanisms with loops"), "{refused}");
+    let refused = traits(&closed, vec![Output::MomentumDerivatives]).expect_err("they do not know the loops");
     assert!(refused.contains("use `derivatives`"), "{refused}");
 }

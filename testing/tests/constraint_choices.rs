@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use mbd_codegen::model::{ConstraintKind, JointKind, Model, Motion};
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
-use mbd_runtime::constrained::Minimal;
+use mbd_codegen::model::{ConstraintKind, JointKind, Model, JointMotion};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_runtime::constrained::CoordinatePartition;
 use mbd_runtime::{Accelerated, Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
-use mbd_testing::random::Knobs;
+use mbd_testing::random::Distribution;
 use mbd_testing::state::State;
 use mbd_testing::substituted;
 
@@ -19,12 +19,12 @@ use dense::minimal::{choices, full, least, others, pivot};
 use dense::{minimal, thesis, Matrix, Truth, Vector};
 
 /// Any choice of independent velocities: `ṗ_ind` out of `ṗ⁺` at `p⁺_dep = 0` is `d/dt (Bᵀ M v)`, by the rates themselves
-/// and by [`Minimal`].
+/// and by [`CoordinatePartition`].
 #[test]
 fn minimal_coordinates_are_a_gauge() {
     let mut velocity = Errors::new("qd", 1e-11);
     let mut rate = Errors::new("pd of independents", 1e-10);
-    let mut adapted = Errors::new("pd of Minimal", 1e-10);
+    let mut adapted = Errors::new("pd of CoordinatePartition", 1e-10);
     let mut choices_met = 0;
     for seed in 0..SYSTEMS / 2 {
         let Some(mut c) = Case::new(seed) else { continue };
@@ -53,10 +53,10 @@ fn minimal_coordinates_are_a_gauge() {
             let scale = c.truth.open_rates.amax().max(turning.amax()).max(exact.amax());
             rate.add(&c, &ours, &exact, scale * b.amax());
             let (mut q, mut gauge) = (c.q(), p.as_slice().to_vec());
-            let mut minimal = Minimal::new(c.i.clone(), &mut q, &mut gauge.clone()).expect("closed");
+            let mut minimal = CoordinatePartition::new(c.i.clone(), &mut q, &mut gauge.clone()).expect("closed");
             minimal.choose_among(&dependents, &mut q, &mut gauge).expect("a valid choice");
-            let (mut qd, mut pd) = (c.i.neutral(), c.i.rest());
-            minimal.state_rates(0.0, &q, &p.as_slice().to_vec(), &mut qd, &mut pd);
+            let (mut qd, mut pd) = (c.i.neutral(), c.i.zero_momenta());
+            minimal.rates_at(0.0, &q, &p.as_slice().to_vec(), &mut qd, &mut pd);
             assert!(dependents.iter().all(|k| pd[*k] == 0.0), "seed {seed}, {dependents:?}: {pd:?}");
             let ours = Vector::from(pd).select_rows(&others(nv, &dependents));
             adapted.add(&c, &ours, &exact, scale * b.amax());
@@ -110,15 +110,15 @@ fn the_gauge_agrees_with_the_thesis_s_recursion() {
 fn results(plan: &Plan, s: &State, p: &[f64]) -> [Vec<f64>; 5] {
     let mut i = s.interpreter(plan);
     let q = s.q.clone();
-    let (mut settled, mut v, mut sigma) = (p.to_vec(), i.rest(), i.zero_rows());
-    i.settle(0.0, &q, &mut settled, &mut v, &mut sigma);
-    let (mut qd, mut pd, mut a) = (i.neutral(), i.rest(), i.rest());
-    i.state_rates(0.0, &q, &settled, &mut qd, &mut pd);
-    i.state_accelerations(&q, &v, &mut a);
+    let (mut settled, mut v, mut sigma) = (p.to_vec(), i.zero_momenta(), i.zero_rows());
+    i.project_momenta(0.0, &q, &mut settled, &mut v, &mut sigma);
+    let (mut qd, mut pd, mut a) = (i.neutral(), i.zero_momenta(), i.zero_momenta());
+    i.rates_at(0.0, &q, &settled, &mut qd, &mut pd);
+    i.generalized_accelerations(&q, &v, &mut a);
     let (mut lambda, mut residual, mut entries) = (i.zero_rows(), i.zero_rows(), i.zero_entries());
     i.multipliers(0.0, &q, &v, &mut lambda);
-    i.closure(&q, &mut residual, &mut entries);
-    let mut force = i.rest();
+    i.constraint_residuals(&q, &mut residual, &mut entries);
+    let mut force = i.zero_momenta();
     for (k, row) in i.rows().iter().enumerate() {
         for at in row.first..row.first + row.len {
             force[i.entry_columns()[at]] += lambda[k] * entries[at];
@@ -145,11 +145,11 @@ fn apart(seed: u64, system: LoopSystem) -> Option<Case> {
 fn parameters_of_constraints_are_as_good_as_constants() {
     let (mut worst, mut met) = (0.0_f64, 0);
     for seed in 0..200 {
-        let knobs = LoopKnobs::everything(seed, 6);
-        let knobs = LoopKnobs { tree: Knobs { params: 0.4, ..knobs.tree }, ..knobs };
-        let Some(c) = apart(seed, random_loops(seed, &knobs)) else { continue };
+        let distribution = LoopKnobs::everything(seed, 6);
+        let distribution = LoopKnobs { tree: Distribution { params: 0.4, ..distribution.tree }, ..distribution };
+        let Some(c) = apart(seed, random_loops(seed, &distribution)) else { continue };
         met += 1;
-        let options = PlanOptions { snap: 0.0, forms: Forms::Single, accelerations: false, ..PlanOptions::default() };
+        let options = PlanOptions { snap: 0.0, forms: EliminationStrategy::Single, accelerations: false, ..PlanOptions::default() };
         let s = &c.system.state;
         let ours = results(&Plan::new(&c.system.model, options), s, c.p.as_slice());
         let plain = Plan::new(&substituted(&c.system.model, &s.params), options);
@@ -172,7 +172,7 @@ fn forms_of_elimination_do_not_matter() {
             let plan = Plan::new(&c.system.model, PlanOptions { forms, ..PlanOptions::default() });
             results(&plan, &c.system.state, c.p.as_slice())
         };
-        let [first, others @ ..] = Forms::ALL.map(of);
+        let [first, others @ ..] = EliminationStrategy::ALL.map(of);
         for other in &others {
             let d = difference(&first, other);
             assert!(d < 1e-10, "seed {seed}: {d:e}");
@@ -197,8 +197,8 @@ fn single_precision_holds_constraints() {
         let plan = dense::case::plan_of(&c.system, seed);
         let mut i: Interpreter<f32> = c.system.state.interpreter_of(&plan, |x, _| x as f32);
         let single = |list: &[f64]| list.iter().map(|x| *x as f32).collect::<Vec<f32>>();
-        let (mut p, mut v, mut sigma) = (single(c.p.as_slice()), i.rest(), i.zero_rows());
-        i.settle(0.0, &single(&c.system.state.q), &mut p, &mut v, &mut sigma);
+        let (mut p, mut v, mut sigma) = (single(c.p.as_slice()), i.zero_momenta(), i.zero_rows());
+        i.project_momenta(0.0, &single(&c.system.state.q), &mut p, &mut v, &mut sigma);
         let v = Vector::from_iterator(v.len(), v.iter().map(|x| f64::from(*x)));
         let error = (v - &c.truth.v).amax() / c.truth.unbound.amax().max(1.0);
         assert!(error < 1e-4, "seed {seed}: {error:e}");
@@ -252,10 +252,10 @@ fn the_systems_have_everything() {
         note("spherical", kind(|k| *k == JointKind::Spherical));
         note("floating", kind(|k| *k == JointKind::Floating));
         note("planar", kind(|k| matches!(k, JointKind::Planar { .. })));
-        note("drive", any(&|j| model.joints[j].motion == Motion::Prescribed));
-        note("mimic", any(&|j| matches!(model.joints[j].motion, Motion::Mimic { .. })));
+        note("drive", any(&|j| model.joints[j].motion == JointMotion::Prescribed));
+        note("mimic", any(&|j| matches!(model.joints[j].motion, JointMotion::Mimic { .. })));
         let led = |j: usize| {
-            let follows = |m: &Motion| matches!(m, Motion::Mimic { leader, .. } if *leader == j);
+            let follows = |m: &Motion| matches!(m, JointMotion::Mimic { leader, .. } if *leader == j);
             model.joints.iter().any(|joint| follows(&joint.motion))
         };
         note("leader", any(&led));

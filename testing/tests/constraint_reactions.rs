@@ -77,7 +77,7 @@ fn reactions_are_what_is_left_for_the_joints() {
         s.v = c.truth.v.as_slice().to_vec();
         c.system.state.v = s.v.clone();
         let mut ours = vec![[0.0; 6]; closed.joint_nodes.len()];
-        let mut a = c.i.rest();
+        let mut a = c.i.zero_momenta();
         c.i.reactions(&s.q, &s.v, &mut a, &mut ours);
         let mut motion = cases::Case::of(seed, c.system.open.clone(), s);
         motion.a = c.truth.motion.x.as_slice().to_vec();

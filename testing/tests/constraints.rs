@@ -86,8 +86,8 @@ fn accelerations_and_multipliers_are_those_of_dense_matrices() {
     for seed in 0..SYSTEMS {
         let Some(mut c) = Case::new(seed) else { continue };
         let v = c.truth.v.as_slice().to_vec();
-        let mut a = c.i.rest();
-        c.i.state_accelerations(&c.q(), &v, &mut a);
+        let mut a = c.i.zero_momenta();
+        c.i.generalized_accelerations(&c.q(), &v, &mut a);
         let scale = c.truth.unbound_motion.amax().max(c.truth.motion.x.amax());
         acceleration.add(&c, &a.into(), &c.truth.motion.x, scale);
         let mut lambda = c.i.zero_rows();
@@ -111,8 +111,8 @@ fn settled_states_are_those_of_dense_matrices() {
     for seed in 0..SYSTEMS {
         let Some(mut c) = Case::new(seed) else { continue };
         let mut p = c.p.as_slice().to_vec();
-        let (mut v, mut sigma) = (c.i.rest(), c.i.zero_rows());
-        c.i.settle(0.0, &c.q(), &mut p, &mut v, &mut sigma);
+        let (mut v, mut sigma) = (c.i.zero_momenta(), c.i.zero_rows());
+        c.i.project_momenta(0.0, &c.q(), &mut p, &mut v, &mut sigma);
         let phi = c.phi(&c.q()).1;
         let (v, scale) = (Vector::from(v), c.truth.unbound.amax().max(c.truth.v.amax()));
         velocity.add(&c, &v, &c.truth.v, scale);
@@ -123,7 +123,7 @@ fn settled_states_are_those_of_dense_matrices() {
         momentum.add(&c, &p.into(), &carried, scale);
         let force = c.phi(&c.q()).1.transpose() * Vector::from(sigma);
         pull.add(&c, &force, &c.truth.pull, scale);
-        let (ours, _) = c.i.state_energy(&c.q(), &c.p.as_slice().to_vec());
+        let (ours, _) = c.i.energies(&c.q(), &c.p.as_slice().to_vec());
         let mut open = c.system.state.interpreter(&c.system.open);
         let (exact, _) = open.energy(&c.system.state.q, carried.as_slice());
         let unbound = 0.5 * c.truth.unbound.dot(&(&c.truth.dense.m * &c.truth.unbound));
@@ -158,8 +158,8 @@ fn corrections_are_those_of_dense_matrices() {
         let m = Matrix::from_row_slice(c.p.len(), c.p.len(), &m);
         let there = Dense::of(m, phi, Vector::zeros(n), Vector::zeros(c.p.len()));
         let exact = there.solve(&Vector::zeros(c.p.len()), &-&residual).x;
-        let (mut found, mut dq, mut pivots) = (c.i.zero_rows(), c.i.rest(), c.i.zero_rows());
-        c.i.correction(&moved, &mut found, &mut dq, &mut pivots);
+        let (mut found, mut dq, mut pivots) = (c.i.zero_rows(), c.i.zero_momenta(), c.i.zero_rows());
+        c.i.position_correction(&moved, &mut found, &mut dq, &mut pivots);
         assert!(pivots.iter().all(|p| *p > 0.0), "seed {seed}: {pivots:?}");
         let scale = exact.amax();
         assert_eq!(found, residual.as_slice());
@@ -193,8 +193,8 @@ fn errors_of_positions_decay() {
         let moved = c.moved(&v);
         let (residual, phi) = c.phi(&moved);
         let mut p = c.p.as_slice().to_vec();
-        let (mut v, mut sigma) = (c.i.rest(), c.i.zero_rows());
-        c.i.settle(0.0, &moved, &mut p, &mut v, &mut sigma);
+        let (mut v, mut sigma) = (c.i.zero_momenta(), c.i.zero_rows());
+        c.i.project_momenta(0.0, &moved, &mut p, &mut v, &mut sigma);
         let mut wanted = Vector::from(residual) * -3.0;
         for (k, _) in c.i.rows().iter().enumerate().filter(|(_, row)| !row.holonomic) {
             wanted[k] = 0.0;

@@ -57,7 +57,7 @@ fn inverse_dynamics_is_the_change_of_momentum() {
         i.momenta(&q, &c.dual_v(), &mut p);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
         c.i.inputs.tau.fill(0.0);
-        c.i.rates_into(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
+        c.i.rates(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
         let other: Vec<f64> = p.iter().zip(&pd).map(|(p, pd)| p.du - pd).collect();
         c.near("tau", &tau, &other, largest(&pd))
     });
@@ -151,7 +151,7 @@ fn drifts_complete_the_accelerations_of_frames() {
         let (nv, n) = (c.plan.dims.nv, c.plan.frames.len());
         let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
         c.i.jacobians(&c.s.q, &mut jacobians);
-        c.i.drifts(&c.s.q, &c.s.v, &mut drifts);
+        c.i.bias_accelerations(&c.s.q, &c.s.v, &mut drifts);
         let (mut i, q) = c.dual();
         let mut frames = vec![FrameState::ground(); n];
         i.frames(&q, &c.dual_v(), &mut frames);

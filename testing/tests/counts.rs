@@ -2,36 +2,36 @@
 
 use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use mbd_codegen::symbolic::Counts;
-use mbd_codegen::{Arithmetic, Group, Options};
+use mbd_codegen::{Arithmetic, Output, Options};
 use mbd_runtime::sweep::Quantity;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 
 const NONE: Gravity = Gravity::Constant([Value::ZERO; 3]);
 
 /// Joints one by one: what is said of loads and outputs does not depend on the form.
-fn program(model: &Model, group: Group, efforts: bool) -> mbd_codegen::symbolic::Program {
-    let plan = PlanOptions { forms: Forms::Single, ..PlanOptions::default() };
+fn program(model: &Model, group: Output, efforts: bool) -> mbd_codegen::symbolic::Program {
+    let plan = PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() };
     let options = Options { efforts, arithmetic: Arithmetic::Exact, plan, ..Options::default() };
     trace(&Plan::new(model, plan), group, &options).expect("no frames are named").program
 }
 
-fn counts(model: &Model, group: Group) -> Counts {
+fn counts(model: &Model, group: Output) -> Counts {
     program(model, group, false).counts()
 }
 
 /// Operations of the rates in the form that has the fewest.
 fn fewest(model: &Model) -> usize {
-    let plan = PlanOptions { forms: Forms::Fewest, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
+    let plan = PlanOptions { forms: EliminationStrategy::Fewest, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
     let options = Options { efforts: false, arithmetic: Arithmetic::Fast, plan, ..Options::default() };
-    trace(&Plan::new(model, plan), Group::Rates, &options).expect("no frames are named").program.counts().total()
+    trace(&Plan::new(model, plan), Output::Rates, &options).expect("no frames are named").program.counts().total()
 }
 
 /// A chain of `n` pins, general in every number.
 fn general_chain(seed: u64, n: usize) -> Model {
-    let knobs = Knobs { bodies: (n, n), gravity: [0.0, 1.0, 0.0], ..Knobs::default() };
-    let mut model = random_model(seed, &knobs);
+    let distribution = Distribution { bodies: (n, n), gravity: [0.0, 1.0, 0.0], ..Distribution::default() };
+    let mut model = random_model(seed, &distribution);
     // Identity placements happen one time in six; here nothing may be aligned.
     for (k, joint) in model.joints.iter_mut().enumerate() {
         if joint.placement.rotation == Rotation::NONE {
@@ -45,7 +45,7 @@ fn general_chain(seed: u64, n: usize) -> Model {
 fn planar_chain(seed: u64, n: usize) -> Model {
     let mut model = general_chain(seed, n);
     for joint in &mut model.joints {
-        joint.kind = JointKind::Pin { axis: [0.0, 0.0, 1.0] };
+        joint.kind = JointKind::Revolute { axis: [0.0, 0.0, 1.0] };
         joint.placement.rotation = Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(0.4)]);
         joint.placement.xyz[2] = Value::ZERO;
     }
@@ -66,14 +66,14 @@ fn planar_chains_are_cheap() {
 #[test]
 fn absent_loads_cost_nothing() {
     for seed in 0..100 {
-        let knobs = Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6) };
-        let mut model = random_model(seed, &knobs);
+        let distribution = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6) };
+        let mut model = random_model(seed, &distribution);
         model.gravity = NONE;
-        let loads = program(&model, Group::Rates, true).counts_where(|(_, what)| *what == Quantity::Load);
+        let loads = program(&model, Output::Rates, true).counts_where(|(_, what)| *what == Quantity::Load);
         assert_eq!(loads, Counts::default(), "seed {seed}");
-        let without = counts(&model, Group::Rates).total();
+        let without = counts(&model, Output::Rates).total();
         model.gravity = Gravity::Input;
-        assert!(counts(&model, Group::Rates).total() >= without, "seed {seed}");
+        assert!(counts(&model, Output::Rates).total() >= without, "seed {seed}");
     }
 }
 
@@ -81,13 +81,13 @@ fn absent_loads_cost_nothing() {
 #[test]
 fn loads_stay_out_of_what_does_not_depend_on_them() {
     for seed in 0..100 {
-        let mut model = random_model(seed, &Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6) });
-        let all = |model: &Model, groups: &[Group]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
+        let mut model = random_model(seed, &Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6) });
+        let all = |model: &Model, groups: &[Output]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
         let kinematic =
-            [Group::Velocities, Group::Momenta, Group::MassMatrix, Group::Frames, Group::Jacobians, Group::Drifts];
-        let before = (all(&model, &kinematic), counts(&model, Group::Energy));
+            [Output::Velocities, Output::Momenta, Output::MassMatrix, Output::Frames, Output::Jacobians, Output::BiasAccelerations];
+        let before = (all(&model, &kinematic), counts(&model, Output::Energy));
         model.wrenches.push(Wrench { name: "w".to_string(), body: 0, axes: WrenchAxes::World });
-        assert_eq!(before, (all(&model, &kinematic), counts(&model, Group::Energy)), "seed {seed}: a wrench");
+        assert_eq!(before, (all(&model, &kinematic), counts(&model, Output::Energy)), "seed {seed}: a wrench");
         model.gravity = Gravity::Input;
         assert_eq!(before.0, all(&model, &kinematic), "seed {seed}: gravity");
     }
@@ -97,9 +97,9 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
 #[test]
 fn efforts_cost_one_addition_each() {
     for seed in 0..100 {
-        let model = random_model(seed, &Knobs::everything(seed, 6));
+        let model = random_model(seed, &Distribution::everything(seed, 6));
         let nv = Plan::new(&model, Options::default().plan).dims.nv;
-        let [with, without] = [true, false].map(|efforts| program(&model, Group::Rates, efforts).counts());
+        let [with, without] = [true, false].map(|efforts| program(&model, Output::Rates, efforts).counts());
         assert!(with.additions <= without.additions + nv, "seed {seed}");
         assert_eq!((with.multiplications, with.divisions), (without.multiplications, without.divisions), "seed {seed}");
     }
@@ -109,16 +109,16 @@ fn efforts_cost_one_addition_each() {
 #[test]
 fn outputs_are_independent() {
     for seed in 0..30 {
-        let model = random_model(seed, &Knobs::everything(seed, 5));
-        let generated = |outputs: Vec<Group>| {
+        let model = random_model(seed, &Distribution::everything(seed, 5));
+        let generated = |outputs: Vec<Output>| {
             generate(&model, &Options { outputs, arithmetic: Arithmetic::Exact, ..Options::default() })
                 .unwrap_or_else(|e| panic!("seed {seed}: {e}"))
         };
-        let all = generated(Group::ALL.to_vec());
-        for (k, group) in Group::ALL.into_iter().enumerate() {
+        let all = generated(Output::ALL.to_vec());
+        for (k, group) in Output::ALL.into_iter().enumerate() {
             let one = generated(vec![group]);
             assert_eq!(one.counts, [all.counts[k]], "seed {seed}: {group:?}");
-            for other in Group::ALL.into_iter().filter(|g| *g != group) {
+            for other in Output::ALL.into_iter().filter(|g| *g != group) {
                 assert!(
                     !one.source.contains(&format!("pub fn {}(", other.name())),
                     "seed {seed}: {group:?}, {other:?}"
@@ -131,11 +131,11 @@ fn outputs_are_independent() {
 /// A frame that is not asked for is not computed.
 #[test]
 fn frames_are_chosen_one_by_one() {
-    let model = random_model(3, &Knobs { bodies: (6, 6), ..Knobs::default() });
+    let model = random_model(3, &Distribution { bodies: (6, 6), ..Distribution::default() });
     let count = |frames: Vec<String>| {
         let options = Options { frames, arithmetic: Arithmetic::Exact, ..Options::default() };
         let plan = Plan::new(&model, options.plan);
-        trace(&plan, Group::Frames, &options).expect("the frames exist").program.counts().total()
+        trace(&plan, Output::Frames, &options).expect("the frames exist").program.counts().total()
     };
     let names: Vec<String> = model.joints.iter().map(|j| model.bodies[j.child].name.clone()).collect();
     let each: Vec<usize> = names.iter().map(|n| count(vec![n.clone()])).collect();
@@ -147,12 +147,12 @@ fn frames_are_chosen_one_by_one() {
 #[test]
 fn structure_pays() {
     for seed in 0..20 {
-        let total = |model: &Model| counts(model, Group::Rates).total();
+        let total = |model: &Model| counts(model, Output::Rates).total();
         let general = general_chain(seed, 8);
         let mut aligned = general.clone();
         for joint in &mut aligned.joints {
             let turn = Rotation::Rpy([Value::Const(std::f64::consts::FRAC_PI_2), Value::ZERO, Value::ZERO]);
-            joint.kind = JointKind::Pin { axis: [0.0, 0.0, 1.0] };
+            joint.kind = JointKind::Revolute { axis: [0.0, 0.0, 1.0] };
             joint.placement.rotation = turn;
         }
         let mut symmetric = aligned.clone();

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use mbd_codegen::model::{Gravity, Joint, JointKind, Model, Motion, Rotation, Value, WrenchAxes};
-use mbd_testing::random::{random_model, Knobs};
+use mbd_codegen::model::{Gravity, Joint, JointKind, Model, JointMotion, Rotation, Value, WrenchAxes};
+use mbd_testing::random::{random_model, Distribution};
 
 fn kind(k: &JointKind) -> &'static str {
     match k {
-        JointKind::Pin { .. } => "pin",
-        JointKind::Slider { .. } => "slider",
+        JointKind::Revolute { .. } => "pin",
+        JointKind::Prismatic { .. } => "slider",
         JointKind::Cylindrical { .. } => "cylindrical",
         JointKind::Helical { .. } => "helical",
         JointKind::Universal { .. } => "universal",
@@ -52,26 +52,26 @@ fn features(model: &Model) -> Vec<&'static str> {
     };
     for joint in &model.joints {
         note(true, kind(&joint.kind));
-        note(joint.motion == Motion::Prescribed && joint.kind.nq() > 1, "prescribed, several coordinates");
-        note(joint.motion == Motion::Prescribed && joint.kind.nq() == 1, "prescribed");
+        note(joint.motion == JointMotion::Prescribed && joint.kind.nq() > 1, "prescribed, several coordinates");
+        note(joint.motion == JointMotion::Prescribed && joint.kind.nq() == 1, "prescribed");
         note(joint.placement.xyz.iter().any(is_param), "parameter in a displacement");
         note(turned(&joint.placement.rotation), "parameter in an angle");
         note(joint.damping.iter().any(is_param), "parameter in damping");
         note(joint.stiffness.iter().any(|k| *k != Value::ZERO), "spring");
         note(joint.armature.iter().any(|k| *k != Value::ZERO) && joint.kind.nv() > 1, "armature on several freedoms");
         note(matches!(joint.kind, JointKind::Helical { pitch: Value::Param(_), .. }), "parameter in a pitch");
-        if let Motion::Mimic { leader, ratio, offset } = joint.motion {
+        if let JointMotion::Mimic { leader, ratio, offset } = joint.motion {
             let leader = &model.joints[leader];
             note(true, "mimic");
-            note(matches!(leader.motion, Motion::Mimic { .. }), "mimic of a mimic");
+            note(matches!(leader.motion, JointMotion::Mimic { .. }), "mimic of a mimic");
             note(true, position(model, joint, leader));
             let (a, b) = (path(model, joint), path(model, leader));
             let between = a.iter().filter(|j| !b.contains(j)).chain(b.iter().filter(|j| !a.contains(j)));
             let others = between.filter(|j| **j != joint && **j != leader);
             let others: Vec<_> = others.filter(|j| j.kind != JointKind::Fixed).collect();
-            note(others.iter().any(|j| j.motion == Motion::Free), "mimic around another joint");
-            note(others.iter().any(|j| matches!(j.motion, Motion::Mimic { .. })), "mimic around another mimic");
-            note(leader.motion == Motion::Prescribed, "mimic of a drive");
+            note(others.iter().any(|j| j.motion == JointMotion::Free), "mimic around another joint");
+            note(others.iter().any(|j| matches!(j.motion, JointMotion::Mimic { .. })), "mimic around another mimic");
+            note(leader.motion == JointMotion::Prescribed, "mimic of a drive");
             note(is_param(&ratio) || is_param(&offset), "parameter in a mimic");
         }
     }
@@ -98,7 +98,7 @@ fn every_feature_is_among_the_trees() {
     for seed in 0..1000 {
         // As in `bitwise.rs`.
         let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
-        let model = random_model(seed, &Knobs::everything(seed, size));
+        let model = random_model(seed, &Distribution::everything(seed, size));
         for feature in features(&model) {
             *counts.entry(feature).or_default() += 1;
         }

@@ -4,12 +4,12 @@
 
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::{Model, Value};
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use mbd_runtime::sweep::{Derivatives, MomentumDerivatives, Sweeps};
 use mbd_runtime::tree::Kind;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Interpreter, System};
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
 
@@ -35,22 +35,22 @@ struct Case {
 impl Case {
     /// A tree whose freedoms are eliminated in one of the ways there are.
     fn new(seed: u64) -> Case {
-        Case::formed(seed, Forms::ALL[seed as usize % 3])
+        Case::formed(seed, EliminationStrategy::ALL[seed as usize % 3])
     }
 
-    fn formed(seed: u64, forms: Forms) -> Case {
-        let model = random_model(seed, &Knobs::everything(seed, [3, 5, 8, 14][seed as usize % 4]));
+    fn formed(seed: u64, forms: EliminationStrategy) -> Case {
+        let model = random_model(seed, &Distribution::everything(seed, [3, 5, 8, 14][seed as usize % 4]));
         Case::of_model(&model, seed, forms)
     }
 
-    fn of_model(model: &Model, seed: u64, forms: Forms) -> Case {
+    fn of_model(model: &Model, seed: u64, forms: EliminationStrategy) -> Case {
         let plan = Plan::new(model, PlanOptions { forms, ..PlanOptions::default() });
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; plan.dims.nv];
         i.momenta(&s.q, &s.v, &mut p);
         let mut d = Derivatives::new(i.tree());
-        i.derivatives_into(&s.q, &p, &mut d);
+        i.derivatives(&s.q, &p, &mut d);
         Case { seed, plan, s, i, p, d }
     }
 
@@ -81,7 +81,7 @@ fn dual(x: &[f64], dx: &[f64]) -> Vec<D> {
 fn rates_of(i: &mut Interpreter<D>, q: &[D], p: &[D]) -> [Vec<f64>; 2] {
     let zero = Dual::new(0.0, 0.0);
     let (mut v, mut qd, mut pd) = (vec![zero; p.len()], vec![zero; q.len()], vec![zero; p.len()]);
-    i.rates_into(q, p, &mut v, &mut qd, &mut pd);
+    i.rates(q, p, &mut v, &mut qd, &mut pd);
     [v, pd].map(|list| list.iter().map(|x| x.du).collect())
 }
 
@@ -119,7 +119,7 @@ fn derivatives_are_those_of_dual_numbers() {
         errors.push((each.fold(0.0, f64::max), seed));
         c.worst("v", &c.d.v, &c.s.v);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; c.plan.dims.nq], vec![0.0; nv]);
-        c.s.interpreter(&c.plan).rates_into(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
+        c.s.interpreter(&c.plan).rates(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
         c.worst("pd", &c.d.pd, &pd);
     }
     errors.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -136,7 +136,7 @@ fn derivatives_at_given_velocities_are_those_of_dual_numbers() {
         let (nq, nv) = (c.plan.dims.nq, c.plan.dims.nv);
         let mut room = Derivatives::new(c.i.tree());
         let mut ours = MomentumDerivatives::new(c.i.tree());
-        c.i.momentum_derivatives_into(&c.s.q, &c.s.v, &mut room, &mut ours);
+        c.i.momentum_derivatives(&c.s.q, &c.s.v, &mut room, &mut ours);
         // Body by body, and with no composite inertia.
         let i: Interpreter<D> = c.s.interpreter_of(&c.plan, |x, _| Dual::new(x, 0.0));
         let sweeps = Sweeps { tree: i.tree(), trace: &() };
@@ -179,7 +179,7 @@ fn derivatives_at_given_velocities_are_those_of_dual_numbers() {
 fn conservative_trees_with_coordinate_rates_are_canonical() {
     let mut trees = 0;
     for seed in 0..TREES {
-        let mut model = random_model(seed, &Knobs::everything(seed, 6));
+        let mut model = random_model(seed, &Distribution::everything(seed, 6));
         model.wrenches.clear();
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
         let plan = Plan::new(&model, Default::default());
@@ -192,7 +192,7 @@ fn conservative_trees_with_coordinate_rates_are_canonical() {
         let (nv, mut p) = (plan.dims.nv, vec![0.0; plan.dims.nv]);
         i.momenta(&s.q, &s.v, &mut p);
         let mut d = Derivatives::new(i.tree());
-        i.derivatives_into(&s.q, &p, &mut d);
+        i.derivatives(&s.q, &p, &mut d);
         for a in 0..nv {
             for b in 0..nv {
                 assert_eq!(d.dpd_dp[a * nv + b], -d.dv_dq[b * nv + a], "seed {seed}");
@@ -230,7 +230,7 @@ fn forms_do_not_matter() {
     let mut met = [0; 6];
     let mut worst = 0.0_f64;
     for seed in 0..TREES / 2 {
-        let [c, others @ ..] = Forms::ALL.map(|forms| Case::formed(seed, forms));
+        let [c, others @ ..] = EliminationStrategy::ALL.map(|forms| Case::formed(seed, forms));
         for other in &others {
             let ours = [&c.d.v, &c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq, &c.d.dpd_dp];
             let theirs = [&other.d.v, &other.d.pd, &other.d.dv_dq, &other.d.dv_dp, &other.d.dpd_dq, &other.d.dpd_dp];
@@ -241,9 +241,9 @@ fn forms_do_not_matter() {
         for node in [&c, &others[0]].into_iter().flat_map(|c| &c.i.tree().nodes) {
             let forms = [
                 node.deferred,
-                node.parent_side,
-                node.unturned,
-                node.gather,
+                node.before_joint,
+                node.non_rotating,
+                node.accumulates_momentum,
                 !node.ends.is_empty(),
                 !node.screws.is_empty(),
             ];
@@ -257,12 +257,12 @@ fn forms_do_not_matter() {
         let (model, findings) = load(file, &text, &ImportOptions { base: Base::Fixed, gravity: None });
         let model = model.unwrap_or_else(|| panic!("{findings}"));
         for seed in 0..20 {
-            let [a, b] = [Forms::Fastest, Forms::Single].map(|forms| Case::of_model(&model, seed, forms));
+            let [a, b] = [EliminationStrategy::Fastest, EliminationStrategy::Single].map(|forms| Case::of_model(&model, seed, forms));
             let [ours, theirs] = [&a, &b].map(|c| [&c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq]);
             for (ours, theirs) in ours.into_iter().zip(theirs) {
                 worst = worst.max(a.worst(file, ours, theirs));
             }
-            met[2] += a.i.tree().nodes.iter().filter(|node| node.unturned).count();
+            met[2] += a.i.tree().nodes.iter().filter(|node| node.non_rotating).count();
         }
     }
     println!("worst {worst:.1e}, met {met:?}");
@@ -274,17 +274,17 @@ fn forms_do_not_matter() {
 fn the_trees_have_everything() {
     let mut met = [0; 10];
     for seed in 0..TREES {
-        let c = Case::formed(seed, Forms::Single);
+        let c = Case::formed(seed, EliminationStrategy::Single);
         for node in &c.i.tree().nodes {
             met[match node.kind {
-                Kind::Pin => 0,
-                Kind::Slider => 1,
+                Kind::Revolute => 0,
+                Kind::Prismatic => 1,
                 Kind::Helical { .. } => 2,
                 Kind::Planar => 3,
                 Kind::Spherical => 4,
                 Kind::Floating => 5,
             }] += 1;
-            met[6] += usize::from(node.shared.is_some() && !node.deferred);
+            met[6] += usize::from(node.unknown.is_some() && !node.deferred);
             met[7] += usize::from(matches!(node.source, mbd_runtime::tree::Source::Drive { .. }));
         }
         for wrench in &c.i.tree().wrenches {

@@ -1,14 +1,14 @@
 //! The same mechanism described in two ways moves in one way.
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Model, Motion, Rotation, Value};
+use mbd_codegen::model::{Model, JointMotion, Rotation, Value};
 use mbd_codegen::plan::{Plan, PlanOptions};
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Source;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Interpreter;
 use mbd_testing::newton::joint_rates;
-use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
 use mbd_testing::{substituted, value};
@@ -23,7 +23,7 @@ fn results(plan: &Plan, s: &State) -> Results {
     let (nq, nv) = (plan.dims.nq, plan.dims.nv);
     let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
     i.momenta(&s.q, &s.v, &mut p);
-    i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+    i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
     let (kinetic, potential) = i.energy(&s.q, &p);
     let mut a = vec![0.0; nv];
     let mut reactions = vec![[0.0; 6]; plan.joint_nodes.len()];
@@ -77,7 +77,7 @@ fn compare(seed: u64, model: &Model, a: &Results, b: &Results, tolerance: f64) -
 fn parameters_are_as_good_as_constants() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
-        let model = random_model(seed, &Knobs { params: 0.4, ..Knobs::everything(seed, 8) });
+        let model = random_model(seed, &Distribution { params: 0.4, ..Distribution::everything(seed, 8) });
         let plan = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let s = random_state(&plan, seed);
         let plain = Plan::new(&substituted(&model, &s.params), PlanOptions { snap: 0.0, ..PlanOptions::default() });
@@ -93,7 +93,7 @@ fn parameters_are_as_good_as_constants() {
 fn regrouped_trees_move_as_described_ones() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
-        let model = random_model(seed, &Knobs::everything(seed, 8));
+        let model = random_model(seed, &Distribution::everything(seed, 8));
         let plan = Plan::new(&model, PlanOptions::default());
         let s = random_state(&plan, seed);
         let regrouped = results(&plan, &s);
@@ -138,14 +138,14 @@ fn regrouped_trees_move_as_described_ones() {
 fn mimics_are_projections_of_free_joints() {
     let (mut worst, mut seen) = (0.0_f64, 0);
     for seed in 0..2 * TREES {
-        let model = random_model(seed, &Knobs { mimic: 0.7, ..Knobs::everything(seed, 8) });
+        let model = random_model(seed, &Distribution { mimic: 0.7, ..Distribution::everything(seed, 8) });
         let plan = Plan::new(&model, PlanOptions::default());
-        seen += usize::from(!plan.shared.is_empty());
+        seen += usize::from(!plan.unknowns.is_empty());
         let s = random_state(&plan, seed);
         let mut released = model.clone();
         for joint in &mut released.joints {
-            if let Motion::Mimic { .. } = joint.motion {
-                joint.motion = Motion::Free;
+            if let JointMotion::Mimic { .. } = joint.motion {
+                joint.motion = JointMotion::Free;
             }
         }
         let free = Plan::new(&released, PlanOptions::default());
@@ -229,8 +229,8 @@ fn snapping_changes_no_more_than_the_angles() {
     const OFF: f64 = 1e-8;
     let (mut worst, mut noticed) = (0.0_f64, 0);
     for seed in 0..TREES {
-        let knobs = Knobs { skew: 0.0, params: 0.0, ..Knobs::everything(seed, 6) };
-        let mut model = random_model(seed, &knobs);
+        let distribution = Distribution { skew: 0.0, params: 0.0, ..Distribution::everything(seed, 6) };
+        let mut model = random_model(seed, &distribution);
         let mut rng = Rng::new(seed, 7);
         for joint in &mut model.joints {
             let angles: &mut [Value] = match &mut joint.placement.rotation {

@@ -15,13 +15,13 @@ mod wide;
 
 use std::fmt::Write;
 
-use mbd_codegen::generate::{trace, GroupProgram};
+use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{JointKind, Model};
-use mbd_codegen::plan::{Candidate, Forms, Plan, PlanOptions};
-use mbd_codegen::{Arithmetic, Group, Options};
+use mbd_codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::{Arithmetic, Output, Options};
 use mbd_runtime::Scalar;
 use mbd_testing::chains;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 use wide::{inputs, model, Errors, Spread, Wide, MANY, MODELS};
 
@@ -29,23 +29,23 @@ use wide::{inputs, model, Errors, Spread, Wide, MANY, MODELS};
 const ARRAYS: [&str; 3] = ["q̇", "ṗ", "v̇"];
 
 /// What is measured: how joints are eliminated, and how the program is rewritten.
-type Kind = (Forms, Arithmetic);
+type Kind = (EliminationStrategy, Arithmetic);
 
-const ARTICULATED: Kind = (Forms::Single, Arithmetic::Exact);
-const DEFAULT: Kind = (Forms::Fastest, Arithmetic::Fast);
+const ARTICULATED: Kind = (EliminationStrategy::Single, Arithmetic::Exact);
+const DEFAULT: Kind = (EliminationStrategy::Fastest, Arithmetic::Fast);
 
-fn plan(model: &Model, forms: Forms) -> Plan {
+fn plan(model: &Model, forms: EliminationStrategy) -> Plan {
     Plan::new(model, PlanOptions { forms, ..PlanOptions::default() })
 }
 
 /// Errors in each array of programs of one model, kind by kind.
 fn measure(plans: &[Plan], kinds: &[Kind], states: u64) -> Vec<[Spread; 3]> {
     let mut all = vec![[(); 3].map(|()| [(); 2].map(|()| Errors::default())); kinds.len()];
-    for group in [Group::Rates, Group::Accelerations] {
+    for group in [Output::Rates, Output::Accelerations] {
         let program = |(plan, &(_, arithmetic)): (&Plan, &Kind)| {
             trace(plan, group, &Options { arithmetic, ..Options::default() }).expect("no frames are named")
         };
-        let programs: Vec<GroupProgram> = plans.iter().zip(kinds).map(program).collect();
+        let programs: Vec<OutputProgram> = plans.iter().zip(kinds).map(program).collect();
         for seed in 0..states {
             let s = random_state(&plans[0], seed);
             let mut p = vec![0.0; plans[0].dims.nv];
@@ -72,22 +72,22 @@ fn measure(plans: &[Plan], kinds: &[Kind], states: u64) -> Vec<[Spread; 3]> {
 
 /// The output of a plan in one state, in double-double numbers from the numbers of the model on: constants that programs
 /// fold are roundings of theirs.
-fn reference(plan: &Plan, group: Group, s: &State, p: &[f64]) -> Vec<Wide> {
+fn reference(plan: &Plan, group: Output, s: &State, p: &[f64]) -> Vec<Wide> {
     let wide = |list: &[f64]| list.iter().map(|x| Wide::constant(*x)).collect::<Vec<Wide>>();
     let mut interpreter = s.interpreter_of(plan, |x, _| Wide::constant(x));
     let zeros = |n: usize| vec![Wide::zero(); n];
     let (mut v, mut qd, mut pd) = (zeros(plan.dims.nv), zeros(plan.dims.nq), zeros(plan.dims.nv));
-    if group == Group::Accelerations {
+    if group == Output::Accelerations {
         interpreter.accelerations(&wide(&s.q), &wide(&s.v), &mut v);
         return v;
     }
-    interpreter.rates_into(&wide(&s.q), &wide(p), &mut v, &mut qd, &mut pd);
+    interpreter.rates(&wide(&s.q), &wide(p), &mut v, &mut qd, &mut pd);
     [qd, pd].concat()
 }
 
 /// Adds the errors of one state to those of the arrays of a group.
-fn add(errors: &mut [[Errors; 2]; 3], k: usize, group: Group, nq: usize, results: &[f64], right: &[Wide]) {
-    if group == Group::Accelerations {
+fn add(errors: &mut [[Errors; 2]; 3], k: usize, group: Output, nq: usize, results: &[f64], right: &[Wide]) {
+    if group == Output::Accelerations {
         return errors[2][k].add(results, right);
     }
     errors[0][k].add(&results[..nq], &right[..nq]);
@@ -110,7 +110,7 @@ const TREES: u64 = 16;
 
 /// A tree with joints of all kinds.
 fn tree(seed: u64) -> Model {
-    random_model(seed, &Knobs { bodies: (6, 12), branching: 0.3, ..Knobs::everything(seed, 12) })
+    random_model(seed, &Distribution { bodies: (6, 12), branching: 0.3, ..Distribution::everything(seed, 12) })
 }
 
 /// Ratios of errors that are beyond the limits, in words.
@@ -132,7 +132,7 @@ fn default_forms_do_not_cost_accuracy() {
         if name.starts_with("g1") || name.starts_with("20") {
             continue;
         }
-        let plans = [Forms::Single, Forms::Fastest].map(|forms| plan(&model, forms));
+        let plans = [EliminationStrategy::Single, EliminationStrategy::Fastest].map(|forms| plan(&model, forms));
         let errors = measure(&plans, &[ARTICULATED, DEFAULT], 300);
         all.extend(beyond(&name, &ratios(&errors[1], &errors[0])));
     }
@@ -150,9 +150,9 @@ fn trees_have_joints_of_all_kinds() {
 const KINDS: [Kind; 5] = [
     ARTICULATED,
     DEFAULT,
-    (Forms::Fastest, Arithmetic::Exact),
-    (Forms::Single, Arithmetic::Fast),
-    (Forms::Fewest, Arithmetic::Fast),
+    (EliminationStrategy::Fastest, Arithmetic::Exact),
+    (EliminationStrategy::Single, Arithmetic::Fast),
+    (EliminationStrategy::Fewest, Arithmetic::Fast),
 ];
 
 const INTRODUCTION: &str = "\
@@ -183,7 +183,7 @@ Median error of the articulated form; median and worst of the default in multipl
 ";
 
 const CAUSES_HEAD: &str = "
-## Forms and arithmetic by themselves
+## EliminationStrategy and arithmetic by themselves
 
 Median and worst, of the array in which they are largest. The forms with the fewest operations are chosen on request only,
 and not held to any limit.
@@ -193,7 +193,7 @@ and not held to any limit.
 ";
 
 const REFUSED_HEAD: &str = "
-## Forms of the rates that were refused
+## EliminationStrategy of the rates that were refused
 
 The fastest of each branch: time by the cost model in multiples of the form that was taken, and error on the states of the
 generator.

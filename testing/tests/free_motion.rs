@@ -13,9 +13,9 @@ use mbd_runtime::integrate::{
 };
 use mbd_runtime::spatial::{add3, cross, quaternion_matrix, Vec3};
 use mbd_runtime::sweep::FrameState;
-use mbd_runtime::system::GroupKind;
+use mbd_runtime::system::LieGroup;
 use mbd_runtime::{Interpreter, System};
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 
 type Any = Box<dyn Stepper<Interpreter<f64>>>;
@@ -146,8 +146,8 @@ struct Floating {
 impl Floating {
     fn new(seed: u64, gravity: f64) -> Floating {
         let kinds = [3.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0];
-        let knobs = Knobs { bodies: (5, 5), kinds, branching: 0.5, springs: 0.5, ..Knobs::default() };
-        let mut model = random_model(seed, &knobs);
+        let distribution = Distribution { bodies: (5, 5), kinds, branching: 0.5, springs: 0.5, ..Distribution::default() };
+        let mut model = random_model(seed, &distribution);
         let root = model.joints.iter().position(|j| j.parent.is_none()).expect("a tree has a root");
         let joint = &mut model.joints[root];
         joint.kind = JointKind::Floating;
@@ -162,7 +162,7 @@ impl Floating {
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
         i.momenta(&s.q, &s.v, &mut p);
-        let group = *i.groups().iter().find(|g| g.kind == GroupKind::Pose).expect("the base floats");
+        let group = *i.groups().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
         let weights = model.joints.iter().map(|j| {
             let body = &model.bodies[j.child];
             (mbd_testing::value(body.mass, &[]), body.com.map(|x| mbd_testing::value(x, &[])))

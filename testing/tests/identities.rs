@@ -10,7 +10,7 @@ use mbd_runtime::sweep::Sweeps;
 use mbd_runtime::tree::{Kind, Source};
 use mbd_runtime::workspace::Workspace;
 use mbd_testing::newton;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 use mbd_testing::value;
 
@@ -208,12 +208,12 @@ fn reactions_are_what_newton_and_euler_ask_for() {
 fn momentum_of_free_trees_is_constant() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
-        let knobs = Knobs { roots: 0.0, prescribed: 0.0, wrenches: 0.0, ..Knobs::everything(seed, 8) };
-        let mut model = random_model(seed, &Knobs { gravity: [0.0, 1.0, 0.0], ..knobs });
+        let distribution = Distribution { roots: 0.0, prescribed: 0.0, wrenches: 0.0, ..Distribution::everything(seed, 8) };
+        let mut model = random_model(seed, &Distribution { gravity: [0.0, 1.0, 0.0], ..distribution });
         // One base, free in space.
         let base = &mut model.joints[0];
         base.kind = JointKind::Floating;
-        base.motion = mbd_codegen::model::Motion::Free;
+        base.motion = mbd_codegen::model::JointMotion::Free;
         for list in [&mut base.damping, &mut base.stiffness, &mut base.rest, &mut base.armature] {
             *list = vec![mbd_codegen::model::Value::ZERO; 6];
         }
@@ -223,8 +223,8 @@ fn momentum_of_free_trees_is_constant() {
             body.inertia[..3].fill(mbd_codegen::model::Value::Const(0.02));
         }
         for joint in &mut model.joints {
-            if matches!(joint.motion, mbd_codegen::model::Motion::Mimic { leader: 0, .. }) {
-                joint.motion = mbd_codegen::model::Motion::Free;
+            if matches!(joint.motion, mbd_codegen::model::JointMotion::Mimic { leader: 0, .. }) {
+                joint.motion = mbd_codegen::model::JointMotion::Free;
             }
         }
         let plan = Plan::new(&model, Default::default());
@@ -248,8 +248,8 @@ fn momentum_of_free_trees_is_constant() {
 #[test]
 fn reduced_inertia_has_nothing_along_its_freedoms() {
     for seed in 0..TREES {
-        let knobs = Knobs { armature: 0.0, massless: 0.0, ..Knobs::everything(seed, 8) };
-        let plan = Plan::new(&random_model(seed, &knobs), Default::default());
+        let distribution = Distribution { armature: 0.0, massless: 0.0, ..Distribution::everything(seed, 8) };
+        let plan = Plan::new(&random_model(seed, &distribution), Default::default());
         let s = random_state(&plan, seed);
         let tree = plan.tree(&s.params).regrouped();
         let mut w = Workspace::new(&tree);
@@ -257,7 +257,7 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
         sweeps.articulate(&s.q, &s.drive[0], &mut w.poses);
         sweeps.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
         for (i, node) in tree.nodes.iter().enumerate() {
-            if node.shared.is_some() || matches!(node.source, Source::Drive { .. }) {
+            if node.unknown.is_some() || matches!(node.source, Source::Drive { .. }) {
                 continue;
             }
             let m = &w.factor.m[i];
@@ -268,7 +268,7 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
                     assert!(along.get(j).abs() <= 1e-12 * size, "seed {seed}, node {i}, {:?}: {along:?}", node.kind);
                 }
                 // The rows of single freedoms are zero by construction, not by luck.
-                if let Kind::Pin | Kind::Slider = node.kind {
+                if let Kind::Revolute | Kind::Prismatic = node.kind {
                     assert_eq!(along.dot(&node.kind.axis(0).motion(1.0)), 0.0, "seed {seed}, node {i}");
                 }
             }

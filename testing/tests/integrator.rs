@@ -11,7 +11,7 @@ use mbd_runtime::integrate::{
 };
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{AccelerationForm, Energetic, Interpreter, Real, Scalar, System};
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 
 type Any<Y> = Box<dyn Stepper<Y>>;
@@ -118,8 +118,8 @@ struct Scene {
 impl Scene {
     /// Three or four bodies, springs and gravity, nothing that takes energy out or puts it in.
     fn new(name: &'static str, seed: u64, steps: u16, kinds: [f64; 9]) -> Scene {
-        let knobs = Knobs { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Knobs::default() };
-        let mut model = random_model(seed, &knobs);
+        let distribution = Distribution { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Distribution::default() };
+        let mut model = random_model(seed, &distribution);
         model.gravity = Gravity::Constant([Value::ZERO, Value::ZERO, Value::Const(-9.81)]);
         let plan = Plan::new(&model, Default::default());
         let mut s = random_state(&plan, seed);
@@ -168,11 +168,11 @@ where
     let (mut system, mut energy) = (system.clone(), system.clone());
     let mut method = (row.make)(&system);
     assert_eq!(f64::from(method.order()), row.order, "{}", row.name);
-    let (kinetic, potential) = energy.state_energy(&q, &p);
+    let (kinetic, potential) = energy.energies(&q, &p);
     let (start, mut size, mut drift) = (kinetic + potential, kinetic.to_f64(), 0.0_f64);
     for k in 0..(time / h).round() as usize {
         method.step(&mut system, S::constant(k as f64 * h), S::constant(h), &mut q, &mut p)?;
-        let (kinetic, potential) = energy.state_energy(&q, &p);
+        let (kinetic, potential) = energy.energies(&q, &p);
         size = size.max(kinetic.to_f64());
         drift = drift.max((kinetic + potential - start).abs().to_f64());
     }

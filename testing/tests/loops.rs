@@ -3,18 +3,18 @@
 //! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
 
 use mbd_codegen::generate::trace;
-use mbd_codegen::loops::{looped, LoopProgram};
+use mbd_codegen::rolled::{looped, RolledProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
-use mbd_codegen::{Arithmetic, Group, Loops, Options};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::{Arithmetic, Output, RolledCode, Options};
 use mbd_runtime::Constrained;
 use mbd_testing::chains::{general, planar};
-use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
 
 /// Inputs of a program in order.
-fn inputs(program: &LoopProgram, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
+fn inputs(program: &RolledProgram, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
     let mut all = Vec::new();
     for array in &program.inputs {
         match array.name.as_str() {
@@ -50,36 +50,36 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     i.accelerations(&s.q, &s.v, &mut a);
     let mut nodes = 0;
     let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
-    for group in Group::every() {
+    for group in Output::every() {
         let Some(program) = looped(&plan, group, options) else { continue };
         nodes = nodes.max(program.loops.iter().map(|l| l.nodes.len()).sum());
         let results = program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
         let expected = match group {
-            Group::Rates => {
-                i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+            Output::Rates => {
+                i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
                 [qd.as_slice(), &pd].concat()
             }
-            Group::Velocities => {
+            Output::Velocities => {
                 i.velocities(&s.q, &p, &mut v);
                 v.clone()
             }
-            Group::Momenta => p.clone(),
-            Group::Accelerations => a.clone(),
-            Group::InverseDynamics => {
+            Output::Momenta => p.clone(),
+            Output::Accelerations => a.clone(),
+            Output::InverseDynamics => {
                 i.inverse_dynamics(&s.q, &s.v, &a, &mut v);
                 v.clone()
             }
-            Group::Bias => {
+            Output::Bias => {
                 i.bias(&s.q, &s.v, &mut v);
                 v.clone()
             }
-            Group::Settle => {
+            Output::ProjectMomenta => {
                 let mut freed = p.clone();
-                i.settle(0.0, &s.q, &mut freed, &mut v, &mut rows);
+                i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
                 [v.as_slice(), &freed, &rows].concat()
             }
-            Group::Correction => {
-                i.correction(&s.q, &mut rows, &mut v, &mut pivots);
+            Output::PositionCorrection => {
+                i.position_correction(&s.q, &mut rows, &mut v, &mut pivots);
                 [rows.as_slice(), &v, &pivots].concat()
             }
             _ => {
@@ -113,11 +113,11 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
 fn forced(seed: u64) -> Options {
     let mut rng = Rng::new(seed, 9);
     // Blocks at the tips stay straight-line and leave little for loops in short chains.
-    let forms = rng.pick(&[Forms::Single, Forms::Single, Forms::Fewest, Forms::Fastest]);
+    let forms = rng.pick(&[EliminationStrategy::Single, EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest]);
     Options {
         arithmetic: Arithmetic::Exact,
         efforts: rng.chance(0.7),
-        plan: PlanOptions { forms, loops: Loops::Always, ..PlanOptions::default() },
+        plan: PlanOptions { forms, loops: RolledCode::Always, ..PlanOptions::default() },
         ..Options::default()
     }
 }
@@ -126,8 +126,8 @@ fn forced(seed: u64) -> Options {
 fn chains_of_pins() {
     for seed in 0..30 {
         let n = 5 + seed as usize % 25;
-        let knobs = Knobs { bodies: (n, n), taper: 1.0, ..Knobs::default() };
-        let nodes = compare(&random_model(seed, &knobs), seed, &forced(seed));
+        let distribution = Distribution { bodies: (n, n), taper: 1.0, ..Distribution::default() };
+        let nodes = compare(&random_model(seed, &distribution), seed, &forced(seed));
         assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
     }
 }
@@ -138,7 +138,7 @@ fn chains_of_pins() {
 fn closed_chains() {
     let kinds = [
         LoopKind::Spherical,
-        LoopKind::Pin { axis: [0.2, 0.0, 1.0] },
+        LoopKind::Revolute { axis: [0.2, 0.0, 1.0] },
         LoopKind::Planar { normal: [0.0, 0.0, 1.0] },
         LoopKind::Fixed,
         LoopKind::Helical { axis: [1.0, 0.0, 0.0], pitch: Value::Const(0.3) },
@@ -157,8 +157,8 @@ fn closed_chains() {
         model.constraints.push(Constraint { name: "loop".to_string(), kind, decay });
         let mut options = forced(seed);
         // Frames that do not turn keep their nodes out of loops.
-        if options.plan.forms == Forms::Fewest {
-            options.plan.forms = Forms::Single;
+        if options.plan.forms == EliminationStrategy::Fewest {
+            options.plan.forms = EliminationStrategy::Single;
         }
         let nodes = compare(&model, seed, &options);
         if seed % 4 == 0 {
@@ -166,7 +166,7 @@ fn closed_chains() {
             continue;
         }
         let plan = Plan::new(&model, options.plan);
-        for group in [Group::Rates, Group::Energy, Group::Settle, Group::Correction] {
+        for group in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
             let looped = looped(&plan, group, &options).is_some();
             assert!(looped, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);
         }
@@ -180,10 +180,10 @@ fn closed_chains() {
 fn rewritten_chains() {
     for seed in 0..12 {
         let n = 16 + seed as usize;
-        let knobs =
-            Knobs { bodies: (n, n), taper: 1.0, skew: if seed % 2 == 0 { 1.0 } else { 0.0 }, ..Knobs::default() };
+        let distribution =
+            Distribution { bodies: (n, n), taper: 1.0, skew: if seed % 2 == 0 { 1.0 } else { 0.0 }, ..Distribution::default() };
         let options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
-        compare(&random_model(seed, &knobs), seed, &options);
+        compare(&random_model(seed, &distribution), seed, &options);
     }
 }
 
@@ -191,11 +191,11 @@ fn rewritten_chains() {
 fn trees_of_everything() {
     let mut nodes = 0;
     for seed in 0..300 {
-        let all = Knobs { wrenches: 0.0, ..Knobs::everything(seed, 6 + seed as usize % 20) };
+        let all = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6 + seed as usize % 20) };
         // Parameters, followers and drives keep their nodes out of loops.
-        let plain = Knobs { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
-        let knobs = if seed % 3 == 0 { all } else { plain };
-        nodes += compare(&random_model(seed, &knobs), seed, &forced(seed));
+        let plain = Distribution { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
+        let distribution = if seed % 3 == 0 { all } else { plain };
+        nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
     assert!(nodes > 150, "only {nodes} nodes were in loops");
 }
@@ -207,16 +207,16 @@ fn chains_of_one_kind() {
         let mut kinds = [0.0; 9];
         kinds[seed as usize % 8] = 1.0;
         let n = 4 + seed as usize % 9;
-        let knobs = Knobs {
+        let distribution = Distribution {
             wrenches: 0.0,
             mimic: 0.0,
             prescribed: 0.0,
             bodies: (n, n),
             branching: 0.1,
             kinds,
-            ..Knobs::everything(seed, n)
+            ..Distribution::everything(seed, n)
         };
-        nodes += compare(&random_model(seed, &knobs), seed, &forced(seed));
+        nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
     assert!(nodes > 200, "only {nodes} nodes were in loops");
 }

@@ -6,7 +6,7 @@ mod wide;
 use mbd_codegen::import::Base;
 use mbd_codegen::model::Value;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::integrate::{Ab6, Projection, Stepper};
+use mbd_runtime::integrate::{Ab6, EnergyProjection, Stepper};
 use mbd_testing::state::random_state;
 
 /// UR5 without friction and torques, let go at ±0.3 rad in turn, 60 s at 1 kHz: relative error of the energy, by doubles at
@@ -25,7 +25,7 @@ fn energy_error(speed: f32, projected: bool) -> f64 {
     let mut q: Vec<f32> = (0..6).map(|k| if k % 2 == 0 { 0.3 } else { -0.3 }).collect();
     let mut p = vec![0.0; 6];
     single.momenta(&q, &[speed; 6], &mut p);
-    let (mut method, mut projection) = (Ab6::compensated(&single), Projection::new(&mut single, &q, &p, 1));
+    let (mut method, mut projection) = (Ab6::compensated(&single), EnergyProjection::new(&mut single, &q, &p, 1));
     let mut energy = |q: &[f32], p: &[f32]| {
         let exact = |x: &[f32]| x.iter().map(|x| f64::from(*x)).collect::<Vec<f64>>();
         double.energy(&exact(q), &exact(p))

@@ -20,17 +20,17 @@ fn rows_give_way_as_their_weight_says() {
         let mut held = Interpreter::new(tree.clone(), gravity);
         let q = held.neutral();
         let p: Vec<f64> = (0..tree.dims.nv).map(|k| (1.7 * k as f64 + 0.3).sin()).collect();
-        let mut exact = held.rest();
-        held.settle(0.0, &q, &mut p.clone(), &mut exact, &mut held.zero_rows());
+        let mut exact = held.zero_momenta();
+        held.project_momenta(0.0, &q, &mut p.clone(), &mut exact, &mut held.zero_rows());
 
         let mut worst = [0.0_f64; 2];
         for (weight, worst) in [1e4, 1e6].into_iter().zip(&mut worst) {
             let mut soft = Interpreter::new(tree.penalised(weight, 0.0), gravity);
-            let (mut v, mut sigma, mut freed) = (soft.rest(), soft.zero_rows(), p.clone());
-            soft.settle(0.0, &q, &mut freed, &mut v, &mut sigma);
+            let (mut v, mut sigma, mut freed) = (soft.zero_momenta(), soft.zero_rows(), p.clone());
+            soft.project_momenta(0.0, &q, &mut freed, &mut v, &mut sigma);
             // σ = α Φ v, row by row.
             let (mut gap, mut phi) = (soft.zero_rows(), soft.zero_entries());
-            soft.closure(&q, &mut gap, &mut phi);
+            soft.constraint_residuals(&q, &mut gap, &mut phi);
             let scale =
                 v.iter().fold(1e-3_f64, |m, x| m.max(x.abs())) * phi.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             for (row, sigma) in soft.rows().iter().zip(&sigma) {
@@ -39,12 +39,12 @@ fn rows_give_way_as_their_weight_says() {
                 assert!((rate - sigma / weight).abs() < 1e-9 * scale, "seed {seed}: {rate} {sigma}");
             }
             // Freed momenta are those of the velocities, and the energy is theirs.
-            let mut again = soft.rest();
-            soft.state_momenta(&q, &v, &mut again);
+            let mut again = soft.zero_momenta();
+            soft.conjugate_momenta(&q, &v, &mut again);
             let size = p.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             assert!(again.iter().zip(&freed).all(|(a, b)| (a - b).abs() < 1e-8 * size), "seed {seed}");
             let kinetic = 0.5 * v.iter().zip(&again).map(|(v, p)| v * p).sum::<f64>();
-            assert!((soft.state_energy(&q, &p).0 - kinetic).abs() < 1e-8 * kinetic.abs().max(1e-3), "seed {seed}");
+            assert!((soft.energies(&q, &p).0 - kinetic).abs() < 1e-8 * kinetic.abs().max(1e-3), "seed {seed}");
             *worst = v.iter().zip(&exact).fold(0.0, |m, (a, b)| m.max((a - b).abs()));
         }
         assert!(worst[1] < 0.1 * worst[0] || worst[1] < 1e-9, "seed {seed}: {worst:?}");

@@ -8,7 +8,7 @@ use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{Dop853, Point, Rk4, Stepper, Tsit5, Verner9};
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{Interpreter, Real, Scalar};
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 
 type Number = Wide<false>;
@@ -56,7 +56,7 @@ impl Scene {
         let random = |seed| {
             let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             let model =
-                random_model(seed, &Knobs { bodies: (4, 7), branching: 0.3, skew: 0.0, kinds, ..Knobs::default() });
+                random_model(seed, &Distribution { bodies: (4, 7), branching: 0.3, skew: 0.0, kinds, ..Distribution::default() });
             Scene::new(Plan::new(&model, Default::default()), seed)
         };
         std::iter::once(Scene::new(ur5, 0)).chain((1..16).map(random)).collect()
@@ -73,7 +73,7 @@ impl Scene {
     fn rates(&mut self) -> [Vec<Number>; 3] {
         let zeros = |n: usize| vec![Number::zero(); n];
         let (mut v, mut qd, mut pd) = (zeros(self.v.len()), zeros(self.q.len()), zeros(self.p.len()));
-        self.i.rates_into(&self.q, &self.p, &mut v, &mut qd, &mut pd);
+        self.i.rates(&self.q, &self.p, &mut v, &mut qd, &mut pd);
         [v, qd, pd]
     }
 
@@ -91,7 +91,7 @@ fn doubles_agree() {
         let n = scene.p.len();
         let (mut p, mut v, mut qd, mut pd) = (vec![0.0; n], vec![0.0; n], vec![0.0; scene.q.len()], vec![0.0; n]);
         i.momenta(&scene.state.q, &scene.state.v, &mut p);
-        i.rates_into(&scene.state.q, &p, &mut v, &mut qd, &mut pd);
+        i.rates(&scene.state.q, &p, &mut v, &mut qd, &mut pd);
         let off = off(&numbers(&pd), &right) / size(&right);
         assert!(off < 1e-13, "{k}: {off:e}");
         assert!(off > 1e-18, "{k}: they are the same numbers");

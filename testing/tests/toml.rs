@@ -3,15 +3,15 @@
 use mbd_codegen::diag::Severity;
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{
-    Constraint, ConstraintKind, JointKind, LoopKind, Model, Motion, Mount, Placement, Start, Value,
+    Constraint, ConstraintKind, JointKind, LoopKind, Model, JointMotion, Mount, Placement, Start, Value,
 };
-use mbd_testing::random::{random_model, Knobs, Rng};
+use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::toml::{to_toml_in, Order};
 
 #[test]
 fn reader_gives_the_model_that_was_written() {
     for seed in 0..300 {
-        let model = random_model(seed, &Knobs::everything(seed, 12));
+        let model = random_model(seed, &Distribution::everything(seed, 12));
         for order in [Order::DepthFirst, Order::BreadthFirst] {
             let text = to_toml_in(&model, order);
             let (read, findings) = read("model.toml", &text);
@@ -24,7 +24,7 @@ fn reader_gives_the_model_that_was_written() {
 
 /// A constraint of any kind between what the model has; whether it can be met is of no concern here.
 fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
-    let single = |j: &usize| model.joints[*j].kind.nv() == 1 && model.joints[*j].motion == Motion::Free;
+    let single = |j: &usize| model.joints[*j].kind.nv() == 1 && model.joints[*j].motion == JointMotion::Free;
     let singles: Vec<usize> = (0..model.joints.len()).filter(single).collect();
     let decay = Value::Const(rng.pick(&[0.0, 20.0]));
     if singles.len() >= 2 && rng.chance(0.3) {
@@ -43,7 +43,7 @@ fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
     // The body that a body follows without freedom; what a mimic follows does not matter.
     let mut root = vec![None; model.bodies.len()];
     for j in &model.joints {
-        let rigid = j.kind.nv() == 0 || j.motion == Motion::Prescribed;
+        let rigid = j.kind.nv() == 0 || j.motion == JointMotion::Prescribed;
         root[j.child] = if rigid { j.parent.and_then(|b| root[b]) } else { Some(j.child) };
     }
     if first.body.and_then(|b| root[b]) == second.body.and_then(|b| root[b]) {
@@ -72,8 +72,8 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
     let square = rng.pick(&[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0], [3.0, -1.0, 0.0]]]);
     let size = value(model, rng, 0.1, 1.0);
     match rng.below(16) {
-        0 => LoopKind::Pin { axis },
-        1 => LoopKind::Slider { axis },
+        0 => LoopKind::Revolute { axis },
+        1 => LoopKind::Prismatic { axis },
         2 => LoopKind::Cylindrical { axis },
         3 => LoopKind::Helical { axis, pitch: size },
         4 => LoopKind::Universal { axes: square },
@@ -93,7 +93,7 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
 
 fn start(model: &Model, joint: usize, rng: &mut Rng) -> Option<Start> {
     let j = &model.joints[joint];
-    if j.motion != Motion::Free || j.kind.nq() == 0 || rng.chance(0.5) {
+    if j.motion != JointMotion::Free || j.kind.nq() == 0 || rng.chance(0.5) {
         return None;
     }
     let mut q: Vec<f64> = (0..j.kind.nq()).map(|_| rng.around(1.0)).collect();
@@ -108,7 +108,7 @@ fn start(model: &Model, joint: usize, rng: &mut Rng) -> Option<Start> {
 fn reader_gives_the_constraints_that_were_written() {
     let mut seen = [0; 2];
     for seed in 0..300 {
-        let mut model = random_model(seed, &Knobs::everything(seed, 12));
+        let mut model = random_model(seed, &Distribution::everything(seed, 12));
         let rng = &mut Rng::new(seed, 5);
         let constraints = (0..6).filter_map(|k| constraint(&model, k, rng)).collect::<Vec<_>>();
         let starts = (0..model.joints.len()).filter_map(|j| start(&model, j, rng)).collect();
@@ -127,8 +127,8 @@ fn reader_gives_the_constraints_that_were_written() {
 /// An end of a loop without a frame of its own gets one.
 #[test]
 fn ends_without_a_frame_are_written_with_one() {
-    let mut model = random_model(3, &Knobs::everything(3, 12));
-    let body = model.joints.iter().find(|j| j.kind.nv() > 0 && j.motion == Motion::Free).map(|j| j.child);
+    let mut model = random_model(3, &Distribution::everything(3, 12));
+    let body = model.joints.iter().find(|j| j.kind.nv() > 0 && j.motion == JointMotion::Free).map(|j| j.child);
     let first = Mount { body: None, placement: Placement::IDENTITY };
     let xyz = [Value::Const(0.125), Value::ZERO, Value::ZERO];
     let second = Mount { body, placement: Placement { xyz, ..Placement::IDENTITY } };

@@ -7,7 +7,7 @@ fn main() {
         System,
     };
     let mut arm = Arm::new();
-    let (mut q, mut p) = (arm.neutral(), arm.rest());
+    let (mut q, mut p) = (arm.neutral(), arm.zero_momenta());
     q[1] = 0.5;
     arm.tau[1] = 2.0;
     let (mut qd, mut pd) = ([0.0; Arm::NQ], [0.0; Arm::NV]);

@@ -2,8 +2,8 @@
 
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::layout::pinocchio;
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
-use mbd_codegen::{generate, Group, Options};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::{generate, Output, Options};
 use std::fmt::Write as _;
 
 fn main() {
@@ -35,14 +35,14 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     }
     let options = Options {
         type_name: "Kernel".to_string(),
-        outputs: vec![Group::Rates, Group::Accelerations],
+        outputs: vec![Output::Rates, Output::Accelerations],
         source: name.to_string(),
         ..Options::default()
     };
     let generated = generate(&model, &options).expect("code");
     write(&format!("{name}.rs"), &generated.source);
     // For the order of coordinates, which no form changes.
-    let plan = Plan::new(&model, PlanOptions { forms: Forms::Single, ..PlanOptions::default() });
+    let plan = Plan::new(&model, PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() });
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();
@@ -50,8 +50,8 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
         (0..here).for_each(|k| q[part.q.0 + k] = part.q.1 + k);
         (0..n).for_each(|k| v[part.v.0 + k] = part.v.1 + k);
     }
-    let ops = |g: Group| generated.counts.iter().find(|c| c.0 == g).expect("generated").1.total();
-    let (rates, accelerations) = (ops(Group::Rates), ops(Group::Accelerations));
+    let ops = |g: Output| generated.counts.iter().find(|c| c.0 == g).expect("generated").1.total();
+    let (rates, accelerations) = (ops(Output::Rates), ops(Output::Accelerations));
     let (nq, nv) = (q.len(), v.len());
     let _ = write!(
         lib,

@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{Forms, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{Arithmetic, Group, Loops, Options, Precision};
+use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::{Arithmetic, Output, RolledCode, Options, Precision};
 use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
 
@@ -143,11 +143,11 @@ pub struct CodeArgs {
     pub arithmetic: ArithmeticArg,
     /// How joints are eliminated: in the form that is fastest by the cost model, in the one with the fewest operations, or
     /// one by one. `mbd count` shows the candidates
-    #[arg(long, value_enum, default_value_t = FormsArg::Fastest)]
-    pub forms: FormsArg,
+    #[arg(long, value_enum, default_value_t = EliminationArg::Fastest)]
+    pub forms: EliminationArg,
     /// Loops over runs of like links, or straight-line code
-    #[arg(long, value_enum, default_value_t = LoopsArg::Auto)]
-    pub loops: LoopsArg,
+    #[arg(long, value_enum, default_value_t = RolledArg::Auto)]
+    pub loops: RolledArg,
     /// No joint forces: they are zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -157,7 +157,7 @@ pub struct CodeArgs {
     /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Each change is told
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
     pub snap: f64,
-    /// Frames and bodies of the outputs `frames`, `jacobians`, `drifts`, with commas between [default: all]
+    /// Frames and bodies of the outputs `frames`, `jacobians`, `bias_accelerations`, with commas between [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
     /// Longer bodies are written in blocks of this many statements
@@ -167,11 +167,11 @@ pub struct CodeArgs {
 
 /// One item of `--outputs`: a group, or all of them.
 #[derive(Clone)]
-pub struct OutputList(pub Vec<Group>);
+pub struct OutputList(pub Vec<Output>);
 
 impl CodeArgs {
     /// The outputs, each once.
-    pub fn groups(&self) -> Vec<Group> {
+    pub fn groups(&self) -> Vec<Output> {
         let mut groups = Vec::new();
         for group in self.outputs.iter().flat_map(|o| &o.0) {
             if !groups.contains(group) {
@@ -209,7 +209,7 @@ impl CodeArgs {
 
 /// Elimination.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FormsArg {
+pub enum EliminationArg {
     /// Least time for one state
     Fastest,
     /// Fewest operations
@@ -218,12 +218,12 @@ pub enum FormsArg {
     Single,
 }
 
-impl FormsArg {
-    fn forms(self) -> Forms {
+impl EliminationArg {
+    fn forms(self) -> EliminationStrategy {
         match self {
-            FormsArg::Fastest => Forms::Fastest,
-            FormsArg::Fewest => Forms::Fewest,
-            FormsArg::Single => Forms::Single,
+            EliminationArg::Fastest => EliminationStrategy::Fastest,
+            EliminationArg::Fewest => EliminationStrategy::Fewest,
+            EliminationArg::Single => EliminationStrategy::Single,
         }
     }
 }
@@ -255,7 +255,7 @@ impl ArithmeticArg {
 
 /// Loops in generated code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum LoopsArg {
+pub enum RolledArg {
     /// Where a run of like links is long enough to gain by it
     Auto,
     /// Wherever links repeat
@@ -264,12 +264,12 @@ pub enum LoopsArg {
     Never,
 }
 
-impl LoopsArg {
-    fn loops(self) -> Loops {
+impl RolledArg {
+    fn loops(self) -> RolledCode {
         match self {
-            LoopsArg::Auto => Loops::Auto,
-            LoopsArg::Always => Loops::Always,
-            LoopsArg::Never => Loops::Never,
+            RolledArg::Auto => RolledCode::Auto,
+            RolledArg::Always => RolledCode::Always,
+            RolledArg::Never => RolledCode::Never,
         }
     }
 }
@@ -524,7 +524,7 @@ impl HoldArg {
     pub fn stabilisation(self) -> Stabilisation {
         match self {
             HoldArg::None => Stabilisation::None,
-            HoldArg::Settle => Stabilisation::Settle,
+            HoldArg::Settle => Stabilisation::Momenta,
             HoldArg::Mass => Stabilisation::Mass,
             HoldArg::Gradient => Stabilisation::Gradient,
             HoldArg::Partition => Stabilisation::Partition,

@@ -2,7 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use multibody::codegen::import::words;
-use multibody::codegen::Group;
+use multibody::codegen::Output;
 use multibody::runtime::integrate::catalogue;
 
 use super::{OutputList, DEFAULT_RUNTIME};
@@ -51,11 +51,11 @@ pub fn vector(text: &str) -> Result<[f64; 3], String> {
 /// An output by its name, or all of them.
 pub fn outputs(text: &str) -> Result<OutputList, String> {
     if text == "all" {
-        return Ok(OutputList(Group::ALL.to_vec()));
+        return Ok(OutputList(Output::ALL.to_vec()));
     }
-    let names = || Group::every().map(|g| g.name()).chain(["all"]);
+    let names = || Output::every().map(|g| g.name()).chain(["all"]);
     let unknown = || words::did_you_mean(text, names(), || format!("outputs are {}", words::list(names())));
-    Group::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
+    Output::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
 }
 
 /// A path of Rust, `::multibody::runtime`.

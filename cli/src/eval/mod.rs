@@ -146,7 +146,7 @@ fn results(
     interpreter.momenta(q, v, &mut p);
     if has(Quantity::CoordinateRates) || has(Quantity::MomentumRates) {
         let (mut v2, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
-        interpreter.rates_into(q, &p, &mut v2, &mut qd, &mut pd);
+        interpreter.rates(q, &p, &mut v2, &mut qd, &mut pd);
         out.qd = has(Quantity::CoordinateRates).then(|| outer.coordinate_rates(q, &qd));
         out.pd = has(Quantity::MomentumRates).then(|| outer.derivative(q, v, &p, &pd));
     }
@@ -176,7 +176,7 @@ fn results(
     }
     if plan.dims.rows > 0 {
         let (mut phi, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-        interpreter.closure(q, &mut phi, &mut entries);
+        interpreter.constraint_residuals(q, &mut phi, &mut entries);
         out.phi = has(Quantity::Residuals).then_some(phi);
         out.lambda = has(Quantity::Multipliers).then(|| {
             let mut lambda = interpreter.zero_rows();

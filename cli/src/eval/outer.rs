@@ -1,8 +1,8 @@
 //! States as the file has them: another program's order and form.
 
 use multibody::codegen::layout;
-use multibody::codegen::model::{JointKind, Motion};
-use multibody::codegen::plan::{Forms, Plan, PlanOptions};
+use multibody::codegen::model::{JointKind, JointMotion};
+use multibody::codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use multibody::runtime::layout::{Form, Layout, Part};
 use multibody::runtime::tree::Source;
 
@@ -59,13 +59,13 @@ impl Outer {
         let mut model = plan.model.clone();
         for joint in &mut model.joints {
             joint.motion = match joint.motion {
-                Motion::Free => Motion::Prescribed,
-                Motion::Prescribed => Motion::Free,
+                JointMotion::Free => JointMotion::Prescribed,
+                JointMotion::Prescribed => JointMotion::Free,
                 mimic => mimic,
             };
         }
         // Only its names are used: no search for blocks.
-        let options = PlanOptions { forms: Forms::Single, ..PlanOptions::default() };
+        let options = PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() };
         Outer::new(&Plan::new(&model, options), LayoutArg::Mbd)
     }
 

@@ -49,7 +49,7 @@ fn one(plan: &Plan, k: usize, node: &PlanNode, out: &mut dyn Write) -> Outcome {
     writeln!(out, "    joint: {}", motion(plan, node))?;
     if node.deferred {
         writeln!(out, "    solved further inboard, in one block with other joints: fewer operations")?;
-    } else if node.shared.is_some() {
+    } else if node.unknown.is_some() {
         writeln!(out, "    shares its coordinate with other joints: solved where all of them have met")?;
     }
     inertia(plan, node, out)
@@ -80,8 +80,8 @@ fn motion(plan: &Plan, node: &PlanNode) -> String {
     }
     let slide = if node.slide == 0.0 { String::new() } else { format!(", then z {}", node.slide) };
     match node.kind {
-        NodeKind::Pin => format!("Rz({angle}){slide}"),
-        NodeKind::Slider => {
+        NodeKind::Revolute => format!("Rz({angle}){slide}"),
+        NodeKind::Prismatic => {
             // The angle without the coordinate: what is left of a placement.
             let turn = angle[coordinate.len()..].trim_start_matches(" + ");
             let turn = if turn.is_empty() { String::new() } else { format!(", Rz({})", turn.trim_start()) };

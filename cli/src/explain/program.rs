@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::io::Write;
 
 use multibody::codegen::emit::quantity;
-use multibody::codegen::generate::GroupProgram;
+use multibody::codegen::generate::OutputProgram;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::symbolic::{Op, Operand, Output};
 
 use crate::Outcome;
 
 /// Operations the sweeps made and those that the output needs, by quantity. Sines and cosines count one each.
-pub fn created(group: &GroupProgram, out: &mut dyn Write) -> Outcome {
+pub fn created(group: &OutputProgram, out: &mut dyn Write) -> Outcome {
     let program = &group.program;
     let mut live: BTreeMap<_, usize> = BTreeMap::new();
     for (_, op, (_, what)) in &program.steps {
@@ -34,7 +34,7 @@ pub fn created(group: &GroupProgram, out: &mut dyn Write) -> Outcome {
 }
 
 /// The program, one operation a line.
-pub fn statements(plan: &Plan, group: &GroupProgram, out: &mut dyn Write) -> Outcome {
+pub fn statements(plan: &Plan, group: &OutputProgram, out: &mut dyn Write) -> Outcome {
     writeln!(out, "{}", group.group.name())?;
     let mut inputs = BTreeMap::new();
     let mut places = group.inputs.iter().flat_map(|a| (0..a.len).map(move |k| place(&a.name, k, a.sixes)));
@@ -96,7 +96,7 @@ fn place(array: &str, k: usize, sixes: bool) -> String {
 }
 
 /// The order: parts, values alive at once, longest chain.
-pub fn schedule(group: &GroupProgram, chunk: usize, out: &mut dyn Write) -> Outcome {
+pub fn schedule(group: &OutputProgram, chunk: usize, out: &mut dyn Write) -> Outcome {
     let steps = &group.program.steps;
     let statements = steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
     writeln!(out, "{}", group.group.name())?;
@@ -117,7 +117,7 @@ pub fn schedule(group: &GroupProgram, chunk: usize, out: &mut dyn Write) -> Outc
 }
 
 /// Largest number of values between their definition and their last use, and the step where it is reached.
-fn alive(group: &GroupProgram) -> (usize, usize) {
+fn alive(group: &OutputProgram) -> (usize, usize) {
     let steps = &group.program.steps;
     let mut last: BTreeMap<u32, usize> = BTreeMap::new();
     for (k, (_, op, _)) in steps.iter().enumerate() {
@@ -150,7 +150,7 @@ fn alive(group: &GroupProgram) -> (usize, usize) {
 }
 
 /// Length of the longest chain of operations.
-fn depth(group: &GroupProgram) -> usize {
+fn depth(group: &OutputProgram) -> usize {
     let mut depth: BTreeMap<u32, usize> = BTreeMap::new();
     for (id, op, _) in &group.program.steps {
         let below = op.operands().map(|o| if let Operand::Node(k) = o { depth[&k] } else { 0 }).max().unwrap_or(0);

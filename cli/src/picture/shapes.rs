@@ -79,7 +79,7 @@ impl Shapes {
         for joint in &model.joints {
             let (slides, free) = match joint.kind {
                 JointKind::Floating | JointKind::Planar { .. } => (false, true),
-                JointKind::Slider { .. } | JointKind::Cylindrical { .. } => (true, false),
+                JointKind::Prismatic { .. } | JointKind::Cylindrical { .. } => (true, false),
                 _ => (false, false),
             };
             if free {

@@ -5,13 +5,13 @@ use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawModel, RawMotion};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::{list, quote};
-use crate::model::{Joint, JointKind, Motion, Value};
+use crate::model::{Joint, JointKind, JointMotion, Value};
 
 /// A type as it is written.
 pub(super) fn type_name(kind: JointType) -> &'static str {
     match kind {
-        JointType::Pin => "pin",
-        JointType::Slider => "slider",
+        JointType::Revolute => "pin",
+        JointType::Prismatic => "slider",
         JointType::Cylindrical => "cylindrical",
         JointType::Helical => "helical",
         JointType::Universal => "universal",
@@ -26,8 +26,8 @@ pub(super) fn type_name(kind: JointType) -> &'static str {
 pub(super) fn coordinates(kind: JointType) -> &'static [Quantity] {
     use Quantity::{Angle, Length};
     match kind {
-        JointType::Pin | JointType::Helical => &[Angle],
-        JointType::Slider => &[Length],
+        JointType::Revolute | JointType::Helical => &[Angle],
+        JointType::Prismatic => &[Length],
         JointType::Cylindrical => &[Length, Angle],
         JointType::Universal => &[Angle, Angle],
         JointType::Planar => &[Length, Length, Angle],
@@ -80,8 +80,8 @@ fn joint_kind(raw: &RawJoint, kind: JointType, what: &str, numbers: &mut Numbers
     };
     let z = [0.0, 0.0, 1.0];
     match kind {
-        JointType::Pin => JointKind::Pin { axis: direction(&raw.axis, "axis", z) },
-        JointType::Slider => JointKind::Slider { axis: direction(&raw.axis, "axis", z) },
+        JointType::Revolute => JointKind::Revolute { axis: direction(&raw.axis, "axis", z) },
+        JointType::Prismatic => JointKind::Prismatic { axis: direction(&raw.axis, "axis", z) },
         JointType::Cylindrical => JointKind::Cylindrical { axis: direction(&raw.axis, "axis", z) },
         JointType::Planar => JointKind::Planar { normal: direction(&raw.axis, "axis", z) },
         JointType::Spherical => JointKind::Spherical,
@@ -222,7 +222,7 @@ fn signs(raw: &RawJoint, joint: &Joint, what: &str, numbers: &mut Numbers) {
     }
 }
 
-fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Numbers) -> Motion {
+fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Numbers) -> JointMotion {
     if let RawMotion::Prescribed(span) = raw.motion {
         if kind == Some(JointType::Fixed) {
             let message = format!("{what}: a fixed joint has no motion to prescribe");
@@ -235,8 +235,8 @@ fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Num
     }
     let Some(mimic) = &raw.mimic else {
         return match raw.motion {
-            RawMotion::Free => Motion::Free,
-            RawMotion::Prescribed(_) => Motion::Prescribed,
+            RawMotion::Free => JointMotion::Free,
+            RawMotion::Prescribed(_) => JointMotion::Prescribed,
         };
     };
     if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
@@ -251,7 +251,7 @@ fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Num
     }
     let quantity = kind.map_or(&[] as &[_], coordinates).first().copied().unwrap_or(Quantity::Plain);
     let offset = numbers.or_zero(&mimic.offset, quantity, &format!("{what}: `offset`"));
-    Motion::Mimic { leader: 0, ratio: ratio.unwrap_or(Value::ONE), offset }
+    JointMotion::Mimic { leader: 0, ratio: ratio.unwrap_or(Value::ONE), offset }
 }
 
 /// File index of the leader of each joint that mimics one. Reports leaders that cannot lead and rings.

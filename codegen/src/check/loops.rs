@@ -1,4 +1,4 @@
-//! Loops: what they bind and how.
+//! RolledCode: what they bind and how.
 
 use super::decay;
 use super::names::{norm, End, Names};
@@ -6,7 +6,7 @@ use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{LoopType, RawConstraint, RawLoop, RawModel, RawNumber};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::quote;
-use crate::model::{Body, Constraint, ConstraintKind, Frame, Joint, LoopKind, Motion, Mount, Placement, Value};
+use crate::model::{Body, Constraint, ConstraintKind, Frame, Joint, LoopKind, JointMotion, Mount, Placement, Value};
 
 /// Cosine up to which two axes pass for being at right angles: seven digits.
 const RIGHT_ANGLE: f64 = 1e-6;
@@ -14,7 +14,7 @@ const RIGHT_ANGLE: f64 = 1e-6;
 /// Keys that a type has beside `name`, `type` and `between`.
 fn keys(kind: LoopType) -> &'static [&'static str] {
     match kind {
-        LoopType::Pin | LoopType::Slider | LoopType::Cylindrical | LoopType::PointOnLine => &["axis", "decay"],
+        LoopType::Revolute | LoopType::Prismatic | LoopType::Cylindrical | LoopType::PointOnLine => &["axis", "decay"],
         LoopType::Helical => &["axis", "pitch", "decay"],
         LoopType::Universal => &["axis", "axis2", "decay"],
         LoopType::Planar | LoopType::PointOnPlane => &["normal", "decay"],
@@ -150,8 +150,8 @@ fn loop_kind(raw: &RawLoop, kind: LoopType, what: &str, numbers: &mut Numbers) -
         right_angle(raw, [axis, axis2], what, numbers.findings);
     }
     match kind {
-        LoopType::Pin => LoopKind::Pin { axis },
-        LoopType::Slider => LoopKind::Slider { axis },
+        LoopType::Revolute => LoopKind::Revolute { axis },
+        LoopType::Prismatic => LoopKind::Prismatic { axis },
         LoopType::Cylindrical => LoopKind::Cylindrical { axis },
         LoopType::Helical => LoopKind::Helical { axis, pitch },
         LoopType::Universal => LoopKind::Universal { axes: [axis, axis2] },
@@ -223,7 +223,7 @@ pub(super) fn rigid(
     findings: &mut Findings,
 ) {
     let welded = merged(joints, bodies.len(), |j| j.kind.nv() == 0);
-    let led = merged(joints, bodies.len(), |j| j.kind.nv() == 0 || j.motion == Motion::Prescribed);
+    let led = merged(joints, bodies.len(), |j| j.kind.nv() == 0 || j.motion == JointMotion::Prescribed);
     for (source, constraint) in raw.constraints.iter().zip(constraints) {
         let (RawConstraint::Loop(source), Some(constraint)) = (source, constraint) else { continue };
         let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };

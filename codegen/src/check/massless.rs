@@ -4,7 +4,7 @@ use super::symmetric::full;
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
-use crate::model::{Body, JointKind, Model, Motion, Placement, Rotation, Value};
+use crate::model::{Body, JointKind, Model, JointMotion, Placement, Rotation, Value};
 
 type Mat3 = [[f64; 3]; 3];
 
@@ -28,7 +28,7 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
     }
     let mut leads = vec![false; n];
     for joint in &model.joints {
-        if let Motion::Mimic { leader, .. } = joint.motion {
+        if let JointMotion::Mimic { leader, .. } = joint.motion {
             leads[leader] = true;
         }
     }
@@ -40,7 +40,7 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
     for k in (0..n).rev() {
         let joint = &model.joints[k];
         let nv = joint.kind.nv();
-        let judged = nv > 0 && joint.motion == Motion::Free && !leads[k];
+        let judged = nv > 0 && joint.motion == JointMotion::Free && !leads[k];
         if judged && !reported[k] {
             if let Some(problem) = weak_freedom(model, k, heavy[k], moving[k], inertia[k]) {
                 let source = &raw.joints[order[k]];
@@ -96,7 +96,7 @@ fn about(kind: &JointKind, freedom: usize) -> &'static str {
         (JointKind::Universal { .. }, 0) => " about the first axis",
         (JointKind::Universal { .. }, _) => " about the second axis",
         (JointKind::Planar { .. }, _) => " about the normal",
-        (JointKind::Pin { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => " about the axis",
+        (JointKind::Revolute { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => " about the axis",
         _ => "",
     }
 }
@@ -154,8 +154,8 @@ fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
     const NONE: [f64; 3] = [0.0; 3];
     const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     match kind {
-        JointKind::Pin { axis } => vec![(NONE, unit(*axis))],
-        JointKind::Slider { axis } => vec![(unit(*axis), NONE)],
+        JointKind::Revolute { axis } => vec![(NONE, unit(*axis))],
+        JointKind::Prismatic { axis } => vec![(unit(*axis), NONE)],
         JointKind::Cylindrical { axis } => vec![(unit(*axis), NONE), (NONE, unit(*axis))],
         JointKind::Helical { axis, pitch } => {
             let a = unit(*axis);

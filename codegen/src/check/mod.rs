@@ -74,7 +74,7 @@ fn assemble(
         let mut joint = joints[j].clone();
         joint.parent = links[j].parent.unwrap_or(None);
         joint.child = links[j].child.unwrap_or(0);
-        if let (crate::model::Motion::Mimic { leader, .. }, Some(l)) = (&mut joint.motion, leaders[j]) {
+        if let (crate::model::JointMotion::Mimic { leader, .. }, Some(l)) = (&mut joint.motion, leaders[j]) {
             *leader = place[l];
         }
         joint

@@ -2,7 +2,7 @@
 
 mod lanes;
 mod layout;
-mod loops;
+mod rolled;
 pub(crate) mod names;
 mod ports;
 mod statements;
@@ -10,9 +10,9 @@ mod traits;
 
 use std::fmt::Write;
 
-use crate::options::{Group, Options};
+use crate::options::{Output, Options};
 use crate::plan::Plan;
-use crate::trace::GroupProgram;
+use crate::trace::OutputProgram;
 use statements::{Body, Head};
 
 pub use layout::joint_word;
@@ -22,16 +22,16 @@ pub use names::{identifier, quantity};
 type Writer = fn(&mut String, &Plan, &Options);
 
 /// Source of one type with a function for each group, and of its `System` where the rates are among them.
-pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &GroupProgram) -> String {
+pub fn source(plan: &Plan, options: &Options, groups: &[OutputProgram], map: &OutputProgram) -> String {
     let mut out = String::new();
-    let has = |x: Group| groups.iter().any(|g| g.group == x);
-    let rates = has(Group::Rates);
+    let has = |x: Output| groups.iter().any(|g| g.group == x);
+    let rates = has(Output::Rates);
     let traits: [(bool, Writer); 5] = [
-        (has(Group::Momenta), traits::conjugate),
-        (has(Group::Energy), traits::energetic),
-        (has(Group::Accelerations), traits::accelerated),
-        (has(Group::Derivatives), traits::differentiable),
-        (Group::CONSTRAINED.into_iter().all(has), traits::constrained),
+        (has(Output::Momenta), traits::conjugate),
+        (has(Output::Energy), traits::energetic),
+        (has(Output::Accelerations), traits::accelerated),
+        (has(Output::Derivatives), traits::differentiable),
+        (Output::CONSTRAINED.into_iter().all(has), traits::constrained),
     ];
     layout::header(&mut out, plan, options, groups);
     layout::type_definition(&mut out, plan, options, groups);
@@ -54,7 +54,7 @@ pub fn source(plan: &Plan, options: &Options, groups: &[GroupProgram], map: &Gro
         let ports = ports::ports(group, signature);
         let head = Head { options, name, id, function: signature, ports: &ports };
         match &group.loops {
-            Some(program) => loops::Loops::new(plan, program, head).write(&mut out),
+            Some(program) => rolled::RolledWriter::new(plan, program, head).write(&mut out),
             None => Body::new(plan, group, head).write(&mut out),
         }
         kernels.push(lanes::Kernel { id, name, signature, ports });

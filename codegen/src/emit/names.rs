@@ -23,7 +23,7 @@ pub fn quantity(q: Quantity) -> (&'static str, &'static str) {
         Quantity::Pose => ("pose", "sine and cosine, rotation"),
         Quantity::Inertia => ("inertia", "inertia carried to the parent, M* (4.48)"),
         Quantity::Pivot => ("pivot", "U, Mj, k and the reduced inertia M' (4.44)"),
-        Quantity::Remainder => ("rest", "momentum remainder D, D' (4.45, 4.49)"),
+        Quantity::BiasMomentum => ("rest", "momentum remainder D, D' (4.45, 4.49)"),
         Quantity::Velocity => ("vel", "velocity and joint rate (4.40)"),
         Quantity::Rate => ("rate", "coordinate rates"),
         Quantity::Acceleration => ("acc", "acceleration"),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::layout::Function;
 use crate::symbolic::Op;
-use crate::trace::GroupProgram;
+use crate::trace::OutputProgram;
 
 /// One array.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +72,7 @@ pub fn declared(function: &Function) -> Vec<Port> {
 }
 
 /// Numbers of the inputs that are used.
-fn used(group: &GroupProgram) -> BTreeSet<usize> {
+fn used(group: &OutputProgram) -> BTreeSet<usize> {
     match &group.loops {
         Some(program) => program.used_inputs(),
         None => {
@@ -83,7 +83,7 @@ fn used(group: &GroupProgram) -> BTreeSet<usize> {
 }
 
 /// Inputs that are used, then outputs, in the order of the function's results.
-pub fn ports(group: &GroupProgram, function: &Function) -> Vec<Port> {
+pub fn ports(group: &OutputProgram, function: &Function) -> Vec<Port> {
     let used = used(group);
     let mut ports = Vec::new();
     let mut at = 0;

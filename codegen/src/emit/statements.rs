@@ -13,8 +13,8 @@ use super::names::{identifier, quantity};
 use super::ports::{self, Port};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Fma, Label, Op, Operand, Output, Pivot};
-use crate::trace::{GroupProgram, InputArray};
+use crate::symbolic::{Fma, Label, Op, Operand, ProgramResult, FlooredReciprocal};
+use crate::trace::{OutputProgram, InputArray};
 
 /// What every function begins with.
 pub struct Head<'a> {
@@ -115,7 +115,7 @@ impl Head<'_> {
                 let number = self.options.precision.name();
                 format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(minus_product), minus(minus_addend))
             }
-            Op::ReciprocalAbove(Pivot { value, floor, minus_value, minus_floor }) => {
+            Op::ReciprocalAbove(FlooredReciprocal { value, floor, minus_value, minus_floor }) => {
                 let (value, floor) = (text(value), text(floor));
                 let (rt, v, f) = (&self.options.runtime, minus(minus_value), minus(minus_floor));
                 format!("{rt}::Scalar::reciprocal_above({v}{value}, {f}{floor})")
@@ -126,10 +126,10 @@ impl Head<'_> {
     }
 
     /// An output of a program as it is written.
-    pub fn value(&self, output: &Output, names: &BTreeMap<u32, String>) -> String {
+    pub fn value(&self, output: &ProgramResult, names: &BTreeMap<u32, String>) -> String {
         match output {
-            Output::Const(x) => self.constant(*x),
-            Output::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, names[id]),
+            ProgramResult::Const(x) => self.constant(*x),
+            ProgramResult::Node(id, neg) => format!("{}{}", if *neg { "-" } else { "" }, names[id]),
         }
     }
 
@@ -150,7 +150,7 @@ pub fn input(inputs: &[InputArray], k: usize, more: &str, lane: &str) -> String 
 pub struct Body<'a> {
     plan: &'a Plan,
     head: Head<'a>,
-    group: &'a GroupProgram,
+    group: &'a OutputProgram,
     names: BTreeMap<u32, String>,
     angles: Angles,
 }
@@ -179,7 +179,7 @@ struct Angles {
 }
 
 impl Angles {
-    fn new(group: &GroupProgram) -> Angles {
+    fn new(group: &OutputProgram) -> Angles {
         let mut angles = Angles::default();
         let mut all: BTreeMap<u32, [Option<u32>; 2]> = BTreeMap::new();
         // Nodes that do not follow from inputs by sums and products.
@@ -199,7 +199,7 @@ impl Angles {
         (angles.late, angles.early) = all.into_iter().partition(|(a, _)| involved.contains(a));
         angles.before.extend(angles.early.keys());
         for output in &group.program.outputs {
-            if let Output::Node(id, _) = output {
+            if let ProgramResult::Node(id, _) = output {
                 angles.after.insert(*id);
             }
         }
@@ -219,7 +219,7 @@ impl Angles {
 
 impl<'a> Body<'a> {
     /// Names every value after its body and quantity, numbered in order.
-    pub fn new(plan: &'a Plan, group: &'a GroupProgram, head: Head<'a>) -> Self {
+    pub fn new(plan: &'a Plan, group: &'a OutputProgram, head: Head<'a>) -> Self {
         let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
         let mut next: BTreeMap<(&str, &str), usize> = BTreeMap::new();
         let mut names = BTreeMap::new();
@@ -298,8 +298,8 @@ impl<'a> Body<'a> {
         }
         match lanes {
             true => last.extend(self.group.program.outputs.iter().filter_map(|output| match output {
-                Output::Node(id, _) => Some((*id, usize::MAX)),
-                Output::Const(_) => None,
+                ProgramResult::Node(id, _) => Some((*id, usize::MAX)),
+                ProgramResult::Const(_) => None,
             })),
             false => last.extend(self.angles.early.keys().map(|id| (*id, usize::MAX))),
         }

@@ -24,7 +24,7 @@ pub fn system(out: &mut String, plan: &Plan, options: &Options) {
                 JointKind::Planar { .. } => "Plane",
                 _ => return None,
             };
-            Some(format!("{rt}::system::Group::new({rt}::system::GroupKind::{kind}, {q}, {v})"))
+            Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{kind}, {q}, {v})"))
         })
         .collect();
     let neutral = neutral(plan, false);
@@ -42,17 +42,17 @@ impl {rt}::System for {name} {{
         {neutral}
     }}
 
-    fn rest(&self) -> [{t}; {nv}] {{
+    fn zero_momenta(&self) -> [{t}; {nv}] {{
         [0.0; {nv}]
     }}
 
     #[inline]
-    fn groups(&self) -> &[{rt}::system::Group] {{
+    fn lie_joints(&self) -> &[{rt}::system::LieJoint] {{
         const {{ &[{groups}] }}
     }}
 
     #[inline]
-    fn state_rates(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
+    fn rates_at(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
         Self::rates(self, q, p, qd, pd);
     }}
 
@@ -75,7 +75,7 @@ pub fn energetic(out: &mut String, plan: &Plan, options: &Options) {
 #[rustfmt::skip]
 impl {rt}::Energetic for {name} {{
     #[inline]
-    fn state_energy(&mut self, q: &[{t}; {nq}], p: &[{t}; {nv}]) -> ({t}, {t}) {{
+    fn energies(&mut self, q: &[{t}; {nq}], p: &[{t}; {nv}]) -> ({t}, {t}) {{
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }}
@@ -94,7 +94,7 @@ pub fn conjugate(out: &mut String, plan: &Plan, options: &Options) {
 #[rustfmt::skip]
 impl {rt}::Conjugate for {name} {{
     #[inline]
-    fn state_momenta(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], p: &mut [{t}; {nv}]) {{
+    fn conjugate_momenta(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], p: &mut [{t}; {nv}]) {{
         Self::momenta(self, q, v, p);
     }}
 }}
@@ -112,7 +112,7 @@ pub fn accelerated(out: &mut String, plan: &Plan, options: &Options) {
 #[rustfmt::skip]
 impl {rt}::Accelerated for {name} {{
     #[inline]
-    fn state_accelerations(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], a: &mut [{t}; {nv}]) {{
+    fn generalized_accelerations(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], a: &mut [{t}; {nv}]) {{
         Self::accelerations(self, q, v, a);
     }}
 }}
@@ -173,19 +173,19 @@ impl {rt}::Constrained for {name} {{
     }}
 
     #[inline]
-    fn closure(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], jacobian: &mut [{t}; {entries}]) {{
-        Self::closure(self, q, residual, jacobian);
+    fn constraint_residuals(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], jacobian: &mut [{t}; {entries}]) {{
+        Self::constraint_residuals(self, q, residual, jacobian);
     }}
 
     #[inline]
-    fn settle(&mut self, _t: {t}, q: &[{t}; {nq}], p: &mut [{t}; {nv}], v: &mut [{t}; {nv}], sigma: &mut [{t}; {rows}]) {{
+    fn project_momenta(&mut self, _t: {t}, q: &[{t}; {nq}], p: &mut [{t}; {nv}], v: &mut [{t}; {nv}], sigma: &mut [{t}; {rows}]) {{
         let augmented = *p;
-        Self::settle(self, q, &augmented, v, p, sigma);
+        Self::project_momenta(self, q, &augmented, v, p, sigma);
     }}
 
     #[inline]
-    fn correction(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], dq: &mut [{t}; {nv}], pivots: &mut [{t}; {rows}]) {{
-        Self::correction(self, q, residual, dq, pivots);
+    fn position_correction(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], dq: &mut [{t}; {nv}], pivots: &mut [{t}; {rows}]) {{
+        Self::position_correction(self, q, residual, dq, pivots);
     }}
 
     #[inline]

@@ -75,9 +75,9 @@ pub struct RawBody {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointType {
     /// One turn.
-    Pin,
+    Revolute,
     /// One slide.
-    Slider,
+    Prismatic,
     /// A slide and a turn about one axis.
     Cylindrical,
     /// A screw.
@@ -204,9 +204,9 @@ pub struct RawFrame {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoopType {
     /// As a pin would.
-    Pin,
+    Revolute,
     /// As a slider would.
-    Slider,
+    Prismatic,
     /// A slide and a turn about one axis are left.
     Cylindrical,
     /// A screw is left.
@@ -240,8 +240,8 @@ pub enum LoopType {
 impl LoopType {
     /// Every type and what it is called.
     pub const ALL: [(&'static str, LoopType); 16] = [
-        ("pin", LoopType::Pin),
-        ("slider", LoopType::Slider),
+        ("pin", LoopType::Revolute),
+        ("slider", LoopType::Prismatic),
         ("cylindrical", LoopType::Cylindrical),
         ("helical", LoopType::Helical),
         ("universal", LoopType::Universal),

@@ -15,7 +15,7 @@ use mbd_runtime::{Interpreter, Scalar};
 use super::forms::options;
 use super::Plan;
 use crate::model::{Gravity, JointKind};
-use crate::options::Group;
+use crate::options::Output;
 use crate::symbolic::Program;
 use crate::trace::{trace, InputArray};
 use crate::wide::Wide;
@@ -26,7 +26,7 @@ const STATES: std::ops::RangeInclusive<usize> = 64..=256;
 /// Nodes in all states together, beyond which there are fewer states.
 const WORK: usize = 1600;
 
-/// The largest [`Judge::loss`] of a form that is chosen. Over many states the median error is to stay below 2 times that
+/// The largest [`ErrorEstimator::loss`] of a form that is chosen. Over many states the median error is to stay below 2 times that
 /// of the articulated form, the worst below 3 times; rewriting for speed costs about a tenth, and what is measured on a few
 /// hundred states is known to a tenth.
 pub const LIMIT: f64 = 1.6;
@@ -100,7 +100,7 @@ struct Sample {
 }
 
 /// Measures the programs of forms against the articulated form.
-pub struct Judge {
+pub struct ErrorEstimator {
     /// Results that are measured by their largest: `q̇` and `ṗ`, or accelerations.
     parts: Vec<Range<usize>>,
     samples: Vec<Sample>,
@@ -128,17 +128,17 @@ impl Errors {
     }
 }
 
-impl Judge {
+impl ErrorEstimator {
     /// A judge of one output of other forms of a plan with joints one by one: the rates, or the accelerations. Parameters
     /// have their default values.
-    pub fn new(plan: &Plan, group: Group) -> Judge {
-        let mut judge = Judge { parts: Vec::new(), samples: Vec::new(), articulated: Vec::new() };
+    pub fn new(plan: &Plan, group: Output) -> ErrorEstimator {
+        let mut judge = ErrorEstimator { parts: Vec::new(), samples: Vec::new(), articulated: Vec::new() };
         let plan = &turned(plan);
-        let [Ok(momenta), Ok(single)] = [Group::Momenta, group].map(|group| trace(plan, group, &options(group))) else {
+        let [Ok(momenta), Ok(single)] = [Output::Momenta, group].map(|group| trace(plan, group, &options(group))) else {
             return judge;
         };
         let n = single.program.outputs.len();
-        judge.parts = if group == Group::Rates { vec![0..plan.dims.nq, plan.dims.nq..n] } else { vec![0..n; 1] };
+        judge.parts = if group == Output::Rates { vec![0..plan.dims.nq, plan.dims.nq..n] } else { vec![0..n; 1] };
         let states = (WORK / plan.nodes.len().max(1)).clamp(*STATES.start(), *STATES.end());
         let params: Vec<Wide> = plan.default_params().into_iter().map(Wide::constant).collect();
         let mut interpreter = Interpreter::new(plan.tree(&params), [Wide::zero(); 3]);
@@ -179,7 +179,7 @@ impl Judge {
 /// The plan with frames that all turn.
 fn turned(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
-    plan.nodes.iter_mut().for_each(|node| node.unturned = false);
+    plan.nodes.iter_mut().for_each(|node| node.non_rotating = false);
     plan
 }
 
@@ -218,7 +218,7 @@ impl State {
             let at = match plan.model.joints[slot.joint].kind {
                 JointKind::Spherical => at,
                 JointKind::Floating => at + 3,
-                JointKind::Slider { .. } => {
+                JointKind::Prismatic { .. } => {
                     list[at] *= 0.2;
                     continue;
                 }
@@ -245,7 +245,7 @@ impl State {
     }
 
     /// The output that programs should give.
-    fn right(&self, plan: &Plan, group: Group, interpreter: &mut Interpreter<Wide>) -> Vec<Wide> {
+    fn right(&self, plan: &Plan, group: Output, interpreter: &mut Interpreter<Wide>) -> Vec<Wide> {
         let d = plan.dims;
         let wide = |x: Vec<f64>| x.into_iter().map(Wide::constant).collect::<Vec<Wide>>();
         let input = |name: &str, len: usize| wide(self.input(name, len));
@@ -265,11 +265,11 @@ impl State {
         inputs.gravity = std::array::from_fn(|k| Wide::constant(gravity[k]));
         let zeros = |n: usize| vec![Wide::zero(); n];
         let (mut v, mut qd, mut pd) = (zeros(d.nv), zeros(d.nq), zeros(d.nv));
-        if group == Group::Accelerations {
+        if group == Output::Accelerations {
             interpreter.accelerations(&wide(self.q.clone()), &wide(self.v.clone()), &mut v);
             return v;
         }
-        interpreter.rates_into(&wide(self.q.clone()), &wide(self.p.clone()), &mut v, &mut qd, &mut pd);
+        interpreter.rates(&wide(self.q.clone()), &wide(self.p.clone()), &mut v, &mut qd, &mut pd);
         [qd, pd].concat()
     }
 }

@@ -14,8 +14,8 @@ impl Plan {
         }
         let mut next = 0..;
         let numbers: Vec<Option<usize>> = keep.iter().map(|k| if *k { next.next() } else { None }).collect();
-        let follows: Vec<bool> = (0..self.shared.len())
-            .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.shared == Some(g)))
+        let follows: Vec<bool> = (0..self.unknowns.len())
+            .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.unknown == Some(g)))
             .collect();
         let inside = |c: &PlanConstraint| c.nodes().all(|k| keep[k]);
         let constraints: Vec<PlanConstraint> =
@@ -92,8 +92,8 @@ impl Plan {
 impl NodeKind {
     fn letter(self) -> char {
         match self {
-            NodeKind::Pin => 'P',
-            NodeKind::Slider => 'S',
+            NodeKind::Revolute => 'P',
+            NodeKind::Prismatic => 'S',
             NodeKind::Helical(_) => 'H',
             NodeKind::Planar => 'E',
             NodeKind::Spherical => 'B',

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::sweep::Sweeps;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Shared, Source, Tree, TreeFrame};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Unknown, Source, Tree, TreeFrame};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
@@ -14,9 +14,9 @@ use super::placement::{direction, placement};
 use super::shared::ancestors;
 use super::{Plan, PlanFrame, PoseStep, Rigid};
 use crate::model::{ConstraintKind, JointKind, LoopKind, Model, Mount, Value};
-use crate::options::{Group, Options};
+use crate::options::{Output, Options};
 use crate::symbolic::{Expr, Graph};
-use crate::trace::Given;
+use crate::trace::SymbolicInputs;
 
 /// What a constraint binds, on nodes.
 #[derive(Clone, Debug)]
@@ -87,8 +87,8 @@ fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
         super::placement::constant(&[PoseStep::Rotate(to(axis).rot), step]).map(|pose| PoseStep::Rotate(pose.rot))
     };
     match *kind {
-        LoopKind::Pin { axis }
-        | LoopKind::Slider { axis }
+        LoopKind::Revolute { axis }
+        | LoopKind::Prismatic { axis }
         | LoopKind::Cylindrical { axis }
         | LoopKind::Helical { axis, .. }
         | LoopKind::Planar { normal: axis } => [z(axis), z(axis)],
@@ -144,8 +144,8 @@ pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
         };
         let first = plan.dims.rows;
         plan.dims.rows += count;
-        let slots: Vec<usize> = (0..count).map(|k| plan.shared.len() + k).collect();
-        plan.shared.extend((first..first + count).map(Shared::Row));
+        let slots: Vec<usize> = (0..count).map(|k| plan.unknowns.len() + k).collect();
+        plan.unknowns.extend((first..first + count).map(Unknown::Row));
         open(plan, &slots, &bond, &members);
         let velocities = velocities(plan, &cycle(&bond));
         let decay = constraint.decay;
@@ -160,13 +160,13 @@ pub fn rest_idle(plan: &mut Plan) {
         return;
     }
     let graph = Graph::default();
-    let given = Given::new(&graph, plan, Group::Correction, &Options::default());
+    let given = SymbolicInputs::new(&graph, plan, Output::PositionCorrection, &Options::default());
     let tree: Tree<Expr> = plan.tree(&given.params);
     let mut w = Workspace::new(&tree);
     let [mut phi, mut pivots] = [plan.dims.rows, plan.dims.rows].map(|n| vec![Expr::Const(0.0); n]);
     let mut dq = vec![Expr::Const(0.0); plan.dims.nv];
     let sweeps = Sweeps { tree: &tree, trace: &graph };
-    sweeps.correction(&given.q, &given.inputs(), &mut w, &mut phi, &mut dq, &mut pivots);
+    sweeps.position_correction(&given.q, &given.inputs(), &mut w, &mut phi, &mut dq, &mut pivots);
     let rows = plan.constraints.iter().flat_map(|c| c.slots.iter().zip(c.first..));
     let idle: Vec<usize> =
         rows.filter(|(_, r)| matches!(pivots[*r], Expr::Const(x) if x == 0.0)).map(|(g, _)| *g).collect();
@@ -201,7 +201,7 @@ fn velocities(plan: &Plan, nodes: &[usize]) -> Vec<usize> {
 fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usize>]) {
     let ways: Vec<Vec<usize>> = members.iter().map(|i| i.map_or(Vec::new(), |i| ancestors(plan, i))).collect();
     let cycle = cycle(bond);
-    let shared: Vec<usize> = cycle.iter().filter_map(|&i| plan.nodes[i].shared).collect();
+    let shared: Vec<usize> = cycle.iter().filter_map(|&i| plan.nodes[i].unknown).collect();
     let solved = |i: usize| {
         let node = &plan.nodes[i];
         shared.iter().filter(|g| node.solve_before.contains(g) || node.solve_after.contains(g)).count()
@@ -241,8 +241,8 @@ fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
         Value::Param(k) => params.get(k).copied().unwrap_or(S::one()),
     };
     match *kind {
-        LoopKind::Pin { .. } => Closure::Pin,
-        LoopKind::Slider { .. } => Closure::Slider,
+        LoopKind::Revolute { .. } => Closure::Revolute,
+        LoopKind::Prismatic { .. } => Closure::Prismatic,
         LoopKind::Cylindrical { .. } => Closure::Cylindrical,
         LoopKind::Helical { pitch, .. } => Closure::Helical { pitch: of(pitch) },
         LoopKind::Universal { .. } => Closure::Universal,

@@ -1,12 +1,12 @@
-//! Forms of the joints inside of closed loops: columns of multipliers ride through all of them, so that what makes columns
+//! EliminationStrategy of the joints inside of closed loops: columns of multipliers ride through all of them, so that what makes columns
 //! cheap (frames that do not turn) and what does without them (momenta gathered from the tips) pays more there.
 
-use super::forms::{parallel_runs, Goal};
+use super::forms::{parallel_runs, Objective};
 use super::shared::ancestors;
 use super::Plan;
 
 /// Chooses, cycle by cycle, whether frames turn and whether momenta are gathered; `single` has joints one by one.
-pub(super) fn choose(plan: &mut Plan, single: &Plan, goal: Goal) {
+pub(super) fn choose(plan: &mut Plan, single: &Plan, goal: Objective) {
     let runs = parallel_runs(plan);
     for cycle in cycles(plan) {
         let (part, numbers) = part(plan, &cycle);
@@ -16,18 +16,18 @@ pub(super) fn choose(plan: &mut Plan, single: &Plan, goal: Goal) {
             runs.iter().filter(|run| run.iter().any(|i| cycle.contains(i))).flatten().copied().collect();
         let frames = at(&inside);
         let mut best = (goal.score(&part), None);
-        for (gather, unturned) in [(true, false), (false, true), (true, true), (false, false)] {
+        for (accumulates_momentum, non_rotating) in [(true, false), (false, true), (true, true), (false, false)] {
             let mut trial = part.clone();
-            gathered.iter().for_each(|&i| trial.nodes[i].gather = gather);
-            frames.iter().for_each(|&i| trial.nodes[i].unturned = unturned);
+            gathered.iter().for_each(|&i| trial.nodes[i].accumulates_momentum = accumulates_momentum);
+            frames.iter().for_each(|&i| trial.nodes[i].non_rotating = non_rotating);
             let score = goal.score(&trial);
             if score < best.0 && goal.accepts(&trial, &self::part(single, &cycle).0) {
-                best = (score, Some((gather, unturned)));
+                best = (score, Some((accumulates_momentum, non_rotating)));
             }
         }
-        if let Some((gather, unturned)) = best.1 {
-            cycle.iter().for_each(|&i| plan.nodes[i].gather = gather);
-            inside.iter().for_each(|&i| plan.nodes[i].unturned = unturned);
+        if let Some((accumulates_momentum, non_rotating)) = best.1 {
+            cycle.iter().for_each(|&i| plan.nodes[i].accumulates_momentum = accumulates_momentum);
+            inside.iter().for_each(|&i| plan.nodes[i].non_rotating = non_rotating);
         }
     }
 }
@@ -37,7 +37,7 @@ fn cycles(plan: &Plan) -> Vec<Vec<usize>> {
     let mut all: Vec<Vec<usize>> = Vec::new();
     for constraint in &plan.constraints {
         let mut nodes = constraint.cycle();
-        nodes.retain(|&i| plan.nodes[i].kind.nv() == 1 && !plan.nodes[i].looped);
+        nodes.retain(|&i| plan.nodes[i].kind.nv() == 1 && !plan.nodes[i].rolled);
         let (joined, rest): (Vec<_>, Vec<_>) = all.into_iter().partition(|c| c.iter().any(|i| nodes.contains(i)));
         all = rest;
         nodes.extend(joined.into_iter().flatten());

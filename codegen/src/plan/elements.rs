@@ -50,11 +50,11 @@ pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) 
         pose.extend(placement(&joint.placement, snap, &mut note));
         let halves: Vec<(NodeKind, Option<[f64; 3]>)> = match joint.kind {
             JointKind::Fixed => Vec::new(),
-            JointKind::Pin { axis } => vec![(NodeKind::Pin, Some(axis))],
-            JointKind::Slider { axis } => vec![(NodeKind::Slider, Some(axis))],
-            JointKind::Cylindrical { axis } => vec![(NodeKind::Slider, Some(axis)), (NodeKind::Pin, Some(axis))],
+            JointKind::Revolute { axis } => vec![(NodeKind::Revolute, Some(axis))],
+            JointKind::Prismatic { axis } => vec![(NodeKind::Prismatic, Some(axis))],
+            JointKind::Cylindrical { axis } => vec![(NodeKind::Prismatic, Some(axis)), (NodeKind::Revolute, Some(axis))],
             JointKind::Helical { axis, pitch } => vec![(NodeKind::Helical(pitch), Some(axis))],
-            JointKind::Universal { axes } => vec![(NodeKind::Pin, Some(axes[0])), (NodeKind::Pin, Some(axes[1]))],
+            JointKind::Universal { axes } => vec![(NodeKind::Revolute, Some(axes[0])), (NodeKind::Revolute, Some(axes[1]))],
             JointKind::Planar { normal } => vec![(NodeKind::Planar, Some(normal))],
             JointKind::Spherical => vec![(NodeKind::Spherical, None)],
             JointKind::Floating => vec![(NodeKind::Floating, None)],

@@ -9,12 +9,12 @@
 //! its rounding errors are not much larger than those of one joint at a time.
 
 use mbd_runtime::sweep::Quantity;
-use mbd_runtime::tree::{Shared, Source};
+use mbd_runtime::tree::{Unknown, Source};
 
-use super::accuracy::{Judge, LIMIT};
+use super::accuracy::{ErrorEstimator, LIMIT};
 use super::{NodeKind, Plan, PlanNode, PlanOptions, PoseStep};
-use crate::loops;
-use crate::options::{Arithmetic, Group, Loops, Options};
+use crate::rolled;
+use crate::options::{Arithmetic, Output, RolledCode, Options};
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;
 
@@ -38,7 +38,7 @@ const LARGEST: usize = 150;
 
 /// How the joints are eliminated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Forms {
+pub enum EliminationStrategy {
     /// Branch by branch the form for which the rates take the least time for one state, by the cost model, of those whose
     /// rounding errors are not much larger than one joint at a time makes them.
     #[default]
@@ -49,32 +49,32 @@ pub enum Forms {
     Single,
 }
 
-impl Forms {
+impl EliminationStrategy {
     /// All of them.
-    pub const ALL: [Forms; 3] = [Forms::Fastest, Forms::Fewest, Forms::Single];
+    pub const ALL: [EliminationStrategy; 3] = [EliminationStrategy::Fastest, EliminationStrategy::Fewest, EliminationStrategy::Single];
 
     /// Its name in options.
     pub fn name(self) -> &'static str {
         match self {
-            Forms::Fastest => "fastest",
-            Forms::Fewest => "fewest",
-            Forms::Single => "single",
+            EliminationStrategy::Fastest => "fastest",
+            EliminationStrategy::Fewest => "fewest",
+            EliminationStrategy::Single => "single",
         }
     }
 
     /// What the search makes small.
     fn score(self, cost: &Cost) -> f64 {
         match self {
-            Forms::Fastest => cost.cycles(),
-            Forms::Fewest | Forms::Single => cost.operations as f64,
+            EliminationStrategy::Fastest => cost.cycles(),
+            EliminationStrategy::Fewest | EliminationStrategy::Single => cost.operations as f64,
         }
     }
 
-    /// What a form may lose, see [`Judge::loss`].
+    /// What a form may lose, see [`ErrorEstimator::loss`].
     fn limit(self) -> f64 {
         match self {
-            Forms::Fastest => LIMIT,
-            Forms::Fewest | Forms::Single => f64::INFINITY,
+            EliminationStrategy::Fastest => LIMIT,
+            EliminationStrategy::Fewest | EliminationStrategy::Single => f64::INFINITY,
         }
     }
 }
@@ -91,9 +91,9 @@ struct Form {
     /// Joints eliminated on the parent's side of their own motion.
     turned: Vec<bool>,
     /// Joints before this one get their momentum rates from accumulated momenta.
-    gather: usize,
+    accumulates_momentum: usize,
     /// Whether the joints are the turns of a loop.
-    looped: bool,
+    rolled: bool,
 }
 
 /// Chooses a form for every chain that ends at a tip. Each is searched with what carries it alone.
@@ -103,28 +103,28 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
     }
     let mut runs = parallel_runs(plan);
     let mut chains = tip_chains(plan);
-    if options.forms == Forms::Fastest {
-        chains.retain(|chain| !chain.iter().any(|&i| plan.nodes[i].looped));
+    if options.forms == EliminationStrategy::Fastest {
+        chains.retain(|chain| !chain.iter().any(|&i| plan.nodes[i].rolled));
         runs.retain(|run| !touches_loop(plan, run));
     }
     if chains.is_empty() && runs.is_empty() && plan.constraints.is_empty() {
         return;
     }
-    let goals = [Group::Rates, Group::Accelerations].map(|group| Goal { forms: options.forms, group });
+    let goals = [Output::Rates, Output::Accelerations].map(|group| Objective { forms: options.forms, group });
     let single = plan.clone();
     toggle_unturned(plan, &single, &runs, goals[0]);
     let mut other = options.accelerations.then(|| plan.clone());
-    let mut known: Vec<Known> = Vec::new();
+    let mut known: Vec<Cached> = Vec::new();
     for chain in chains {
         let (branch, numbers) = plan.branch(chain[0]);
         let inside: Vec<usize> = chain.iter().filter_map(|&i| numbers[i]).collect();
-        let here = Here { letters: branch.letters(), plan: branch, chain: inside, goals };
+        let here = Branch { letters: branch.letters(), plan: branch, chain: inside, goals };
         let like = known.iter().position(|k| k.letters == here.letters && k.is_accurate(&here));
         let like = like.unwrap_or_else(|| {
             known.push(here.search(options));
             known.len() - 1
         });
-        let Known { forms: [first, second], tried, .. } = &known[like];
+        let Cached { forms: [first, second], tried, .. } = &known[like];
         let ends = [chain[0], chain[chain.len() - 1]];
         plan.candidates.extend(tried.iter().map(|c| Candidate { branch: ends, ..c.clone() }));
         first.iter().for_each(|form| apply(plan, &chain, form));
@@ -144,24 +144,24 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) {
 }
 
 /// A branch with what carries it, and what it is searched for.
-struct Here {
+struct Branch {
     letters: String,
     plan: Plan,
     chain: Vec<usize>,
-    goals: [Goal; 2],
+    goals: [Objective; 2],
 }
 
 /// What was found for a branch, and is right for every one like it: the other leg.
-struct Known {
+struct Cached {
     letters: String,
     /// For rates and for accelerations.
     forms: [Option<Form>; 2],
     tried: Vec<Candidate>,
 }
 
-impl Known {
+impl Cached {
     /// Whether the forms are accurate with the numbers of another branch.
-    fn is_accurate(&self, here: &Here) -> bool {
+    fn is_accurate(&self, here: &Branch) -> bool {
         self.forms.iter().zip(here.goals).all(|(form, goal)| {
             form.as_ref().is_none_or(|form| {
                 let mut plan = here.plan.clone();
@@ -172,18 +172,18 @@ impl Known {
     }
 }
 
-impl Here {
-    fn search(self, options: PlanOptions) -> Known {
+impl Branch {
+    fn search(self, options: PlanOptions) -> Cached {
         let (plan, chain) = (&self.plan, &self.chain[..]);
-        let as_loop = (options.forms, options.loops) == (Forms::Fastest, Loops::Auto);
-        let looped = Form::looped(chain.len()).filter(|_| as_loop);
+        let as_loop = (options.forms, options.loops) == (EliminationStrategy::Fastest, RolledCode::Auto);
+        let rolled = Form::rolled(chain.len()).filter(|_| as_loop);
         let from_ground = plan.nodes[chain[0]].parent.is_none();
         let mut search = Search::new(plan, chain, self.goals[0]);
         for form in first_forms(chain.len(), from_ground) {
             search.consider(form);
         }
         while search.neighbours(from_ground) {}
-        if let Some(form) = &looped {
+        if let Some(form) = &rolled {
             search.consider(form.clone());
         }
         let Search { chosen, tried, mut seen, .. } = search;
@@ -197,16 +197,16 @@ impl Here {
                 search.consider(form);
             }
             while search.neighbours(from_ground) {}
-            if let Some(form) = &looped {
+            if let Some(form) = &rolled {
                 search.consider(form.clone());
             }
             second = search.chosen;
         }
-        Known { forms: [chosen, second], tried, letters: self.letters }
+        Cached { forms: [chosen, second], tried, letters: self.letters }
     }
 }
 
-/// Forms of a chain that are tried for the accelerations, beside their neighbours.
+/// EliminationStrategy of a chain that are tried for the accelerations, beside their neighbours.
 const TRIED: usize = 6;
 
 /// Runs of pins about parallel axes: the nodes whose frames need not turn, because all that they carry next turns about
@@ -214,12 +214,12 @@ const TRIED: usize = 6;
 pub(super) fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     let swings = |i: usize| {
         let node = &plan.nodes[i];
-        node.kind == NodeKind::Pin && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
+        node.kind == NodeKind::Revolute && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
     };
     let mut runs: Vec<Vec<usize>> = Vec::new();
     for (i, node) in plan.nodes.iter().enumerate() {
         let mut children = plan.nodes.iter().enumerate().filter(|(_, n)| n.parent == Some(i)).peekable();
-        if node.kind != NodeKind::Pin || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
+        if node.kind != NodeKind::Revolute || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
             continue;
         }
         match runs.iter_mut().find(|run| node.parent.is_some_and(|p| run.contains(&p)) && swings(i)) {
@@ -232,52 +232,52 @@ pub(super) fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
 
 /// Turns or does not turn the frames of every run, whichever is cheaper, if that is accurate; `single` has joints one by
 /// one.
-fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Goal) {
+fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Objective) {
     for run in runs {
-        if goal.forms == Forms::Fastest && touches_loop(plan, run) {
+        if goal.forms == EliminationStrategy::Fastest && touches_loop(plan, run) {
             continue;
         }
         let (mut branch, numbers) = plan.branch(run[0]);
         let score = goal.score(&branch);
-        run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].unturned ^= true);
+        run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].non_rotating ^= true);
         if goal.score(&branch) < score && goal.accepts(&branch, &single.branch(run[0]).0) {
-            run.iter().for_each(|&i| plan.nodes[i].unturned ^= true);
+            run.iter().for_each(|&i| plan.nodes[i].non_rotating ^= true);
         }
     }
 }
 
 /// What is to be made small.
 #[derive(Clone, Copy)]
-pub(super) struct Goal {
-    forms: Forms,
-    group: Group,
+pub(super) struct Objective {
+    forms: EliminationStrategy,
+    group: Output,
 }
 
 /// What forms are compared by. Joint forces cost the rates an addition each, whatever the form.
-pub(super) fn options(group: Group) -> Options {
-    Options { efforts: group != Group::Rates, arithmetic: Arithmetic::Exact, ..Options::default() }
+pub(super) fn options(group: Output) -> Options {
+    Options { efforts: group != Output::Rates, arithmetic: Arithmetic::Exact, ..Options::default() }
 }
 
 /// The output of a plan, and its cost.
-struct Look {
+struct Evaluation {
     program: Program,
     cost: Cost,
 }
 
-impl Look {
+impl Evaluation {
     /// Operations that lead to velocities.
     fn velocities(&self) -> usize {
-        use Quantity::{Inertia, Pivot, Remainder, Velocity};
-        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | Remainder | Velocity);
+        use Quantity::{Inertia, Pivot, BiasMomentum, Velocity};
+        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | BiasMomentum | Velocity);
         self.program.counts_where(velocities).total()
     }
 }
 
-impl Goal {
+impl Objective {
     /// Makes the output of a plan as the sweeps do.
-    fn look(self, plan: &Plan) -> Option<Look> {
+    fn look(self, plan: &Plan) -> Option<Evaluation> {
         let program = trace(plan, self.group, &options(self.group)).ok()?.program;
-        Some(Look { cost: symbolic::cost(&program), program })
+        Some(Evaluation { cost: symbolic::cost(&program), program })
     }
 
     pub(super) fn score(self, plan: &Plan) -> f64 {
@@ -287,7 +287,7 @@ impl Goal {
     /// Whether a plan is accurate; `single` is the same with joints one by one.
     pub(super) fn accepts(self, plan: &Plan, single: &Plan) -> bool {
         let limit = self.forms.limit();
-        let loss = || self.look(plan).map(|look| Judge::new(single, self.group).loss(&look.program));
+        let loss = || self.look(plan).map(|look| ErrorEstimator::new(single, self.group).loss(&look.program));
         limit == f64::INFINITY || loss().is_some_and(|loss| loss <= limit)
     }
 }
@@ -295,8 +295,8 @@ impl Goal {
 struct Search<'a> {
     plan: &'a Plan,
     chain: &'a [usize],
-    goal: Goal,
-    judge: Judge,
+    goal: Objective,
+    judge: ErrorEstimator,
     best: f64,
     chosen: Option<Form>,
     tried: Vec<Candidate>,
@@ -307,14 +307,14 @@ struct Search<'a> {
 impl Form {
     /// A chain as the turns of a loop, whose time is that of the shortest way through a link: one joint at a time, on the
     /// parent's side.
-    fn looped(len: usize) -> Option<Form> {
-        let form = Form { split: 0, base: len - 1, turned: vec![true; len], gather: 0, looped: true };
+    fn rolled(len: usize) -> Option<Form> {
+        let form = Form { split: 0, base: len - 1, turned: vec![true; len], accumulates_momentum: 0, rolled: true };
         (len >= TRIED_AS_LOOP).then_some(form)
     }
 
     /// In words.
     fn words(&self, len: usize) -> String {
-        if self.looped {
+        if self.rolled {
             return "a loop".to_string();
         }
         let mut words = Vec::new();
@@ -332,8 +332,8 @@ impl Form {
         if turned > 0 {
             words.push(format!("{turned} on the parent's side"));
         }
-        if self.gather > 0 {
-            words.push(format!("momenta of {}", self.gather));
+        if self.accumulates_momentum > 0 {
+            words.push(format!("momenta of {}", self.accumulates_momentum));
         }
         words.join("; ")
     }
@@ -360,8 +360,8 @@ pub struct Candidate {
 }
 
 impl<'a> Search<'a> {
-    fn new(plan: &'a Plan, chain: &'a [usize], goal: Goal) -> Search<'a> {
-        let judge = Judge::new(plan, goal.group);
+    fn new(plan: &'a Plan, chain: &'a [usize], goal: Objective) -> Search<'a> {
+        let judge = ErrorEstimator::new(plan, goal.group);
         Search { plan, chain, goal, judge, best: f64::INFINITY, chosen: None, tried: Vec::new(), seen: Vec::new() }
     }
 
@@ -370,14 +370,14 @@ impl<'a> Search<'a> {
         let mut candidate = self.plan.clone();
         apply(&mut candidate, self.chain, &form);
         let Some(mut look) = self.goal.look(&candidate) else { return false };
-        if form.looped {
+        if form.rolled {
             let options = Options { arithmetic: Arithmetic::Fast, ..options(self.goal.group) };
-            let Some(cost) = loops::cost(&candidate, self.goal.group, &options) else { return false };
+            let Some(cost) = rolled::cost(&candidate, self.goal.group, &options) else { return false };
             look.cost = cost;
         }
         // Momenta are the rates' alone.
-        let seen = (look.velocities(), Form { gather: 0, ..form.clone() });
-        if !form.looped && !self.seen.contains(&seen) {
+        let seen = (look.velocities(), Form { accumulates_momentum: 0, ..form.clone() });
+        if !form.rolled && !self.seen.contains(&seen) {
             self.seen.push(seen);
         }
         let score = self.goal.forms.score(&look.cost);
@@ -409,11 +409,11 @@ impl<'a> Search<'a> {
         let Some(form) = self.chosen.clone() else { return false };
         let len = self.chain.len();
         let mut near = Vec::new();
-        if form.gather < len {
-            near.push(Form { gather: form.gather + 1, ..form.clone() });
+        if form.accumulates_momentum < len {
+            near.push(Form { accumulates_momentum: form.accumulates_momentum + 1, ..form.clone() });
         }
         if from_ground && form.split < form.base {
-            near.push(Form { split: form.split + 1, gather: form.gather.max(form.split + 1), ..form.clone() });
+            near.push(Form { split: form.split + 1, accumulates_momentum: form.accumulates_momentum.max(form.split + 1), ..form.clone() });
         }
         for k in 0..len.min(LONGEST) {
             let mut turned = form.turned.clone();
@@ -428,8 +428,8 @@ impl<'a> Search<'a> {
 /// The forms to begin with.
 fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     let mut forms = Vec::new();
-    let mut add = |split: usize, base: usize, from: usize, gather: usize| {
-        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), gather, looped: false };
+    let mut add = |split: usize, base: usize, from: usize, accumulates_momentum: usize| {
+        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), accumulates_momentum, rolled: false };
         if !forms.contains(&form) {
             forms.push(form);
         }
@@ -452,14 +452,14 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
 
 /// A joint of one freedom that is solved by itself.
 fn eligible(node: &PlanNode) -> bool {
-    let single = matches!(node.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
-    let plain = node.shared.is_none() && node.solve_before.is_empty() && node.open.is_empty();
+    let single = matches!(node.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
+    let plain = node.unknown.is_none() && node.solve_before.is_empty() && node.open.is_empty();
     single && plain && matches!(node.source, Source::State { .. })
 }
 
 /// The same, though columns of constraints go by.
 fn eligible_in_loop(plan: &Plan, i: usize) -> bool {
-    let row = |g: &usize| matches!(plan.shared[*g], Shared::Row(_));
+    let row = |g: &usize| matches!(plan.unknowns[*g], Unknown::Row(_));
     let mut node = plan.nodes[i].clone();
     node.open.retain(|g| !row(g));
     eligible(&node)
@@ -477,34 +477,34 @@ fn children(plan: &Plan) -> Vec<usize> {
 /// Whether a loop has one of these nodes, or starts behind one: a frame that does not turn leaves its children to it, too.
 fn touches_loop(plan: &Plan, nodes: &[usize]) -> bool {
     let touches = |k: usize, i: usize| k == i || plan.nodes[k].parent == Some(i);
-    (0..plan.nodes.len()).any(|k| plan.nodes[k].looped && nodes.iter().any(|&i| touches(k, i)))
+    (0..plan.nodes.len()).any(|k| plan.nodes[k].rolled && nodes.iter().any(|&i| touches(k, i)))
 }
 
 /// Marks what may become loops: all that repeats, or what is long enough to gain by it for sure. The search adds to it.
 pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
-    let fastest = options.forms == Forms::Fastest;
+    let fastest = options.forms == EliminationStrategy::Fastest;
     let least = match (options.loops, fastest) {
-        (Loops::Never, _) => return,
-        (Loops::Always, true) => 3,
-        (Loops::Always, false) => 1,
-        (Loops::Auto, true) => LOOP,
-        (Loops::Auto, false) => LOOP_OTHERWISE,
+        (RolledCode::Never, _) => return,
+        (RolledCode::Always, true) => 3,
+        (RolledCode::Always, false) => 1,
+        (RolledCode::Auto, true) => LOOP,
+        (RolledCode::Auto, false) => LOOP_OTHERWISE,
     };
     let mut long = paths(plan, least);
-    if (options.loops, fastest) == (Loops::Auto, true) && plan.nodes.len() <= LARGEST {
-        let goal = Goal { forms: options.forms, group: Group::Rates };
+    if (options.loops, fastest) == (RolledCode::Auto, true) && plan.nodes.len() <= LARGEST {
+        let goal = Objective { forms: options.forms, group: Output::Rates };
         long.retain(|path| goal.look(&plan.branch(path[0]).0).is_none_or(|look| look.cost.bytes > LONG));
     }
     for i in long.concat() {
-        plan.nodes[i].looped = true;
-        plan.nodes[i].parent_side = fastest && eligible_in_loop(plan, i);
+        plan.nodes[i].rolled = true;
+        plan.nodes[i].before_joint = fastest && eligible_in_loop(plan, i);
     }
 }
 
 /// Joints one behind the other, without branches, at least so many.
 fn paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
     let children = children(plan);
-    let own = |node: &PlanNode| node.shared.is_none() && matches!(node.source, Source::State { .. });
+    let own = |node: &PlanNode| node.unknown.is_none() && matches!(node.source, Source::State { .. });
     let mut paths: Vec<Vec<usize>> = Vec::new();
     for (i, node) in plan.nodes.iter().enumerate().filter(|(_, n)| own(n)) {
         match paths.last_mut() {
@@ -535,12 +535,12 @@ fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
 
 fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
     for (&i, &turned) in chain.iter().zip(&form.turned) {
-        plan.nodes[i].parent_side = turned;
-        plan.nodes[i].looped |= form.looped;
-        plan.nodes[i].unturned &= !form.looped;
+        plan.nodes[i].before_joint = turned;
+        plan.nodes[i].rolled |= form.rolled;
+        plan.nodes[i].non_rotating &= !form.rolled;
     }
-    for &i in &chain[..form.gather] {
-        plan.nodes[i].gather = true;
+    for &i in &chain[..form.accumulates_momentum] {
+        plan.nodes[i].accumulates_momentum = true;
     }
     let met = form.split == form.base && form.split > 0;
     let first = if met { form.base } else { form.base + 1 };
@@ -570,9 +570,9 @@ fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
 /// Makes a freedom one that is solved further inboard; gives its number among the shared coordinates.
 fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
     let Source::State { v, .. } = plan.nodes[i].source else { return None };
-    let g = plan.shared.len();
-    plan.shared.push(Shared::Velocity(v));
-    plan.nodes[i].shared = Some(g);
+    let g = plan.unknowns.len();
+    plan.unknowns.push(Unknown::Velocity(v));
+    plan.nodes[i].unknown = Some(g);
     plan.nodes[i].deferred = true;
     Some(g)
 }

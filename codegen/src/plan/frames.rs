@@ -12,7 +12,7 @@ use super::instantiate::body_inertia;
 use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
 use super::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
-use crate::model::{Model, Motion, Value};
+use crate::model::{Model, JointMotion, Value};
 
 /// Nodes with their frames chosen.
 pub struct Framed {
@@ -43,7 +43,7 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
             weights[a].cmp(&weights[b]).then(b.cmp(&a))
         });
         let line = primary.and_then(|c| line_of(elements, c, &align));
-        let turns = matches!(element.kind, NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_));
+        let turns = matches!(element.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
         let ((c, s), h) = match (turns, primary) {
             (false, _) => ((1.0, 0.0), 0.0),
             (true, None) => tip(&way, element.kind, centre(model, elements, k, &align)),
@@ -127,7 +127,7 @@ fn tip(way: &Screws, kind: NodeKind, centre: Option<Vec3<f64>>) -> (Turn, f64) {
     let (c, s) = way.turn;
     let undo = (c, -s);
     let turn = match centre {
-        Some([x, y, _]) if kind == NodeKind::Pin && x.hypot(y) > 0.0 => {
+        Some([x, y, _]) if kind == NodeKind::Revolute && x.hypot(y) > 0.0 => {
             let ahead = unit(x, y);
             // Against the parent's axes: already zero there?
             let y = c * y + s * x;
@@ -190,7 +190,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
     let (source, follow) = source(model, slots, joint, first);
     let mut place = way.steps;
     let (phase, quarter, slide) = match element.kind {
-        NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_) => {
+        NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_) => {
             let (c0, s0) = way.turn;
             let angle = (s0 * c + c0 * s).atan2(c0 * c - s0 * s);
             let quarters = (angle / std::f64::consts::FRAC_PI_2).round();
@@ -222,12 +222,12 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
         slide,
         inertia: [0.0; 10],
         variable: Vec::new(),
-        shared: None,
+        unknown: None,
         deferred: false,
-        parent_side: false,
-        looped: false,
-        unturned: false,
-        gather: false,
+        before_joint: false,
+        rolled: false,
+        non_rotating: false,
+        accumulates_momentum: false,
         ends: Vec::new(),
         screws: Vec::new(),
         open: Vec::new(),
@@ -240,7 +240,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
 fn source(model: &Model, slots: &[Slot], joint: usize, first: usize) -> (Source, Vec<(Value, Value)>) {
     let mut follow = Vec::new();
     let mut at = joint;
-    while let Motion::Mimic { leader, ratio, offset } = model.joints[at].motion {
+    while let JointMotion::Mimic { leader, ratio, offset } = model.joints[at].motion {
         follow.insert(0, (ratio, offset));
         at = leader;
     }

@@ -1,6 +1,6 @@
 //! From the plan to a tree of any scalar: numbers, symbols, duals. The fork is one type parameter.
 
-use mbd_runtime::spatial::{add3, Mat3, RigidInertia, Step, Vec3, SYM};
+use mbd_runtime::spatial::{add3, Mat3, RigidInertia, ElementaryTransform, Vec3, SYM};
 use mbd_runtime::system::Row;
 use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
 use mbd_runtime::{Interpreter, Scalar};
@@ -16,16 +16,16 @@ pub(super) fn value<S: Scalar>(v: Value, params: &[S]) -> S {
     }
 }
 
-pub(super) fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<Step<S>> {
+pub(super) fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<ElementaryTransform<S>> {
     pose.iter()
         .map(|step| match *step {
-            PoseStep::Turn { axis, c, s } => Step::Turn { axis, c: S::constant(c), s: S::constant(s) },
+            PoseStep::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: S::constant(c), s: S::constant(s) },
             PoseStep::TurnBy { axis, angle } => {
                 let (s, c) = value(angle, params).sin_cos();
-                Step::Turn { axis, c, s }
+                ElementaryTransform::Turn { axis, c, s }
             }
-            PoseStep::Shift { axis, r } => Step::Shift { axis, r: value(r, params) },
-            PoseStep::Rotate(m) => Step::Rotate(m.map(|row| row.map(S::constant))),
+            PoseStep::Shift { axis, r } => ElementaryTransform::Shift { axis, r: value(r, params) },
+            PoseStep::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(S::constant))),
         })
         .collect()
 }
@@ -44,10 +44,10 @@ pub(super) fn body_inertia<S: Scalar>(
     let about_com = [xx, xy, xz, yy, yz, zz];
     let turned = |m: [S; 6], r: &Mat3<S>| {
         let body = RigidInertia { mass: S::zero(), moment: [S::zero(); 3], inertia: m };
-        Step::Rotate(*r).inertia(&body.articulated()).j
+        ElementaryTransform::Rotate(*r).inertia(&body.articulated()).j
     };
     let j = turned(turned(about_com, axes), rot);
-    let c = add3(Step::Rotate(*rot).vector_back(com), pos);
+    let c = add3(ElementaryTransform::Rotate(*rot).vector_back(com), pos);
     let square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
     let mut at_frame = j;
     for a in 0..3 {
@@ -87,7 +87,7 @@ impl Plan {
         Tree {
             nodes: self.nodes.iter().map(|n| self.node(n, params)).collect(),
             dims: self.dims,
-            shared: self.shared.clone(),
+            unknowns: self.unknowns.clone(),
             solve_at_ground: self.solve_at_ground.clone(),
             ground_moment: [S::zero(); 3],
             wrenches: wrenches.collect(),
@@ -102,8 +102,8 @@ impl Plan {
 
     fn node<S: Scalar>(&self, node: &PlanNode, params: &[S]) -> Node<S> {
         let kind = match node.kind {
-            NodeKind::Pin => Kind::Pin,
-            NodeKind::Slider => Kind::Slider,
+            NodeKind::Revolute => Kind::Revolute,
+            NodeKind::Prismatic => Kind::Prismatic,
             NodeKind::Helical(pitch) => Kind::Helical { pitch: value(pitch, params) },
             NodeKind::Planar => Kind::Planar,
             NodeKind::Spherical => Kind::Spherical,
@@ -135,11 +135,11 @@ impl Plan {
             quarter: node.quarter,
             slide: S::constant(node.slide),
             inertia: self.inertia(node, params),
-            shared: node.shared,
+            unknown: node.unknown,
             deferred: node.deferred,
-            parent_side: node.parent_side,
-            unturned: node.unturned,
-            gather: node.gather,
+            before_joint: node.before_joint,
+            non_rotating: node.non_rotating,
+            accumulates_momentum: node.accumulates_momentum,
             ends: node.ends.clone(),
             screws: node.screws.clone(),
             open: node.open.clone(),

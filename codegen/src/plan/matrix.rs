@@ -1,7 +1,7 @@
 //! How far out the mass matrix carries screws.
 
 use super::Plan;
-use crate::options::{Group, Options};
+use crate::options::{Output, Options};
 use crate::trace::trace;
 
 /// Trees beyond this are not searched.
@@ -13,7 +13,7 @@ pub fn choose(plan: &mut Plan) {
         return;
     }
     let cost = |plan: &Plan| {
-        let program = trace(plan, Group::MassMatrix, &Options::default());
+        let program = trace(plan, Output::MassMatrix, &Options::default());
         program.map_or(usize::MAX, |g| g.program.counts().total())
     };
     let mut candidate = plan.clone();

@@ -15,13 +15,13 @@ mod rigid;
 mod shared;
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Shared, Source, WrenchAxes};
+use mbd_runtime::tree::{Dims, Unknown, Source, WrenchAxes};
 
-use crate::model::{Gravity, JointKind, Model, Motion, Param, Value};
-use crate::options::Loops;
+use crate::model::{Gravity, JointKind, Model, JointMotion, Param, Value};
+use crate::options::RolledCode;
 
 pub use constraints::{PlanBond, PlanConstraint};
-pub use forms::{Candidate, Forms};
+pub use forms::{Candidate, EliminationStrategy};
 pub use rigid::Rigid;
 
 /// Angles this close to a multiple of 90° are taken as one, rad (see [`PlanOptions::snap`]).
@@ -34,19 +34,19 @@ pub struct PlanOptions {
     /// number of the description. A decimal π/2 costs a term wherever an exact zero would have stood.
     pub snap: f64,
     /// Joints that are solved together.
-    pub forms: Forms,
+    pub forms: EliminationStrategy,
     /// Whether accelerations get a search of their own. Without it they are right, and cost what the form of the rates
     /// makes them cost.
     pub accelerations: bool,
     /// Whether the mass matrix gets one.
     pub mass_matrix: bool,
     /// Loops over runs of like links: long chains are laid out for them.
-    pub loops: Loops,
+    pub loops: RolledCode,
 }
 
 impl Default for PlanOptions {
     fn default() -> Self {
-        let (forms, loops) = (Forms::default(), Loops::default());
+        let (forms, loops) = (EliminationStrategy::default(), RolledCode::default());
         PlanOptions { snap: DEFAULT_SNAP, forms, accelerations: true, mass_matrix: true, loops }
     }
 }
@@ -85,9 +85,9 @@ pub enum PoseStep {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeKind {
     /// Turn.
-    Pin,
+    Revolute,
     /// Slide.
-    Slider,
+    Prismatic,
     /// Turn with a slide.
     Helical(Value),
     /// Two slides and a turn.
@@ -102,7 +102,7 @@ impl NodeKind {
     /// Number of velocities.
     pub fn nv(self) -> usize {
         match self {
-            NodeKind::Pin | NodeKind::Slider | NodeKind::Helical(_) => 1,
+            NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_) => 1,
             NodeKind::Planar | NodeKind::Spherical => 3,
             NodeKind::Floating => 6,
         }
@@ -137,17 +137,17 @@ pub struct PlanNode {
     /// Bodies with parameters in their inertia or pose: body index and pose in the node frame.
     pub variable: Vec<(usize, Vec<PoseStep>)>,
     /// Index of a coordinate shared with other nodes.
-    pub shared: Option<usize>,
+    pub unknown: Option<usize>,
     /// See [`mbd_runtime::tree::Node`].
     pub deferred: bool,
     /// See [`mbd_runtime::tree::Node`].
-    pub parent_side: bool,
+    pub before_joint: bool,
     /// See [`mbd_runtime::tree::Node`].
-    pub unturned: bool,
+    pub non_rotating: bool,
     /// See [`mbd_runtime::tree::Node`].
-    pub gather: bool,
+    pub accumulates_momentum: bool,
     /// Whether the generator may make it part of a loop.
-    pub looped: bool,
+    pub rolled: bool,
     /// See [`mbd_runtime::tree::Node`].
     pub ends: Vec<usize>,
     /// See [`mbd_runtime::tree::Node`].
@@ -190,7 +190,7 @@ pub struct Plan {
     /// Dimensions.
     pub dims: Dims,
     /// Shared coordinates, and rows of constraints.
-    pub shared: Vec<Shared>,
+    pub unknowns: Vec<Unknown>,
     /// Shared coordinates solved at the ground.
     pub solve_at_ground: Vec<usize>,
     /// Frames of the moving joints' child bodies, in joint order, then those of all other bodies and frames.
@@ -225,7 +225,7 @@ impl Plan {
             model: model.clone(),
             nodes: framed.nodes,
             dims: Dims { wrenches: model.wrenches.len(), ..dims },
-            shared: Vec::new(),
+            unknowns: Vec::new(),
             solve_at_ground: Vec::new(),
             frames: framed.frames,
             joint_nodes: framed.joint_nodes,
@@ -253,10 +253,10 @@ impl Plan {
         constraints::constrain(&mut plan, framed.mounts);
         constraints::rest_idle(&mut plan);
         forms::lay_out(&mut plan, options);
-        if options.forms != Forms::Single {
+        if options.forms != EliminationStrategy::Single {
             forms::choose(&mut plan, options);
         }
-        if options.forms != Forms::Single && options.mass_matrix {
+        if options.forms != EliminationStrategy::Single && options.mass_matrix {
             matrix::choose(&mut plan);
         }
         plan
@@ -328,19 +328,19 @@ fn slots(model: &Model) -> (Dims, Vec<Slot>) {
             continue;
         }
         let at = match joint.motion {
-            Motion::Free => {
+            JointMotion::Free => {
                 let at = Source::State { q: dims.nq, v: dims.nv };
                 dims.nq += nq;
                 dims.nv += nv;
                 Some(at)
             }
-            Motion::Prescribed => {
+            JointMotion::Prescribed => {
                 let at = Source::Drive { q: dims.drive_q, v: dims.drive_v };
                 dims.drive_q += nq;
                 dims.drive_v += nv;
                 Some(at)
             }
-            Motion::Mimic { .. } => None,
+            JointMotion::Mimic { .. } => None,
         };
         slots.push(Slot { joint: k, at });
     }

@@ -1,6 +1,6 @@
 //! Placements of the model as steps, with right angles made exact.
 
-use mbd_runtime::spatial::{Axis, Mat3, Step, Vec3};
+use mbd_runtime::spatial::{Axis, Mat3, ElementaryTransform, Vec3};
 
 use super::{PoseStep, Rigid};
 use crate::model::{Placement, Rotation, Value};
@@ -75,9 +75,9 @@ pub fn constant(steps: &[PoseStep]) -> Option<Rigid> {
     let mut pos = [0.0; 3];
     for step in steps {
         let step = match *step {
-            PoseStep::Turn { axis, c, s } => Step::Turn { axis, c, s },
-            PoseStep::Shift { axis, r } => Step::Shift { axis, r: r.constant()? },
-            PoseStep::Rotate(m) => Step::Rotate(m),
+            PoseStep::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c, s },
+            PoseStep::Shift { axis, r } => ElementaryTransform::Shift { axis, r: r.constant()? },
+            PoseStep::Rotate(m) => ElementaryTransform::Rotate(m),
             PoseStep::TurnBy { .. } => return None,
         };
         step.pose(&mut rot, &mut pos);

@@ -1,9 +1,9 @@
 //! Coordinates shared by several joints: where their columns are open, and where they are solved.
 
-use mbd_runtime::tree::{Shared, Source};
+use mbd_runtime::tree::{Unknown, Source};
 
 use super::Plan;
-use crate::model::Motion;
+use crate::model::JointMotion;
 
 /// Marks the nodes of every coordinate that more than one node follows.
 pub fn share(plan: &mut Plan) {
@@ -13,15 +13,15 @@ pub fn share(plan: &mut Plan) {
             .collect();
         let mimics = members.iter().any(|&i| {
             let joint = plan.nodes[i].joint.0;
-            matches!(plan.model.joints[joint].motion, Motion::Mimic { .. })
+            matches!(plan.model.joints[joint].motion, JointMotion::Mimic { .. })
         });
         if !mimics {
             continue;
         }
-        let g = plan.shared.len();
-        plan.shared.push(Shared::Velocity(v));
+        let g = plan.unknowns.len();
+        plan.unknowns.push(Unknown::Velocity(v));
         for &i in &members {
-            plan.nodes[i].shared = Some(g);
+            plan.nodes[i].unknown = Some(g);
         }
         open(plan, g, &members);
     }

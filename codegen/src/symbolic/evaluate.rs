@@ -2,7 +2,7 @@
 
 use mbd_runtime::Scalar;
 
-use super::{Op, Operand, Output, Program};
+use super::{Op, Operand, ProgramResult, Program};
 
 impl Program {
     /// Results for given inputs, operation by operation in the program's order; `fused(a, b, c)` is `a · b + c`.
@@ -33,10 +33,10 @@ impl Program {
             };
             values[*id as usize] = value;
         }
-        let result = |output: &Output| match *output {
-            Output::Const(x) => S::constant(x),
-            Output::Node(id, true) => -values[id as usize],
-            Output::Node(id, false) => values[id as usize],
+        let result = |output: &ProgramResult| match *output {
+            ProgramResult::Const(x) => S::constant(x),
+            ProgramResult::Node(id, true) => -values[id as usize],
+            ProgramResult::Node(id, false) => values[id as usize],
         };
         self.outputs.iter().map(result).collect()
     }

@@ -32,7 +32,7 @@ pub enum Op {
     /// `±a · b ± c`; made by passes, never by sweeps.
     Fma(Fma),
     /// `1 / ±a` where that is above `±floor`, else zero.
-    ReciprocalAbove(Pivot),
+    ReciprocalAbove(FlooredReciprocal),
     /// Square root.
     Sqrt(u32),
     /// Sine.
@@ -58,7 +58,7 @@ pub struct Fma {
 
 /// What is inverted, and where it counts as zero. Signs cannot be taken outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Pivot {
+pub struct FlooredReciprocal {
     /// What is inverted.
     pub value: Operand,
     /// What it has to exceed.
@@ -319,7 +319,7 @@ impl Scalar for Expr<'_> {
             (Expr::Const(x), Expr::Const(y)) => Expr::Const(Scalar::reciprocal_above(x, y)),
             (Expr::Node { graph, .. }, _) | (_, Expr::Node { graph, .. }) => {
                 let ((value, minus_value), (floor, minus_floor)) = (self.split(), floor.split());
-                graph.node(Op::ReciprocalAbove(Pivot { value, floor, minus_value, minus_floor }), false)
+                graph.node(Op::ReciprocalAbove(FlooredReciprocal { value, floor, minus_value, minus_floor }), false)
             }
         }
     }

@@ -8,7 +8,7 @@ use super::{Expr, Graph, Label, Op, Operand};
 
 /// A signed result: a constant or a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Output {
+pub enum ProgramResult {
     /// A constant.
     Const(f64),
     /// A node or its negative.
@@ -69,7 +69,7 @@ pub struct Program {
     /// Live nodes in order: node id, operation, origin.
     pub steps: Vec<(u32, Op, Label)>,
     /// Results, in the order they were asked for.
-    pub outputs: Vec<Output>,
+    pub outputs: Vec<ProgramResult>,
     /// Operations the sweeps made, live or not, inputs left out.
     pub created: BTreeMap<Quantity, usize>,
 }
@@ -77,16 +77,16 @@ pub struct Program {
 impl Program {
     /// The program of some outputs; everything they do not need is left out.
     pub fn new(graph: &Graph, outputs: &[Expr]) -> Program {
-        let outputs: Vec<Output> = outputs
+        let outputs: Vec<ProgramResult> = outputs
             .iter()
             .map(|e| match *e {
-                Expr::Const(x) => Output::Const(x),
-                Expr::Node { id, neg, .. } => Output::Node(id, neg),
+                Expr::Const(x) => ProgramResult::Const(x),
+                Expr::Node { id, neg, .. } => ProgramResult::Node(id, neg),
             })
             .collect();
         let mut live = vec![false; graph.len()];
         for output in &outputs {
-            if let Output::Node(id, _) = output {
+            if let ProgramResult::Node(id, _) = output {
                 live[*id as usize] = true;
             }
         }
@@ -140,7 +140,7 @@ impl Program {
         }
         let mut signs = std::collections::BTreeMap::new();
         for output in &self.outputs {
-            if let Output::Node(id, neg) = output {
+            if let ProgramResult::Node(id, neg) = output {
                 signs.entry(*id).and_modify(|all| *all &= *neg).or_insert(*neg);
             }
         }
@@ -156,7 +156,7 @@ impl Program {
             }
         }
         for output in &mut self.outputs {
-            if let Output::Node(id, neg) = output {
+            if let ProgramResult::Node(id, neg) = output {
                 if signs.get(id) == Some(&true) {
                     *neg = false;
                 }

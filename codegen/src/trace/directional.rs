@@ -5,9 +5,9 @@ use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use super::Given;
+use super::SymbolicInputs;
 use crate::model::{Gravity, Value};
-use crate::options::Group;
+use crate::options::Output;
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
 
@@ -30,7 +30,7 @@ fn unit<'g>(n: usize, k: usize) -> Vec<Expr<'g>> {
 struct Rates<'a, 'g> {
     graph: &'g Graph,
     plan: &'a Plan,
-    given: &'a Given<'g>,
+    given: &'a SymbolicInputs<'g>,
     tolerance: Expr<'g>,
 }
 
@@ -61,12 +61,12 @@ impl<'g> Rates<'_, 'g> {
     }
 }
 
-/// Results of [`Group::Derivatives`] or [`Group::ParameterDerivatives`].
+/// Results of [`Output::Derivatives`] or [`Output::ParameterDerivatives`].
 pub(super) fn derivatives<'g>(
     graph: &'g Graph,
     plan: &Plan,
-    group: Group,
-    given: &Given<'g>,
+    group: Output,
+    given: &SymbolicInputs<'g>,
     tolerance: Expr<'g>,
 ) -> Vec<Expr<'g>> {
     let (nv, np) = (plan.dims.nv, given.params.len());
@@ -77,7 +77,7 @@ pub(super) fn derivatives<'g>(
     let block = |columns: &[[Vec<Expr<'g>>; 2]], half: usize| {
         (0..nv).flat_map(|a| columns.iter().map(move |c| c[half][a])).collect::<Vec<Expr>>()
     };
-    if group == Group::ParameterDerivatives {
+    if group == Output::ParameterDerivatives {
         let column = |k| du(rates.along(&q, &p, &moving(&given.params, &unit(np, k))));
         let columns: Vec<_> = (0..np).map(column).collect();
         return [block(&columns, 0), block(&columns, 1)].concat();

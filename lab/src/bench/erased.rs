@@ -1,7 +1,7 @@
 //! A system whose type is not known, so that every method is compiled once for all scenes.
 
 use crate::scenes::{Dynamics, Scene};
-use multibody::runtime::system::Group;
+use multibody::runtime::system::LieJoint;
 use multibody::runtime::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Interpreter, Real, System};
 
 /// What a scene is asked for, on slices.
@@ -32,7 +32,7 @@ impl<Y: Dynamics> Held<Y> {
 impl<Y: Dynamics> Calls<Y::Scalar> for Held<Y> {
     fn rates(&mut self, t: Y::Scalar, q: &[Y::Scalar], p: &[Y::Scalar], qd: &mut [Y::Scalar], pd: &mut [Y::Scalar]) {
         self.take(q, p);
-        self.y.state_rates(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
+        self.y.rates_at(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
         qd.copy_from_slice(self.qd.as_ref());
         pd.copy_from_slice(self.pd.as_ref());
     }
@@ -45,18 +45,18 @@ impl<Y: Dynamics> Calls<Y::Scalar> for Held<Y> {
 
     fn energy(&mut self, q: &[Y::Scalar], p: &[Y::Scalar]) -> (Y::Scalar, Y::Scalar) {
         self.take(q, p);
-        self.y.state_energy(&self.q, &self.p)
+        self.y.energies(&self.q, &self.p)
     }
 
     fn accelerations(&mut self, q: &[Y::Scalar], v: &[Y::Scalar], a: &mut [Y::Scalar]) {
         self.take(q, v);
-        self.y.state_accelerations(&self.q, &self.p, &mut self.pd);
+        self.y.generalized_accelerations(&self.q, &self.p, &mut self.pd);
         a.copy_from_slice(self.pd.as_ref());
     }
 
     fn momenta(&mut self, q: &[Y::Scalar], v: &[Y::Scalar], p: &mut [Y::Scalar]) {
         self.take(q, v);
-        self.y.state_momenta(&self.q, &self.p, &mut self.pd);
+        self.y.conjugate_momenta(&self.q, &self.p, &mut self.pd);
         p.copy_from_slice(self.pd.as_ref());
     }
 }
@@ -68,7 +68,7 @@ type Rows<'a, S> = [&'a mut [Vec<S>]; 4];
 type Derivatives<S> = Box<dyn FnMut(S, &[S], &[S], &mut [S], &mut [S], Rows<'_, S>)>;
 
 fn derivatives<Y: Dynamics + Differentiable + 'static>(mut y: Y) -> Derivatives<Y::Scalar> {
-    let (mut q, mut p, mut v, mut pd) = (y.neutral(), y.rest(), y.rest(), y.rest());
+    let (mut q, mut p, mut v, mut pd) = (y.neutral(), y.zero_momenta(), y.zero_momenta(), y.zero_momenta());
     let mut blocks = [y.square(), y.square(), y.square(), y.square()];
     Box::new(move |t, q_, p_, v_, pd_, rows| {
         q.as_mut().copy_from_slice(q_);
@@ -101,7 +101,7 @@ impl<S: Real + 'static> Erased<S> {
 
     /// Some system of the scene.
     pub fn new<Y: Dynamics<Scalar = S> + 'static>(scene: &Scene, y: Y) -> Self {
-        let held = Held { q: y.neutral(), p: y.rest(), qd: y.neutral(), pd: y.rest(), y };
+        let held = Held { q: y.neutral(), p: y.zero_momenta(), qd: y.neutral(), pd: y.zero_momenta(), y };
         let calls = std::cell::RefCell::new(Box::new(held) as Box<dyn Calls<S>>);
         Erased { calls, interpreter: scene.interpreter(), derivatives: None }
     }
@@ -121,15 +121,15 @@ impl<S: Real + 'static> System for Erased<S> {
         self.interpreter.neutral()
     }
 
-    fn rest(&self) -> Vec<S> {
-        self.interpreter.rest()
+    fn zero_momenta(&self) -> Vec<S> {
+        self.interpreter.zero_momenta()
     }
 
-    fn groups(&self) -> &[Group] {
-        self.interpreter.groups()
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.interpreter.lie_joints()
     }
 
-    fn state_rates(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+    fn rates_at(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         self.calls.get_mut().rates(t, q, p, qd, pd);
     }
 
@@ -139,19 +139,19 @@ impl<S: Real + 'static> System for Erased<S> {
 }
 
 impl<S: Real + 'static> Energetic for Erased<S> {
-    fn state_energy(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
+    fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
         self.calls.get_mut().energy(q, p)
     }
 }
 
 impl<S: Real + 'static> Accelerated for Erased<S> {
-    fn state_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
+    fn generalized_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
         self.calls.get_mut().accelerations(q, v, a);
     }
 }
 
 impl<S: Real + 'static> Conjugate for Erased<S> {
-    fn state_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
+    fn conjugate_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
         self.calls.get_mut().momenta(q, v, p);
     }
 }

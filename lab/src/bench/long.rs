@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::scenes::Scene;
 use multibody::runtime::integrate::catalogue::{self, Start};
-use multibody::runtime::integrate::{Projection, Step};
+use multibody::runtime::integrate::{EnergyProjection, Step};
 use multibody::runtime::{Energetic, System};
 use serde::Serialize;
 
@@ -52,17 +52,17 @@ pub fn methods(asked: &[String]) -> Vec<String> {
 pub fn height(scene: &Scene, system: &mut Erased<f64>) -> f64 {
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let (mut q, mut p) = scene.start(system);
-    let before = total(system.state_energy(&q, &p));
+    let before = total(system.energies(&q, &p));
     let (mut qd, mut pd) = (q.clone(), p.clone());
     let mut least = before;
     for k in 0..200_000 {
-        system.state_rates(0.0, &q, &p, &mut qd, &mut pd);
+        system.rates_at(0.0, &q, &p, &mut qd, &mut pd);
         let h = scene.rk4_step;
         p.iter_mut().zip(&pd).for_each(|(p, pd)| *p = 0.99 * (*p + h * pd));
-        system.state_rates(0.0, &q, &p, &mut qd, &mut pd);
+        system.rates_at(0.0, &q, &p, &mut qd, &mut pd);
         q.iter_mut().zip(&qd).for_each(|(q, qd)| *q += h * qd);
         if k % 100 == 0 {
-            least = least.min(system.state_energy(&q, &p).1);
+            least = least.min(system.energies(&q, &p).1);
         }
     }
     before - least
@@ -86,8 +86,8 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     let start = Start { q: &q, p: &p, step, compensated: true };
     let mut driver = catalogue::any(method, system, &start)?.ok()?;
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
-    let before = total(system.state_energy(&q, &p));
-    let mut projection = Projection::new(system, &q, &p, 3);
+    let before = total(system.energies(&q, &p));
+    let mut projection = EnergyProjection::new(system, &q, &p, 3);
     let (mut energy, mut failure) = (0.0_f64, None);
     let clock = Instant::now();
     let mut looking = 0.0;
@@ -106,7 +106,7 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
         if k % LOOK == 0 {
             let clock = Instant::now();
             driver.state(system, &mut q, &mut p);
-            energy = energy.max((total(system.state_energy(&q, &p)) - before).abs());
+            energy = energy.max((total(system.energies(&q, &p)) - before).abs());
             looking += clock.elapsed().as_secs_f64();
         }
     }

@@ -110,7 +110,7 @@ where
     Y::Scalar: Real,
 {
     let total = |(kinetic, potential): (Y::Scalar, Y::Scalar)| kinetic.to_f64() + potential.to_f64();
-    let before = total(system.state_energy(start.q, start.p));
+    let before = total(system.energies(start.q, start.p));
     let run = match run(system, make, start, t_end)? {
         Ok(run) => run,
         Err(e) => {
@@ -133,7 +133,7 @@ where
         None => {
             let q: Vec<f64> = run.q.as_ref().iter().map(|x| x.to_f64()).collect();
             sample.end_error = Some(end_error(&q, reference));
-            sample.energy_error = Some(total(system.state_energy(&run.q, &run.p)) - before);
+            sample.energy_error = Some(total(system.energies(&run.q, &run.p)) - before);
         }
     }
     Some(sample)

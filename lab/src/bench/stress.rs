@@ -90,7 +90,7 @@ fn go<S: Real + 'static>(
     driver.run(system, S::constant(scene.t_end)).map_err(|e| e.to_string())?;
     let (mut q, mut p) = (q.clone(), p.clone());
     driver.state(system, &mut q, &mut p);
-    let (kinetic, potential) = system.state_energy(&q, &p);
+    let (kinetic, potential) = system.energies(&q, &p);
     if !q.iter().chain(&p).all(|x| x.is_finite()) || !(kinetic + potential).is_finite() {
         return Err("NOT FINITE AND NOT SAID".into());
     }

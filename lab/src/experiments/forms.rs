@@ -44,16 +44,16 @@ struct Halves {
 
 impl Halves {
     fn new<Y: Closed>(system: &Y) -> Self {
-        Halves { q: system.neutral(), p: system.rest(), qd: system.neutral(), pd: system.rest() }
+        Halves { q: system.neutral(), p: system.zero_momenta(), qd: system.neutral(), pd: system.zero_momenta() }
     }
 
     fn rates<Y: Closed>(&mut self, system: &mut Y, kind: Kind) {
         let Halves { q, p, qd, pd } = self;
         match kind {
-            Kind::Momenta => system.state_rates(0.0, q, p, qd, pd),
+            Kind::Momenta => system.rates_at(0.0, q, p, qd, pd),
             Kind::Velocities => {
                 system.coordinate_rates(q, p, qd);
-                system.state_accelerations(q, p, pd);
+                system.generalized_accelerations(q, p, pd);
             }
         }
     }
@@ -94,7 +94,7 @@ impl<Y: Closed> Equation for Whole<'_, Y> {
         q.copy_from_slice(&y[..n]);
         p.copy_from_slice(&y[n..]);
         let mut sigma = self.system.zero_rows();
-        self.system.settle(0.0, q, p, v, &mut sigma);
+        self.system.project_momenta(0.0, q, p, v, &mut sigma);
         y[n..].copy_from_slice(p);
         true
     }
@@ -135,7 +135,7 @@ impl<'a, Y: Closed> Minimal<'a, Y> {
 
     /// Residuals and `Φ` at the coordinates.
     fn look(&mut self) {
-        self.system.closure(&self.room.q, &mut self.residual, &mut self.entries);
+        self.system.constraint_residuals(&self.room.q, &mut self.residual, &mut self.entries);
         let columns = self.system.entry_columns();
         for (row, phi) in self.system.rows().iter().zip(&mut self.phi) {
             phi.fill(0.0);
@@ -201,10 +201,10 @@ impl<'a, Y: Closed> Minimal<'a, Y> {
         self.take(y);
         let Halves { q, p, pd, .. } = &mut self.room;
         let (kinetic, potential) = match self.kind {
-            Kind::Momenta => self.system.state_energy(q, p),
+            Kind::Momenta => self.system.energies(q, p),
             Kind::Velocities => {
-                self.system.state_momenta(q, p, pd);
-                self.system.state_energy(q, pd)
+                self.system.conjugate_momenta(q, p, pd);
+                self.system.energies(q, pd)
             }
         };
         kinetic + potential

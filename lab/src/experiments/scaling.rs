@@ -77,9 +77,9 @@ impl Effort {
 /// One evaluation at the start, moving.
 fn call(mechanism: &mut Mechanism) -> Box<dyn FnMut() + '_> {
     let Mechanism { system, q, .. } = mechanism;
-    let (mut p, mut qd, mut pd) = (system.rest(), system.neutral(), system.rest());
+    let (mut p, mut qd, mut pd) = (system.zero_momenta(), system.neutral(), system.zero_momenta());
     moving(system, q, &mut p);
-    Box::new(move || system.state_rates(0.0, std::hint::black_box(q), &p, &mut qd, &mut pd))
+    Box::new(move || system.rates_at(0.0, std::hint::black_box(q), &p, &mut qd, &mut pd))
 }
 
 /// Momenta of a motion: those of small velocities.
@@ -218,7 +218,7 @@ fn code(effort: &Effort) -> Outcome<String> {
     let (mut mechanisms, mut generated) = (Vec::new(), Vec::new());
     for (family, n) in systems {
         let mut mechanism = mechanism::read(&self::text(family, n))?;
-        let mut p = mechanism.system.rest();
+        let mut p = mechanism.system.zero_momenta();
         moving(&mut mechanism.system, &mechanism.q, &mut p);
         generated.extend(visit_chain(family, n, Repeated { q: &mechanism.q, p: &p }));
         mechanisms.push(mechanism);
@@ -249,11 +249,11 @@ struct Repeated<'a> {
 impl crate::generated::VisitRates for Repeated<'_> {
     type Out = Box<dyn FnMut()>;
     fn visit<Y: System<Scalar = f64> + 'static>(self, mut system: Y) -> Box<dyn FnMut()> {
-        let (mut q, mut p, mut qd, mut pd) = (system.neutral(), system.rest(), system.neutral(), system.rest());
+        let (mut q, mut p, mut qd, mut pd) = (system.neutral(), system.zero_momenta(), system.neutral(), system.zero_momenta());
         q.as_mut().copy_from_slice(self.q);
         p.as_mut().copy_from_slice(self.p);
         Box::new(move || {
-            system.state_rates(0.0, std::hint::black_box(&q), &p, &mut qd, &mut pd);
+            system.rates_at(0.0, std::hint::black_box(&q), &p, &mut qd, &mut pd);
             std::hint::black_box(&pd);
         })
     }

@@ -170,9 +170,9 @@ impl<Y: Closed> Study<Y> {
         let (q, mut p) = (q.to_vec(), p.to_vec());
         if kind == Kind::Velocities {
             let v = p.clone();
-            self.system.state_momenta(&q, &v, &mut p);
+            self.system.conjugate_momenta(&q, &v, &mut p);
         }
-        let (kinetic, potential) = self.system.state_energy(&q, &p);
+        let (kinetic, potential) = self.system.energies(&q, &p);
         kinetic + potential
     }
 
@@ -304,9 +304,9 @@ impl<Y: Closed> Study<Y> {
     fn project(&mut self, q: &mut [f64]) {
         let mut at = q.to_vec();
         let (mut residual, mut pivots) = (self.system.zero_rows(), self.system.zero_rows());
-        let mut dq = self.system.rest();
+        let mut dq = self.system.zero_momenta();
         for _ in 0..3 {
-            self.system.correction(&at, &mut residual, &mut dq, &mut pivots);
+            self.system.position_correction(&at, &mut residual, &mut dq, &mut pivots);
             at.iter_mut().zip(&dq).for_each(|(q, d)| *q += d);
             if residual.iter().all(|r| r.abs() < 1e-9) {
                 break;

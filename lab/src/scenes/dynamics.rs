@@ -23,11 +23,11 @@ impl Scene {
 
     /// Coordinates and momenta at the start, of a system made from its model.
     pub fn start<Y: Dynamics>(&self, system: &mut Y) -> (Y::Coordinates, Y::Momenta) {
-        let (mut q, mut v) = (system.neutral(), system.rest());
+        let (mut q, mut v) = (system.neutral(), system.zero_momenta());
         fill(q.as_mut(), &self.q);
         fill(v.as_mut(), &self.v);
-        let mut p = system.rest();
-        system.state_momenta(&q, &v, &mut p);
+        let mut p = system.zero_momenta();
+        system.conjugate_momenta(&q, &v, &mut p);
         (q, p)
     }
 }

@@ -4,7 +4,7 @@
 //! Link `i` points along `(cos θ_i, sin θ_i)`. A place is a sum of links, so kinetic energy is `½ Σ c_ij cos(θ_i − θ_j) ω_i ω_j`
 //! and potential energy `g Σ w_i sin θ_i` with numbers `c`, `w` of the chain alone.
 
-use multibody::runtime::system::Group;
+use multibody::runtime::system::LieJoint;
 use multibody::runtime::System;
 
 /// Links.
@@ -185,13 +185,13 @@ impl System for Biped {
     fn neutral(&self) -> Vec<f64> {
         self.theta[..3].to_vec()
     }
-    fn rest(&self) -> Vec<f64> {
+    fn zero_momenta(&self) -> Vec<f64> {
         vec![0.0; 3]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
-    fn state_rates(&mut self, _t: f64, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>, a: &mut Vec<f64>) {
+    fn rates_at(&mut self, _t: f64, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>, a: &mut Vec<f64>) {
         let (_, omega) = self.whole(q, v);
         qd.copy_from_slice(v);
         a.copy_from_slice(&self.accelerations(&omega)[..3]);

@@ -10,7 +10,7 @@ use biped::{absolute, relative, Biped, Vector};
 use command::{files, folder, good, out, read, run_in};
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::runtime::constrained::Minimal;
+use multibody::runtime::constrained::CoordinatePartition;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
 use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
 
@@ -45,7 +45,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 /// Angles of the joints at the end by the equations that are written down by hand.
 fn by_hand() -> Vector {
     let mut biped = Biped::new();
-    let (mut q, mut v) = (biped.neutral(), biped.rest());
+    let (mut q, mut v) = (biped.neutral(), biped.zero_momenta());
     let (theta, omega) = biped.whole(&q, &v);
     let start = biped.energy(&theta, &omega);
     let mut method = Verner9::new(&biped);
@@ -64,7 +64,7 @@ fn energy(
     q: &Vec<f64>,
     p: &Vec<f64>,
 ) -> f64 {
-    let (kinetic, potential) = system.state_energy(q, p);
+    let (kinetic, potential) = system.energies(q, p);
     kinetic + potential
 }
 
@@ -76,20 +76,20 @@ fn every_way_leads_to_the_same_end() {
     let h = END / f64::from(steps);
 
     // Method 1: augmented momenta, multipliers begun anew at every step.
-    let (mut q, mut p, mut v, mut sigma) = (start.clone(), system.rest(), system.rest(), system.zero_rows());
+    let (mut q, mut p, mut v, mut sigma) = (start.clone(), system.zero_momenta(), system.zero_momenta(), system.zero_rows());
     let mut method = Verner9::new(&system);
     let before = energy(&mut system, &q, &p);
     for k in 0..steps {
         method.step(&mut system, f64::from(k) * h, h, &mut q, &mut p).expect("a step");
-        system.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+        system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
         assert!((energy(&mut system, &q, &p) - before).abs() < 1e-10);
     }
     assert!(apart(&q, &reference) < 1e-9, "method 1: {q:?} {reference:?}");
 
     // Method 2: minimal coordinates, dependents chosen and changed by the library; then those of the thesis throughout.
     for thesis in [false, true] {
-        let (mut q, mut p) = (start.clone(), system.rest());
-        let minimal = Minimal::new(system.clone(), &mut q, &mut p).expect("closed");
+        let (mut q, mut p) = (start.clone(), system.zero_momenta());
+        let minimal = CoordinatePartition::new(system.clone(), &mut q, &mut p).expect("closed");
         let mut minimal = if thesis { minimal.with_ratio(f64::INFINITY) } else { minimal };
         if thesis {
             minimal.choose_among(&[3, 4], &mut q, &mut p).expect("a choice of the thesis");
@@ -108,7 +108,7 @@ fn every_way_leads_to_the_same_end() {
 
     // The acceleration form, its index reduced.
     let mut form = AccelerationForm::new(system);
-    let (mut q, mut v) = (start, form.rest());
+    let (mut q, mut v) = (start, form.zero_momenta());
     let mut method = Verner9::new(&form);
     for k in 0..steps {
         method.step(&mut form, f64::from(k) * h, h, &mut q, &mut v).expect("a step");
@@ -127,7 +127,7 @@ fn drift<Y>(
 where
     Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
 {
-    let (mut q, mut p, mut worst) = (q.to_vec(), system.rest(), 0.0_f64);
+    let (mut q, mut p, mut worst) = (q.to_vec(), system.zero_momenta(), 0.0_f64);
     let mut method = Rk4::new(system);
     for k in 0..850 {
         method.step(system, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p).expect("a step");
@@ -144,13 +144,13 @@ fn momenta_drift_less_than_accelerations_and_projection_stops_it() {
         Biped::residual(&absolute(q)).iter().fold(0.0, |m: f64, r| m.max(r.abs()))
     };
     let (mut system, q) = shipped();
-    let (mut v, mut sigma, mut pivots) = (system.rest(), system.zero_rows(), system.zero_rows());
-    let settled = drift(&mut system, &q, gap, |system, q, p| system.settle(0.0, q, p, &mut v, &mut sigma));
+    let (mut v, mut sigma, mut pivots) = (system.zero_momenta(), system.zero_rows(), system.zero_rows());
+    let settled = drift(&mut system, &q, gap, |system, q, p| system.project_momenta(0.0, q, p, &mut v, &mut sigma));
     let projected = drift(&mut system, &q, gap, |system, q, p| {
-        system.settle(0.0, q, p, &mut v, &mut sigma);
+        system.project_momenta(0.0, q, p, &mut v, &mut sigma);
         // Two steps of Newton's method: the first one leaves the square of 1e-8.
         for _ in 0..2 {
-            system.correction(q, &mut sigma, &mut v, &mut pivots);
+            system.position_correction(q, &mut sigma, &mut v, &mut pivots);
             q.iter_mut().zip(&v).for_each(|(q, dq)| *q += dq);
         }
     });
@@ -163,9 +163,9 @@ fn momenta_drift_less_than_accelerations_and_projection_stops_it() {
 #[test]
 fn the_start_is_at_rest() {
     let (mut system, q) = shipped();
-    let mut p = system.rest();
-    let v = system.rest();
-    system.state_momenta(&q, &v, &mut p);
+    let mut p = system.zero_momenta();
+    let v = system.zero_momenta();
+    system.conjugate_momenta(&q, &v, &mut p);
     assert!(p.iter().all(|p| *p == 0.0));
 }
 

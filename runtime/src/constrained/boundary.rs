@@ -5,8 +5,8 @@ use crate::integrate::{Chart, Field, Point, Statistics, StepError, Stepper};
 use crate::system::{Real, System};
 
 /// What is done to a state where a step ends.
-pub trait Boundary<Y: System> {
-    /// Whether [`Boundary::turn`] does anything.
+pub trait PostStep<Y: System> {
+    /// Whether [`PostStep::turn`] does anything.
     const TURNS: bool = false;
 
     /// Changes the state at the end of a step that is about to be accepted, or inside of it, by little or by what means nothing
@@ -45,7 +45,7 @@ pub trait Boundary<Y: System> {
 /// so is dense output. A rate at the end that the method found for its error estimate does not hold any longer: pairs with a first
 /// stage that is the last one's make one evaluation more.
 #[derive(Clone, Debug)]
-pub struct Bounded<Y: System, M, B> {
+pub struct WithPostStep<Y: System, M, B> {
     /// The method.
     method: M,
     /// What is done at the ends.
@@ -57,17 +57,17 @@ pub struct Bounded<Y: System, M, B> {
     new: (Y::Coordinates, Y::Momenta),
 }
 
-impl<Y, M, B> Bounded<Y, M, B>
+impl<Y, M, B> WithPostStep<Y, M, B>
 where
     Y: System,
     Y::Scalar: Real,
     M: Stepper<Y>,
-    B: Boundary<Y>,
+    B: PostStep<Y>,
 {
     /// Around a method.
     pub fn new(system: &Y, method: M, boundary: B) -> Self {
-        let state = || (system.neutral(), system.rest());
-        Bounded {
+        let state = || (system.neutral(), system.zero_momenta());
+        WithPostStep {
             method,
             boundary,
             delta: Point::zero(system),
@@ -85,7 +85,7 @@ where
 
     /// Changes a displacement that ends at time `t` as the boundary wants it: `other`, or that of the last attempt.
     fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
-        let Bounded { method, boundary, delta, old, new: (q, p), .. } = self;
+        let WithPostStep { method, boundary, delta, old, new: (q, p), .. } = self;
         let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
         method.parts().0.chart().state(system, point, &mut old.0, &mut old.1);
         q.as_mut().copy_from_slice(old.0.as_ref());
@@ -119,12 +119,12 @@ where
     }
 }
 
-impl<Y, M, B> Stepper<Y> for Bounded<Y, M, B>
+impl<Y, M, B> Stepper<Y> for WithPostStep<Y, M, B>
 where
     Y: System,
     Y::Scalar: Real,
     M: Stepper<Y>,
-    B: Boundary<Y>,
+    B: PostStep<Y>,
 {
     fn order(&self) -> u32 {
         self.method.order()

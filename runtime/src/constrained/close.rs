@@ -60,9 +60,9 @@ where
     Y::Scalar: Real,
 {
     let (mut residual, mut entries) = (system.zero_rows(), system.zero_entries());
-    let (mut dx, mut step, mut trial) = (system.rest(), system.rest(), q.clone());
+    let (mut dx, mut step, mut trial) = (system.zero_momenta(), system.zero_momenta(), q.clone());
     let mut least = Basic::new(system);
-    system.closure(q, &mut residual, &mut entries);
+    system.constraint_residuals(q, &mut residual, &mut entries);
     let mut iterations = 0;
     loop {
         let (at, size) = worst(residual.as_ref());
@@ -84,7 +84,7 @@ where
             }
             trial.as_mut().copy_from_slice(q.as_ref());
             Chart::displace(system, &mut step, &mut trial);
-            system.closure(&trial, &mut residual, &mut entries);
+            system.constraint_residuals(&trial, &mut residual, &mut entries);
             let after = square(residual.as_ref());
             if after < before - SHARE * part.to_f64() * promise {
                 found = true;
@@ -97,7 +97,7 @@ where
             q.as_mut().copy_from_slice(trial.as_ref());
         }
         if closed {
-            system.closure(q, &mut residual, &mut entries);
+            system.constraint_residuals(q, &mut residual, &mut entries);
             return Ok(Closed { iterations, residual: worst(residual.as_ref()).1.to_f64(), rank });
         }
         if !found {
@@ -139,10 +139,10 @@ where
     Y::Scalar: Real,
 {
     let (mut residual, mut wanted, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-    let (mut p, mut dv, mut new) = (system.rest(), system.rest(), v.clone());
+    let (mut p, mut dv, mut new) = (system.zero_momenta(), system.zero_momenta(), v.clone());
     // Any velocities that meet the constraints tell what the rows have to be.
-    system.settle(t, q, &mut p, &mut dv, &mut residual);
-    system.closure(q, &mut residual, &mut entries);
+    system.project_momenta(t, q, &mut p, &mut dv, &mut residual);
+    system.constraint_residuals(q, &mut residual, &mut entries);
     rates(system, &entries, &dv, &mut wanted);
     let mut least = Basic::new(system);
     let mut rank = 0;

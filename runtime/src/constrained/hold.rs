@@ -2,7 +2,7 @@
 
 #[cfg(feature = "alloc")]
 use super::basic::Basic;
-use super::boundary::Boundary;
+use super::boundary::PostStep;
 use super::rows::{add_forces, named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
@@ -15,7 +15,7 @@ pub enum Stabilisation {
     /// Nothing: multipliers `σ` add up in the momenta, positions drift.
     None,
     /// Momenta are freed of `σ` ([`Constrained::settle`]); positions drift with the method's error.
-    Settle,
+    Momenta,
     /// After that positions are moved back, least in the metric of the mass matrix ([`Constrained::correction`]); momenta stay.
     #[default]
     Mass,
@@ -49,11 +49,11 @@ impl Effort {
     }
 }
 
-/// A [`Stabilisation`] as the [`Boundary`] of a method: re-zeroes momenta first, then moves positions and keeps the momenta,
+/// A [`Stabilisation`] as the [`PostStep`] of a method: re-zeroes momenta first, then moves positions and keeps the momenta,
 /// which disturbs the energy least.
 ///
 /// Methods that remember rates of the past keep their `σ`: it is taken off, and put back where the positions are then.
-/// [`Stabilisation::Settle`] and [`Stabilisation::Mass`] allocate nothing.
+/// [`Stabilisation::Momenta`] and [`Stabilisation::Mass`] allocate nothing.
 #[derive(Clone, Debug)]
 pub struct Hold<Y: Constrained> {
     policy: Stabilisation,
@@ -83,7 +83,7 @@ where
         Hold {
             policy,
             effort,
-            v: system.rest(),
+            v: system.zero_momenta(),
             sigma: system.zero_rows(),
             residual: system.zero_rows(),
             pivots: system.zero_rows(),
@@ -117,17 +117,17 @@ where
     }
 
     /// Residuals, and the displacement that corrects them into `v`. The number of independent rows.
-    fn correction(&mut self, system: &mut Y, q: &Y::Coordinates) -> usize {
+    fn position_correction(&mut self, system: &mut Y, q: &Y::Coordinates) -> usize {
         #[cfg(feature = "alloc")]
         if let Some(basic) = &mut self.basic {
-            system.closure(q, &mut self.residual, &mut self.entries);
+            system.constraint_residuals(q, &mut self.residual, &mut self.entries);
             let (residual, entries, dq) = (self.residual.as_ref(), self.entries.as_ref(), self.v.as_mut());
             return match self.policy {
                 Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
                 _ => basic.dependent(entries, residual, dq),
             };
         }
-        system.correction(q, &mut self.residual, &mut self.v, &mut self.pivots);
+        system.position_correction(q, &mut self.residual, &mut self.v, &mut self.pivots);
         self.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
     }
 
@@ -151,7 +151,7 @@ where
         let constant = self.effort.tolerance <= 0.0;
         let iterations = self.effort.iterations;
         for k in 0..iterations {
-            let rank = self.correction(system, q);
+            let rank = self.position_correction(system, q);
             let (at, size) = worst(self.residual.as_ref());
             if k == 0 {
                 self.found = size;
@@ -179,7 +179,7 @@ where
             return Ok(());
         }
         // All iterations are used up: round-off is left, or the step went too far.
-        system.closure(q, &mut self.residual, &mut self.entries);
+        system.constraint_residuals(q, &mut self.residual, &mut self.entries);
         let (at, size) = worst(self.residual.as_ref());
         let residual = size.to_f64();
         if residual <= self.effort.tolerance.max(libm::sqrt(Y::Scalar::epsilon())) {
@@ -195,7 +195,7 @@ fn unfit<S: Real>(x: &[S]) -> (usize, bool) {
     (index, !size.is_finite())
 }
 
-impl<Y> Boundary<Y> for Hold<Y>
+impl<Y> PostStep<Y> for Hold<Y>
 where
     Y: Constrained,
     Y::Scalar: Real,
@@ -208,18 +208,18 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
-        if self.policy == Stabilisation::None || (remembers && self.policy == Stabilisation::Settle) {
+        if self.policy == Stabilisation::None || (remembers && self.policy == Stabilisation::Momenta) {
             return Ok(());
         }
-        system.settle(t, q, p, &mut self.v, &mut self.sigma);
+        system.project_momenta(t, q, p, &mut self.v, &mut self.sigma);
         if let (index, true) = unfit(p.as_ref()) {
             return Err(ConstraintError::NotFinite { index });
         }
-        if self.policy != Stabilisation::Settle {
+        if self.policy != Stabilisation::Momenta {
             self.project(system, q)?;
         }
         if remembers {
-            system.closure(q, &mut self.residual, &mut self.entries);
+            system.constraint_residuals(q, &mut self.residual, &mut self.entries);
             add_forces(system, &self.entries, &self.sigma, p);
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use super::ends::Ends;
 use super::rows::{add_forces, worst};
-use super::split::Parted;
+use super::split::Unconstrained;
 use super::ConstraintError;
 use crate::integrate::tableau::RADAU5;
 use crate::integrate::{hermite, Chart, Field, Point, Statistics, StepError, Stepper};
@@ -20,7 +20,7 @@ const ITERATIONS: u32 = 100;
 /// Stages are solved for by inserting, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
 /// projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
 #[derive(Clone, Debug)]
-pub struct IndexTwo<Y: Parted>
+pub struct RadauIndex2<Y: Unconstrained>
 where
     Y::Scalar: Real,
 {
@@ -58,16 +58,16 @@ fn inverse<S: Scalar>(a: &[[S; 3]; 3]) -> [[S; 3]; 3] {
     core::array::from_fn(|i| core::array::from_fn(|j| minor(j, i) / det))
 }
 
-impl<Y> IndexTwo<Y>
+impl<Y> RadauIndex2<Y>
 where
-    Y: Parted,
+    Y: Unconstrained,
     Y::Scalar: Real,
 {
     /// Room for one system.
     pub fn new(system: &Y) -> Self {
         let point = || Point::zero(system);
         let a = RADAU5.a.map(|row| row.map(|x| x.get()));
-        IndexTwo {
+        RadauIndex2 {
             field: Field::new(system, false),
             statistics: Statistics::default(),
             evaluations: 0,
@@ -84,9 +84,9 @@ where
             entries: system.zero_entries(),
             residual: system.zero_rows(),
             q: system.neutral(),
-            p: system.rest(),
+            p: system.zero_momenta(),
             qd: system.neutral(),
-            work: system.rest(),
+            work: system.zero_momenta(),
             size: (0.0, 0.0),
             ends: Ends::new(system),
         }
@@ -110,7 +110,7 @@ where
         let (z, f) = (&self.z[i], &mut self.f[i]);
         let chart = self.field.chart();
         chart.state(system, z, &mut self.q, &mut self.p);
-        system.closure(&self.q, &mut self.residual, &mut self.entries);
+        system.constraint_residuals(&self.q, &mut self.residual, &mut self.entries);
         let force = &mut self.work;
         force.as_mut().fill(Y::Scalar::zero());
         add_forces(system, &self.entries, &self.lambda[i], force);
@@ -150,7 +150,7 @@ where
         for i in 0..3 {
             let at = t + self.c[i] * h;
             self.field.chart().state(system, &self.z[i], &mut self.q, &mut self.p);
-            system.settle(at, &self.q, &mut self.p, &mut self.work, &mut self.sigma[i]);
+            system.project_momenta(at, &self.q, &mut self.p, &mut self.work, &mut self.sigma[i]);
         }
         // h Σ a_ij Φ_jᵀ δλ_j = Φ_iᵀ σ_i, with Φ_j for Φ_i.
         for (lambda, row) in self.lambda.iter_mut().zip(&self.inverse) {
@@ -198,9 +198,9 @@ fn largest<S: Real>(least: f64, x: &[S]) -> f64 {
     }
 }
 
-impl<Y> Stepper<Y> for IndexTwo<Y>
+impl<Y> Stepper<Y> for RadauIndex2<Y>
 where
-    Y: Parted,
+    Y: Unconstrained,
     Y::Scalar: Real,
 {
     fn order(&self) -> u32 {

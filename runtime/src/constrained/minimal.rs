@@ -3,11 +3,11 @@
 use alloc::vec::Vec;
 
 use super::basic::Basic;
-use super::boundary::Boundary;
+use super::boundary::PostStep;
 use super::rows::{named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
-use crate::system::{Constrained, Energetic, Group, Real, System};
+use crate::system::{Constrained, Energetic, LieJoint, Real, System};
 use crate::Scalar;
 
 /// Iterations for the dependent coordinates of one evaluation.
@@ -37,11 +37,11 @@ pub struct Switch {
 /// `p_dep = 0`: every constant `p_dep` is a gauge too.
 ///
 /// Dependent velocities are single freedoms, chosen for each group of coupled rows by complete pivoting, with as many rows as
-/// are independent; redundant ones are left out. [`Watch`] changes the choice between steps where it has become poor.
+/// are independent; redundant ones are left out. [`Repartition`] changes the choice between steps where it has become poor.
 ///
-/// Where the dependents cannot be found, rates are not numbers, which every method reports; [`Minimal::trouble`] says why.
+/// Where the dependents cannot be found, rates are not numbers, which every method reports; [`CoordinatePartition::trouble`] says why.
 #[derive(Clone, Debug)]
-pub struct Minimal<Y: Constrained> {
+pub struct CoordinatePartition<Y: Constrained> {
     /// The system itself; inputs may be set between calls.
     pub system: Y,
     basic: Basic<Y::Scalar>,
@@ -57,7 +57,7 @@ pub struct Minimal<Y: Constrained> {
     closures: u64,
 }
 
-impl<Y> Minimal<Y>
+impl<Y> CoordinatePartition<Y>
 where
     Y: Constrained,
     Y::Scalar: Real,
@@ -67,13 +67,13 @@ where
     /// # Errors
     /// [`ConstraintError::NotClosed`] if the coordinates are not near closed ones, [`ConstraintError::NotFinite`].
     pub fn new(system: Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) -> Result<Self, ConstraintError> {
-        let mut minimal = Minimal {
+        let mut minimal = CoordinatePartition {
             basic: Basic::new(&system),
             ratio: 2.0,
             residual: system.zero_rows(),
             entries: system.zero_entries(),
             q: q.clone(),
-            dq: system.rest(),
+            dq: system.zero_momenta(),
             trouble: None,
             switches: 0,
             record: Vec::with_capacity(KEPT),
@@ -95,7 +95,7 @@ where
     /// Chooses dependents anew, for coordinates `q`, which are closed, and momenta `p`, which change to the new gauge.
     ///
     /// # Errors
-    /// As [`Minimal::new`].
+    /// As [`CoordinatePartition::new`].
     pub fn choose(&mut self, q: &mut Y::Coordinates, p: &mut Y::Momenta) -> Result<(), ConstraintError> {
         self.look(Some(q));
         self.basic.choose();
@@ -105,10 +105,10 @@ where
     }
 
     /// Takes the dependents as given, by indices of velocities, in groups of rows as far as they are enough for each; for
-    /// coordinates and momenta as [`Minimal::choose`].
+    /// coordinates and momenta as [`CoordinatePartition::choose`].
     ///
     /// # Errors
-    /// As [`Minimal::new`], and [`ConstraintError::RankLoss`] where the other velocities do not determine these.
+    /// As [`CoordinatePartition::new`], and [`ConstraintError::RankLoss`] where the other velocities do not determine these.
     pub fn choose_among(
         &mut self,
         dependents: &[usize],
@@ -153,7 +153,7 @@ where
 
     /// `Φ` at coordinates, or at those that are being closed.
     fn look(&mut self, q: Option<&Y::Coordinates>) {
-        self.system.closure(q.unwrap_or(&self.q), &mut self.residual, &mut self.entries);
+        self.system.constraint_residuals(q.unwrap_or(&self.q), &mut self.residual, &mut self.entries);
         self.basic.blocks.fill(self.entries.as_ref());
         self.closures += 1;
     }
@@ -234,7 +234,7 @@ where
     /// new gauge `p_dep = 0`. Whether any were.
     ///
     /// # Errors
-    /// As [`Minimal::close`]; the dependents are chosen anew before.
+    /// As [`CoordinatePartition::close`]; the dependents are chosen anew before.
     pub fn watch(
         &mut self,
         t: Y::Scalar,
@@ -291,13 +291,13 @@ where
 
     /// `q̇` at closed coordinates becomes that at others, where quaternions are.
     fn turn_rates(&mut self, q: &Y::Coordinates, qd: &mut Y::Coordinates) {
-        if self.system.groups().is_empty() {
+        if self.system.lie_joints().is_empty() {
             return;
         }
         let (from, v) = (qd.as_ref(), self.dq.as_mut());
         // Plain coordinates before each group, and after the last.
         let (mut at, mut to) = (0, 0);
-        for group in self.system.groups() {
+        for group in self.system.lie_joints() {
             let n = group.v - to;
             v[to..group.v].copy_from_slice(&from[at..at + n]);
             group.body(self.q.as_ref(), from, v);
@@ -309,7 +309,7 @@ where
     }
 }
 
-impl<Y> System for Minimal<Y>
+impl<Y> System for CoordinatePartition<Y>
 where
     Y: Constrained,
     Y::Scalar: Real,
@@ -322,15 +322,15 @@ where
         self.system.neutral()
     }
 
-    fn rest(&self) -> Y::Momenta {
-        self.system.rest()
+    fn zero_momenta(&self) -> Y::Momenta {
+        self.system.zero_momenta()
     }
 
-    fn groups(&self) -> &[Group] {
-        self.system.groups()
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.system.lie_joints()
     }
 
-    fn state_rates(
+    fn rates_at(
         &mut self,
         t: Y::Scalar,
         q: &Y::Coordinates,
@@ -344,7 +344,7 @@ where
             pd.as_mut().fill(Y::Scalar::constant(f64::NAN));
             return;
         }
-        self.system.state_rates(t, &self.q, p, qd, pd);
+        self.system.rates_at(t, &self.q, p, qd, pd);
         self.turn_rates(q, qd);
         self.gauge(pd);
     }
@@ -354,27 +354,27 @@ where
     }
 }
 
-impl<Y> Energetic for Minimal<Y>
+impl<Y> Energetic for CoordinatePartition<Y>
 where
     Y: Constrained + Energetic,
     Y::Scalar: Real,
 {
-    fn state_energy(&mut self, q: &Y::Coordinates, p: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
-        self.system.state_energy(q, p)
+    fn energies(&mut self, q: &Y::Coordinates, p: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
+        self.system.energies(q, p)
     }
 }
 
-/// The [`Boundary`] of minimal coordinates: closes the dependents at the end of every step, and changes the partition before
+/// The [`PostStep`] of minimal coordinates: closes the dependents at the end of every step, and changes the partition before
 /// the next one where it has become poor.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Watch {
+pub struct Repartition {
     /// Whether each step begins with `σ = 0` rather than `p_dep = 0`: `p_dep` is then what it is in `M v`, and stays so during
     /// the step. Costs one solve a step more; where the mechanism is nearly singular the gauge `p_dep = 0` has multipliers that
     /// grow beyond all bounds. Not for methods that remember rates of the past, which go on in the gauge they are in.
     pub settle: bool,
 }
 
-impl<Y> Boundary<Minimal<Y>> for Watch
+impl<Y> PostStep<CoordinatePartition<Y>> for Repartition
 where
     Y: Constrained,
     Y::Scalar: Real,
@@ -383,7 +383,7 @@ where
 
     fn close(
         &mut self,
-        system: &mut Minimal<Y>,
+        system: &mut CoordinatePartition<Y>,
         t: Y::Scalar,
         remembers: bool,
         q: &mut Y::Coordinates,
@@ -392,7 +392,7 @@ where
         system.close(q)?;
         if self.settle {
             if !remembers {
-                system.system.settle(t, q, p, &mut system.dq, &mut system.residual);
+                system.system.project_momenta(t, q, p, &mut system.dq, &mut system.residual);
             }
             return Ok(());
         }
@@ -403,7 +403,7 @@ where
 
     fn turn(
         &mut self,
-        system: &mut Minimal<Y>,
+        system: &mut CoordinatePartition<Y>,
         t: Y::Scalar,
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,

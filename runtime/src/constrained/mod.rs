@@ -3,18 +3,18 @@
 //! | variant | momenta | positions | cost at the end of a step |
 //! | --- | --- | --- | --- |
 //! | [`Stabilisation::None`] | `σ` adds up | drift | nothing |
-//! | [`Stabilisation::Settle`] | re-zeroed | drift, by the method's error | one solve |
+//! | [`Stabilisation::Momenta`] | re-zeroed | drift, by the method's error | one solve |
 //! | [`Stabilisation::Mass`] | re-zeroed | closed | one solve, and one for each iteration and the last look |
 //! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
 //! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
 //!
-//! | `Minimal` with `Watch` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
+//! | `CoordinatePartition` with `Repartition` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
 //! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
-//! | [`IndexTwo`] | re-zeroed | drift | inside of the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
+//! | [`RadauIndex2`] | re-zeroed | drift | inside of the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
 //!
-//! The first five are wrapped around any method ([`Bounded`], [`Hold`]; by name `catalogue::explicit_bounded` and
+//! The first five are wrapped around any method ([`WithPostStep`], [`Hold`]; by name `catalogue::explicit_bounded` and
 //! `implicit_bounded`); minimal coordinates are a [`System`](crate::System) of their own, and the last two are methods on a
-//! system with and without its constraints ([`Split`]).
+//! system with and without its constraints ([`OpenAndClosed`]).
 //!
 //! Methods that remember rates of the past go on with their `σ`, as their history must. [`Stabilisation::Mass`] is the choice
 //! where nothing speaks for another: what it costs is small, and of a mechanism that passes a singular position it loses least.
@@ -44,16 +44,16 @@ mod rows;
 mod split;
 mod steady;
 
-pub use boundary::{Boundary, Bounded};
+pub use boundary::{PostStep, WithPostStep};
 #[cfg(feature = "alloc")]
 pub use close::{close, complete, Closed, Closing};
 pub use error::ConstraintError;
 pub use hold::{Effort, Hold, Stabilisation};
-pub use index_two::IndexTwo;
+pub use index_two::RadauIndex2;
 #[cfg(feature = "alloc")]
-pub use minimal::{Minimal, Switch, Watch};
+pub use minimal::{CoordinatePartition, Switch, Repartition};
 pub use rattle::Rattle;
-pub use split::{Parted, Split};
+pub use split::{Unconstrained, OpenAndClosed};
 pub use steady::Steady;
 
 #[cfg(doc)]

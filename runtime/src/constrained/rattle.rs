@@ -2,7 +2,7 @@
 
 use super::ends::Ends;
 use super::rows::{add_forces, worst};
-use super::split::Parted;
+use super::split::Unconstrained;
 use super::ConstraintError;
 use crate::integrate::{hermite, Chart, Field, Point, Statistics, StepError, Stepper};
 use crate::system::Real;
@@ -22,7 +22,7 @@ const ITERATIONS: u32 = 100;
 /// sweeps for its multipliers each time. Momenta are `M v` at both ends. Constraints and open system must not depend on time, and
 /// be holonomic for the energy's sake.
 #[derive(Clone, Debug)]
-pub struct Rattle<Y: Parted>
+pub struct Rattle<Y: Unconstrained>
 where
     Y::Scalar: Real,
 {
@@ -50,12 +50,12 @@ where
 
 impl<Y> Rattle<Y>
 where
-    Y: Parted,
+    Y: Unconstrained,
     Y::Scalar: Real,
 {
     /// Room for one system.
     pub fn new(system: &Y) -> Self {
-        let (point, state) = (|| Point::zero(system), || (system.neutral(), system.rest()));
+        let (point, state) = (|| Point::zero(system), || (system.neutral(), system.zero_momenta()));
         Rattle {
             field: Field::new(system, false),
             statistics: Statistics::default(),
@@ -70,8 +70,8 @@ where
             rows: [system.zero_rows(), system.zero_rows()],
             start: state(),
             state: state(),
-            other: system.rest(),
-            work: [system.rest(), system.rest()],
+            other: system.zero_momenta(),
+            work: [system.zero_momenta(), system.zero_momenta()],
             qd: system.neutral(),
             ends: Ends::new(system),
         }
@@ -139,14 +139,14 @@ where
         let [dq, momenta] = &mut self.work;
         let [residual, sigma] = &mut self.rows;
         self.field.chart().state(system, &self.delta, &mut self.state.0, &mut self.state.1);
-        system.correction(&self.state.0, residual, dq, sigma);
+        system.position_correction(&self.state.0, residual, dq, sigma);
         let (index, size) = worst(dq.as_ref());
         if !size.is_finite() {
             return Err(ConstraintError::NotFinite { index });
         }
         // δq = h M⁻¹ δp½, and δp½ = −h/2 Φ₀ᵀ δλ.
         system.momenta(&self.start.0, dq, momenta);
-        system.settle(t, &self.start.0, momenta, dq, sigma);
+        system.project_momenta(t, &self.start.0, momenta, dq, sigma);
         let factor = Y::Scalar::constant(2.0) / (h * h);
         for (lambda, sigma) in self.lambda.as_mut().iter_mut().zip(sigma.as_ref()) {
             *lambda = *lambda - factor * *sigma;
@@ -181,7 +181,7 @@ where
 
 impl<Y> Stepper<Y> for Rattle<Y>
 where
-    Y: Parted,
+    Y: Unconstrained,
     Y::Scalar: Real,
 {
     fn order(&self) -> u32 {
@@ -207,7 +207,7 @@ where
         let wrong = |error| StepError::Constraint { time: t.to_f64(), error };
         self.ends.forget_end();
         self.field.chart().base(system, &mut self.start.0, &mut self.start.1);
-        system.closure(&self.start.0, &mut self.rows[0], &mut self.entries);
+        system.constraint_residuals(&self.start.0, &mut self.rows[0], &mut self.entries);
         if !worst(self.lambda.as_ref()).1.is_finite() {
             self.lambda.as_mut().fill(Y::Scalar::zero());
         }
@@ -225,7 +225,7 @@ where
         self.field.chart().state(system, &self.delta, q, p);
         new.as_mut().copy_from_slice(p.as_ref());
         let ([v, _], [sigma, _]) = (&mut self.work, &mut self.rows);
-        system.settle(t + h, q, new, v, sigma);
+        system.project_momenta(t + h, q, new, v, sigma);
         Chart::correct(system, (q, p), (q, new), &mut self.delta);
         Ok(0.0)
     }

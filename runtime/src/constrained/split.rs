@@ -1,18 +1,18 @@
 //! A mechanism with its constraints, and without.
 
-use crate::system::{Conjugate, Constrained, Energetic, Group, Real, Row, System};
+use crate::system::{Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 
 /// The same mechanism twice: `open`, whose constraints are not looked at, and `closed`. Both have the same state layout, and the
 /// same inputs, which are set in both. As a [`System`] it is the closed one.
 #[derive(Clone, Debug)]
-pub struct Split<O, C> {
+pub struct OpenAndClosed<O, C> {
     /// Without constraints.
     pub open: O,
     /// With them.
     pub closed: C,
 }
 
-impl<O, C: System> System for Split<O, C> {
+impl<O, C: System> System for OpenAndClosed<O, C> {
     type Scalar = C::Scalar;
     type Coordinates = C::Coordinates;
     type Momenta = C::Momenta;
@@ -20,13 +20,13 @@ impl<O, C: System> System for Split<O, C> {
     fn neutral(&self) -> C::Coordinates {
         self.closed.neutral()
     }
-    fn rest(&self) -> C::Momenta {
-        self.closed.rest()
+    fn zero_momenta(&self) -> C::Momenta {
+        self.closed.zero_momenta()
     }
-    fn groups(&self) -> &[Group] {
-        self.closed.groups()
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.closed.lie_joints()
     }
-    fn state_rates(
+    fn rates_at(
         &mut self,
         t: C::Scalar,
         q: &C::Coordinates,
@@ -34,20 +34,20 @@ impl<O, C: System> System for Split<O, C> {
         qd: &mut C::Coordinates,
         pd: &mut C::Momenta,
     ) {
-        self.closed.state_rates(t, q, p, qd, pd);
+        self.closed.rates_at(t, q, p, qd, pd);
     }
     fn coordinate_rates(&self, q: &C::Coordinates, v: &C::Momenta, qd: &mut C::Coordinates) {
         self.closed.coordinate_rates(q, v, qd);
     }
 }
 
-impl<O, C: Energetic> Energetic for Split<O, C> {
-    fn state_energy(&mut self, q: &C::Coordinates, p: &C::Momenta) -> (C::Scalar, C::Scalar) {
-        self.closed.state_energy(q, p)
+impl<O, C: Energetic> Energetic for OpenAndClosed<O, C> {
+    fn energies(&mut self, q: &C::Coordinates, p: &C::Momenta) -> (C::Scalar, C::Scalar) {
+        self.closed.energies(q, p)
     }
 }
 
-impl<O, C: Constrained> Constrained for Split<O, C> {
+impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     type Rows = C::Rows;
     type Entries = C::Entries;
 
@@ -63,10 +63,10 @@ impl<O, C: Constrained> Constrained for Split<O, C> {
     fn entry_columns(&self) -> &[usize] {
         self.closed.entry_columns()
     }
-    fn closure(&mut self, q: &C::Coordinates, residual: &mut C::Rows, jacobian: &mut C::Entries) {
-        self.closed.closure(q, residual, jacobian);
+    fn constraint_residuals(&mut self, q: &C::Coordinates, residual: &mut C::Rows, jacobian: &mut C::Entries) {
+        self.closed.constraint_residuals(q, residual, jacobian);
     }
-    fn settle(
+    fn project_momenta(
         &mut self,
         t: C::Scalar,
         q: &C::Coordinates,
@@ -74,10 +74,10 @@ impl<O, C: Constrained> Constrained for Split<O, C> {
         v: &mut C::Momenta,
         sigma: &mut C::Rows,
     ) {
-        self.closed.settle(t, q, p, v, sigma);
+        self.closed.project_momenta(t, q, p, v, sigma);
     }
-    fn correction(&mut self, q: &C::Coordinates, residual: &mut C::Rows, dq: &mut C::Momenta, pivots: &mut C::Rows) {
-        self.closed.correction(q, residual, dq, pivots);
+    fn position_correction(&mut self, q: &C::Coordinates, residual: &mut C::Rows, dq: &mut C::Momenta, pivots: &mut C::Rows) {
+        self.closed.position_correction(q, residual, dq, pivots);
     }
     fn multipliers(&mut self, t: C::Scalar, q: &C::Coordinates, v: &C::Momenta, lambda: &mut C::Rows) {
         self.closed.multipliers(t, q, v, lambda);
@@ -85,11 +85,11 @@ impl<O, C: Constrained> Constrained for Split<O, C> {
 }
 
 /// What methods that work with multipliers of their own need of a system.
-pub trait Parted: Constrained
+pub trait Unconstrained: Constrained
 where
     Self::Scalar: Real,
 {
-    /// [`System::state_rates`] without constraints.
+    /// [`System::rates_at`] without constraints.
     fn open_rates(
         &mut self,
         t: Self::Scalar,
@@ -102,7 +102,7 @@ where
     fn momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
 }
 
-impl<O, C> Parted for Split<O, C>
+impl<O, C> Unconstrained for OpenAndClosed<O, C>
 where
     C: Constrained,
     C::Scalar: Real,
@@ -116,9 +116,9 @@ where
         qd: &mut C::Coordinates,
         pd: &mut C::Momenta,
     ) {
-        self.open.state_rates(t, q, p, qd, pd);
+        self.open.rates_at(t, q, p, qd, pd);
     }
     fn momenta(&mut self, q: &C::Coordinates, v: &C::Momenta, p: &mut C::Momenta) {
-        self.open.state_momenta(q, v, p);
+        self.open.conjugate_momenta(q, v, p);
     }
 }

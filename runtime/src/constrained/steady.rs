@@ -1,6 +1,6 @@
 //! Constraints kept at step boundaries by work that is always the same.
 
-use super::boundary::Boundary;
+use super::boundary::PostStep;
 use super::rows::worst;
 use super::ConstraintError;
 use crate::integrate::Chart;
@@ -21,7 +21,7 @@ impl<Y: Constrained, const N: usize> Steady<Y, N> {
     /// Room for one system.
     pub fn new(system: &Y) -> Self {
         let rows = || system.zero_rows();
-        Steady { v: system.rest(), sigma: rows(), residual: rows(), pivots: rows() }
+        Steady { v: system.zero_momenta(), sigma: rows(), residual: rows(), pivots: rows() }
     }
 
     /// Residuals that the last iteration found, m and rad.
@@ -30,7 +30,7 @@ impl<Y: Constrained, const N: usize> Steady<Y, N> {
     }
 }
 
-impl<Y, const N: usize> Boundary<Y> for Steady<Y, N>
+impl<Y, const N: usize> PostStep<Y> for Steady<Y, N>
 where
     Y: Constrained,
     Y::Scalar: Real,
@@ -45,10 +45,10 @@ where
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
         if !remembers {
-            system.settle(t, q, p, &mut self.v, &mut self.sigma);
+            system.project_momenta(t, q, p, &mut self.v, &mut self.sigma);
         }
         for _ in 0..N {
-            system.correction(q, &mut self.residual, &mut self.v, &mut self.pivots);
+            system.position_correction(q, &mut self.residual, &mut self.v, &mut self.pivots);
             Chart::displace(system, &mut self.v, q);
         }
         for x in [p.as_ref(), q.as_ref()] {

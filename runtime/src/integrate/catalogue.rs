@@ -3,11 +3,11 @@
 use alloc::boxed::Box;
 
 use super::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, VariableAdams};
-use super::{BackwardEuler, Gauss12, Gauss12Inserted, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
+use super::{BackwardEuler, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
 use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
 use super::{Composition, Doubled, StepDoubling, Symmetric};
-use super::{Limits, Projection, Solver, Statistics, Step, StepError, Stepper};
-use crate::constrained::{Boundary, Bounded};
+use super::{Limits, EnergyProjection, Solver, Statistics, Step, StepError, Stepper};
+use crate::constrained::{PostStep, WithPostStep};
 use crate::system::{Differentiable, Energetic, Real, System};
 
 /// What there is to know of a method before it is made.
@@ -48,7 +48,7 @@ pub trait Drive<Y: System> {
     /// [`Solver::statistics`].
     fn statistics(&self) -> Statistics;
     /// [`Solver::project`].
-    fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    fn project(&mut self, system: &mut Y, projection: &mut EnergyProjection<Y>)
     where
         Y: Energetic;
 }
@@ -83,7 +83,7 @@ where
     fn statistics(&self) -> Statistics {
         Solver::statistics(self)
     }
-    fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    fn project(&mut self, system: &mut Y, projection: &mut EnergyProjection<Y>)
     where
         Y: Energetic,
     {
@@ -148,13 +148,13 @@ macro_rules! catalogue {
         where
             Y: $bound + 'a,
             Y::Scalar: Real,
-            B: Boundary<Y> + 'a,
+            B: PostStep<Y> + 'a,
         {
             let $compensated = start.compensated;
             match name {
                 $($name => {
                     let method = $method;
-                    let method = Bounded::new($system, method, boundary);
+                    let method = WithPostStep::new($system, method, boundary);
                     boxed($system, method, start)
                 })*
                 _ => None,
@@ -194,7 +194,7 @@ catalogue! {
         "abm8" "Adams-Bashforth-Moulton, order 8" false sums!(Abm8, system, c);
         "abm12" "Adams-Bashforth-Moulton, order 12" false sums!(Abm12, system, c);
         "adams" "Adams-Bashforth-Moulton, variable steps and orders" true sums!(VariableAdams, system, c);
-        "gauss12" "Gauss-Legendre, order 12, by insertion" false sums!(Gauss12Inserted, system, c);
+        "gauss12" "Gauss-Legendre, order 12, by insertion" false sums!(Gauss12FixedPoint, system, c);
         "doubled" "phase space doubled, order 2 (experiment)" false Doubled::new(system, BINDING);
         "doubled-6" "phase space doubled, composed to order 6 (experiment)" false
             Composition::new(system, Doubled::new(system, BINDING), Symmetric::KAHAN_LI_6);

@@ -14,7 +14,7 @@
 use super::constant::Constant;
 use super::group::normalise;
 use super::StepError;
-use crate::system::{Group, Real, System};
+use crate::system::{LieJoint, Real, System};
 use crate::Scalar;
 
 /// A displacement of a state, or its rate: `nv` coordinates, `nv` momenta.
@@ -29,7 +29,7 @@ pub struct Point<Y: System> {
 impl<Y: System> Point<Y> {
     /// No displacement.
     pub fn zero(system: &Y) -> Self {
-        Point { x: system.rest(), p: system.rest() }
+        Point { x: system.zero_momenta(), p: system.zero_momenta() }
     }
 
     /// Both halves.
@@ -136,20 +136,20 @@ pub struct Chart<Y: System> {
 
 /// Stretches of the state that are moved by addition, positions of groups included, each with the group at its end.
 struct Stretches<'a> {
-    groups: core::slice::Iter<'a, Group>,
+    groups: core::slice::Iter<'a, LieJoint>,
     at: (usize, usize),
     end: (usize, usize),
 }
 
 impl<'a> Stretches<'a> {
-    fn new(groups: &'a [Group], nq: usize, nv: usize) -> Self {
+    fn new(groups: &'a [LieJoint], nq: usize, nv: usize) -> Self {
         Stretches { groups: groups.iter(), at: (0, 0), end: (nq, nv) }
     }
 }
 
 impl<'a> Iterator for Stretches<'a> {
     /// First index into `q` and into `v`, how many; the group.
-    type Item = (usize, usize, usize, Option<&'a Group>);
+    type Item = (usize, usize, usize, Option<&'a LieJoint>);
 
     #[inline]
     fn next(&mut self) -> Option<Self::Item> {
@@ -171,7 +171,7 @@ where
 {
     /// About the neutral state. `compensated` sums of steps carry on what rounding takes from them.
     pub fn new(system: &Y, compensated: bool) -> Self {
-        Chart { q: system.neutral(), p: system.rest(), carry: compensated.then(|| Point::zero(system)) }
+        Chart { q: system.neutral(), p: system.zero_momenta(), carry: compensated.then(|| Point::zero(system)) }
     }
 
     /// About the state of another chart, what it carries on included if this one carries something on.
@@ -196,7 +196,7 @@ where
         if let Some(carry) = &mut self.carry {
             carry.clear();
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             if let Some(index) = group.quaternion() {
                 let norm = normalise(&mut self.q.as_mut()[index..index + 4]).to_f64();
                 if !(norm > 0.999 && norm < 1.001) {
@@ -212,7 +212,7 @@ where
     pub fn base(&self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         q.as_mut().copy_from_slice(self.q.as_ref());
         p.as_mut().copy_from_slice(self.p.as_ref());
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.inward(self.q.as_ref(), [Y::Scalar::zero(); 3], p.as_mut());
         }
     }
@@ -226,7 +226,7 @@ where
     pub fn size(&self, system: &Y, out: &mut Point<Y>) {
         out.clear();
         let (q, x) = (self.q.as_ref(), out.x.as_mut());
-        for (at, v, n, _) in Stretches::new(system.groups(), q.len(), x.len()) {
+        for (at, v, n, _) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
             for k in 0..n {
                 x[v + k] = q[at + k].abs();
             }
@@ -243,10 +243,10 @@ where
         let (cx, cp) = self.carry.as_ref().map_or((None, None), |c| (Some(c.x.as_ref()), Some(c.p.as_ref())));
         let q = q.as_mut();
         displaced(self.p.as_ref(), point.p.as_ref(), cp, p.as_mut());
-        if system.groups().is_empty() {
+        if system.lie_joints().is_empty() {
             return displaced(base, x, cx, q);
         }
-        for (at, v, n, group) in Stretches::new(system.groups(), base.len(), x.len()) {
+        for (at, v, n, group) in Stretches::new(system.lie_joints(), base.len(), x.len()) {
             displaced(&base[at..at + n], &x[v..v + n], cx.map(|c| &c[v..v + n]), &mut q[at..at + n]);
             if let Some(group) = group {
                 group.displace(base, x, q);
@@ -266,10 +266,10 @@ where
         out: &mut Point<Y>,
     ) {
         let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
-        if system.groups().is_empty() {
+        if system.lie_joints().is_empty() {
             return xd.copy_from_slice(qd_);
         }
-        for (at, v, n, group) in Stretches::new(system.groups(), qd_.len(), xd.len()) {
+        for (at, v, n, group) in Stretches::new(system.lie_joints(), qd_.len(), xd.len()) {
             xd[v..v + n].copy_from_slice(&qd_[at..at + n]);
             if let Some(group) = group {
                 group.rates(point.x.as_ref(), (q.as_ref(), p.as_ref()), qd_, xd, out.p.as_mut());
@@ -284,14 +284,14 @@ where
         for (x, p) in gx.iter_mut().zip(gp.iter_mut()) {
             (*x, *p) = (-*p, *x);
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             let (from, n) = (group.v, group.kind.sizes().1);
             let mut p = [Y::Scalar::zero(); 6];
             for (k, p) in p.iter_mut().enumerate().take(n) {
                 *p = self.p.as_ref()[from + k] + point.p.as_ref()[from + k];
             }
             let part = from..from + n;
-            let group = Group { v: 0, ..*group };
+            let group = LieJoint { v: 0, ..*group };
             group.gradient(&point.x.as_ref()[part.clone()], &p, &mut gx[part.clone()], &mut gp[part]);
         }
     }
@@ -306,7 +306,7 @@ where
         }
         let (q, x) = (self.q.as_mut(), point.x.as_ref());
         let mut carry = self.carry.as_mut().map(|c| (c.x.as_mut(), c.p.as_mut()));
-        for (at, v, n, group) in Stretches::new(system.groups(), q.len(), x.len()) {
+        for (at, v, n, group) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
             for k in 0..n {
                 sum(&mut q[at + k], x[v + k], carry.as_mut().map(|c| &mut c.0[v + k]));
             }
@@ -318,7 +318,7 @@ where
         for (k, (p, dp)) in p.iter_mut().zip(point.p.as_ref()).enumerate() {
             sum(p, *dp, carry.as_mut().map(|c| &mut c.1[k]));
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.refer(group.shift(x), p);
         }
         Ok(())
@@ -328,10 +328,10 @@ where
     /// axes on the way.
     pub fn displace(system: &Y, dx: &mut Y::Momenta, q: &mut Y::Coordinates) {
         let (q, x) = (q.as_mut(), dx.as_mut());
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.turn_out(q, x);
         }
-        for (at, v, n, group) in Stretches::new(system.groups(), q.len(), x.len()) {
+        for (at, v, n, group) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
             for (q, x) in q.iter_mut().skip(at).zip(x.iter().skip(v)).take(n) {
                 *q = *q + *x;
             }
@@ -344,7 +344,7 @@ where
     /// Turns forces on the joints, in the axes that momenta of a state have, into rates of the momenta of a displacement
     /// `point` that leads to the coordinates `q`.
     pub fn forces(system: &Y, q: &Y::Coordinates, point: &Point<Y>, forces: &mut Y::Momenta) {
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.outward(q.as_ref(), group.shift(point.x.as_ref()), forces.as_mut());
         }
     }
@@ -358,7 +358,7 @@ where
     ) {
         let (q0, p0, q1, p1) = (from.0.as_ref(), from.1.as_ref(), to.0.as_ref(), to.1.as_ref());
         let (x, p) = (point.x.as_mut(), point.p.as_mut());
-        for (at, v, n, group) in Stretches::new(system.groups(), q0.len(), x.len()) {
+        for (at, v, n, group) in Stretches::new(system.lie_joints(), q0.len(), x.len()) {
             let positions = group.map_or(0, |group| group.kind.positions());
             let before = group.map_or([Y::Scalar::zero(); 3], |group| group.shift(x));
             for k in 0..n {
@@ -376,7 +376,7 @@ where
     /// Appends a displacement from where `total` leads: `total` becomes both, in the chart of its start.
     pub fn compose(system: &Y, step: &Point<Y>, total: &mut Point<Y>) {
         let (x, p) = (total.x.as_mut(), total.p.as_mut());
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.compose((step.x.as_ref(), step.p.as_ref()), x, p);
         }
         for_positions(system, x.len(), |k| x[k] = x[k] + step.x.as_ref()[k]);
@@ -391,7 +391,7 @@ where
         for (p, dp) in p.iter_mut().zip(step.p.as_ref()) {
             *p = *p - *dp;
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.relative(step.x.as_ref(), x, p);
         }
         for_positions(system, x.len(), |k| x[k] = x[k] - step.x.as_ref()[k]);
@@ -401,7 +401,7 @@ where
     /// `step`. Of the displacement only the coordinates are kept up, its momenta are not read.
     pub fn follow(system: &Y, step: &Point<Y>, point: &mut Point<Y>, rate: &mut Point<Y>) {
         let (step, x) = (step.x.as_ref(), point.x.as_mut());
-        for group in system.groups() {
+        for group in system.lie_joints() {
             group.follow(step, x, rate.x.as_mut(), rate.p.as_mut());
         }
         for_positions(system, x.len(), |k| x[k] = x[k] - step[k]);
@@ -411,8 +411,8 @@ where
 /// The components, of `nv`, that displacements are added to.
 #[inline]
 fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) {
-    let nq = system.groups().iter().fold(nv, |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
-    for (_, v, n, _) in Stretches::new(system.groups(), nq, nv) {
+    let nq = system.lie_joints().iter().fold(nv, |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
+    for (_, v, n, _) in Stretches::new(system.lie_joints(), nq, nv) {
         (v..v + n).for_each(&mut with);
     }
 }

@@ -228,7 +228,7 @@ where
                 *x = if *x > least { *x } else { least };
             }
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             let x = self.weight.x.as_mut();
             x[group.v + group.kind.positions()..group.v + group.kind.sizes().1].fill(Y::Scalar::one());
         }

@@ -139,7 +139,7 @@ where
             delta: point(),
             made: point(),
             q: system.neutral(),
-            p: system.rest(),
+            p: system.zero_momenta(),
         }
     }
 

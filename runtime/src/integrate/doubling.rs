@@ -62,7 +62,7 @@ where
             delta: point(),
             whole: point(),
             q: system.neutral(),
-            p: system.rest(),
+            p: system.zero_momenta(),
         }
     }
 

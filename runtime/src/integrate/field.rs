@@ -24,7 +24,7 @@ where
 {
     /// Room for one system; `compensated` as in [`Chart::new`].
     pub fn new(system: &Y, compensated: bool) -> Self {
-        let (q, p) = (system.neutral(), system.rest());
+        let (q, p) = (system.neutral(), system.zero_momenta());
         let chart = Chart::new(system, compensated);
         Field { chart, qd: q.clone(), q, p, stored: false, evaluations: 0 }
     }
@@ -84,7 +84,7 @@ where
     #[inline]
     pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
-        system.state_rates(t, &self.q, &self.p, &mut self.qd, &mut out.p);
+        system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut out.p);
         self.stored = false;
         self.evaluations += 1;
         self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);

@@ -50,9 +50,9 @@ formulas! {
 }
 
 /// [`Gauss12`] by insertion: no derivatives are needed.
-pub type Gauss12Inserted<Y> = Collocation<Y, formula::Gauss12, FixedPoint, 6>;
+pub type Gauss12FixedPoint<Y> = Collocation<Y, formula::Gauss12, FixedPoint, 6>;
 /// [`Gauss6`] by insertion: no derivatives are needed.
-pub type Gauss6Inserted<Y> = Collocation<Y, formula::Gauss6, FixedPoint, 3>;
+pub type Gauss6FixedPoint<Y> = Collocation<Y, formula::Gauss6, FixedPoint, 3>;
 
 /// `(−13 ∓ 7 √6) / 3, −1/3`: Hairer and Wanner, IV.8, eq. 8.19.
 const RADAU5_ERROR: [Constant; 3] = super::constant::list(

@@ -1,7 +1,7 @@
 //! The formulas of [`super::chart`] for one joint.
 
-use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, Step, Vec3};
-use crate::system::{Group, GroupKind};
+use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, ElementaryTransform, Vec3};
+use crate::system::{LieJoint, LieGroup};
 use crate::Scalar;
 
 /// Three components from an index on.
@@ -64,20 +64,20 @@ fn spin<S: Scalar>(q: &[S], qd: &[S]) -> Vec3<S> {
     scale3(S::constant(2.0), w)
 }
 
-impl Group {
+impl LieJoint {
     /// Place of the rotation's vector in the displacement.
     fn phi(&self) -> Option<usize> {
         match self.kind {
-            GroupKind::Rotation => Some(self.v),
-            GroupKind::Pose => Some(self.v + 3),
-            GroupKind::Plane => None,
+            LieGroup::SO3 => Some(self.v),
+            LieGroup::SE3 => Some(self.v + 3),
+            LieGroup::SE2 => None,
         }
     }
 
     /// From body axes to outer ones at coordinates `q`.
-    fn rotation<S: Scalar>(&self, q: &[S]) -> Step<S> {
+    fn rotation<S: Scalar>(&self, q: &[S]) -> ElementaryTransform<S> {
         let o = S::zero();
-        Step::Rotate(match self.quaternion() {
+        ElementaryTransform::Rotate(match self.quaternion() {
             Some(at) => quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]),
             None => {
                 let (s, c) = q[self.q + 2].sin_cos();
@@ -90,30 +90,30 @@ impl Group {
     fn split<S: Scalar>(&self, p: &[S]) -> (Vec3<S>, Vec3<S>) {
         let (o, v) = (S::zero(), self.v);
         match self.kind {
-            GroupKind::Rotation => ([o; 3], three(p, v)),
-            GroupKind::Pose => (three(p, v), three(p, v + 3)),
-            GroupKind::Plane => ([p[v], p[v + 1], o], [o, o, p[v + 2]]),
+            LieGroup::SO3 => ([o; 3], three(p, v)),
+            LieGroup::SE3 => (three(p, v), three(p, v + 3)),
+            LieGroup::SE2 => ([p[v], p[v + 1], o], [o, o, p[v + 2]]),
         }
     }
 
     fn join<S: Scalar>(&self, (linear, angular): (Vec3<S>, Vec3<S>), p: &mut [S]) {
         let v = self.v;
         match self.kind {
-            GroupKind::Rotation => put(p, v, angular),
-            GroupKind::Pose => {
+            LieGroup::SO3 => put(p, v, angular),
+            LieGroup::SE3 => {
                 put(p, v, linear);
                 put(p, v + 3, angular);
             }
-            GroupKind::Plane => put(p, v, [linear[0], linear[1], angular[2]]),
+            LieGroup::SE2 => put(p, v, [linear[0], linear[1], angular[2]]),
         }
     }
 
     /// How far the displacement moves the joint's origin, outer axes.
     pub(super) fn shift<S: Scalar>(&self, x: &[S]) -> Vec3<S> {
         match self.kind {
-            GroupKind::Rotation => [S::zero(); 3],
-            GroupKind::Pose => three(x, self.v),
-            GroupKind::Plane => [x[self.v], x[self.v + 1], S::zero()],
+            LieGroup::SO3 => [S::zero(); 3],
+            LieGroup::SE3 => three(x, self.v),
+            LieGroup::SE2 => [x[self.v], x[self.v + 1], S::zero()],
         }
     }
 
@@ -138,7 +138,7 @@ impl Group {
 
     /// Momenta in outer axes about a point that is `shift` further.
     pub(super) fn refer<S: Scalar>(&self, shift: Vec3<S>, p: &mut [S]) {
-        if self.momenta && self.kind != GroupKind::Rotation {
+        if self.momenta && self.kind != LieGroup::SO3 {
             let (linear, angular) = self.split(p);
             self.join((linear, sub3(angular, cross(shift, linear))), p);
         }
@@ -187,7 +187,7 @@ impl Group {
 
     /// Appends the displacement `(step, dp)` to `(x, p)`: what addition alone would get wrong.
     pub(super) fn compose<S: Scalar>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
-        if self.momenta && self.kind != GroupKind::Rotation {
+        if self.momenta && self.kind != LieGroup::SO3 {
             // About the point where the first of both begins.
             let (linear, angular) = self.split(p);
             self.join((linear, add3(angular, cross(self.shift(x), self.split(dp).0))), p);
@@ -231,7 +231,7 @@ impl Group {
             None => [S::zero(), S::zero(), dq[self.q + 2]],
         };
         // Positions stand first: where `shift` looks for those of a displacement.
-        let linear = Group { v: self.q, ..*self }.shift(dq);
+        let linear = LieJoint { v: self.q, ..*self }.shift(dq);
         self.join((r.vector(linear), r.vector(angular)), out);
     }
 
@@ -280,7 +280,7 @@ impl Group {
             put(x, phi, from(step, back));
         }
         let (v, n) = (self.v, self.kind.sizes().1);
-        let local = Group { v: 0, ..*self };
+        let local = LieJoint { v: 0, ..*self };
         let (mut old, mut new) = ([S::zero(); 6], [S::zero(); 6]);
         old[..n].copy_from_slice(&p0[v..v + n]);
         new[..n].copy_from_slice(&p1[v..v + n]);

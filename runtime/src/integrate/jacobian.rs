@@ -10,7 +10,7 @@
 use super::chart::Point;
 use super::field::Field;
 use super::linear::Matrix;
-use crate::system::{Blocks, Differentiable, Group, Real};
+use crate::system::{Blocks, Differentiable, LieJoint, Real};
 use crate::{Dual, Scalar};
 
 /// Coordinates and momenta of one joint, at most.
@@ -22,7 +22,7 @@ type Table<S> = [[S; 2 * NV]; 2 * NV];
 /// One joint about a state.
 struct Joint<S> {
     /// As if it stood first.
-    group: Group,
+    group: LieJoint,
     /// State of the chart, momenta in outer axes.
     base: ([S; NQ], [S; NV]),
     /// Displacement.
@@ -43,10 +43,10 @@ fn first<S: Scalar, const N: usize>(from: &[S]) -> [S; N] {
 }
 
 impl<S: Scalar> Joint<S> {
-    fn new(group: &Group, base: (&[S], &[S]), point: [&[S]; 2], rates: [&[S]; 2]) -> Self {
+    fn new(group: &LieJoint, base: (&[S], &[S]), point: [&[S]; 2], rates: [&[S]; 2]) -> Self {
         let (q, v) = (group.q, group.v);
         Joint {
-            group: Group { q: 0, v: 0, ..*group },
+            group: LieJoint { q: 0, v: 0, ..*group },
             base: (first(&base.0[q..]), first(&base.1[v..])),
             x: first(&point[0][v..]),
             dp: first(&point[1][v..]),
@@ -142,7 +142,7 @@ where
         let [[dv_dq, dv_dp], [dpd_dq, dpd_dp]] = &mut jacobian.blocks;
         let blocks = Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp };
         system.rate_derivatives(t, &self.q, &self.p, &mut rate.x, &mut rate.p, blocks);
-        for group in system.groups() {
+        for group in system.lie_joints() {
             let joint = Joint::new(group, self.chart.held(), point.parts(), rate.parts());
             let (n, v) = (group.kind.sizes().1, group.v);
             let (xd, pd) = joint.rates();

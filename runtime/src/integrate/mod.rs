@@ -15,8 +15,8 @@
 //! | [`Gauss4`] | 1 | 1 complex | `2 n` |
 //! | [`Gauss6`], [`Radau5`] | 1 | 1 real, 1 complex | `3 n` |
 //! | [`Gauss12`] | 1 | 3 complex | `6 n` |
-//! | [`Gauss6Inserted`] | 0 | 0 | `1 + 3 n` |
-//! | [`Gauss12Inserted`] | 0 | 0 | `1 + 6 n` |
+//! | [`Gauss6FixedPoint`] | 0 | 0 | `1 + 3 n` |
+//! | [`Gauss12FixedPoint`] | 0 | 0 | `1 + 6 n` |
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
 //! This is so with [`Collocation::with_iterations`]. Otherwise `n` is at most 30 (60 by insertion) in a step of given size and 10
@@ -68,10 +68,10 @@ pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, 
 pub use field::Field;
 pub use fixed::FixedIterations;
 pub use formulas::{
-    formula, BackwardEuler, Formula, Gauss12, Gauss12Inserted, Gauss4, Gauss6, Gauss6Inserted, ImplicitMidpoint, Radau5,
+    formula, BackwardEuler, Formula, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
 };
 pub use newton::{FixedPoint, Iteration, Newton};
-pub use projection::Projection;
+pub use projection::EnergyProjection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::SemiImplicitEuler;
 pub use solver::Solver;

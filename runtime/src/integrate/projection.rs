@@ -15,7 +15,7 @@ use crate::Scalar;
 ///
 /// It keeps the energy and little else: the error of the trajectory hardly changes.
 #[derive(Clone, Debug)]
-pub struct Projection<Y: Energetic> {
+pub struct EnergyProjection<Y: Energetic> {
     target: Y::Scalar,
     iterations: u32,
     q: Y::Coordinates,
@@ -23,15 +23,15 @@ pub struct Projection<Y: Energetic> {
     gradient: Point<Y>,
 }
 
-impl<Y> Projection<Y>
+impl<Y> EnergyProjection<Y>
 where
     Y: Energetic,
     Y::Scalar: Real,
 {
     /// Onto the energy of a state, in at most so many iterations a step, of which one is enough where steps are small.
     pub fn new(system: &mut Y, q: &Y::Coordinates, p: &Y::Momenta, iterations: u32) -> Self {
-        let (kinetic, potential) = system.state_energy(q, p);
-        Projection {
+        let (kinetic, potential) = system.energies(q, p);
+        EnergyProjection {
             target: kinetic + potential,
             iterations,
             q: q.clone(),
@@ -59,7 +59,7 @@ where
         let mut first = Y::Scalar::zero();
         for iteration in 0..self.iterations {
             field.chart().state(system, delta, &mut self.q, &mut self.p);
-            let (kinetic, potential) = system.state_energy(&self.q, &self.p);
+            let (kinetic, potential) = system.energies(&self.q, &self.p);
             let off = (potential - self.target) + kinetic;
             if iteration == 0 {
                 first = off;

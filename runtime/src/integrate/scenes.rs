@@ -5,8 +5,8 @@ extern crate std;
 use std::vec;
 use std::vec::Vec;
 
-use crate::spatial::{Axis, RigidInertia, Step};
-use crate::system::{Blocks, Differentiable, Group, Real, System};
+use crate::spatial::{Axis, RigidInertia, ElementaryTransform};
+use crate::system::{Blocks, Differentiable, LieJoint, Real, System};
 use crate::tree::{Dims, Kind, Node, Passive, Source, Tree};
 use crate::{Interpreter, Scalar};
 
@@ -28,7 +28,7 @@ pub fn joint<S: Scalar>(tree: &mut Tree<S>, back: usize, kind: Kind<S>, stiffnes
     let o = S::zero();
     let k = tree.nodes.len();
     let (s, c) = (S::constant(0.6), S::constant(0.8));
-    let place = vec![Step::Shift { axis: Axis::X, r: S::constant(0.4) }, Step::Turn { axis: Axis::X, c, s }];
+    let place = vec![ElementaryTransform::Shift { axis: Axis::X, r: S::constant(0.4) }, ElementaryTransform::Turn { axis: Axis::X, c, s }];
     let passive = Passive { damping: S::constant(damping), stiffness: S::constant(stiffness), rest: o, armature: o };
     let size = 1.0 + 0.2 * k as f64;
     tree.nodes.push(Node {
@@ -43,11 +43,11 @@ pub fn joint<S: Scalar>(tree: &mut Tree<S>, back: usize, kind: Kind<S>, stiffnes
         inertia: body(size, [0.2, 0.05, -0.1], [0.03, 0.05, 0.06]),
         passive: vec![passive; kind.nv()],
         kind,
-        shared: None,
+        unknown: None,
         deferred: false,
-        parent_side: false,
-        unturned: false,
-        gather: false,
+        before_joint: false,
+        non_rotating: false,
+        accumulates_momentum: false,
         ends: vec![],
         screws: vec![],
         open: vec![],
@@ -62,7 +62,7 @@ pub fn empty<S: Scalar>() -> Tree<S> {
     Tree {
         nodes: vec![],
         dims: Dims::default(),
-        shared: vec![],
+        unknowns: vec![],
         solve_at_ground: vec![],
         ground_moment: [S::zero(); 3],
         wrenches: vec![],
@@ -130,8 +130,8 @@ impl<S: Real> Scene<S> {
 
 /// Pins and a slider; a spherical joint and pins; a floating tree with a planar and a spherical joint.
 pub fn three<S: Real>() -> [Scene<S>; 3] {
-    let pins = chain(&[Kind::Pin, Kind::Slider, Kind::Pin], 40.0, 0.0);
-    let ball = chain(&[Kind::Spherical, Kind::Pin], 5.0, 0.0);
+    let pins = chain(&[Kind::Revolute, Kind::Prismatic, Kind::Revolute], 40.0, 0.0);
+    let ball = chain(&[Kind::Spherical, Kind::Revolute], 5.0, 0.0);
     let mut free = chain(&[Kind::Floating, Kind::Planar], 5.0, 0.0);
     joint(&mut free, 1, Kind::Spherical, 0.0, 0.0);
     [
@@ -160,15 +160,15 @@ impl System for Oscillator {
         [0.0]
     }
 
-    fn rest(&self) -> [f64; 1] {
+    fn zero_momenta(&self) -> [f64; 1] {
         [0.0]
     }
 
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
 
-    fn state_rates(&mut self, t: f64, q: &[f64; 1], p: &[f64; 1], qd: &mut [f64; 1], pd: &mut [f64; 1]) {
+    fn rates_at(&mut self, t: f64, q: &[f64; 1], p: &[f64; 1], qd: &mut [f64; 1], pd: &mut [f64; 1]) {
         *qd = [p[0] / self.mass];
         *pd = [-self.stiffness * q[0] - self.damping * p[0] / self.mass + self.force * libm::cos(self.rate * t)];
     }
@@ -198,7 +198,7 @@ impl Differentiable for Oscillator {
         pd: &mut [f64; 1],
         derivatives: Blocks<'_, [[f64; 1]; 1]>,
     ) {
-        self.state_rates(t, q, p, v, pd);
+        self.rates_at(t, q, p, v, pd);
         *derivatives.dv_dq = [[0.0]];
         *derivatives.dv_dp = [[1.0 / self.mass]];
         *derivatives.dpd_dq = [[-self.stiffness]];

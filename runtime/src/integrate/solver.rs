@@ -3,7 +3,7 @@
 use super::chart::Point;
 use super::control::{Control, Limits, Step, Tolerance, Tolerances};
 use super::stepper::{norm, Statistics, Stepper};
-use super::{Projection, StepError};
+use super::{EnergyProjection, StepError};
 use crate::system::{Energetic, Real, System};
 use crate::Scalar;
 
@@ -87,7 +87,7 @@ where
             last_error: 1e-4,
             rejections: 0,
             cut: 0,
-            looked: (system.neutral(), system.rest()),
+            looked: (system.neutral(), system.zero_momenta()),
             handled: (0, t),
             scale,
             size,
@@ -206,7 +206,7 @@ where
     /// # Errors
     /// [`StepError`]; the state is then that of the last accepted step.
     pub fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
-        self.settle(system)?;
+        self.project_momenta(system)?;
         // Small against the time, it is exact; and it is what a last step must be to land on the end.
         let rest = t_end - self.t - self.t_carry;
         if rest <= Y::Scalar::zero() {
@@ -251,7 +251,7 @@ where
     }
 
     /// Moves the end of the last step back to the energy that was there at the start, before the next step begins.
-    pub fn project(&mut self, system: &mut Y, projection: &mut Projection<Y>)
+    pub fn project(&mut self, system: &mut Y, projection: &mut EnergyProjection<Y>)
     where
         Y: Energetic,
     {
@@ -266,7 +266,7 @@ where
     }
 
     /// Accepts what is pending.
-    fn settle(&mut self, system: &mut Y) -> Result<(), StepError> {
+    fn project_momenta(&mut self, system: &mut Y) -> Result<(), StepError> {
         if let Some(step) = self.pending {
             self.method.accept(system, self.t, step.h)?;
             (self.t, self.t_carry, self.pending) = (step.end, step.carry, None);
@@ -360,7 +360,7 @@ where
         for (scale, size) in self.scale.x.as_mut().iter_mut().zip(self.size.x.as_ref()) {
             *scale = allowed(tolerances.coordinates, size.to_f64());
         }
-        for group in system.groups() {
+        for group in system.lie_joints() {
             for k in group.kind.positions()..group.kind.sizes().1 {
                 self.scale.x.as_mut()[group.v + k] = Y::Scalar::constant(tolerances.rotations);
             }

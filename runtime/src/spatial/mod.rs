@@ -9,7 +9,7 @@ mod xform;
 
 pub use inertia::{ArticulatedInertia, RigidInertia, SYM};
 pub use vector::{add3, cross, dot3, dot4, scale3, Force, Motion, Vec3};
-pub use xform::{quaternion_matrix, quaternion_rate, Axis, Step};
+pub use xform::{quaternion_matrix, quaternion_rate, Axis, ElementaryTransform};
 
 /// A 3×3 matrix, row by row.
 pub type Mat3<S> = [[S; 3]; 3];

@@ -1,7 +1,7 @@
 //! Elementary transforms and how each quantity passes through them.
 //!
 //! A placement is a list of steps from the parent frame to the child frame. Velocities go down the list
-//! ([`Step::motion`]), momenta, wrenches and inertia come back up it ([`Step::force`], [`Step::inertia`]).
+//! ([`ElementaryTransform::motion`]), momenta, wrenches and inertia come back up it ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
 
 use super::{cross, ArticulatedInertia, Force, Mat3, Motion, Vec3, SYM};
 use crate::Scalar;
@@ -31,7 +31,7 @@ impl Axis {
 
 /// One elementary transform.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Step<S> {
+pub enum ElementaryTransform<S> {
     /// Rotation about an axis by the angle with cosine `c` and sine `s`.
     Turn {
         /// Axis.
@@ -111,18 +111,18 @@ fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: u
     (h[n][a], h[n][b]) = pair(c, s, h[n][a], h[n][b]);
 }
 
-impl<S: Scalar> Step<S> {
+impl<S: Scalar> ElementaryTransform<S> {
     /// Components of a free vector of the parent in the child's axes.
     pub fn vector(&self, x: Vec3<S>) -> Vec3<S> {
         let mut x = x;
         match self {
-            Step::Turn { axis, c, s } => {
+            ElementaryTransform::Turn { axis, c, s } => {
                 let (a, b, _) = axis.cyclic();
                 (x[a], x[b]) = pair_back(*c, *s, x[a], x[b]);
                 x
             }
-            Step::Shift { .. } => x,
-            Step::Rotate(r) => down3(r, x),
+            ElementaryTransform::Shift { .. } => x,
+            ElementaryTransform::Rotate(r) => down3(r, x),
         }
     }
 
@@ -130,20 +130,20 @@ impl<S: Scalar> Step<S> {
     pub fn vector_back(&self, x: Vec3<S>) -> Vec3<S> {
         let mut x = x;
         match self {
-            Step::Turn { axis, c, s } => {
+            ElementaryTransform::Turn { axis, c, s } => {
                 let (a, b, _) = axis.cyclic();
                 (x[a], x[b]) = pair(*c, *s, x[a], x[b]);
                 x
             }
-            Step::Shift { .. } => x,
-            Step::Rotate(r) => up3(r, x),
+            ElementaryTransform::Shift { .. } => x,
+            ElementaryTransform::Rotate(r) => up3(r, x),
         }
     }
 
     /// Velocity of the parent frame as seen at the child frame, in child axes: `X Ω`.
     pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
         match self {
-            Step::Shift { axis, r } => {
+            ElementaryTransform::Shift { axis, r } => {
                 let (a, b, _) = axis.cyclic();
                 let mut m = *m;
                 m.lin[a] = m.lin[a] + *r * m.ang[b];
@@ -157,7 +157,7 @@ impl<S: Scalar> Step<S> {
     /// Momentum or wrench of the child at the parent frame: `Xᵀ P`.
     pub fn force(&self, f: &Force<S>) -> Force<S> {
         match self {
-            Step::Shift { axis, r } => {
+            ElementaryTransform::Shift { axis, r } => {
                 let (a, b, _) = axis.cyclic();
                 let mut f = *f;
                 f.ang[a] = f.ang[a] - *r * f.lin[b];
@@ -168,10 +168,10 @@ impl<S: Scalar> Step<S> {
         }
     }
 
-    /// Wrench of the parent expressed at the child frame: the inverse of [`Step::force`].
+    /// Wrench of the parent expressed at the child frame: the inverse of [`ElementaryTransform::force`].
     pub fn force_back(&self, f: &Force<S>) -> Force<S> {
         match self {
-            Step::Shift { axis, r } => Step::Shift { axis: *axis, r: -*r }.force(f),
+            ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis: *axis, r: -*r }.force(f),
             _ => Force { lin: self.vector(f.lin), ang: self.vector(f.ang) },
         }
     }
@@ -179,7 +179,7 @@ impl<S: Scalar> Step<S> {
     /// First moment of mass `m` in the parent frame.
     pub fn moment(&self, m: S, s: Vec3<S>) -> Vec3<S> {
         match self {
-            Step::Shift { axis, r } => {
+            ElementaryTransform::Shift { axis, r } => {
                 let (_, _, n) = axis.cyclic();
                 let mut s = s;
                 s[n] = s[n] + m * *r;
@@ -192,7 +192,7 @@ impl<S: Scalar> Step<S> {
     /// Inertia of the child at the parent frame: `Xᵀ M X`.
     pub fn inertia(&self, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
         match self {
-            Step::Turn { axis, c, s } => {
+            ElementaryTransform::Turn { axis, c, s } => {
                 let (a, b, n) = axis.cyclic();
                 let mut m = *m;
                 turn_sym(*c, *s, &mut m.a, a, b, n);
@@ -200,8 +200,8 @@ impl<S: Scalar> Step<S> {
                 turn_sym(*c, *s, &mut m.j, a, b, n);
                 m
             }
-            Step::Shift { axis, r } => shift_inertia(*axis, *r, m),
-            Step::Rotate(r) => {
+            ElementaryTransform::Shift { axis, r } => shift_inertia(*axis, *r, m),
+            ElementaryTransform::Rotate(r) => {
                 ArticulatedInertia { a: congruence_sym(r, &m.a), h: congruence(r, &m.h), j: congruence_sym(r, &m.j) }
             }
         }
@@ -210,33 +210,33 @@ impl<S: Scalar> Step<S> {
     /// A symmetric tensor of the child `[xx, xy, xz, yy, yz, zz]` in the parent's axes.
     pub fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
         match self {
-            Step::Turn { axis, c, s } => {
+            ElementaryTransform::Turn { axis, c, s } => {
                 let (a, b, n) = axis.cyclic();
                 let mut m = *m;
                 turn_sym(*c, *s, &mut m, a, b, n);
                 m
             }
-            Step::Shift { .. } => *m,
-            Step::Rotate(r) => congruence_sym(r, m),
+            ElementaryTransform::Shift { .. } => *m,
+            ElementaryTransform::Rotate(r) => congruence_sym(r, m),
         }
     }
 
     /// Appends the step to the pose `(R, r)` of a frame.
     pub fn pose(&self, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
         match self {
-            Step::Turn { axis, c, s } => {
+            ElementaryTransform::Turn { axis, c, s } => {
                 let (a, b, _) = axis.cyclic();
                 for row in rot.iter_mut() {
                     (row[a], row[b]) = pair_back(*c, *s, row[a], row[b]);
                 }
             }
-            Step::Shift { axis, r } => {
+            ElementaryTransform::Shift { axis, r } => {
                 let (_, _, n) = axis.cyclic();
                 for (x, row) in pos.iter_mut().zip(rot.iter()) {
                     *x = *x + *r * row[n];
                 }
             }
-            Step::Rotate(m) => {
+            ElementaryTransform::Rotate(m) => {
                 for row in rot.iter_mut() {
                     *row = down3(m, *row);
                 }

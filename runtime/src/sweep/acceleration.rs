@@ -30,7 +30,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &w.constraints.rhs);
         self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
         self.collect_rates(&w.acceleration, &w.first, a);
-        self.collect_multipliers(&w.acceleration.shared_rate, &mut w.constraints.multipliers);
+        self.collect_multipliers(&w.acceleration.unknown_rate, &mut w.constraints.multipliers);
         for i in 0..self.tree.nodes.len() {
             self.add_reference_node(i, w, a);
         }

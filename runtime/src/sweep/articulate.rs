@@ -1,7 +1,7 @@
 //! Joint coordinates to joint transforms.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, RigidInertia, Step};
+use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, RigidInertia, ElementaryTransform};
 use crate::tree::{quarter_turn, Kind, Source};
 use crate::workspace::{Poses, TurnedBody};
 use crate::Scalar;
@@ -24,25 +24,25 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         };
         let turn = |angle: S| {
             let (s, c) = quarter_turn((angle + node.phase).sin_cos(), node.quarter);
-            Step::Turn { axis: Axis::Z, c, s }
+            ElementaryTransform::Turn { axis: Axis::Z, c, s }
         };
-        let shift = |axis: Axis, r: S| Step::Shift { axis, r };
+        let shift = |axis: Axis, r: S| ElementaryTransform::Shift { axis, r };
         let x = node.ratio * q[0] + node.offset;
         w.coordinates[i][0] = x;
         if let Kind::Planar = node.kind {
             w.coordinates[i].copy_from_slice(&q[..3]);
         }
         match node.kind {
-            Kind::Pin => self.pin(i, x, w),
-            Kind::Slider => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
+            Kind::Revolute => self.pin(i, x, w),
+            Kind::Prismatic => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
             Kind::Helical { pitch } => w.joint[i].set(&[shift(Axis::Z, node.slide + pitch * x), turn(x)]),
             Kind::Planar => w.joint[i].set(&[shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
-            Kind::Spherical => w.joint[i].set(&[Step::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))]),
+            Kind::Spherical => w.joint[i].set(&[ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))]),
             Kind::Floating => w.joint[i].set(&[
                 shift(Axis::X, q[0]),
                 shift(Axis::Y, q[1]),
                 shift(Axis::Z, q[2]),
-                Step::Rotate(quaternion_matrix([q[3], q[4], q[5], q[6]])),
+                ElementaryTransform::Rotate(quaternion_matrix([q[3], q[4], q[5], q[6]])),
             ]),
         }
     }
@@ -50,7 +50,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Steps of a pin with joint coordinate `x`.
     fn pin(&self, i: usize, x: S, w: &mut Poses<S>) {
         let node = &self.tree.nodes[i];
-        let shift = |axis: Axis, r: S| Step::Shift { axis, r };
+        let shift = |axis: Axis, r: S| ElementaryTransform::Shift { axis, r };
         let (mut angle, mut quarter, mut slide) = (x + node.phase, node.quarter, node.slide);
         let mut placing = [shift(Axis::X, S::zero()), shift(Axis::Y, S::zero())];
         let swung = self.swung(i);
@@ -63,13 +63,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             slide = slide + rz;
         }
         let (s, c) = quarter_turn(angle.sin_cos(), quarter);
-        let turn = Step::Turn { axis: Axis::Z, c, s };
+        let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
         let [px, py] = placing;
         let placed = if swung { 2 } else { 0 };
         let steps = [px, py, shift(Axis::Z, slide), turn];
-        let last = if node.unturned { 3 } else { 4 };
+        let last = if node.non_rotating { 3 } else { 4 };
         w.joint[i].set_with(placed, &steps[2 - placed..last]);
-        if node.unturned {
+        if node.non_rotating {
             let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }
@@ -89,10 +89,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Rate);
         let (q, v, qd) = (&q[at..], &v[vat..], &mut qd[at..]);
         match node.kind {
-            Kind::Pin | Kind::Slider | Kind::Helical { .. } => qd[0] = v[0],
+            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => qd[0] = v[0],
             Kind::Planar => {
                 let (s, c) = quarter_turn((q[2] + node.phase).sin_cos(), node.quarter);
-                let out = Step::Turn { axis: Axis::Z, c, s }.vector_back([v[0], v[1], v[2]]);
+                let out = ElementaryTransform::Turn { axis: Axis::Z, c, s }.vector_back([v[0], v[1], v[2]]);
                 qd[..3].copy_from_slice(&out);
             }
             Kind::Spherical => {
@@ -100,7 +100,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
             Kind::Floating => {
                 let turn = [q[3], q[4], q[5], q[6]];
-                let lin = Step::Rotate(quaternion_matrix(turn)).vector_back([v[0], v[1], v[2]]);
+                let lin = ElementaryTransform::Rotate(quaternion_matrix(turn)).vector_back([v[0], v[1], v[2]]);
                 qd[..3].copy_from_slice(&lin);
                 qd[3..7].copy_from_slice(&quaternion_rate(turn, [v[3], v[4], v[5]]));
             }

@@ -63,7 +63,7 @@ impl<S: Scalar> Closure<S> {
     pub fn rows(&self) -> usize {
         match self {
             Closure::Fixed => 6,
-            Closure::Pin | Closure::Slider | Closure::Helical { .. } => 5,
+            Closure::Revolute | Closure::Prismatic | Closure::Helical { .. } => 5,
             Closure::Cylindrical | Closure::Universal => 4,
             Closure::Planar | Closure::Spherical | Closure::RollingDisc { .. } | Closure::RollingBall { .. } => 3,
             Closure::PointOnLine => 2,
@@ -86,8 +86,8 @@ impl<S: Scalar> Closure<S> {
 
     /// Whether it leaves what a joint would: the motions of a group.
     pub fn is_joint(&self) -> bool {
-        use Closure::{Cylindrical, Fixed, Helical, Pin, Planar, Slider, Spherical};
-        matches!(self, Pin | Slider | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
+        use Closure::{Cylindrical, Fixed, Helical, Revolute, Planar, Prismatic, Spherical};
+        matches!(self, Revolute | Prismatic | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
     }
 
     /// Whether the rows are constants.
@@ -107,8 +107,8 @@ impl<S: Scalar> Closure<S> {
     /// Rows that are constants, by components.
     fn components(&self) -> &'static [usize] {
         match self {
-            Closure::Pin => &[0, 1, 2, 3, 4],
-            Closure::Slider => &[0, 1, 3, 4, 5],
+            Closure::Revolute => &[0, 1, 2, 3, 4],
+            Closure::Prismatic => &[0, 1, 3, 4, 5],
             Closure::Cylindrical | Closure::Helical { .. } => &[0, 1, 3, 4],
             Closure::Planar => &[2, 3, 4],
             Closure::Spherical | Closure::Universal => &[0, 1, 2],
@@ -187,7 +187,7 @@ impl<S: Scalar> Closure<S> {
             *out = small[k];
         }
         // Where `d` is not to vanish, its components change with a tilt as well, which is not what the rows say.
-        if let Closure::Slider | Closure::Cylindrical | Closure::Helical { .. } = self {
+        if let Closure::Prismatic | Closure::Cylindrical | Closure::Helical { .. } = self {
             (out[0], out[1]) = (d[0] - d[2] * z[0], d[1] - d[2] * z[1]);
         }
         match self {

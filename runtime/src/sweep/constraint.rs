@@ -9,7 +9,7 @@
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
-use crate::tree::{Bond, Constraint, Cut, Shared, Source, Tree, TreeFrame};
+use crate::tree::{Bond, Constraint, Cut, Unknown, Source, Tree, TreeFrame};
 use crate::workspace::{Factor, Poses, Relative, Workspace};
 use crate::Scalar;
 use alloc::vec::Vec;
@@ -192,7 +192,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Ratio with which the freedom of node `i` enters the coupling of shared `g`; zero for all else.
     pub(super) fn coupled(&self, i: usize, g: usize) -> S {
-        let Shared::Row(r) = self.tree.shared[g] else { return S::zero() };
+        let Unknown::Row(r) = self.tree.unknowns[g] else { return S::zero() };
         match &self.tree.constraint_of(r).bond {
             Bond::Coupling { terms, .. } => terms.iter().find(|(node, _)| *node == i).map_or(S::zero(), |(_, a)| *a),
             Bond::Cut(_) => S::zero(),
@@ -216,7 +216,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// that its bodies cannot move along it. Where they can move along none of its rows, all of them are rounding, and small
     /// beside what a body of 1 kg or 1 kg m² would give, for which the one stands.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
-        let ng = self.tree.shared.len();
+        let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
         let all = self.tree.constraint_of(r).slots.iter().fold(S::zero(), |sum, &h| sum + f.whole[h]);
         let floor = tolerance * (f.whole[g] + tolerance * (all + S::one()));
@@ -260,7 +260,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         if self.tree.constraints.is_empty() {
             return;
         }
-        self.collect_multipliers(&w.velocity.shared_rate, &mut w.constraints.multipliers);
+        self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
         w.constraints.pull.fill(S::zero());
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(cut) = &constraint.bond else { continue };
@@ -312,7 +312,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::hold_node`], after the velocities: the negative of the multipliers, and what they are at the
     /// ends of cuts.
     pub fn hold_begin(&self, w: &mut Workspace<S>) {
-        self.collect_multipliers(&w.velocity.shared_rate, &mut w.constraints.multipliers);
+        self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
         w.constraints.multipliers.iter_mut().for_each(|x| *x = -*x);
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(_) = &constraint.bond else { continue };
@@ -367,7 +367,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Residuals `φ(q)` of the positions and the entries of `Φ`, placed as [`Tree::entry_columns`] says.
-    pub fn closure(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, phi: &mut [S], entries: &mut [S]) {
+    pub fn constraint_residuals(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, phi: &mut [S], entries: &mut [S]) {
         self.place_rows(q, u, w, true);
         self.residuals(w, phi);
         entries.fill(S::zero());
@@ -408,7 +408,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Velocities and multipliers `σ` of a state, and momenta freed of them: `M v = p⁺ − Φᵀσ`.
-    pub fn settle(
+    pub fn project_momenta(
         &self,
         q: &[S],
         p: &[S],
@@ -434,7 +434,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Newton's step onto the closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`, with the residuals
     /// `φ` and the pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
-    pub fn correction(
+    pub fn position_correction(
         &self,
         q: &[S],
         u: &Inputs<S>,
@@ -469,11 +469,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
     pub fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
-        let ng = self.tree.shared.len();
+        let ng = self.tree.unknowns.len();
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
             // Zero where the pivot was not taken: x · (ρ x).
             let x = w.factor.gram[g * ng + g];
-            pivots[r] = x * (w.factor.shared[g].rho * -x);
+            pivots[r] = x * (w.factor.unknown_pivots[g].rho * -x);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{Freedom, Shared, Source};
+use crate::tree::{Freedom, Unknown, Source};
 use crate::workspace::{Factor, Pivot, Poses, RowState};
 use crate::Scalar;
 
@@ -31,22 +31,22 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Columns and inertias of what stays open: only where they are read, so that many small loops cost as much as they are.
     fn clear_open(&self, f: &mut Factor<S>) {
-        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
         for (i, node) in self.tree.nodes.iter().enumerate() {
-            for g in Self::open_before(node, 0).chain(node.shared) {
+            for g in Self::open_before(node, 0).chain(node.unknown) {
                 f.columns[g * n + i] = Force::zero();
             }
         }
-        for (g, shared) in self.tree.shared.iter().enumerate() {
+        for (g, shared) in self.tree.unknowns.iter().enumerate() {
             f.gram[g * ng + g] = S::zero();
             let clear = |h: usize, gram: &mut [S]| {
                 gram[g * ng + h] = S::zero();
                 gram[h * ng + g] = S::zero();
             };
             match shared {
-                Shared::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
-                Shared::Row(r) => {
+                Unknown::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
+                Unknown::Row(r) => {
                     f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
                     f.gram[g * ng + g] = -self.compliance(*r);
                 }
@@ -61,7 +61,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let inner = &self.tree.nodes[p];
         for &g in &node.screws {
             self.trace.at(Some(i), Quantity::Inertia);
-            let at_parent = match inner.shared == Some(g) {
+            let at_parent = match inner.unknown == Some(g) {
                 true => inner.kind.axis(0).motion(S::one()),
                 false => self.leaving(poses, p).fold(f.screws[g * n + p], |m, step| step.motion(&m)),
             };
@@ -74,7 +74,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
         let mut m = f.m[i]; // M*_i (4.48)
-        if node.parent_side {
+        if node.before_joint {
             self.trace.at(Some(i), Quantity::Inertia);
             m = self.leaving(poses, i).rev().fold(m, |m, step| step.inertia(&m));
             for g in Self::open_before(node, 0) {
@@ -84,16 +84,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         self.trace.at(Some(i), Quantity::Pivot);
         for (k, &g) in node.solve_before.iter().enumerate() {
-            self.solve_shared(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
+            self.solve_unknown(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
         }
         for k in 0..node.kind.nv() {
             self.eliminate(i, k, first[i] + k, &mut m, f);
         }
         for (k, &g) in node.solve_after.iter().enumerate() {
-            self.solve_shared(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
+            self.solve_unknown(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
         }
         f.m[i] = m; // M'_i (4.44)
-        let ng = self.tree.shared.len();
+        let ng = self.tree.unknowns.len();
         for (&h, &g) in node.ends.iter().flat_map(|h| node.screws.iter().map(move |g| (h, g))) {
             let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
             f.gram[g * ng + h] = x;
@@ -115,21 +115,21 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (k, &g) in ground.iter().enumerate() {
             self.trace.at(None, Quantity::Pivot);
             let mut nothing = ArticulatedInertia::zero();
-            self.solve_shared(g, None, ground[k + 1..].iter().copied(), &mut nothing, f);
+            self.solve_unknown(g, None, ground[k + 1..].iter().copied(), &mut nothing, f);
         }
     }
 
     /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of a shared coordinate.
     fn eliminate(&self, i: usize, k: usize, freedom: usize, m: &mut ArticulatedInertia<S>, f: &mut Factor<S>) {
         let node = &self.tree.nodes[i];
-        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         let e = node.kind.axis(k);
         let armature = node.passive[k].armature;
         let u = column(&e, m); // U = M* E
         for h in Self::open_after(node, 0) {
             f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
         }
-        if let Some(g) = node.shared {
+        if let Some(g) = node.unknown {
             let a = node.ratio;
             let old = f.cross[freedom * ng + g];
             let column = f.columns[g * n + i].plus(&u.times(a));
@@ -151,7 +151,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for h in Self::open_after(node, 0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
-            if let Shared::Row(_) = self.tree.shared[h] {
+            if let Unknown::Row(_) = self.tree.unknowns[h] {
                 f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             }
             for h2 in Self::open_after(node, 0) {
@@ -162,7 +162,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Eliminates shared coordinate or row `g` at node `i` (`None`: the ground), `open` being those that stay open.
-    fn solve_shared(
+    fn solve_unknown(
         &self,
         g: usize,
         i: Option<usize>,
@@ -170,9 +170,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         m: &mut ArticulatedInertia<S>,
         f: &mut Factor<S>,
     ) {
-        match self.tree.shared[g] {
-            Shared::Velocity(_) => self.solve_open(g, i, open, m, f),
-            Shared::Row(_) => {
+        match self.tree.unknowns[g] {
+            Unknown::Velocity(_) => self.solve_open(g, i, open, m, f),
+            Unknown::Row(_) => {
                 let later = core::mem::take(&mut f.later[g]);
                 self.solve_open(g, i, later.iter().copied(), m, f);
                 f.later[g] = later;
@@ -188,11 +188,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         m: &mut ArticulatedInertia<S>,
         f: &mut Factor<S>,
     ) {
-        let (n, ng) = (self.tree.nodes.len(), self.tree.shared.len());
+        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         let u = i.map_or(Force::zero(), |i| f.columns[g * n + i]);
-        let rho = match self.tree.shared[g] {
-            Shared::Velocity(_) => S::one() / f.gram[g * ng + g],
-            Shared::Row(r) => self.row_pivot(g, r, f),
+        let rho = match self.tree.unknowns[g] {
+            Unknown::Velocity(_) => S::one() / f.gram[g * ng + g],
+            Unknown::Row(r) => self.row_pivot(g, r, f),
         };
         let k = u.times(rho);
         for a in 0..6 {
@@ -201,21 +201,21 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
         for h in open.clone() {
-            f.shared_cross[g * ng + h] = f.gram[g * ng + h];
+            f.unknown_cross[g * ng + h] = f.gram[g * ng + h];
         }
         for h in open.clone() {
-            let c = f.shared_cross[g * ng + h];
-            if let (Shared::Velocity(_), Shared::Row(_)) = (self.tree.shared[g], self.tree.shared[h]) {
+            let c = f.unknown_cross[g * ng + h];
+            if let (Unknown::Velocity(_), Unknown::Row(_)) = (self.tree.unknowns[g], self.tree.unknowns[h]) {
                 f.whole[h] = f.whole[h] + c * (rho * c);
             }
             if let Some(i) = i {
                 f.columns[h * n + i] = f.columns[h * n + i].minus(&k.times(c));
             }
             for h2 in open.clone() {
-                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (rho * f.shared_cross[g * ng + h2]);
+                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (rho * f.unknown_cross[g * ng + h2]);
             }
         }
-        f.shared[g] = Pivot { u, k, rho, armature: S::zero() };
+        f.unknown_pivots[g] = Pivot { u, k, rho, armature: S::zero() };
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::newton::{Accelerations, ClassicMotion};
 use super::{Inputs, Quantity, Sweeps, Trace};
-use crate::spatial::{add3, scale3, Mat3, Step, Vec3};
+use crate::spatial::{add3, scale3, Mat3, ElementaryTransform, Vec3};
 use crate::tree::{Freedom, Source, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -57,7 +57,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `J̇ v` and its like for each of `frames`: acceleration `[linear; angular]` at `v̇ = 0`, prescribed accelerations
     /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in ground
     /// axes the frame accelerates by `R (J v̇ + drift)`.
-    pub fn drifts<'b>(
+    pub fn bias_accelerations<'b>(
         &self,
         q: &[S],
         v: &[S],
@@ -99,8 +99,8 @@ fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
 }
 
 /// Puts a step before the pose `(rot, pos)`.
-fn before<S: Scalar>(step: &Step<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
-    if let Step::Shift { axis, r } = step {
+fn before<S: Scalar>(step: &ElementaryTransform<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
+    if let ElementaryTransform::Shift { axis, r } = step {
         let (_, _, n) = axis.cyclic();
         pos[n] = pos[n] + *r;
         return;

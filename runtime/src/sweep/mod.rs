@@ -31,7 +31,7 @@ pub use kinematics::FrameState;
 pub use newton::Accelerations;
 pub use solve::Load;
 
-use crate::spatial::{Force, Motion, RigidInertia, Step};
+use crate::spatial::{Force, Motion, RigidInertia, ElementaryTransform};
 use crate::tree::{Node, Tree, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -46,7 +46,7 @@ pub enum Quantity {
     /// `U`, `Mj`, `k`.
     Pivot,
     /// `D`, `D'`.
-    Remainder,
+    BiasMomentum,
     /// `Ω̂`, `Ω`.
     Velocity,
     /// `q̇` or `ν`.
@@ -124,11 +124,11 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Whether the parent's frame does not turn, so that the way from it to node `i` does.
     fn swung(&self, i: usize) -> bool {
-        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].unturned)
+        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].non_rotating)
     }
 
     /// Constant steps from the parent frame to the joint of node `i`.
-    fn place(&self, i: usize) -> &[Step<S>] {
+    fn place(&self, i: usize) -> &[ElementaryTransform<S>] {
         match self.swung(i) {
             true => &[],
             false => &self.tree.nodes[i].place,
@@ -137,7 +137,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Inertia of the body of node `i` in the node frame.
     fn inertia<'b>(&'b self, w: &'b crate::workspace::Poses<S>, i: usize) -> &'b RigidInertia<S> {
-        match self.tree.nodes[i].unturned {
+        match self.tree.nodes[i].non_rotating {
             true => &w.body[i].inertia,
             false => &self.tree.nodes[i].inertia,
         }
@@ -148,8 +148,8 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         &'b self,
         w: &crate::workspace::Poses<S>,
         frame: &'b TreeFrame<S>,
-    ) -> impl DoubleEndedIterator<Item = Step<S>> + 'b {
-        let body = frame.node.filter(|&i| self.tree.nodes[i].unturned).map(|i| w.body[i].step());
+    ) -> impl DoubleEndedIterator<Item = ElementaryTransform<S>> + 'b {
+        let body = frame.node.filter(|&i| self.tree.nodes[i].non_rotating).map(|i| w.body[i].step());
         body.into_iter().chain(frame.place.iter().copied())
     }
 
@@ -158,7 +158,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         &'b self,
         w: &'b crate::workspace::Poses<S>,
         i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         self.place(i).iter().chain(w.joint[i].get())
     }
 
@@ -167,9 +167,9 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         &'b self,
         w: &'b crate::workspace::Poses<S>,
         i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         let joint = &w.joint[i];
-        let steps = if self.tree.nodes[i].parent_side { joint.placing() } else { joint.get() };
+        let steps = if self.tree.nodes[i].before_joint { joint.placing() } else { joint.get() };
         self.place(i).iter().chain(steps)
     }
 
@@ -178,8 +178,8 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         &'b self,
         w: &'b crate::workspace::Poses<S>,
         i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
-        let own: &[Step<S>] = if self.tree.nodes[i].parent_side { w.joint[i].own() } else { &[] };
+    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
+        let own: &[ElementaryTransform<S>] = if self.tree.nodes[i].before_joint { w.joint[i].own() } else { &[] };
         own.iter()
     }
 
@@ -222,7 +222,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.coordinate_rates(q, v, qd);
         self.loads(u, w);
         self.constraint_pull(w);
-        self.gather_momenta(p, w);
+        self.accumulate_momenta(p, w);
         self.momentum_rates(u, w, pd);
     }
 

@@ -1,7 +1,7 @@
 //! Momenta from velocities, and kinetic energy.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::tree::{Shared, Source};
+use crate::tree::{Unknown, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -51,12 +51,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Kinetic energy from twice the sum of all nodes: shared coordinates, and the half.
     pub fn kinetic_end(&self, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
-        for (g, shared) in self.tree.shared.iter().enumerate() {
+        for (g, shared) in self.tree.unknowns.iter().enumerate() {
             twice = match *shared {
-                Shared::Velocity(v) => twice + p[v] * w.velocity.shared_rate[g],
+                Unknown::Velocity(v) => twice + p[v] * w.velocity.unknown_rate[g],
                 // Of p⁺ᵀv the part σᵀΦv is no energy.
-                Shared::Row(r) => {
-                    let sigma = w.velocity.shared_rate[g];
+                Unknown::Row(r) => {
+                    let sigma = w.velocity.unknown_rate[g];
                     twice - (w.constraints.rhs[r] + self.compliance(r) * sigma) * sigma
                 }
             };
@@ -70,7 +70,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Energy);
         let rate = |k: usize| w.velocity.rate[w.first[i] + k];
         match node.source {
-            Source::State { v, .. } if node.shared.is_none() => {
+            Source::State { v, .. } if node.unknown.is_none() => {
                 for k in 0..node.kind.nv() {
                     twice = twice + p[v + k] * rate(k);
                 }

@@ -5,7 +5,7 @@
 //! what the bodies' own wrenches are made of.
 
 use super::{Inputs, Quantity, Sweeps, Trace};
-use crate::spatial::{add3, cross, Axis, Force, Motion, RigidInertia, Step, Vec3};
+use crate::spatial::{add3, cross, Axis, Force, Motion, RigidInertia, ElementaryTransform, Vec3};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -40,7 +40,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         // A slide along the axis of a turn is made after it, where `B` is that of the body.
         let steps = w.poses.joint[i].own();
         let late = match node.kind {
-            Kind::Pin | Kind::Helical { .. } => Some(0),
+            Kind::Revolute | Kind::Helical { .. } => Some(0),
             _ => None,
         };
         for (k, step) in steps.iter().enumerate() {
@@ -109,9 +109,9 @@ pub(super) struct ClassicMotion<S> {
 
 impl<S: Scalar> ClassicMotion<S> {
     /// On to the next frame, fixed to this one.
-    pub(super) fn carry(&mut self, step: &Step<S>) {
+    pub(super) fn carry(&mut self, step: &ElementaryTransform<S>) {
         match step {
-            Step::Shift { axis, r } => {
+            ElementaryTransform::Shift { axis, r } => {
                 let (a, b, n) = axis.cyclic();
                 let column = self.column(*axis);
                 for k in [a, b, n] {
@@ -144,7 +144,7 @@ impl<S: Scalar> ClassicMotion<S> {
             (Source::Drive { v, .. }, _) => node.ratio * u.drive_a[v + k],
             (Source::State { v, .. }, Accelerations::Given(a)) => node.ratio * a[v + k],
             (_, Accelerations::Zero) => S::zero(),
-            (_, Accelerations::Chosen) if node.shared.is_some() && !node.deferred => S::zero(),
+            (_, Accelerations::Chosen) if node.unknown.is_some() && !node.deferred => S::zero(),
             (_, Accelerations::Chosen) => {
                 let (part, z) = match axis {
                     Freedom::Unit(z) if z < 3 => (&mut self.accel, z),

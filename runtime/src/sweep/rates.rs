@@ -24,8 +24,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
     /// node's own axis is known: `EᵀP* = p − armature · rate`, less what couplings hold of `p`.
-    pub fn gather_momenta(&self, p: &[S], w: &mut Workspace<S>) {
-        for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].gather) {
+    pub fn accumulate_momenta(&self, p: &[S], w: &mut Workspace<S>) {
+        for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].accumulates_momentum) {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
@@ -33,11 +33,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Momentum);
-            if node.gather {
+            if node.accumulates_momentum {
                 w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
             }
-            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].gather) else { continue };
-            let mut total = match node.gather {
+            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].accumulates_momentum) else { continue };
+            let mut total = match node.accumulates_momentum {
                 true => w.force[i],
                 false => {
                     let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
@@ -45,7 +45,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
             };
             if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
-                if node.shared.is_none() || node.deferred {
+                if node.unknown.is_none() || node.deferred {
                     let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
                     *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
                 }
@@ -60,7 +60,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::MomentumRate);
-        if node.gather {
+        if node.accumulates_momentum {
             let mut motion = w.velocity.hat[i];
             node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
             let axis = node.kind.axis(0);
@@ -71,8 +71,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let m = &w.factor.m[i];
         let (hat, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
         let gyro = match node.kind {
-            Kind::Pin => gyro_turn(m, &hat, &d),
-            Kind::Slider => gyro_slide(m, &hat, &d),
+            Kind::Revolute => gyro_turn(m, &hat, &d),
+            Kind::Prismatic => gyro_slide(m, &hat, &d),
             Kind::Helical { pitch } => gyro_turn(m, &hat, &d) + pitch * gyro_slide(m, &hat, &d),
             Kind::Planar | Kind::Spherical | Kind::Floating => {
                 let force = w.velocity.omega[i].cross_force(&m.times(&hat).plus(&d));

@@ -6,7 +6,7 @@
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{Freedom, Shared, Source};
+use crate::tree::{Freedom, Unknown, Source};
 use crate::workspace::{Factor, Poses, Solution, Workspace};
 use crate::Scalar;
 
@@ -47,29 +47,29 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         load: &Load<S>,
         sol: &mut Solution<S>,
     ) {
-        self.remainder_begin(load, sol);
+        self.bias_momentum_begin(load, sol);
         for i in (0..self.tree.nodes.len()).rev() {
-            self.remainder_node(i, poses, first, f, load, sol);
+            self.bias_momentum_node(i, poses, first, f, load, sol);
         }
-        self.remainder_ground(f, load, sol);
+        self.bias_momentum_ground(f, load, sol);
         self.motion_ground(f, load, sol);
         for i in 0..self.tree.nodes.len() {
             self.motion_node(i, poses, first, f, load, sol);
         }
     }
 
-    /// Before the first [`Sweeps::remainder_node`].
-    pub fn remainder_begin(&self, load: &Load<S>, sol: &mut Solution<S>) {
+    /// Before the first [`Sweeps::bias_momentum_node`].
+    pub fn bias_momentum_begin(&self, load: &Load<S>, sol: &mut Solution<S>) {
         match load.seeds {
             Some(seeds) => sol.d.copy_from_slice(seeds),
             None => sol.d.fill(Force::zero()),
         }
-        // `shared_rate` holds the momentum remainder of open coordinates until the forward sweep overwrites it.
-        sol.shared_rate.fill(S::zero());
+        // `unknown_rate` holds the momentum remainder of open coordinates until the forward sweep overwrites it.
+        sol.unknown_rate.fill(S::zero());
     }
 
     /// `D`, `D'` and `(p − d) / Mj` of node `i`, all nodes behind it being done.
-    pub fn remainder_node(
+    pub fn bias_momentum_node(
         &self,
         i: usize,
         poses: &Poses<S>,
@@ -79,18 +79,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol: &mut Solution<S>,
     ) {
         let node = &self.tree.nodes[i];
-        self.trace.at(Some(i), Quantity::Remainder);
+        self.trace.at(Some(i), Quantity::BiasMomentum);
         let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
         for (k, &g) in node.solve_before.iter().enumerate() {
             let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
-            d = d.plus(&f.shared[g].u.times(e));
+            d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         for k in 0..node.kind.nv() {
             self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
         }
         for (k, &g) in node.solve_after.iter().enumerate() {
             let e = self.shared_remainder(g, f, load, sol, Self::open_after(node, k + 1));
-            d = d.plus(&f.shared[g].u.times(e));
+            d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
         if let Some(parent) = node.parent {
@@ -99,8 +99,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// After the last [`Sweeps::remainder_node`]: coordinates solved at the ground.
-    pub fn remainder_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+    /// After the last [`Sweeps::bias_momentum_node`]: coordinates solved at the ground.
+    pub fn bias_momentum_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
             self.shared_remainder(g, f, load, sol, ground[k + 1..].iter().copied());
@@ -119,11 +119,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         d: &mut Force<S>,
     ) {
         let node = &self.tree.nodes[i];
-        let ng = self.tree.shared.len();
+        let ng = self.tree.unknowns.len();
         let axis = node.kind.axis(k);
         let pivot = &f.pivots[freedom];
-        if let Some(g) = node.shared {
-            sol.shared_rate[g] = sol.shared_rate[g] + node.ratio * axis.dot(d);
+        if let Some(g) = node.unknown {
+            sol.unknown_rate[g] = sol.unknown_rate[g] + node.ratio * axis.dot(d);
             return;
         }
         let e = match node.source {
@@ -140,7 +140,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         };
         for h in Self::open_after(node, 0) {
-            sol.shared_rate[h] = sol.shared_rate[h] + f.cross[freedom * ng + h] * e;
+            sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
         }
         sol.e[freedom] = e;
     }
@@ -154,18 +154,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol: &mut Solution<S>,
         open: impl Iterator<Item = usize>,
     ) -> S {
-        let ng = self.tree.shared.len();
-        let given = match self.tree.shared[g] {
-            Shared::Velocity(v) => load.p[v],
-            Shared::Row(r) => load.rows[r],
+        let ng = self.tree.unknowns.len();
+        let given = match self.tree.unknowns[g] {
+            Unknown::Velocity(v) => load.p[v],
+            Unknown::Row(r) => load.rows[r],
         };
-        let e = (given - sol.shared_rate[g]) * f.shared[g].rho;
-        let mut add = |h: usize| sol.shared_rate[h] = sol.shared_rate[h] + f.shared_cross[g * ng + h] * e;
-        match self.tree.shared[g] {
-            Shared::Velocity(_) => open.for_each(add),
-            Shared::Row(_) => f.later[g].iter().for_each(|&h| add(h)),
+        let e = (given - sol.unknown_rate[g]) * f.unknown_pivots[g].rho;
+        let mut add = |h: usize| sol.unknown_rate[h] = sol.unknown_rate[h] + f.unknown_cross[g * ng + h] * e;
+        match self.tree.unknowns[g] {
+            Unknown::Velocity(_) => open.for_each(add),
+            Unknown::Row(_) => f.later[g].iter().for_each(|&h| add(h)),
         }
-        sol.shared_e[g] = e;
+        sol.unknown_e[g] = e;
         e
     }
 
@@ -188,7 +188,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         load: &Load<S>,
         sol: &mut Solution<S>,
     ) {
-        let ng = self.tree.shared.len();
+        let ng = self.tree.unknowns.len();
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), load.what);
         let outer = node.parent.map_or(Motion::zero(), |p| sol.omega[p]);
@@ -201,12 +201,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for k in (0..node.kind.nv()).rev() {
             let freedom = first[i] + k;
             let axis = node.kind.axis(k);
-            let rate = match (node.shared, node.source) {
-                (Some(g), _) => node.ratio * sol.shared_rate[g],
+            let rate = match (node.unknown, node.source) {
+                (Some(g), _) => node.ratio * sol.unknown_rate[g],
                 (None, Source::Drive { .. }) => sol.e[freedom],
                 (None, Source::State { .. }) => {
                     let pivot = &f.pivots[freedom];
-                    let open = |rate: S, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.shared_rate[h];
+                    let open = |rate: S, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.unknown_rate[h];
                     if let Freedom::Unit(z) = axis {
                         // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
                         let mut row = pivot.k;
@@ -239,13 +239,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         open: impl Iterator<Item = usize>,
         sol: &mut Solution<S>,
     ) {
-        let ng = self.tree.shared.len();
-        let pivot = &f.shared[g];
-        let rate = sol.shared_e[g] - pivot.k.dot(omega);
-        let less = |rate: S, h: usize| rate - pivot.rho * f.shared_cross[g * ng + h] * sol.shared_rate[h];
-        sol.shared_rate[g] = match self.tree.shared[g] {
-            Shared::Velocity(_) => open.fold(rate, less),
-            Shared::Row(_) => f.later[g].iter().copied().fold(rate, less),
+        let ng = self.tree.unknowns.len();
+        let pivot = &f.unknown_pivots[g];
+        let rate = sol.unknown_e[g] - pivot.k.dot(omega);
+        let less = |rate: S, h: usize| rate - pivot.rho * f.unknown_cross[g * ng + h] * sol.unknown_rate[h];
+        sol.unknown_rate[g] = match self.tree.unknowns[g] {
+            Unknown::Velocity(_) => open.fold(rate, less),
+            Unknown::Row(_) => f.later[g].iter().copied().fold(rate, less),
         };
     }
 
@@ -276,23 +276,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (mut motion, mut own) = (sol.hat[i], None);
         if node.deferred {
             node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
-            own = node.shared;
+            own = node.unknown;
         }
         let open = node.open.iter().chain(&node.ends).filter(|&&g| Some(g) != own);
-        (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.shared_rate[g]))))
+        (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
     }
 
     /// Rates of the state's velocities out of the nodes.
     pub fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
-            if let (Source::State { v: at, .. }, None) = (node.source, node.shared) {
+            if let (Source::State { v: at, .. }, None) = (node.source, node.unknown) {
                 let nv = node.kind.nv();
                 v[at..at + nv].copy_from_slice(&sol.rate[first[i]..first[i] + nv]);
             }
         }
-        for (g, shared) in self.tree.shared.iter().enumerate() {
-            if let Shared::Velocity(at) = *shared {
-                v[at] = sol.shared_rate[g];
+        for (g, shared) in self.tree.unknowns.iter().enumerate() {
+            if let Unknown::Velocity(at) = *shared {
+                v[at] = sol.unknown_rate[g];
             }
         }
     }

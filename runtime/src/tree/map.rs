@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 
 use super::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
-use crate::spatial::{RigidInertia, Step};
+use crate::spatial::{RigidInertia, ElementaryTransform};
 use crate::Scalar;
 
 impl<S: Scalar> Tree<S> {
@@ -12,7 +12,7 @@ impl<S: Scalar> Tree<S> {
         Tree {
             nodes: self.nodes.iter().map(|node| node.map(of)).collect(),
             dims: self.dims,
-            shared: self.shared.clone(),
+            unknowns: self.unknowns.clone(),
             solve_at_ground: self.solve_at_ground.clone(),
             ground_moment: self.ground_moment.map(of),
             wrenches: self
@@ -30,11 +30,11 @@ impl<S: Scalar> Tree<S> {
     }
 }
 
-fn step<S: Scalar, R: Scalar>(step: &Step<S>, of: &impl Fn(S) -> R) -> Step<R> {
+fn step<S: Scalar, R: Scalar>(step: &ElementaryTransform<S>, of: &impl Fn(S) -> R) -> ElementaryTransform<R> {
     match *step {
-        Step::Turn { axis, c, s } => Step::Turn { axis, c: of(c), s: of(s) },
-        Step::Shift { axis, r } => Step::Shift { axis, r: of(r) },
-        Step::Rotate(m) => Step::Rotate(m.map(|row| row.map(of))),
+        ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: of(c), s: of(s) },
+        ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis, r: of(r) },
+        ElementaryTransform::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(of))),
     }
 }
 
@@ -51,8 +51,8 @@ impl<S: Scalar> Node<S> {
             parent: self.parent,
             place: self.place.iter().map(|s| step(s, of)).collect(),
             kind: match self.kind {
-                Kind::Pin => Kind::Pin,
-                Kind::Slider => Kind::Slider,
+                Kind::Revolute => Kind::Revolute,
+                Kind::Prismatic => Kind::Prismatic,
                 Kind::Helical { pitch } => Kind::Helical { pitch: of(pitch) },
                 Kind::Planar => Kind::Planar,
                 Kind::Spherical => Kind::Spherical,
@@ -79,11 +79,11 @@ impl<S: Scalar> Node<S> {
                     armature: of(p.armature),
                 })
                 .collect(),
-            shared: self.shared,
+            unknown: self.unknown,
             deferred: self.deferred,
-            parent_side: self.parent_side,
-            unturned: self.unturned,
-            gather: self.gather,
+            before_joint: self.before_joint,
+            non_rotating: self.non_rotating,
+            accumulates_momentum: self.accumulates_momentum,
             ends: self.ends.clone(),
             screws: self.screws.clone(),
             open: self.open.clone(),
@@ -122,8 +122,8 @@ impl<S: Scalar> Closure<S> {
     /// The same over other numbers.
     pub(crate) fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Closure<R> {
         match self {
-            Closure::Pin => Closure::Pin,
-            Closure::Slider => Closure::Slider,
+            Closure::Revolute => Closure::Revolute,
+            Closure::Prismatic => Closure::Prismatic,
             Closure::Cylindrical => Closure::Cylindrical,
             Closure::Helical { pitch } => Closure::Helical { pitch: of(*pitch) },
             Closure::Universal => Closure::Universal,

@@ -107,6 +107,6 @@ fn velocities_are_completed() {
     assert!((residual - 1.0).abs() < 1e-12);
     // Momenta alone: settling is the projection.
     let (mut p, mut v, mut sigma) = (vec![1.0, 2.0, 3.0, 4.0], vec![0.0; 4], vec![0.0; 3]);
-    y.settle(0.0, &q, &mut p, &mut v, &mut sigma);
+    y.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     assert!(y.off(&q, &p).1 < 1e-14);
 }

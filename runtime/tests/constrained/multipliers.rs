@@ -2,11 +2,11 @@
 
 use super::holding::{apart, held, march, State};
 use super::systems::*;
-use mbd_runtime::constrained::{IndexTwo, Rattle, Split, Stabilisation};
+use mbd_runtime::constrained::{RadauIndex2, Rattle, OpenAndClosed, Stabilisation};
 use mbd_runtime::integrate::{Stepper, Verner9};
 
-fn split<T: Model + Clone>(model: T) -> Split<Open<T>, Closed<T>> {
-    Split { open: Open(model.clone()), closed: Closed::new(model) }
+fn split<T: Model + Clone>(model: T) -> OpenAndClosed<Open<T>, Closed<T>> {
+    OpenAndClosed { open: Open(model.clone()), closed: Closed::new(model) }
 }
 
 /// Both constraints at the end of every step; order 2, of a separable Hamiltonian and of one that is not; the exact motion is
@@ -87,7 +87,7 @@ fn rattle_elsewhere() {
     let q = y.closed.model.leaning(0.3);
     let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 30.0];
     let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
-    mbd_runtime::Constrained::settle(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
+    mbd_runtime::Constrained::project_momenta(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
     let start = (q, p);
     let mut closed = Closed::new(Top::new());
     let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
@@ -113,7 +113,7 @@ fn radau_has_order_five() {
     let reference = march(&mut closed, &mut fine, 1000, 0.5, &start).unwrap();
     for policy in [Stabilisation::None, Stabilisation::Mass] {
         let errors = [10, 20, 40].map(|steps| {
-            let mut method = held(&y, IndexTwo::new(&y), policy);
+            let mut method = held(&y, RadauIndex2::new(&y), policy);
             let end = march(&mut y, &mut method, steps, 0.5, &start).unwrap();
             let sigma = y.closed.velocities(&end.0, &end.1).1;
             println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
@@ -130,13 +130,13 @@ fn radau_has_order_five() {
     let q = y.closed.model.leaning(0.3);
     let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 30.0];
     let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
-    mbd_runtime::Constrained::settle(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
+    mbd_runtime::Constrained::project_momenta(&mut y, 0.0, &q, &mut p, &mut v, &mut sigma);
     let start = (q, p);
     let mut closed = Closed::new(Top::new());
     let mut fine = held(&closed, Verner9::new(&closed), Stabilisation::Mass);
     let reference = march(&mut closed, &mut fine, 500, 0.3, &start).unwrap();
     let errors = [15, 30].map(|steps| {
-        let mut method = held(&y, IndexTwo::new(&y), Stabilisation::Mass);
+        let mut method = held(&y, RadauIndex2::new(&y), Stabilisation::Mass);
         let end = march(&mut y, &mut method, steps, 0.3, &start).unwrap();
         println!("{:?} {:?}", y.closed.off(&end.0, &end.1), method.statistics());
         apart(&end.0, &reference.0)

@@ -1,7 +1,7 @@
 //! Small systems with constraints, written down by hand.
 
 use mbd_runtime::constrained::{close, Closing, ConstraintError};
-use mbd_runtime::system::{Group, GroupKind, Row};
+use mbd_runtime::system::{LieJoint, LieGroup, Row};
 use mbd_runtime::{Conjugate, Constrained, Energetic, System};
 
 /// Gravity, m/s².
@@ -9,7 +9,7 @@ pub const G: f64 = 9.81;
 
 /// What tells one open system with constraints from another: everything else follows from it.
 pub trait Model {
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
     fn neutral(&self) -> Vec<f64>;
@@ -23,7 +23,7 @@ pub trait Model {
         v.to_vec()
     }
     /// Residuals and rows of `Φ`, all columns.
-    fn closure(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
+    fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
     fn holonomic(&self) -> bool {
         true
     }
@@ -98,7 +98,7 @@ impl<T: Model> Closed<T> {
 
     /// Velocities and multipliers of a state, with `Φ`.
     pub fn velocities(&mut self, q: &[f64], p: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
-        let (masses, (_, phi)) = (self.model.masses(q), self.model.closure(q));
+        let (masses, (_, phi)) = (self.model.masses(q), self.model.constraint_residuals(q));
         let free: Vec<f64> = p.iter().zip(&masses).map(|(p, m)| p / m).collect();
         let b: Vec<f64> = phi.iter().map(|row| row.iter().zip(&free).map(|(a, v)| a * v).sum()).collect();
         let (sigma, _) = self.solve(&masses, &phi, &b);
@@ -110,14 +110,14 @@ impl<T: Model> Closed<T> {
     /// The largest residual, of positions and of velocities.
     pub fn off(&mut self, q: &[f64], p: &[f64]) -> (f64, f64) {
         let (v, _, phi) = self.velocities(q, p);
-        let residual = self.model.closure(q).0;
+        let residual = self.model.constraint_residuals(q).0;
         let rates = phi.iter().map(|row| row.iter().zip(&v).map(|(a, v)| a * v).sum::<f64>());
         (residual.iter().fold(0.0, |m, x| m.max(x.abs())), rates.fold(0.0, |m, x| m.max(x.abs())))
     }
 
     #[allow(clippy::ptr_arg)] // what the trait takes
     pub fn energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> f64 {
-        let (t, v) = self.state_energy(q, p);
+        let (t, v) = self.energies(q, p);
         t + v
     }
 
@@ -136,11 +136,11 @@ macro_rules! common {
         fn neutral(&self) -> Vec<f64> {
             self.$field.neutral()
         }
-        fn rest(&self) -> Vec<f64> {
+        fn zero_momenta(&self) -> Vec<f64> {
             vec![0.0; self.$field.nv()]
         }
-        fn groups(&self) -> &[Group] {
-            self.$field.groups()
+        fn lie_joints(&self) -> &[LieJoint] {
+            self.$field.lie_joints()
         }
         fn coordinate_rates(&self, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>) {
             *qd = self.$field.coordinate_rates(q, v);
@@ -150,7 +150,7 @@ macro_rules! common {
 
 impl<T: Model> System for Open<T> {
     common!(Open, 0);
-    fn state_rates(&mut self, _: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
+    fn rates_at(&mut self, _: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
         let v: Vec<f64> = p.iter().zip(self.0.masses(q)).map(|(p, m)| p / m).collect();
         *qd = self.0.coordinate_rates(q, &v);
         *pd = self.0.forces(q, p, &v);
@@ -158,14 +158,14 @@ impl<T: Model> System for Open<T> {
 }
 
 impl<T: Model> Conjugate for Open<T> {
-    fn state_momenta(&mut self, q: &Vec<f64>, v: &Vec<f64>, p: &mut Vec<f64>) {
+    fn conjugate_momenta(&mut self, q: &Vec<f64>, v: &Vec<f64>, p: &mut Vec<f64>) {
         *p = v.iter().zip(self.0.masses(q)).map(|(v, m)| v * m).collect();
     }
 }
 
 impl<T: Model> System for Closed<T> {
     common!(Closed, model);
-    fn state_rates(&mut self, _: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
+    fn rates_at(&mut self, _: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
         let (v, sigma, _) = self.velocities(q, p);
         *qd = self.model.coordinate_rates(q, &v);
         *pd = self.model.forces(q, p, &v);
@@ -176,7 +176,7 @@ impl<T: Model> System for Closed<T> {
 }
 
 impl<T: Model> Energetic for Closed<T> {
-    fn state_energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
+    fn energies(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
         let (v, _, _) = self.velocities(q, p);
         (0.5 * p.iter().zip(&v).map(|(p, v)| p * v).sum::<f64>(), self.model.potential(q))
     }
@@ -197,8 +197,8 @@ impl<T: Model> Constrained for Closed<T> {
     fn entry_columns(&self) -> &[usize] {
         &self.columns
     }
-    fn closure(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
-        let (r, phi) = self.model.closure(q);
+    fn constraint_residuals(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
+        let (r, phi) = self.model.constraint_residuals(q);
         residual.copy_from_slice(&r);
         for (row, values) in self.rows.iter().zip(&phi) {
             for e in row.first..row.first + row.len {
@@ -206,7 +206,7 @@ impl<T: Model> Constrained for Closed<T> {
             }
         }
     }
-    fn settle(&mut self, _: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
+    fn project_momenta(&mut self, _: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
         let (new, multipliers, phi) = self.velocities(q, p);
         for (row, s) in phi.iter().zip(&multipliers) {
             for (p, a) in p.iter_mut().zip(row) {
@@ -216,8 +216,8 @@ impl<T: Model> Constrained for Closed<T> {
         v.copy_from_slice(&new);
         sigma.copy_from_slice(&multipliers);
     }
-    fn correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
-        let (masses, (r, phi)) = (self.model.masses(q), self.model.closure(q));
+    fn position_correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
+        let (masses, (r, phi)) = (self.model.masses(q), self.model.constraint_residuals(q));
         let (x, p) = self.solve(&masses, &phi, &r);
         residual.copy_from_slice(&r);
         pivots.copy_from_slice(&p);
@@ -298,7 +298,7 @@ impl Model for Sticks {
     fn potential(&self, q: &[f64]) -> f64 {
         self.masses.iter().enumerate().map(|(i, m)| m * self.gravity * q[2 * i + 1]).sum()
     }
-    fn closure(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         (0..self.sticks.len())
             .map(|k| {
                 let (d, l) = (self.difference(q, k), self.sticks[k].2);
@@ -363,7 +363,7 @@ impl Model for Polar {
     fn potential(&self, q: &[f64]) -> f64 {
         2.0 * Self::place(q).powi(2)
     }
-    fn closure(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (s, c) = q[1].sin_cos();
         (vec![q[0] * c - 1.0], vec![vec![c, -q[0] * s]])
     }
@@ -379,7 +379,7 @@ impl Model for Polar {
 /// A top of 1 kg as a free body with a point pinned to the origin: three rows in ground axes, which add nothing to `ṗ⁺`.
 #[derive(Clone, Debug)]
 pub struct Top {
-    groups: [Group; 1],
+    groups: [LieJoint; 1],
     pub inertia: [f64; 3],
     /// Of the pinned point in the body, from its centre of mass.
     pub pin: [f64; 3],
@@ -400,7 +400,7 @@ fn rotation(q: &[f64]) -> [[f64; 3]; 3] {
 
 impl Top {
     pub fn new() -> Self {
-        Top { groups: [Group::new(GroupKind::Pose, 0, 0)], inertia: [0.02, 0.03, 0.01], pin: [0.0, 0.0, -0.3] }
+        Top { groups: [LieJoint::new(LieGroup::SE3, 0, 0)], inertia: [0.02, 0.03, 0.01], pin: [0.0, 0.0, -0.3] }
     }
     /// Upright but for a lean about x, rad, pinned.
     pub fn leaning(&self, angle: f64) -> Vec<f64> {
@@ -421,7 +421,7 @@ impl Top {
 }
 
 impl Model for Top {
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &self.groups
     }
     fn neutral(&self) -> Vec<f64> {
@@ -454,7 +454,7 @@ impl Model for Top {
         out.push(-0.5 * (x[0] * w[0] + x[1] * w[1] + x[2] * w[2]));
         out
     }
-    fn closure(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let (r, c) = (rotation(&q[3..]), self.pin);
         (0..3)
             .map(|i| {

@@ -206,7 +206,7 @@ fn single_precision() {
         let mut exact = pendulum::<f64>().0;
         let mut method = if compensated { Ab6::compensated(&y) } else { Ab6::new(&y) };
         let mut energy = |q: [f32; 2], p: [f32; 2]| {
-            let (kinetic, potential) = exact.state_energy(&q.map(f64::from), &p.map(f64::from));
+            let (kinetic, potential) = exact.energies(&q.map(f64::from), &p.map(f64::from));
             (kinetic + potential) / 40.0
         };
         let (start, mut worst) = (energy(q, p), 0.0_f64);

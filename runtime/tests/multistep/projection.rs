@@ -1,6 +1,6 @@
 //! Energy projection.
 
-use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, Field, Point, Projection, Rk4, Stepper};
+use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, Field, Point, EnergyProjection, Rk4, Stepper};
 use mbd_runtime::Energetic;
 
 use crate::systems::{body, pendulum, top, Sledge};
@@ -18,14 +18,14 @@ fn gradient<Y: Energetic<Scalar = f64> + Clone>((mut y, q, p): (Y, Y::Coordinate
     field.rates(&mut y, 0.0, &at, &mut rate);
     let chart: Chart<Y> = field.chart().clone();
     chart.gradient(&y, &at, &mut rate);
-    let group = |k: usize| y.groups().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
+    let group = |k: usize| y.lie_joints().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
     let fixed: Vec<bool> = (0..2 * n).map(|k| k >= n && group(k - n)).collect();
     let found: Vec<f64> = rate.parts().concat();
     let mut energy = |k: usize, e: f64| {
         let (mut moved, mut q, mut p) = (at.clone(), q.clone(), p.clone());
         moved.parts_mut()[k / n][k % n] += e;
         chart.state(&y, &moved, &mut q, &mut p);
-        let (kinetic, potential) = y.state_energy(&q, &p);
+        let (kinetic, potential) = y.energies(&q, &p);
         kinetic + potential
     };
     for k in 0..2 * n {
@@ -53,7 +53,7 @@ fn energies<Y: Energetic<Scalar = f64> + Clone, M: Stepper<Y>>(
     h: f64,
 ) -> [f64; 2] {
     [true, false].map(|projected| {
-        let (mut method, mut projection) = (make(&y), Projection::new(&mut y, &q, &p, 2));
+        let (mut method, mut projection) = (make(&y), EnergyProjection::new(&mut y, &q, &p, 2));
         let (mut q, mut p) = (q.clone(), p.clone());
         let mut worst = 0.0_f64;
         for _ in 0..(10.0 / h) as u32 {
@@ -61,7 +61,7 @@ fn energies<Y: Energetic<Scalar = f64> + Clone, M: Stepper<Y>>(
                 true => projection.step(&mut method, &mut y, 0.0, h, &mut q, &mut p).unwrap(),
                 false => method.step(&mut y, 0.0, h, &mut q, &mut p).unwrap(),
             }
-            let (kinetic, potential) = y.state_energy(&q, &p);
+            let (kinetic, potential) = y.energies(&q, &p);
             worst = worst.max((kinetic + potential - projection.target()).abs() / 10.0);
         }
         worst
@@ -87,7 +87,7 @@ fn projection_keeps_the_energy() {
 #[test]
 fn projection_costs_no_evaluation() {
     let (mut y, mut q, mut p) = pendulum::<f64>();
-    let (mut method, mut projection) = (Ab4::new(&y), Projection::new(&mut y, &q, &p, 1));
+    let (mut method, mut projection) = (Ab4::new(&y), EnergyProjection::new(&mut y, &q, &p, 1));
     for _ in 0..100 {
         projection.step(&mut method, &mut y, 0.0, 0.005, &mut q, &mut p).unwrap();
     }

@@ -1,7 +1,7 @@
 //! Mechanisms written out by hand, and steps of them.
 
 use mbd_runtime::integrate::Stepper;
-use mbd_runtime::system::{Group, GroupKind};
+use mbd_runtime::system::{LieJoint, LieGroup};
 use mbd_runtime::{Energetic, Real, Scalar, System};
 
 /// Two bars of length and mass 1, all mass at the ends: `H` is not a sum of parts of `q` and `p`.
@@ -16,13 +16,13 @@ impl<S: Real> System for Pendulum<S> {
     fn neutral(&self) -> [S; 2] {
         [S::zero(); 2]
     }
-    fn rest(&self) -> [S; 2] {
+    fn zero_momenta(&self) -> [S; 2] {
         [S::zero(); 2]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
-    fn state_rates(&mut self, _t: S, q: &[S; 2], p: &[S; 2], qd: &mut [S; 2], pd: &mut [S; 2]) {
+    fn rates_at(&mut self, _t: S, q: &[S; 2], p: &[S; 2], qd: &mut [S; 2], pd: &mut [S; 2]) {
         let g = S::constant(9.81);
         let (s, c) = (q[0] - q[1]).sin_cos();
         let d = S::one() / (S::one() + s * s);
@@ -37,9 +37,9 @@ impl<S: Real> System for Pendulum<S> {
 }
 
 impl<S: Real> Energetic for Pendulum<S> {
-    fn state_energy(&mut self, q: &[S; 2], p: &[S; 2]) -> (S, S) {
+    fn energies(&mut self, q: &[S; 2], p: &[S; 2]) -> (S, S) {
         let (mut v, mut pd) = ([S::zero(); 2], [S::zero(); 2]);
-        self.state_rates(S::zero(), q, p, &mut v, &mut pd);
+        self.rates_at(S::zero(), q, p, &mut v, &mut pd);
         let g = S::constant(9.81);
         let kinetic = S::constant(0.5) * (v[0] * p[0] + v[1] * p[1]);
         (kinetic, -(g + g) * q[0].sin_cos().1 - g * q[1].sin_cos().1)
@@ -71,7 +71,7 @@ pub fn spin(q: &[f64], w: [f64; 3], qd: &mut [f64]) {
 #[derive(Clone, Debug)]
 pub struct Top(f64);
 pub const TOP: [f64; 3] = [1.0, 2.0, 2.5];
-pub const BALL: [Group; 1] = [Group::new(GroupKind::Rotation, 0, 0)];
+pub const BALL: [LieJoint; 1] = [LieJoint::new(LieGroup::SO3, 0, 0)];
 
 impl System for Top {
     type Scalar = f64;
@@ -81,13 +81,13 @@ impl System for Top {
     fn neutral(&self) -> [f64; 4] {
         [0.0, 0.0, 0.0, 1.0]
     }
-    fn rest(&self) -> [f64; 3] {
+    fn zero_momenta(&self) -> [f64; 3] {
         [0.0; 3]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &BALL
     }
-    fn state_rates(&mut self, _t: f64, q: &[f64; 4], p: &[f64; 3], qd: &mut [f64; 4], pd: &mut [f64; 3]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 4], p: &[f64; 3], qd: &mut [f64; 4], pd: &mut [f64; 3]) {
         let w = [0, 1, 2].map(|k| p[k] / TOP[k]);
         spin(q, w, qd);
         let (torque, turn) = (cross([0.0, 0.0, self.0], turned(q, [0.0, 0.0, -1.0], 1.0)), cross(*p, w));
@@ -97,7 +97,7 @@ impl System for Top {
 }
 
 impl Energetic for Top {
-    fn state_energy(&mut self, q: &[f64; 4], p: &[f64; 3]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 4], p: &[f64; 3]) -> (f64, f64) {
         let kinetic = (0..3).map(|k| 0.5 * p[k] * p[k] / TOP[k]).sum();
         (kinetic, self.0 * turned(q, [0.0, 0.0, 1.0], -1.0)[2])
     }
@@ -107,7 +107,7 @@ impl Energetic for Top {
 #[derive(Clone, Debug)]
 pub struct Body;
 pub const ADDED: [f64; 6] = [1.0, 2.0, 3.0, 0.5, 0.8, 0.9];
-pub const POSE: [Group; 1] = [Group::new(GroupKind::Pose, 0, 0)];
+pub const POSE: [LieJoint; 1] = [LieJoint::new(LieGroup::SE3, 0, 0)];
 
 impl System for Body {
     type Scalar = f64;
@@ -117,13 +117,13 @@ impl System for Body {
     fn neutral(&self) -> [f64; 7] {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     }
-    fn rest(&self) -> [f64; 6] {
+    fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &POSE
     }
-    fn state_rates(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
         let (v, w) = ([0, 1, 2].map(|k| p[k] / ADDED[k]), [0, 1, 2].map(|k| p[k + 3] / ADDED[k + 3]));
         qd[..3].copy_from_slice(&turned(&q[3..], v, -1.0));
         spin(&q[3..], w, &mut qd[3..]);
@@ -139,7 +139,7 @@ impl System for Body {
 }
 
 impl Energetic for Body {
-    fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {
         ((0..6).map(|k| 0.5 * p[k] * p[k] / ADDED[k]).sum(), 9.81 * q[2])
     }
 }
@@ -147,7 +147,7 @@ impl Energetic for Body {
 /// The same in the plane: along its sides it carries different masses.
 #[derive(Clone, Debug)]
 pub struct Sledge;
-pub const PLANE: [Group; 1] = [Group::new(GroupKind::Plane, 0, 0)];
+pub const PLANE: [LieJoint; 1] = [LieJoint::new(LieGroup::SE2, 0, 0)];
 
 impl System for Sledge {
     type Scalar = f64;
@@ -157,13 +157,13 @@ impl System for Sledge {
     fn neutral(&self) -> [f64; 3] {
         [0.0; 3]
     }
-    fn rest(&self) -> [f64; 3] {
+    fn zero_momenta(&self) -> [f64; 3] {
         [0.0; 3]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &PLANE
     }
-    fn state_rates(&mut self, _t: f64, q: &[f64; 3], p: &[f64; 3], qd: &mut [f64; 3], pd: &mut [f64; 3]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 3], p: &[f64; 3], qd: &mut [f64; 3], pd: &mut [f64; 3]) {
         let (s, c) = q[2].sin_cos();
         let (v, w) = ([p[0], 0.4 * p[1]], 2.0 * p[2]);
         *qd = [c * v[0] - s * v[1], s * v[0] + c * v[1], w];
@@ -173,7 +173,7 @@ impl System for Sledge {
 }
 
 impl Energetic for Sledge {
-    fn state_energy(&mut self, q: &[f64; 3], p: &[f64; 3]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 3], p: &[f64; 3]) -> (f64, f64) {
         (0.5 * (p[0] * p[0] + 0.4 * p[1] * p[1] + 2.0 * p[2] * p[2]), 9.81 * q[1])
     }
 }

@@ -3,7 +3,7 @@
 
 use mbd_runtime::integrate::{Solver, Step, StepError, Stepper, Tolerances};
 use mbd_runtime::spatial::RigidInertia;
-use mbd_runtime::system::Group;
+use mbd_runtime::system::LieJoint;
 use mbd_runtime::tree::{Dims, Kind, Node, Passive, Source, Tree};
 use mbd_runtime::{Interpreter, Real, Scalar, System};
 
@@ -32,13 +32,13 @@ where
     fn neutral(&self) -> [S; N] {
         [S::zero(); N]
     }
-    fn rest(&self) -> [S; N] {
+    fn zero_momenta(&self) -> [S; N] {
         [S::zero(); N]
     }
-    fn groups(&self) -> &[Group] {
+    fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
-    fn state_rates(&mut self, t: S, q: &[S; N], p: &[S; N], qd: &mut [S; N], pd: &mut [S; N]) {
+    fn rates_at(&mut self, t: S, q: &[S; N], p: &[S; N], qd: &mut [S; N], pd: &mut [S; N]) {
         (*qd, *pd) = (self.0)(t, q, p);
     }
     fn coordinate_rates(&self, _q: &[S; N], v: &[S; N], qd: &mut [S; N]) {
@@ -103,11 +103,11 @@ pub fn rotor() -> Interpreter<f64> {
         slide: o,
         inertia: RigidInertia { mass: one, moment: [o; 3], inertia: [1.0, o, o, 2.0, o, 3.0] },
         passive: vec![passive; 3],
-        shared: None,
+        unknown: None,
         deferred: false,
-        parent_side: false,
-        unturned: false,
-        gather: false,
+        before_joint: false,
+        non_rotating: false,
+        accumulates_momentum: false,
         ends: vec![],
         screws: vec![],
         open: vec![],
@@ -117,7 +117,7 @@ pub fn rotor() -> Interpreter<f64> {
     let tree = Tree {
         nodes: vec![node],
         dims: Dims { nq: 4, nv: 3, ..Dims::default() },
-        shared: vec![],
+        unknowns: vec![],
         solve_at_ground: vec![],
         ground_moment: [o; 3],
         wrenches: vec![],
@@ -155,7 +155,7 @@ pub fn state<Y: System, M: Stepper<Y>>(solver: &mut Solver<Y, M>, system: &Y) ->
 where
     Y::Scalar: Real,
 {
-    let (mut q, mut p) = (system.neutral(), system.rest());
+    let (mut q, mut p) = (system.neutral(), system.zero_momenta());
     solver.state(system, &mut q, &mut p);
     q.as_ref().iter().chain(p.as_ref()).map(|x| x.to_f64()).collect()
 }

@@ -30,7 +30,7 @@ pub fn weights(b: &mut Builder, s: &Skeleton, joints: &[Joint], params: &[f64]) 
     for i in 0..n {
         let children: Vec<usize> = (0..n).filter(|&c| s.parent[c] == Some(i)).collect();
         let parent_is_full = s.parent[i].is_none_or(|p| weight[p] == Weight::Full);
-        if children.is_empty() || keep[i] || !parent_is_full || !b.rng.chance(b.knobs.massless) {
+        if children.is_empty() || keep[i] || !parent_is_full || !b.rng.chance(b.distribution.massless) {
             continue;
         }
         weight[i] = if b.rng.chance(0.7) { Weight::None } else { Weight::Point };
@@ -48,8 +48,8 @@ pub fn weights(b: &mut Builder, s: &Skeleton, joints: &[Joint], params: &[f64]) 
 /// Whether the motion of a child's joint can never undo that of `kind`.
 fn independent(kind: &JointKind, child: &Joint, params: &[f64]) -> bool {
     let single = |k: &JointKind| match *k {
-        JointKind::Pin { axis } | JointKind::Helical { axis, .. } => Some((true, axis)),
-        JointKind::Slider { axis } => Some((false, axis)),
+        JointKind::Revolute { axis } | JointKind::Helical { axis, .. } => Some((true, axis)),
+        JointKind::Prismatic { axis } => Some((false, axis)),
         _ => None,
     };
     if child.kind == JointKind::Fixed {
@@ -105,7 +105,7 @@ impl Builder<'_> {
         }
         let [a, b, c] = edges.map(|x| x * x * mass / 12.0);
         let mut inertia = [b + c, a + c, a + b, 0.0, 0.0, 0.0];
-        let general = self.rng.chance(self.knobs.products);
+        let general = self.rng.chance(self.distribution.products);
         if general && self.rng.chance(0.6) {
             let small = 0.12 * (a + b + c);
             for x in &mut inertia[3..] {

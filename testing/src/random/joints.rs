@@ -16,7 +16,7 @@ pub fn sine(a: [f64; 3], b: [f64; 3]) -> f64 {
 impl Builder<'_> {
     /// Any vector of about the given size, or one along an axis.
     pub fn vector(&mut self, size: f64) -> [f64; 3] {
-        if self.rng.chance(self.knobs.skew) {
+        if self.rng.chance(self.distribution.skew) {
             return std::array::from_fn(|_| self.rng.around(size));
         }
         let mut v = [0.0; 3];
@@ -28,7 +28,7 @@ impl Builder<'_> {
 
     /// A direction, not always of unit length.
     pub fn direction(&mut self) -> [f64; 3] {
-        if !self.rng.chance(self.knobs.skew) {
+        if !self.rng.chance(self.distribution.skew) {
             let mut v = [0.0; 3];
             v[self.rng.below(3)] = self.rng.pick(&[1.0, 1.0, -1.0, 2.0]);
             return v;
@@ -57,7 +57,7 @@ impl Builder<'_> {
 
     /// Orientation, in one of the ways to write it.
     pub fn rotation(&mut self) -> Rotation {
-        let general = self.rng.chance(self.knobs.skew);
+        let general = self.rng.chance(self.distribution.skew);
         if self.rng.chance(0.25) {
             let axis = self.direction();
             return Rotation::AxisAngle { axis, angle: self.angle(general) };
@@ -73,9 +73,9 @@ impl Builder<'_> {
 
     /// Kind and axes of a joint.
     pub fn kind(&mut self) -> JointKind {
-        match self.rng.weighted(&self.knobs.kinds) {
-            0 => JointKind::Pin { axis: self.direction() },
-            1 => JointKind::Slider { axis: self.direction() },
+        match self.rng.weighted(&self.distribution.kinds) {
+            0 => JointKind::Revolute { axis: self.direction() },
+            1 => JointKind::Prismatic { axis: self.direction() },
             2 => JointKind::Cylindrical { axis: self.direction() },
             3 => {
                 let (axis, pitch) = (self.direction(), self.rng.around(0.3));

@@ -2,11 +2,11 @@
 
 mod bodies;
 mod joints;
-mod knobs;
+mod distribution;
 mod model;
 mod rng;
 
 pub use bodies::matrix as rotation_matrix;
-pub use knobs::Knobs;
+pub use distribution::Distribution;
 pub use model::random_model;
 pub use rng::Rng;

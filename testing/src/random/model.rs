@@ -1,16 +1,16 @@
 //! The mechanism as a whole.
 
-use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, Model, Motion, Param, Value, Wrench, WrenchAxes};
+use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, Model, JointMotion, Param, Value, Wrench, WrenchAxes};
 
 use super::bodies::{weights, Weight};
-use super::{Knobs, Rng};
+use super::{Distribution, Rng};
 
 /// What a model is made with.
 pub struct Builder<'k> {
     /// Randomness.
     pub rng: Rng,
     /// What is allowed.
-    pub knobs: &'k Knobs,
+    pub distribution: &'k Distribution,
     /// Parameters so far.
     params: Vec<Param>,
 }
@@ -30,7 +30,7 @@ const ODD_NAMES: [&str; 12] =
 impl Builder<'_> {
     /// A constant, or a parameter with this default.
     pub fn value(&mut self, x: f64) -> Value {
-        if !self.rng.chance(self.knobs.params) {
+        if !self.rng.chance(self.distribution.params) {
             return Value::Const(x);
         }
         let k = self.params.len();
@@ -59,13 +59,13 @@ impl Builder<'_> {
     }
 
     fn skeleton(&mut self) -> Skeleton {
-        let (low, high) = self.knobs.bodies;
+        let (low, high) = self.distribution.bodies;
         let n = low + self.rng.below(high - low + 1);
         let mut s = Skeleton { parent: Vec::new(), depth: Vec::new() };
         for i in 0..n {
-            let parent = if i == 0 || self.rng.chance(self.knobs.roots) {
+            let parent = if i == 0 || self.rng.chance(self.distribution.roots) {
                 None
-            } else if self.rng.chance(self.knobs.branching) {
+            } else if self.rng.chance(self.distribution.branching) {
                 Some(self.rng.below(i))
             } else {
                 Some(i - 1)
@@ -79,7 +79,7 @@ impl Builder<'_> {
     fn joint(&mut self, name: String, child: usize, parent: Option<usize>, length: f64) -> Joint {
         let kind = self.kind();
         let n = kind.nv();
-        let k = self.knobs;
+        let k = self.distribution;
         let sprung = if matches!(kind, JointKind::Spherical | JointKind::Floating) { 0.0 } else { k.springs };
         let stiffness = self.per_freedom(n, sprung, 1.0, 30.0);
         let has_spring = stiffness.iter().any(|s| *s != Value::ZERO);
@@ -90,7 +90,7 @@ impl Builder<'_> {
             child,
             placement: self.placement(length),
             unbounded: false,
-            motion: if n > 0 && self.rng.chance(k.prescribed) { Motion::Prescribed } else { Motion::Free },
+            motion: if n > 0 && self.rng.chance(k.prescribed) { JointMotion::Prescribed } else { JointMotion::Free },
             damping: self.per_freedom(n, k.damping, 0.1, 2.0),
             rest: self.per_freedom(n, if has_spring { 0.7 } else { 0.0 }, -0.5, 0.5),
             stiffness,
@@ -104,7 +104,7 @@ impl Builder<'_> {
         for &j in &can {
             // A leader of lower rank: chains, but no rings.
             let leaders: Vec<usize> = can.iter().copied().filter(|&l| rank[l] < rank[j]).collect();
-            if leaders.is_empty() || joints[j].motion != Motion::Free || !self.rng.chance(self.knobs.mimic) {
+            if leaders.is_empty() || joints[j].motion != JointMotion::Free || !self.rng.chance(self.distribution.mimic) {
                 continue;
             }
             let ratio = match self.rng.below(4) {
@@ -114,12 +114,12 @@ impl Builder<'_> {
             };
             let offset = if self.rng.chance(0.4) { 0.0 } else { self.rng.around(1.0) };
             let (leader, ratio) = (self.rng.pick(&leaders), self.value(ratio));
-            joints[j].motion = Motion::Mimic { leader, ratio, offset: self.value_or_zero(offset) };
+            joints[j].motion = JointMotion::Mimic { leader, ratio, offset: self.value_or_zero(offset) };
         }
     }
 
     fn gravity(&mut self) -> Gravity {
-        match self.rng.weighted(&self.knobs.gravity) {
+        match self.rng.weighted(&self.distribution.gravity) {
             0 if self.rng.chance(0.5) => Gravity::Constant([Value::ZERO, Value::ZERO, self.value(-9.81)]),
             0 => Gravity::Constant(self.vector(9.0).map(|x| self.value_or_zero(x))),
             1 => Gravity::Constant([Value::ZERO; 3]),
@@ -128,7 +128,7 @@ impl Builder<'_> {
     }
 
     fn wrenches(&mut self, bodies: usize) -> Vec<Wrench> {
-        let on: Vec<usize> = (0..bodies).filter(|_| self.rng.chance(self.knobs.wrenches)).collect();
+        let on: Vec<usize> = (0..bodies).filter(|_| self.rng.chance(self.distribution.wrenches)).collect();
         let both = on.iter().flat_map(|&b| vec![b; 1 + usize::from(self.rng.chance(0.2))]).collect::<Vec<_>>();
         let wrench = |(k, body): (usize, usize)| {
             let axes = self.rng.pick(&[WrenchAxes::Body, WrenchAxes::World]);
@@ -141,7 +141,7 @@ impl Builder<'_> {
         let at = (0..=bodies).map(|b| b.checked_sub(1)).collect::<Vec<_>>();
         let mut frames = Vec::new();
         for body in at {
-            if self.rng.chance(self.knobs.frames) {
+            if self.rng.chance(self.distribution.frames) {
                 frames.push(Frame { name: format!("frame{}", frames.len()), body, placement: self.placement(0.5) });
             }
         }
@@ -162,13 +162,13 @@ fn depth_first(parent: &[Option<usize>]) -> Vec<usize> {
 }
 
 /// A random mechanism: checked, regular (`M` is positive definite in every configuration and near the defaults of the
-/// parameters), the same for the same seed and knobs.
-pub fn random_model(seed: u64, knobs: &Knobs) -> Model {
-    let mut b = Builder { rng: Rng::new(seed, 2), knobs, params: Vec::new() };
+/// parameters), the same for the same seed and distribution.
+pub fn random_model(seed: u64, distribution: &Distribution) -> Model {
+    let mut b = Builder { rng: Rng::new(seed, 2), distribution, params: Vec::new() };
     let s = b.skeleton();
     let n = s.parent.len();
     let (body_names, joint_names) = (b.names("b", n), b.names("j", n));
-    let length: Vec<f64> = s.depth.iter().map(|&d| 0.5 * knobs.taper.powi(d)).collect();
+    let length: Vec<f64> = s.depth.iter().map(|&d| 0.5 * distribution.taper.powi(d)).collect();
     let mut joints: Vec<Joint> = (0..n).map(|i| b.joint(joint_names[i].clone(), i, s.parent[i], length[i])).collect();
     let defaults: Vec<f64> = b.params.iter().map(|p| p.default).collect();
     let (weight, rotor) = weights(&mut b, &s, &joints, &defaults);
@@ -180,7 +180,7 @@ pub fn random_model(seed: u64, knobs: &Knobs) -> Model {
     }
     let body = |i: usize| {
         let full = if weight[i] == Weight::Full { 2.0 } else { 1.0 };
-        b.body(body_names[i].clone(), weight[i], full * knobs.taper.powi(s.depth[i]), length[i])
+        b.body(body_names[i].clone(), weight[i], full * distribution.taper.powi(s.depth[i]), length[i])
     };
     let mut bodies: Vec<_> = (0..n).map(body).collect();
     let mut joints: Vec<Joint> = depth_first(&s.parent).into_iter().map(|j| joints[j].clone()).collect();

@@ -1,4 +1,4 @@
-//! Loops, couplings and starts.
+//! RolledCode, couplings and starts.
 
 use mbd_codegen::model::{Constraint, ConstraintKind, Joint, JointKind, LoopKind, Mount, Placement, Start, Value};
 
@@ -57,7 +57,7 @@ impl Writer<'_> {
                 line(out, "joints", format!("[{}]", names.join(", ")));
                 let ratios: Vec<Value> = terms.iter().map(|(_, ratio)| *ratio).collect();
                 line(out, "ratios", self.list(&ratios, false));
-                let turns = !joints.iter().any(|j| matches!(j.kind, JointKind::Slider { .. }));
+                let turns = !joints.iter().any(|j| matches!(j.kind, JointKind::Prismatic { .. }));
                 if *offset != Value::ZERO {
                     line(out, "offset", self.number(*offset, turns));
                 }
@@ -68,8 +68,8 @@ impl Writer<'_> {
 
     fn loop_kind(&self, out: &mut String, kind: &LoopKind) {
         let name = match kind {
-            LoopKind::Pin { .. } => "pin",
-            LoopKind::Slider { .. } => "slider",
+            LoopKind::Revolute { .. } => "pin",
+            LoopKind::Prismatic { .. } => "slider",
             LoopKind::Cylindrical { .. } => "cylindrical",
             LoopKind::Helical { .. } => "helical",
             LoopKind::Universal { .. } => "universal",
@@ -104,8 +104,8 @@ impl Writer<'_> {
                 direction("normal", normal, z);
                 direction("axis", axis, z);
             }
-            LoopKind::Pin { axis }
-            | LoopKind::Slider { axis }
+            LoopKind::Revolute { axis }
+            | LoopKind::Prismatic { axis }
             | LoopKind::Cylindrical { axis }
             | LoopKind::Helical { axis, .. }
             | LoopKind::PointOnLine { axis }
@@ -127,7 +127,7 @@ impl Writer<'_> {
     /// Start of a joint, if it has one.
     pub(super) fn start(&self, out: &mut String, joint: usize) {
         let Some(Start { q, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
-        let turns = matches!(self.model.joints[joint].kind, JointKind::Pin { .. } | JointKind::Helical { .. });
+        let turns = matches!(self.model.joints[joint].kind, JointKind::Revolute { .. } | JointKind::Helical { .. });
         match q[..] {
             [x] => line(out, "start", self.number(Value::Const(x), turns)),
             _ => line(out, "start", format!("{q:?}")),

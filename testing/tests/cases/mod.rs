@@ -5,7 +5,7 @@ use mbd_runtime::spatial::{cross, Motion};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::{Dual, Interpreter, System};
 use mbd_testing::newton;
-use mbd_testing::random::{random_model, Knobs};
+use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 
 pub type D = Dual<f64>;
@@ -29,7 +29,7 @@ pub struct Case {
 
 impl Case {
     pub fn new(seed: u64) -> Case {
-        let plan = Plan::new(&random_model(seed, &Knobs::everything(seed, 8)), Default::default());
+        let plan = Plan::new(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
         let s = random_state(&plan, seed);
         Case::of(seed, plan, s)
     }
@@ -41,7 +41,7 @@ impl Case {
             (vec![0.0; nq], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv], vec![0.0; nv]);
         i.momenta(&s.q, &s.v, &mut p);
         i.accelerations(&s.q, &s.v, &mut a);
-        i.rates_into(&s.q, &p, &mut v, &mut qd, &mut pd);
+        i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
         i.coordinate_rates(&s.q, &s.v, &mut qd);
         Case { seed, plan, s, i, qd, p, pd, a }
     }

@@ -1,9 +1,9 @@
 //! Random systems in a state, and what is compared of them.
 
-use mbd_codegen::plan::{Forms, Plan, PlanOptions};
+use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use mbd_runtime::{Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
-use mbd_testing::random::{Knobs, Rng};
+use mbd_testing::random::{Distribution, Rng};
 
 use super::{Matrix, Truth, Vector};
 
@@ -27,11 +27,11 @@ pub fn system(seed: u64) -> LoopSystem {
         // Whole joints in a plane: two or three rows of each count.
         1 => {
             let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5, 0.0];
-            let tree = Knobs {
+            let tree = Distribution {
                 bodies: (3, 8),
                 branching: 0.3,
                 kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-                ..Knobs::default()
+                ..Distribution::default()
             };
             random_loops(seed, &LoopKnobs { planar: true, kinds, tree, ..LoopKnobs::plain() })
         }
@@ -41,8 +41,8 @@ pub fn system(seed: u64) -> LoopSystem {
 
 pub fn plan_of(system: &LoopSystem, seed: u64) -> Plan {
     // Most as they stand; some as the search lays them out.
-    let forms = if seed.is_multiple_of(7) { Forms::ALL[seed as usize / 7 % 3] } else { Forms::Single };
-    let searched = forms != Forms::Single;
+    let forms = if seed.is_multiple_of(7) { EliminationStrategy::ALL[seed as usize / 7 % 3] } else { EliminationStrategy::Single };
+    let searched = forms != EliminationStrategy::Single;
     let options = PlanOptions { forms, accelerations: searched, mass_matrix: false, ..PlanOptions::default() };
     Plan::new(&system.model, options)
 }
@@ -82,8 +82,8 @@ impl Case {
 
     pub fn least_pivot(&mut self) -> f64 {
         let phi = self.phi(&self.q()).1;
-        let (mut residual, mut dq, mut pivots) = (self.i.zero_rows(), self.i.rest(), self.i.zero_rows());
-        self.i.correction(&self.q(), &mut residual, &mut dq, &mut pivots);
+        let (mut residual, mut dq, mut pivots) = (self.i.zero_rows(), self.i.zero_momenta(), self.i.zero_rows());
+        self.i.position_correction(&self.q(), &mut residual, &mut dq, &mut pivots);
         let a = &phi * self.truth.dense.m.clone().cholesky().expect("M is positive definite").solve(&phi.transpose());
         let kept = pivots.iter().enumerate().filter(|(_, pivot)| **pivot > 0.0);
         kept.map(|(k, pivot)| pivot / a[(k, k)]).fold(1.0, f64::min)
@@ -92,7 +92,7 @@ impl Case {
     /// Entries of `Φ` as the interpreter has them.
     pub fn phi(&mut self, q: &[f64]) -> (Vec<f64>, Matrix) {
         let (mut residual, mut entries) = (self.i.zero_rows(), self.i.zero_entries());
-        self.i.closure(&q.to_vec(), &mut residual, &mut entries);
+        self.i.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
         let mut phi = Matrix::zeros(residual.len(), self.p.len());
         for (k, row) in self.i.rows().iter().enumerate() {
             for at in row.first..row.first + row.len {
@@ -103,8 +103,8 @@ impl Case {
     }
 
     pub fn rates(&mut self, p: &Vector) -> (Vector, Vector) {
-        let (mut qd, mut pd) = (self.i.neutral(), self.i.rest());
-        self.i.state_rates(0.0, &self.q(), &p.as_slice().to_vec(), &mut qd, &mut pd);
+        let (mut qd, mut pd) = (self.i.neutral(), self.i.zero_momenta());
+        self.i.rates_at(0.0, &self.q(), &p.as_slice().to_vec(), &mut qd, &mut pd);
         (qd.into(), pd.into())
     }
 

@@ -252,6 +252,6 @@ pub fn open_rates(open: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> Vector {
     let nv = v.len();
     let (mut p, mut again, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; q.len()], vec![0.0; nv]);
     open.momenta(q, v, &mut p);
-    open.rates_into(q, &p, &mut again, &mut qd, &mut pd);
+    open.rates(q, &p, &mut again, &mut qd, &mut pd);
     pd.into()
 }

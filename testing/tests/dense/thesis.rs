@@ -9,7 +9,7 @@ use mbd_runtime::System;
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
 use mbd_testing::kkt::{across, mounted, unit, Pose};
 use mbd_testing::newton::{body_frames, freedoms, joint_coordinates};
-use mbd_testing::random::{rotation_matrix, Knobs};
+use mbd_testing::random::{rotation_matrix, Distribution};
 use mbd_testing::value;
 
 use super::minimal::least;
@@ -69,8 +69,8 @@ pub fn cut_rows(kind: &LoopKind) -> Option<Matrix> {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let all = |f: &dyn Fn([f64; 3]) -> Vec<f64>, list: &[[f64; 3]]| list.iter().map(|n| f(*n)).collect::<Vec<_>>();
     let columns: Vec<Vec<f64>> = match *kind {
-        LoopKind::Pin { axis } => [all(&lin, &axes), all(&ang, &across(axis))].concat(),
-        LoopKind::Slider { axis } => [all(&lin, &across(axis)), all(&ang, &axes)].concat(),
+        LoopKind::Revolute { axis } => [all(&lin, &axes), all(&ang, &across(axis))].concat(),
+        LoopKind::Prismatic { axis } => [all(&lin, &across(axis)), all(&ang, &axes)].concat(),
         LoopKind::Cylindrical { axis } => [all(&lin, &across(axis)), all(&ang, &across(axis))].concat(),
         LoopKind::Planar { normal } => [vec![lin(unit(normal))], all(&ang, &across(normal))].concat(),
         LoopKind::Spherical => all(&lin, &axes),
@@ -183,14 +183,14 @@ impl Chain {
 pub fn chain(seed: u64) -> LoopSystem {
     let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
     let kinds = if seed.is_multiple_of(2) { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
-    let tree = Knobs { bodies: (3, 6), kinds, ..Knobs::default() };
+    let tree = Distribution { bodies: (3, 6), kinds, ..Distribution::default() };
     let mut cuts = [0.0; 16];
     for k in [0, 1, 2, 5, 6, 7, 9, 10] {
         cuts[k] = 1.0;
     }
-    let knobs = LoopKnobs { tree, count: (1, 1), ground: 1.0, coupling: 0.0, kinds: cuts, ..LoopKnobs::plain() };
+    let distribution = LoopKnobs { tree, count: (1, 1), ground: 1.0, coupling: 0.0, kinds: cuts, ..LoopKnobs::plain() };
     (0..)
-        .map(|k| random_loops(seed + 1000 * k, &knobs))
+        .map(|k| random_loops(seed + 1000 * k, &distribution))
         .find(serial)
         .expect("some loop goes from the ground to the tip")
 }

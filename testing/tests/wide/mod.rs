@@ -3,7 +3,7 @@
 //! Sines and cosines are rounded to 53 bits: those that programs on doubles compute. They are inputs of the algebra, the
 //! same in every form, and their own errors are held to an ulp elsewhere; what is compared here are the roundings after them.
 
-use mbd_codegen::generate::GroupProgram;
+use mbd_codegen::generate::OutputProgram;
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
 pub use mbd_codegen::wide::Wide;
@@ -11,7 +11,7 @@ use mbd_runtime::Scalar;
 use mbd_testing::state::State;
 
 /// Inputs of a program in their order.
-pub fn inputs(group: &GroupProgram, s: &State, p: &[f64]) -> Vec<f64> {
+pub fn inputs(group: &OutputProgram, s: &State, p: &[f64]) -> Vec<f64> {
     let array = |name: &str| -> Vec<f64> {
         match name {
             "q" => s.q.clone(),

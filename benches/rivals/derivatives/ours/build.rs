@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::layout::pinocchio;
 use mbd_codegen::plan::{Plan, PlanOptions};
-use mbd_codegen::{generate, Group, Options};
+use mbd_codegen::{generate, Output, Options};
 
 fn main() {
     println!("cargo:rerun-if-env-changed=RIVALS_ROBOTS");
@@ -41,7 +41,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     }
     let options = Options {
         type_name: "Kernel".to_string(),
-        outputs: vec![Group::Derivatives],
+        outputs: vec![Output::Derivatives],
         source: name.to_string(),
         chunk: std::env::var("RIVALS_CHUNK").map_or(1000, |c| c.parse().expect("a number")),
         ..Options::default()

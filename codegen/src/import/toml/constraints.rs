@@ -148,5 +148,5 @@ fn coupling(table: &Table, sliders: &HashSet<&str>, findings: &mut Findings) -> 
 }
 
 fn slides(joint: &RawJoint) -> bool {
-    joint.kind.as_ref().is_some_and(|k| k.value == JointType::Slider)
+    joint.kind.as_ref().is_some_and(|k| k.value == JointType::Prismatic)
 }

@@ -108,8 +108,8 @@ fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
 }
 
 const TYPES: [(&str, JointType); 9] = [
-    ("pin", JointType::Pin),
-    ("slider", JointType::Slider),
+    ("pin", JointType::Revolute),
+    ("slider", JointType::Prismatic),
     ("cylindrical", JointType::Cylindrical),
     ("helical", JointType::Helical),
     ("universal", JointType::Universal),
@@ -164,7 +164,7 @@ fn joint_type(table: &Table, findings: &mut Findings) -> Option<Spanned<JointTyp
 fn units(kind: Option<JointType>) -> &'static [Unit] {
     use Unit::{Angle, Plain};
     match kind {
-        Some(JointType::Slider) => &[Plain],
+        Some(JointType::Prismatic) => &[Plain],
         Some(JointType::Cylindrical) => &[Plain, Angle],
         Some(JointType::Planar) => &[Plain, Plain, Angle],
         // An unknown type is one finding; its units are not another.

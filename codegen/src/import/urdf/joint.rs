@@ -10,9 +10,9 @@ use roxmltree::Node;
 
 /// Kinds by their names in a file. `spherical` and `ball` are no part of URDF, but some simulators know them.
 const KINDS: [(&str, JointType); 8] = [
-    ("revolute", JointType::Pin),
-    ("continuous", JointType::Pin),
-    ("prismatic", JointType::Slider),
+    ("revolute", JointType::Revolute),
+    ("continuous", JointType::Revolute),
+    ("prismatic", JointType::Prismatic),
     ("planar", JointType::Planar),
     ("floating", JointType::Floating),
     ("spherical", JointType::Spherical),

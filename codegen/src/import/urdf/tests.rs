@@ -1,7 +1,7 @@
 use super::read;
 use crate::diag::{Diagnostics, Severity};
 use crate::import::{Base, ImportOptions};
-use crate::model::{Gravity, JointKind, Model, Motion, Rotation, Value};
+use crate::model::{Gravity, JointKind, Model, JointMotion, Rotation, Value};
 use std::fmt::Write;
 
 const SOLID: &str =
@@ -63,11 +63,11 @@ fn every_number_arrives_in_its_place() {
     assert_eq!((shoulder.parent, shoulder.child), (Some(0), 1));
     assert_eq!(consts(shoulder.placement.xyz), [4.0, 5.0, 6.0]);
     assert_eq!(shoulder.placement.rotation, Rotation::Rpy([0.4, 0.5, 0.6].map(Value::Const)));
-    assert_eq!(shoulder.kind, JointKind::Pin { axis: [0.0, 3.0, 4.0] });
+    assert_eq!(shoulder.kind, JointKind::Revolute { axis: [0.0, 3.0, 4.0] });
     assert_eq!(shoulder.damping, [Value::Const(0.7)]);
     let rail = &m.joints[2];
-    assert_eq!(rail.kind, JointKind::Slider { axis: [0.0, 0.0, -1.0] });
-    assert_eq!(rail.motion, Motion::Mimic { leader: 1, ratio: Value::Const(-2.0), offset: Value::Const(0.25) });
+    assert_eq!(rail.kind, JointKind::Prismatic { axis: [0.0, 0.0, -1.0] });
+    assert_eq!(rail.motion, JointMotion::Mimic { leader: 1, ratio: Value::Const(-2.0), offset: Value::Const(0.25) });
 }
 
 #[test]
@@ -77,8 +77,8 @@ fn what_is_left_out_takes_the_default_of_urdf() {
     let text = format!("<robot name='r'><link name='base'/>{}{}{joints}</robot>", link("one"), link("two"));
     let (m, findings) = model(&text, Base::Fixed);
     // The default axis is x, not the z of this project's own format; it is told once.
-    assert_eq!(m.joints[1].kind, JointKind::Pin { axis: [1.0, 0.0, 0.0] });
-    assert_eq!(m.joints[1].motion, Motion::Mimic { leader: 2, ratio: Value::ONE, offset: Value::ZERO });
+    assert_eq!(m.joints[1].kind, JointKind::Revolute { axis: [1.0, 0.0, 0.0] });
+    assert_eq!(m.joints[1].motion, JointMotion::Mimic { leader: 2, ratio: Value::ONE, offset: Value::ZERO });
     assert_eq!(consts(m.joints[1].placement.xyz), [0.0; 3]);
     assert_eq!(m.bodies[0].mass, Value::ZERO);
     assert!(findings.contains("turns about or slides along its x axis (2 times, first here)"), "{findings}");
@@ -88,9 +88,9 @@ fn what_is_left_out_takes_the_default_of_urdf() {
 fn every_joint_type() {
     let x = [1.0, 0.0, 0.0];
     let kinds = [
-        ("revolute", JointKind::Pin { axis: x }),
-        ("continuous", JointKind::Pin { axis: x }),
-        ("prismatic", JointKind::Slider { axis: x }),
+        ("revolute", JointKind::Revolute { axis: x }),
+        ("continuous", JointKind::Revolute { axis: x }),
+        ("prismatic", JointKind::Prismatic { axis: x }),
         ("planar", JointKind::Planar { normal: x }),
         ("floating", JointKind::Floating),
         ("spherical", JointKind::Spherical),

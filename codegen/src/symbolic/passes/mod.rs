@@ -14,7 +14,7 @@ pub(super) mod terms;
 
 use super::Program;
 use crate::options::Arithmetic;
-use crate::plan::Forms;
+use crate::plan::EliminationStrategy;
 pub(super) use rebuild::width;
 use schedule::Limits;
 
@@ -34,14 +34,14 @@ const WIDE: f64 = 2.0;
 const LONG: usize = 1400;
 
 /// The program as it is to be emitted. Whoever wants the fewest operations gets none twice to save time.
-pub fn run(program: Program, arithmetic: Arithmetic, forms: Forms) -> Program {
+pub fn run(program: Program, arithmetic: Arithmetic, forms: EliminationStrategy) -> Program {
     match arithmetic {
         Arithmetic::Exact => program,
         Arithmetic::Fast => {
             let program = fewer(program);
             let gathered = constants::gather(&program);
             let program = match forms {
-                Forms::Fewest => {
+                EliminationStrategy::Fewest => {
                     let [a, b] = [sums::regroup(&gathered), sums::regroup(&program)];
                     if a.counts().total() <= b.counts().total() {
                         a
@@ -49,7 +49,7 @@ pub fn run(program: Program, arithmetic: Arithmetic, forms: Forms) -> Program {
                         b
                     }
                 }
-                Forms::Fastest | Forms::Single => shorten::regroup_short(&gathered),
+                EliminationStrategy::Fastest | EliminationStrategy::Single => shorten::regroup_short(&gathered),
             };
             let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
             match wide && program.instructions() >= LONG {
@@ -78,7 +78,7 @@ mod tests {
 
     #[test]
     fn values_stay() {
-        for forms in Forms::ALL {
+        for forms in EliminationStrategy::ALL {
             random::keeps_values(|p| run(p.clone(), Arithmetic::Fast, forms));
         }
         random::keeps_values(|p| fewer(p.clone()));
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn counts_do_not_grow() {
-        for forms in Forms::ALL {
+        for forms in EliminationStrategy::ALL {
             random::counts_never_grow(|p| run(p.clone(), Arithmetic::Fast, forms));
         }
         random::counts_never_grow(|p| fewer(p.clone()));
@@ -96,7 +96,7 @@ mod tests {
     fn the_same_program_gives_the_same_program() {
         for seed in 0..20 {
             let program = random::integer_program(seed, 100);
-            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast, Forms::default()));
+            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast, EliminationStrategy::default()));
             assert_eq!((a.steps, a.outputs), (b.steps, b.outputs));
         }
     }
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn exact_programs_are_left_alone() {
         let program = random::integer_program(1, 100);
-        let exact = run(program.clone(), Arithmetic::Exact, Forms::default());
+        let exact = run(program.clone(), Arithmetic::Exact, EliminationStrategy::default());
         assert_eq!((exact.steps, exact.outputs), (program.steps, program.outputs));
     }
 }

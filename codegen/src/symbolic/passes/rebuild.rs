@@ -3,7 +3,7 @@
 use mbd_runtime::sweep::Trace;
 use mbd_runtime::Scalar;
 
-use crate::symbolic::{Expr, Graph, Label, Op, Operand, Output, Program};
+use crate::symbolic::{Expr, Graph, Label, Op, Operand, ProgramResult, Program};
 
 /// A program on its way into another graph: the expression of every node so far.
 pub struct Rebuilt<'g> {
@@ -61,9 +61,9 @@ impl<'g> Rebuilt<'g> {
 
     /// The program that the new graph makes of the old one's results.
     pub fn finish(&self, old: &Program) -> Program {
-        let result = |output: &Output| match *output {
-            Output::Const(x) => Expr::Const(x),
-            Output::Node(id, neg) => {
+        let result = |output: &ProgramResult| match *output {
+            ProgramResult::Const(x) => Expr::Const(x),
+            ProgramResult::Node(id, neg) => {
                 let value = self.get(Operand::Node(id));
                 if neg {
                     -value
@@ -95,7 +95,7 @@ pub fn uses(program: &Program) -> Vec<u32> {
         }
     }
     for output in &program.outputs {
-        if let Output::Node(id, _) = output {
+        if let ProgramResult::Node(id, _) = output {
             uses[*id as usize] += 1;
         }
     }

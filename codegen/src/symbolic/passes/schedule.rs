@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::symbolic::machine::{latency, pipe, Pipe, PIPES};
-use crate::symbolic::{Op, Operand, Output, Program};
+use crate::symbolic::{Op, Operand, ProgramResult, Program};
 
 /// Limits of a schedule.
 #[derive(Clone, Copy, Debug)]
@@ -55,8 +55,8 @@ fn renumber(program: &Program, order: &[u32]) -> Program {
         };
         (k as u32, op, label)
     };
-    let output = |output: &Output| match *output {
-        Output::Node(k, neg) => Output::Node(id(k), neg),
+    let output = |output: &ProgramResult| match *output {
+        ProgramResult::Node(k, neg) => ProgramResult::Node(id(k), neg),
         constant => constant,
     };
     Program {
@@ -114,7 +114,7 @@ impl<'p> Scheduler<'p> {
         }
         let mut is_result = vec![false; n];
         for output in &program.outputs {
-            if let Output::Node(id, _) = output {
+            if let ProgramResult::Node(id, _) = output {
                 is_result[position[*id as usize] as usize] = true;
             }
         }

@@ -1,7 +1,7 @@
 //! What the firmware and its host twin both run: generated dynamics in steps of 1 ms.
 #![no_std]
 
-use mbd_runtime::constrained::{Bounded, Steady};
+use mbd_runtime::constrained::{WithPostStep, Steady};
 use mbd_runtime::integrate::{Ab6, ImplicitMidpoint, Rk4, Stepper};
 use mbd_runtime::{Constrained, Differentiable, Energetic, Real, Scalar, System};
 
@@ -33,13 +33,13 @@ mbd_macros::mbd_model! {
     path = "../../../models/mechanisms/fourbar.toml",
     name = FourbarF32,
     scalar = f32,
-    outputs = [rates, closure, settle, correction, multipliers, energy]
+    outputs = [rates, constraint_residuals, project_momenta, position_correction, multipliers, energy]
 }
 mbd_macros::mbd_model! {
     path = "../../../models/mechanisms/fourbar.toml",
     name = FourbarF64,
     scalar = f64,
-    outputs = [rates, closure, settle, correction, multipliers, energy]
+    outputs = [rates, constraint_residuals, project_momenta, position_correction, multipliers, energy]
 }
 
 /// Number of steps of the short runs.
@@ -127,7 +127,7 @@ where
         *q = start;
         start = -start;
     }
-    let p = system.rest();
+    let p = system.zero_momenta();
     let method = Ab6::compensated(system);
     watched(system, method, MINUTE, (q, p), watch)
 }
@@ -146,13 +146,13 @@ where
     M: Stepper<Y>,
 {
     watch(&q, &p);
-    let (kinetic, potential) = system.state_energy(&q, &p);
+    let (kinetic, potential) = system.energies(&q, &p);
     let start = kinetic + potential;
     let (mut change, mut largest) = (Y::Scalar::zero(), kinetic);
     let end = run(system, method, steps, (q, p), |system, step, q, p| {
         watch(q, p);
         if step % often == 0 {
-            let (kinetic, potential) = system.state_energy(q, p);
+            let (kinetic, potential) = system.energies(q, p);
             let off = ((potential - start) + kinetic).abs();
             change = if off > change { off } else { change };
             largest = if kinetic > largest { kinetic } else { largest };
@@ -183,12 +183,12 @@ where
     Y: Constrained + Energetic,
     Y::Scalar: Real,
 {
-    let (mut q, p) = (system.neutral(), system.rest());
+    let (mut q, p) = (system.neutral(), system.zero_momenta());
     for (q, start) in q.as_mut().iter_mut().zip(FOURBAR) {
         *q = Y::Scalar::constant(start);
     }
     let hold = Steady::<_, 1>::new(system);
-    let method = Bounded::new(system, Rk4::new(system), hold);
+    let method = WithPostStep::new(system, Rk4::new(system), hold);
     watched(system, method, LOOP, (q, p), watch)
 }
 
@@ -205,7 +205,7 @@ where
         *q = start;
         start = start + Y::Scalar::constant(0.2);
     }
-    let p = system.rest();
+    let p = system.zero_momenta();
     run(system, method, STEPS, (q, p), |_, _, _, _| ())
 }
 

@@ -57,7 +57,7 @@ impl Watch {
 fn minute() -> f64 {
     let (mut exact, mut energy) = (Ur5F64::new(), Watch::default());
     let run = scenes::watched_minute(&mut Ur5F32::new(), |q, p| {
-        energy.look(exact.state_energy(&q.map(f64::from), &p.map(f64::from)));
+        energy.look(exact.energies(&q.map(f64::from), &p.map(f64::from)));
     });
     run.unwrap_or_else(|error| fail(&format!("UR5, one minute: {error:?}")));
     energy.error("UR5, one minute")
@@ -73,9 +73,9 @@ where
     let run = scenes::watched_closed(&mut system, |q, p| {
         let number = |x: &[Y::Scalar]| core::array::from_fn(|k| mbd_runtime::Real::to_f64(x[k]));
         let (q, p) = (number(q.as_ref()), number(p.as_ref()));
-        energy.look(exact.state_energy(&q, &p));
+        energy.look(exact.energies(&q, &p));
         let (mut residual, mut entries) = (exact.zero_rows(), exact.zero_entries());
-        Constrained::closure(&mut exact, &q, &mut residual, &mut entries);
+        Constrained::constraint_residuals(&mut exact, &q, &mut residual, &mut entries);
         gap = residual.iter().fold(gap, |gap, x| gap.max(x.abs()));
     });
     run.unwrap_or_else(|error| fail(&format!("four-bar: {error:?}")));

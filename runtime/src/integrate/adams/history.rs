@@ -72,7 +72,7 @@ where
         for j in 0..self.len {
             let slot = self.slot(j);
             self.ages[slot] = self.ages[slot] + h;
-            if !system.groups().is_empty() {
+            if !system.lie_joints().is_empty() {
                 Chart::follow(system, step, &mut self.places[slot], &mut self.rates[slot]);
             }
         }

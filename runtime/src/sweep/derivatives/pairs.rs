@@ -1,7 +1,7 @@
 //! Columns of every freedom, carried inward and met by every freedom on the way.
 
 use super::{single, velocity, Derivatives};
-use crate::spatial::{cross, dot3, Force, Motion, RigidInertia, Step, Vec3};
+use crate::spatial::{cross, dot3, Force, Motion, RigidInertia, ElementaryTransform, Vec3};
 use crate::sweep::{Inputs, Quantity, Sweeps, Trace};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::{Poses, Workspace};
@@ -9,14 +9,14 @@ use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Steps from the parent's node frame to the frame that the columns of node `i` are taken in.
-    fn to_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> impl DoubleEndedIterator<Item = &'b Step<S>> + 'b {
+    fn to_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         let joint = &poses.joint[i];
         let steps = if single(&self.tree.nodes[i]) { joint.placing() } else { joint.get() };
         self.place(i).iter().chain(steps)
     }
 
     /// Steps from there to the node frame.
-    fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [Step<S>] {
+    fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [ElementaryTransform<S>] {
         match single(&self.tree.nodes[i]) {
             true => poses.joint[i].own(),
             false => &[],
@@ -184,7 +184,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let s = node.kind.axis(k).motion(S::one());
         let psi = &d.psi[w.first[i] + k];
-        if matches!(node.kind, Kind::Pin) && d.summed[i] {
+        if matches!(node.kind, Kind::Revolute) && d.summed[i] {
             let turned = turned_momentum(&d.inertia[i], &d.hat[i]);
             let swing = S::constant(0.5) * turned.dot(&d.hat[i]) + d.rest[i].dot(psi);
             return (turned.plus(&s.cross_force(&d.rest[i])), swing);
@@ -241,7 +241,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let k = |k: usize| node.passive[k].stiffness;
             match node.kind {
                 Kind::Spherical | Kind::Floating => {}
-                Kind::Pin | Kind::Slider | Kind::Helical { .. } => take(0, 0, node.ratio * node.ratio * k(0)),
+                Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => take(0, 0, node.ratio * node.ratio * k(0)),
                 Kind::Planar => {
                     // The springs act in the outer axes, the freedoms in those of the node.
                     let turn = w.poses.joint[i].get()[2];
@@ -284,11 +284,11 @@ fn turned_momentum<S: Scalar>(m: &RigidInertia<S>, hat: &Motion<S>) -> Force<S> 
 }
 
 /// Inertia of a rigid body in the parent frame of a step.
-fn inertia_out<S: Scalar>(step: &Step<S>, m: &RigidInertia<S>) -> RigidInertia<S> {
+fn inertia_out<S: Scalar>(step: &ElementaryTransform<S>, m: &RigidInertia<S>) -> RigidInertia<S> {
     use crate::spatial::SYM;
     let moment: Vec3<S> = step.moment(m.mass, m.moment);
     let mut j = m.inertia;
-    if let Step::Shift { axis, r } = step {
+    if let ElementaryTransform::Shift { axis, r } = step {
         let (a, b, n) = axis.cyclic();
         let add = *r * (m.moment[n] + moment[n]);
         j[SYM[a][a]] = j[SYM[a][a]] + add;

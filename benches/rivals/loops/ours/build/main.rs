@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::{Plan, PlanOptions};
-use mbd_codegen::{generate, Group, Options};
+use mbd_codegen::{generate, Output, Options};
 use mbd_runtime::tree::Source;
 
 fn main() {
@@ -55,7 +55,7 @@ fn order(ours: &Model, plan: &Plan, theirs: &Model) -> (Vec<usize>, Vec<usize>, 
 }
 
 fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
-    use Group::{Accelerations, Closure, Correction, Momenta, Multipliers, Rates, Settle};
+    use Output::{Accelerations, Closure, Correction, Momenta, Multipliers, Rates, Settle};
     let options = Options {
         type_name: "Kernel".to_string(),
         outputs: vec![Rates, Momenta, Accelerations, Closure, Settle, Correction, Multipliers],
@@ -66,7 +66,7 @@ fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
     write(&format!("{name}.rs"), &generated.source);
     let plan = Plan::new(model, PlanOptions::default());
     let (q, v, start) = order(model, &plan, theirs);
-    let count = |group: Group| generated.counts.iter().find(|c| c.0 == group).map_or(0, |c| c.1.total());
+    let count = |group: Output| generated.counts.iter().find(|c| c.0 == group).map_or(0, |c| c.1.total());
     let (rates, accelerations) = (count(Rates), count(Accelerations));
     let (nq, nv, rows) = (q.len(), v.len(), plan.dims.rows);
     let _ = write!(

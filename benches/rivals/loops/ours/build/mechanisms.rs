@@ -45,7 +45,7 @@ fn model(path: &str, text: &str) -> Model {
     for (k, joint) in model.joints.iter_mut().enumerate() {
         joint.damping.fill(Value::ZERO);
         joint.stiffness.fill(Value::ZERO);
-        if let JointKind::Pin { axis } | JointKind::Slider { axis } = &mut joint.kind {
+        if let JointKind::Revolute { axis } | JointKind::Prismatic { axis } = &mut joint.kind {
             if backwards(axis) {
                 let start = model.starts.iter_mut().filter(|s| s.joint == k);
                 start.for_each(|s| s.q.iter_mut().for_each(|q| *q = -*q));
@@ -53,7 +53,7 @@ fn model(path: &str, text: &str) -> Model {
         }
     }
     for Constraint { kind, .. } in &mut model.constraints {
-        if let ConstraintKind::Loop { kind: LoopKind::Pin { axis }, .. } = kind {
+        if let ConstraintKind::Loop { kind: LoopKind::Revolute { axis }, .. } = kind {
             backwards(axis);
         }
     }

@@ -1,7 +1,7 @@
 //! Massless rods as bodies: Pinocchio's rigid constraints know no distances.
 
 use mbd_codegen::model::{
-    Body, Constraint, ConstraintKind, Joint, JointKind, LoopKind, Model, Motion, Mount, Placement, Rotation, Value,
+    Body, Constraint, ConstraintKind, Joint, JointKind, LoopKind, Model, JointMotion, Mount, Placement, Rotation, Value,
 };
 
 /// Mass of a rod of the Delta robot, half of it at either end, kg.
@@ -43,7 +43,7 @@ pub fn with_rods(model: &Model) -> Model {
                 child: rod,
                 placement: first.placement,
                 unbounded: false,
-                motion: Motion::Free,
+                motion: JointMotion::Free,
                 damping: vec![Value::ZERO; 2],
                 stiffness: vec![Value::ZERO; 2],
                 rest: vec![Value::ZERO; 2],

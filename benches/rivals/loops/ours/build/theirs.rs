@@ -49,8 +49,8 @@ fn joint(kind: &JointKind) -> (String, [f64; 6]) {
         (format!("{letter}{}", aligned.map_or('U', |k| ['X', 'Y', 'Z'][k])), [x, y, z, 0.0, 0.0, 0.0])
     };
     match *kind {
-        JointKind::Pin { axis } => one('R', axis),
-        JointKind::Slider { axis } => one('P', axis),
+        JointKind::Revolute { axis } => one('R', axis),
+        JointKind::Prismatic { axis } => one('P', axis),
         JointKind::Universal { axes: [[a, b, c], [d, e, f]] } => ("UN".to_string(), [a, b, c, d, e, f]),
         JointKind::Floating => ("FF".to_string(), [0.0; 6]),
         _ => panic!("a joint that no mechanism here has"),
@@ -81,7 +81,7 @@ pub fn text(name: &str, model: &Model) -> String {
     }
     for constraint in &model.constraints {
         let ConstraintKind::Loop { kind, first, second } = &constraint.kind else { panic!("{name}: loops only") };
-        assert!(matches!(kind, LoopKind::Pin { .. } | LoopKind::Spherical), "{name}: {}", kind.word());
+        assert!(matches!(kind, LoopKind::Revolute { .. } | LoopKind::Spherical), "{name}: {}", kind.word());
         // Their first joint is to be that of a body.
         let mut ends: Vec<&Mount> = vec![first, second];
         ends.sort_by_key(|m| m.body.is_none());

@@ -37,12 +37,12 @@ where
             quaternion.iter_mut().for_each(|x| *x /= norm);
         }
         let Ok(closed) = close(system, q, &Closing { tolerance: 1e-13, ..Closing::default() }) else { continue };
-        let (mut p, mut sigma) = (system.rest(), system.zero_rows());
+        let (mut p, mut sigma) = (system.zero_momenta(), system.zero_rows());
         v.as_mut().iter_mut().for_each(|v| *v = random.next());
-        system.state_momenta(q, v, &mut p);
+        system.conjugate_momenta(q, v, &mut p);
         // Twice: round-off of the first projection goes with its multipliers.
         for _ in 0..2 {
-            system.settle(0.0, q, &mut p, v, &mut sigma);
+            system.project_momenta(0.0, q, &mut p, v, &mut sigma);
         }
         return closed.residual;
     }

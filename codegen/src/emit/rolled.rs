@@ -6,32 +6,32 @@ use std::fmt::Write;
 
 use super::names::{identifier, quantity};
 use super::statements::{input, Head};
-use crate::loops::{Block, Loop, LoopProgram, Place, Repeat, Start, Target, Way};
+use crate::rolled::{Block, Loop, RolledProgram, Place, Repeat, Start, Target, SweepDirection};
 use crate::options::Precision;
 use crate::plan::Plan;
-use crate::symbolic::{Op, Output};
+use crate::symbolic::{Op, ProgramResult};
 
 /// Bytes that the rows of eight lanes may take on the stack; beyond, lanes are computed one after the other.
 const ROWS: usize = 1 << 19;
 
 /// Writes the function of a group in loop form.
-pub struct Loops<'a> {
+pub struct RolledWriter<'a> {
     plan: &'a Plan,
-    program: &'a LoopProgram,
+    program: &'a RolledProgram,
     head: Head<'a>,
     /// Whether lanes are computed one after the other.
     one_by_one: bool,
 }
 
-impl<'a> Loops<'a> {
+impl<'a> RolledWriter<'a> {
     /// Of one group.
-    pub fn new(plan: &'a Plan, program: &'a LoopProgram, head: Head<'a>) -> Self {
+    pub fn new(plan: &'a Plan, program: &'a RolledProgram, head: Head<'a>) -> Self {
         let bytes = match head.options.precision {
             Precision::F64 => 64,
             Precision::F32 => 32,
         };
         let rows: usize = program.loops.iter().map(|l| l.row * l.table.len()).sum();
-        Loops { plan, program, head, one_by_one: rows * bytes > ROWS }
+        RolledWriter { plan, program, head, one_by_one: rows * bytes > ROWS }
     }
 
     /// Lane in inputs and results.
@@ -120,7 +120,7 @@ impl<'a> Loops<'a> {
             let _ = writeln!(out, "            for l in 0..LANES {{ carried{k}[l] = {start}; }}");
         }
         let turns = self.program.loops[repeat.run].table.len();
-        let order = if repeat.way == Some(Way::Back) { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
+        let order = if repeat.way == Some(SweepDirection::TipToBase) { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
         let _ = writeln!(out, "            for k in {order} {{");
         let _ = writeln!(out, "                let row = &mut rows{}[k];", repeat.run);
         self.open_table(out, block, repeat.run);
@@ -160,7 +160,7 @@ impl<'a> Loops<'a> {
         }
         let _ = writeln!(out, "            for k in 0..{turns} {{");
         for (output, target) in block.program.outputs.iter().zip(&block.outputs) {
-            let (Output::Node(id, _), Target::Row(row)) = (output, target) else { continue };
+            let (ProgramResult::Node(id, _), Target::Row(row)) = (output, target) else { continue };
             let part = |(k, pair): (usize, &[Option<u32>; 2])| {
                 let name = ["sines", "cosines"].into_iter().zip(pair).find(|(_, node)| **node == Some(*id));
                 name.map(|(name, _)| format!("{name}{k}"))

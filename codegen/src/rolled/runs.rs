@@ -6,8 +6,8 @@
 
 use std::ops::Range;
 
-use mbd_runtime::spatial::Step;
-use mbd_runtime::tree::{Bond, Kind, Node, Shared, Source, Tree};
+use mbd_runtime::spatial::ElementaryTransform;
+use mbd_runtime::tree::{Bond, Kind, Node, Unknown, Source, Tree};
 
 use crate::symbolic::Expr;
 
@@ -92,12 +92,12 @@ fn path_from(links: &[Option<Node<f64>>], children: &[usize], start: usize) -> R
 /// Node `i` with numbers for constants, if it can be in a loop.
 fn constant_link(tree: &Tree<Expr>, i: usize) -> Option<Node<f64>> {
     let node = &tree.nodes[i];
-    let plain = node.shared.is_none()
+    let plain = node.unknown.is_none()
         && !node.deferred
-        && !node.gather
-        && !node.unturned
-        && !node.parent.is_some_and(|p| tree.nodes[p].gather || tree.nodes[p].unturned)
-        && node.open.iter().all(|&g| matches!(tree.shared[g], Shared::Row(_)))
+        && !node.accumulates_momentum
+        && !node.non_rotating
+        && !node.parent.is_some_and(|p| tree.nodes[p].accumulates_momentum || tree.nodes[p].non_rotating)
+        && node.open.iter().all(|&g| matches!(tree.unknowns[g], Unknown::Row(_)))
         && !tree.constraints.iter().any(|c| ends_at(&c.bond, i))
         && node.ends.is_empty()
         && node.screws.is_empty()
@@ -182,11 +182,11 @@ fn constants(node: &Node<f64>) -> Vec<f64> {
     out
 }
 
-fn same_step(a: &Step<f64>, b: &Step<f64>) -> bool {
+fn same_step(a: &ElementaryTransform<f64>, b: &ElementaryTransform<f64>) -> bool {
     match (a, b) {
-        (Step::Turn { axis: a, .. }, Step::Turn { axis: b, .. }) => a == b,
-        (Step::Shift { axis: a, .. }, Step::Shift { axis: b, .. }) => a == b,
-        (Step::Rotate(_), Step::Rotate(_)) => true,
+        (ElementaryTransform::Turn { axis: a, .. }, ElementaryTransform::Turn { axis: b, .. }) => a == b,
+        (ElementaryTransform::Shift { axis: a, .. }, ElementaryTransform::Shift { axis: b, .. }) => a == b,
+        (ElementaryTransform::Rotate(_), ElementaryTransform::Rotate(_)) => true,
         _ => false,
     }
 }
@@ -194,7 +194,7 @@ fn same_step(a: &Step<f64>, b: &Step<f64>) -> bool {
 fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
     std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
         && a.quarter == b.quarter
-        && a.parent_side == b.parent_side
+        && a.before_joint == b.before_joint
         && a.open == b.open
 }
 
@@ -212,13 +212,13 @@ fn compatible(a: &Node<f64>, b: &Node<f64>) -> bool {
 }
 
 /// The longer placement, if the other is the same but for shifts left out. A shift by zero is exact; a turn by zero rounds.
-fn merged(a: &[Step<f64>], b: &[Step<f64>]) -> Option<Vec<Step<f64>>> {
+fn merged(a: &[ElementaryTransform<f64>], b: &[ElementaryTransform<f64>]) -> Option<Vec<ElementaryTransform<f64>>> {
     let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
     let mut rest = short.iter().peekable();
     for step in long {
         if rest.peek().is_some_and(|s| same_step(s, step)) {
             rest.next();
-        } else if !matches!(step, Step::Shift { .. }) {
+        } else if !matches!(step, ElementaryTransform::Shift { .. }) {
             return None;
         }
     }
@@ -226,15 +226,15 @@ fn merged(a: &[Step<f64>], b: &[Step<f64>]) -> Option<Vec<Step<f64>>> {
 }
 
 /// A placement written with the steps of a longer one, identity steps let in.
-fn padded(place: &[Step<f64>], steps: &[Step<f64>]) -> Option<Vec<Step<f64>>> {
+fn padded(place: &[ElementaryTransform<f64>], steps: &[ElementaryTransform<f64>]) -> Option<Vec<ElementaryTransform<f64>>> {
     let mut rest = place.iter().copied().peekable();
     let mut out = Vec::new();
     for step in steps {
         match rest.peek() {
             Some(s) if same_step(s, step) => out.extend(rest.next()),
             _ => match *step {
-                Step::Shift { axis, .. } => out.push(Step::Shift { axis, r: 0.0 }),
-                Step::Turn { .. } | Step::Rotate(_) => return None,
+                ElementaryTransform::Shift { axis, .. } => out.push(ElementaryTransform::Shift { axis, r: 0.0 }),
+                ElementaryTransform::Turn { .. } | ElementaryTransform::Rotate(_) => return None,
             },
         }
     }
@@ -272,14 +272,14 @@ fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<R
 /// A node with every constant replaced, always in the same order.
 pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -> Node<B> {
     let place = node.place.iter().map(|step| match *step {
-        Step::Turn { axis, c, s } => Step::Turn { axis, c: f(c), s: f(s) },
-        Step::Shift { axis, r } => Step::Shift { axis, r: f(r) },
-        Step::Rotate(m) => Step::Rotate(m.map(|row| row.map(&mut *f))),
+        ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: f(c), s: f(s) },
+        ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis, r: f(r) },
+        ElementaryTransform::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(&mut *f))),
     });
     let place = place.collect();
     let kind = match node.kind {
-        Kind::Pin => Kind::Pin,
-        Kind::Slider => Kind::Slider,
+        Kind::Revolute => Kind::Revolute,
+        Kind::Prismatic => Kind::Prismatic,
         Kind::Helical { pitch } => Kind::Helical { pitch: f(pitch) },
         Kind::Planar => Kind::Planar,
         Kind::Spherical => Kind::Spherical,
@@ -308,11 +308,11 @@ pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -
             inertia: node.inertia.inertia.map(&mut *f),
         },
         passive,
-        shared: node.shared,
+        unknown: node.unknown,
         deferred: node.deferred,
-        parent_side: node.parent_side,
-        unturned: node.unturned,
-        gather: node.gather,
+        before_joint: node.before_joint,
+        non_rotating: node.non_rotating,
+        accumulates_momentum: node.accumulates_momentum,
         ends: node.ends.clone(),
         screws: node.screws.clone(),
         open: node.open.clone(),

@@ -1,18 +1,18 @@
 //! What a loop form costs to run, in the terms of [`symbolic::cost`](crate::symbolic::cost()).
 
-use super::{looped, Block, LoopProgram, Place, Target};
-use crate::options::{Group, Options};
+use super::{rolled, Block, RolledProgram, Place, Target};
+use crate::options::{Output, Options};
 use crate::plan::Plan;
 use crate::symbolic::machine::{latency, SINE, WIDTH};
-use crate::symbolic::{Cost, Operand, Output, BYTES};
+use crate::symbolic::{Cost, Operand, ProgramResult, BYTES};
 
 /// Cost of a group in loop form; `None` where it has none. Turns follow each other as fast as what they carry allows.
 /// Sines and cosines are left out, as everywhere.
-pub fn cost(plan: &Plan, group: Group, options: &Options) -> Option<Cost> {
-    looped(plan, group, options).map(|program| of_program(&program))
+pub fn cost(plan: &Plan, group: Output, options: &Options) -> Option<Cost> {
+    rolled(plan, group, options).map(|program| of_program(&program))
 }
 
-fn of_program(program: &LoopProgram) -> Cost {
+fn of_program(program: &RolledProgram) -> Cost {
     let mut sum = Cost { operations: program.counts().total(), critical_path: SINE, ..Cost::default() };
     for block in &program.blocks {
         let instructions = block.program.instructions();
@@ -48,7 +48,7 @@ fn carried_path(block: &Block) -> u32 {
     }
     let outputs = block.program.outputs.iter().zip(&block.outputs);
     let carried = outputs.filter_map(|(output, target)| match (output, target) {
-        (Output::Node(id, _), Target::Carried(_)) => ready.get(id).copied(),
+        (ProgramResult::Node(id, _), Target::Carried(_)) => ready.get(id).copied(),
         _ => None,
     });
     carried.max().unwrap_or(0)

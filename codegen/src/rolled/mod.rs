@@ -16,14 +16,14 @@ mod stage;
 
 use std::collections::BTreeSet;
 
-use crate::options::{Group, Loops, Options};
+use crate::options::{Output, RolledCode, Options};
 use crate::plan::Plan;
-use crate::symbolic::{Counts, Output, Program};
+use crate::symbolic::{Counts, ProgramResult, Program};
 use crate::trace::InputArray;
 
 pub use cost::cost;
 pub use runs::{find, Run};
-pub use stage::Way;
+pub use stage::SweepDirection;
 
 /// Nodes in the shortest run that becomes a loop where the plan allows one.
 const LEAST: usize = 6;
@@ -90,7 +90,7 @@ pub struct Repeat {
     /// Which run.
     pub run: usize,
     /// Order of the turns; `None`: any, the turns do not depend on each other.
-    pub way: Option<Way>,
+    pub way: Option<SweepDirection>,
     /// First values of what is carried, and where the last ones are kept.
     pub carried: Vec<(Start, Option<usize>)>,
 }
@@ -123,9 +123,9 @@ pub struct Loop {
 
 /// An output group in loop form.
 #[derive(Clone, Debug)]
-pub struct LoopProgram {
+pub struct RolledProgram {
     /// Which.
-    pub group: Group,
+    pub group: Output,
     /// Input arrays, numbered through.
     pub inputs: Vec<InputArray>,
     /// Number of results.
@@ -138,7 +138,7 @@ pub struct LoopProgram {
     pub kept: usize,
 }
 
-impl LoopProgram {
+impl RolledProgram {
     /// Operations that are executed.
     pub fn counts(&self) -> Counts {
         self.blocks.iter().fold(Counts::default(), |sum, block| {
@@ -177,8 +177,8 @@ impl LoopProgram {
                     crate::symbolic::Operand::Node(_) => None,
                 });
                 let outputs_fit = block.program.outputs.iter().all(|o| match o {
-                    Output::Const(x) => fits(*x),
-                    Output::Node(..) => true,
+                    ProgramResult::Const(x) => fits(*x),
+                    ProgramResult::Node(..) => true,
                 });
                 outputs_fit && operands.all(&mut fits)
             })
@@ -186,11 +186,11 @@ impl LoopProgram {
 }
 
 /// The loop form of a group; `None` where there is none, or straight-line code is better.
-pub fn looped(plan: &Plan, group: Group, options: &Options) -> Option<LoopProgram> {
+pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<RolledProgram> {
     let least = match options.plan.loops {
-        Loops::Never => return None,
-        Loops::Auto => LEAST,
-        Loops::Always => LEAST_ALWAYS,
+        RolledCode::Never => return None,
+        RolledCode::Auto => LEAST,
+        RolledCode::Always => LEAST_ALWAYS,
     };
     stage::passes(group, !plan.constraints.is_empty())?;
     build::build(plan, group, options, least)

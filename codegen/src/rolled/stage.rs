@@ -7,37 +7,37 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
-use crate::options::Group;
+use crate::options::Output;
 use crate::symbolic::{Expr, Graph};
-use crate::trace::Given;
+use crate::trace::SymbolicInputs;
 
-/// Way of a pass.
+/// SweepDirection of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
+pub enum SweepDirection {
     /// Leaves to base.
-    Back,
+    TipToBase,
     /// Base to leaves.
-    Forth,
+    BaseToTip,
 }
 
 /// Passes of a group; `None` for groups that have no loop form. With constraints, `constrained`, the way to their frames
 /// comes first.
-pub fn passes(group: Group, constrained: bool) -> Option<&'static [Way]> {
+pub fn passes(group: Output, constrained: bool) -> Option<&'static [SweepDirection]> {
     match group {
-        Group::Correction if constrained => Some(&[Way::Forth, Way::Back, Way::Forth]),
-        Group::Settle => Some(&[Way::Back, Way::Forth, Way::Back]),
-        Group::Accelerations if constrained => None,
-        Group::Rates | Group::Velocities | Group::Energy => Some(&[Way::Back, Way::Forth]),
-        Group::Momenta | Group::InverseDynamics | Group::Bias => Some(&[Way::Forth, Way::Back]),
-        Group::Accelerations => Some(&[Way::Forth, Way::Back, Way::Forth]),
+        Output::PositionCorrection if constrained => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip]),
+        Output::ProjectMomenta => Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip, SweepDirection::TipToBase]),
+        Output::Accelerations if constrained => None,
+        Output::Rates | Output::Velocities | Output::Energy => Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip]),
+        Output::Momenta | Output::InverseDynamics | Output::Bias => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase]),
+        Output::Accelerations => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip]),
         _ => None,
     }
 }
 
 /// A tree on its way through the passes.
 #[derive(Clone)]
-pub struct Stage<'g> {
-    group: Group,
+pub struct PassState<'g> {
+    group: Output,
     graph: &'g Graph,
     /// Whether there are constraints that matter.
     bound: bool,
@@ -58,18 +58,18 @@ pub struct Stage<'g> {
     energy: [Expr<'g>; 2],
 }
 
-impl<'g> Stage<'g> {
+impl<'g> PassState<'g> {
     /// Nothing done yet.
-    pub fn new(group: Group, graph: &'g Graph, tree: Tree<Expr<'g>>, alone: bool) -> Self {
+    pub fn new(group: Output, graph: &'g Graph, tree: Tree<Expr<'g>>, alone: bool) -> Self {
         let zeros = |n: usize| vec![Expr::zero(); n];
         let (nq, nv) = (tree.dims.nq, tree.dims.nv);
         let work = Workspace::new(&tree);
         let energy = [Expr::zero(); 2];
         let bound = solves(group) && !tree.constraints.is_empty();
-        let reaches = bound && group == Group::Correction;
-        let gathers = tree.nodes.iter().any(|n| n.gather);
+        let reaches = bound && group == Output::PositionCorrection;
+        let gathers = tree.nodes.iter().any(|n| n.accumulates_momentum);
         let (v, qd, pd, p) = (zeros(nv), zeros(nq), zeros(nv), zeros(nv));
-        Stage { group, graph, bound, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
+        PassState { group, graph, bound, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
     }
 
     /// The pass among those of a mechanism without constraints; `None`: that to the frames of the constraints.
@@ -78,11 +78,11 @@ impl<'g> Stage<'g> {
     }
 
     /// Before the first node of a pass.
-    pub fn begin(&mut self, pass: usize, given: &Given<'g>) {
+    pub fn begin(&mut self, pass: usize, given: &SymbolicInputs<'g>) {
         let own = self.own(pass);
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
-        if pass == 0 && self.group != Group::Momenta {
+        if pass == 0 && self.group != Output::Momenta {
             // Screws that are carried outward need the joints of the whole tree.
             for i in 0..self.tree.nodes.len() {
                 sweeps.articulate_node(i, &given.q, &given.drive[0], &mut w.poses);
@@ -91,23 +91,23 @@ impl<'g> Stage<'g> {
         let Some(pass) = own else { return sweeps.reach_begin(w) };
         if self.bound && pass == 0 && !self.alone {
             sweeps.set_rows(w, self.reaches);
-            if self.group == Group::Correction {
+            if self.group == Output::PositionCorrection {
                 sweeps.aim_at_closed(w);
             }
         }
         let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
         match (self.group, pass) {
-            (Group::Momenta, 1) => sweeps.momentum_begin(w),
-            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) | (Group::Accelerations, 0) => {}
-            (Group::Accelerations, 1) => {
+            (Output::Momenta, 1) => sweeps.momentum_begin(w),
+            (Output::Momenta | Output::InverseDynamics | Output::Bias, _) | (Output::Accelerations, 0) => {}
+            (Output::Accelerations, 1) => {
                 for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
                     *f = *f + *tau;
                 }
                 sweeps.factor_begin(&w.poses, &mut w.factor);
                 let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
-                sweeps.remainder_begin(&load, &mut w.acceleration);
+                sweeps.bias_momentum_begin(&load, &mut w.acceleration);
             }
-            (Group::Accelerations, _) => {
+            (Output::Accelerations, _) => {
                 let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
                 sweeps.motion_ground(&w.factor, &load, &mut w.acceleration);
             }
@@ -116,10 +116,10 @@ impl<'g> Stage<'g> {
                 if !self.alone {
                     sweeps.seed_columns(&w.constraints.rows, &mut w.factor);
                 }
-                sweeps.remainder_begin(&load, &mut w.velocity);
+                sweeps.bias_momentum_begin(&load, &mut w.velocity);
                 sweeps.moment_begin(w);
             }
-            (Group::Settle, 2) => {
+            (Output::ProjectMomenta, 2) => {
                 self.p = given.second.clone();
                 if !self.alone {
                     sweeps.hold_begin(w);
@@ -127,7 +127,7 @@ impl<'g> Stage<'g> {
             }
             (group, _) => {
                 sweeps.motion_ground(&w.factor, &load, &mut w.velocity);
-                if group == Group::Energy {
+                if group == Output::Energy {
                     self.energy[1] = sweeps.weight_potential(&u, w);
                 }
             }
@@ -135,19 +135,19 @@ impl<'g> Stage<'g> {
     }
 
     /// One node of a pass.
-    pub fn node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+    pub fn node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
         let Some(pass) = self.own(pass) else {
             return Sweeps { tree: &self.tree, trace: self.graph }.reach_node(i, &mut self.work);
         };
         match self.group {
-            Group::Momenta => self.momentum_node(pass, i, given),
-            Group::Accelerations => self.acceleration_node(pass, i, given),
-            Group::InverseDynamics | Group::Bias => self.newton_node(pass, i, given),
+            Output::Momenta => self.momentum_node(pass, i, given),
+            Output::Accelerations => self.acceleration_node(pass, i, given),
+            Output::InverseDynamics | Output::Bias => self.newton_node(pass, i, given),
             _ => self.velocity_node(pass, i, given),
         }
     }
 
-    fn momentum_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+    fn momentum_node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let w = &mut self.work;
         if pass == 1 {
@@ -157,7 +157,7 @@ impl<'g> Stage<'g> {
         sweeps.velocity_node(i, &given.second, &given.drive[1], w);
     }
 
-    fn newton_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+    fn newton_node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let w = &mut self.work;
         if pass == 1 {
@@ -167,7 +167,7 @@ impl<'g> Stage<'g> {
         sweeps.newton_wrench_node(i, w);
     }
 
-    fn acceleration_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+    fn acceleration_node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let w = &mut self.work;
         if pass == 0 {
@@ -178,23 +178,23 @@ impl<'g> Stage<'g> {
         let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
         if pass == 1 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
-            sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
+            sweeps.bias_momentum_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
         } else {
             sweeps.motion_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
         }
     }
 
     /// Of all groups that solve for velocities.
-    fn velocity_node(&mut self, pass: usize, i: usize, given: &Given<'g>) {
+    fn velocity_node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
-        if (self.group, pass) == (Group::Settle, 2) {
+        if (self.group, pass) == (Output::ProjectMomenta, 2) {
             return sweeps.hold_node(i, w, &mut self.p);
         }
         let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
         if pass == 0 {
             sweeps.factor_node(i, &w.poses, &w.first, &mut w.factor);
-            sweeps.remainder_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
+            sweeps.bias_momentum_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
             if weighs(self.group) {
                 sweeps.moment_node(i, w);
             }
@@ -202,13 +202,13 @@ impl<'g> Stage<'g> {
         }
         sweeps.motion_node(i, &w.poses, &w.first, &w.factor, &load, &mut w.velocity);
         match self.group {
-            Group::Rates => {
+            Output::Rates => {
                 sweeps.gravity_node(i, &u, w);
                 if !self.gathers {
                     sweeps.momentum_rate_node(i, w, &mut self.pd);
                 }
             }
-            Group::Energy => {
+            Output::Energy => {
                 self.energy[0] = sweeps.kinetic_node(i, &given.second, w, self.energy[0]);
                 self.energy[1] = sweeps.spring_node(i, w, self.energy[1]);
             }
@@ -217,36 +217,36 @@ impl<'g> Stage<'g> {
     }
 
     /// After the last node of a pass.
-    pub fn end(&mut self, pass: usize, given: &Given<'g>) {
+    pub fn end(&mut self, pass: usize, given: &SymbolicInputs<'g>) {
         let Some(pass) = self.own(pass) else { return };
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         let (u, w) = (given.inputs(), &mut self.work);
         match (self.group, pass) {
-            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) => {}
-            (Group::Accelerations, 1) => {
+            (Output::Momenta | Output::InverseDynamics | Output::Bias, _) => {}
+            (Output::Accelerations, 1) => {
                 sweeps.factor_ground(&mut w.factor);
                 let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &[]);
-                sweeps.remainder_ground(&w.factor, &load, &mut w.acceleration);
+                sweeps.bias_momentum_ground(&w.factor, &load, &mut w.acceleration);
             }
-            (Group::Accelerations, _) => {}
+            (Output::Accelerations, _) => {}
             (_, 0) => {
                 sweeps.factor_ground(&mut w.factor);
                 let load = load(self.group, given, &u, [&w.generalized, &w.drive, &w.constraints.rhs]);
-                sweeps.remainder_ground(&w.factor, &load, &mut w.velocity);
+                sweeps.bias_momentum_ground(&w.factor, &load, &mut w.velocity);
             }
             _ => {}
         }
     }
 
     /// Results in the order of the generated function, after the last pass. For a link alone, its own part of them.
-    pub fn finish(&mut self, given: &Given<'g>) -> Vec<Expr<'g>> {
+    pub fn finish(&mut self, given: &SymbolicInputs<'g>) -> Vec<Expr<'g>> {
         let sweeps = Sweeps { tree: &self.tree, trace: self.graph };
         match self.group {
-            Group::Rates => {
+            Output::Rates => {
                 sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
                 sweeps.coordinate_rates(&given.q, &self.v, &mut self.qd);
                 if self.gathers {
-                    sweeps.gather_momenta(&given.second, &mut self.work);
+                    sweeps.accumulate_momenta(&given.second, &mut self.work);
                     (0..self.tree.nodes.len()).for_each(|i| sweeps.momentum_rate_node(i, &self.work, &mut self.pd));
                 }
                 for (pd, tau) in self.pd.iter_mut().zip(&given.tau) {
@@ -254,17 +254,17 @@ impl<'g> Stage<'g> {
                 }
                 [self.qd.as_slice(), &self.pd].concat()
             }
-            Group::Velocities => {
+            Output::Velocities => {
                 sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
                 self.v.clone()
             }
-            Group::Settle => {
+            Output::ProjectMomenta => {
                 sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
                 let mut sigma = vec![Expr::zero(); self.tree.dims.rows];
                 sweeps.settled_multipliers(&self.work, &mut sigma);
                 [self.v.as_slice(), &self.p, &sigma].concat()
             }
-            Group::Correction => {
+            Output::PositionCorrection => {
                 sweeps.collect_rates(&self.work.velocity, &self.work.first, &mut self.v);
                 let rows = vec![Expr::zero(); if self.alone { 0 } else { self.tree.dims.rows }];
                 let (mut residuals, mut pivots) = (rows.clone(), rows);
@@ -274,18 +274,18 @@ impl<'g> Stage<'g> {
                 }
                 [residuals, self.v.clone(), pivots].concat()
             }
-            Group::Momenta => self.p.clone(),
-            Group::Accelerations => {
+            Output::Momenta => self.p.clone(),
+            Output::Accelerations => {
                 sweeps.collect_rates(&self.work.acceleration, &self.work.first, &mut self.v);
                 (0..self.tree.nodes.len()).for_each(|i| sweeps.add_reference_node(i, &self.work, &mut self.v));
                 self.v.clone()
             }
-            Group::InverseDynamics | Group::Bias => {
+            Output::InverseDynamics | Output::Bias => {
                 let a = imposed(self.group, given);
                 (0..self.tree.nodes.len()).for_each(|i| sweeps.joint_force_node(i, a, &self.work, &mut self.p));
                 self.p.clone()
             }
-            Group::Energy => {
+            Output::Energy => {
                 vec![sweeps.kinetic_end(&given.second, &self.work, self.energy[0]), self.energy[1]]
             }
             _ => Vec::new(),
@@ -299,18 +299,18 @@ impl<'g> Stage<'g> {
         let (n, slots) = (self.tree.nodes.len(), slots(&self.tree));
         let w = &mut self.work;
         match (self.group, pass) {
-            (Group::Momenta, 0) => motion(&mut w.velocity.omega[i]),
-            (Group::InverseDynamics | Group::Bias | Group::Accelerations, 0) => {
+            (Output::Momenta, 0) => motion(&mut w.velocity.omega[i]),
+            (Output::InverseDynamics | Output::Bias | Output::Accelerations, 0) => {
                 let newton = &mut w.newton;
                 newton.spin[i].iter_mut().chain(&mut newton.alpha[i]).chain(&mut newton.accel[i]).collect()
             }
-            (Group::Momenta | Group::InverseDynamics | Group::Bias, _) => force(&mut w.force[i]),
-            (Group::Accelerations, 1) => {
+            (Output::Momenta | Output::InverseDynamics | Output::Bias, _) => force(&mut w.force[i]),
+            (Output::Accelerations, 1) => {
                 let mut all = inertia(&mut w.factor.m[i]);
                 all.extend(force(&mut w.acceleration.d[i]));
                 all
             }
-            (Group::Accelerations, _) => motion(&mut w.acceleration.omega[i]),
+            (Output::Accelerations, _) => motion(&mut w.acceleration.omega[i]),
             (group, 0) => {
                 let mut all = inertia(&mut w.factor.m[i]);
                 all.extend(force(&mut w.velocity.d[i]));
@@ -321,12 +321,12 @@ impl<'g> Stage<'g> {
                 columns.filter(|(k, _)| k % n == i && slots.contains(&(k / n))).for_each(|(_, c)| all.extend(force(c)));
                 all
             }
-            (Group::Settle, 2) => Vec::new(),
+            (Output::ProjectMomenta, 2) => Vec::new(),
             (group, _) => {
                 let mut all = motion(&mut w.velocity.omega[i]);
                 match group {
-                    Group::Rates => all.extend(w.loads.gravity[i].iter_mut()),
-                    Group::Energy => all.extend(self.energy.iter_mut()),
+                    Output::Rates => all.extend(w.loads.gravity[i].iter_mut()),
+                    Output::Energy => all.extend(self.energy.iter_mut()),
                     _ => {}
                 }
                 all
@@ -339,7 +339,7 @@ impl<'g> Stage<'g> {
         if !self.bound {
             return Vec::new();
         }
-        let (own, ng, slots) = (self.own(pass), self.tree.shared.len(), slots(&self.tree));
+        let (own, ng, slots) = (self.own(pass), self.tree.unknowns.len(), slots(&self.tree));
         let w = &mut self.work;
         let Some(pass) = own else {
             let ends = w.constraints.reach.iter_mut().flatten();
@@ -349,7 +349,7 @@ impl<'g> Stage<'g> {
             return w.constraints.hold.iter_mut().flatten().flat_map(force).collect();
         }
         let row = |g: &usize| slots.contains(g);
-        let rates = w.velocity.shared_rate.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
+        let rates = w.velocity.unknown_rate.iter_mut().enumerate().filter(|(g, _)| row(g)).map(|(_, x)| x);
         if pass == 1 {
             return rates.collect();
         }
@@ -360,25 +360,25 @@ impl<'g> Stage<'g> {
 }
 
 /// Whether a group solves for velocities.
-pub fn solves(group: Group) -> bool {
-    matches!(group, Group::Rates | Group::Velocities | Group::Energy | Group::Settle | Group::Correction)
+pub fn solves(group: Output) -> bool {
+    matches!(group, Output::Rates | Output::Velocities | Output::Energy | Output::ProjectMomenta | Output::PositionCorrection)
 }
 
 /// Whether it needs masses and first moments.
-fn weighs(group: Group) -> bool {
-    matches!(group, Group::Rates | Group::Energy)
+fn weighs(group: Output) -> bool {
+    matches!(group, Output::Rates | Output::Energy)
 }
 
 /// What velocities are solved from; `own` are the workspace's right-hand sides: of freedoms, drives, rows.
 fn load<'a, 'g>(
-    group: Group,
-    given: &'a Given<'g>,
+    group: Output,
+    given: &'a SymbolicInputs<'g>,
     u: &Inputs<'a, Expr<'g>>,
     own: [&'a [Expr<'g>]; 3],
 ) -> Load<'a, Expr<'g>> {
     let [p, drive, rows] = own;
     match group {
-        Group::Correction => Load { p, drive, seeds: None, rows, what: Quantity::Constraint },
+        Output::PositionCorrection => Load { p, drive, seeds: None, rows, what: Quantity::Constraint },
         _ => Load::velocities(&given.second, u, rows),
     }
 }
@@ -389,9 +389,9 @@ fn slots(tree: &Tree<Expr>) -> Vec<usize> {
 }
 
 /// Accelerations that the inverse dynamics of a group start from.
-fn imposed<'a, 'g>(group: Group, given: &'a Given<'g>) -> Accelerations<'a, Expr<'g>> {
+fn imposed<'a, 'g>(group: Output, given: &'a SymbolicInputs<'g>) -> Accelerations<'a, Expr<'g>> {
     match group {
-        Group::InverseDynamics => Accelerations::Given(&given.third),
+        Output::InverseDynamics => Accelerations::Given(&given.third),
         _ => Accelerations::Zero,
     }
 }

@@ -2,9 +2,9 @@
 
 use mbd_runtime::Scalar;
 
-use super::{LoopProgram, Place, Start, Target, Way};
+use super::{RolledProgram, Place, Start, Target, SweepDirection};
 
-impl LoopProgram {
+impl RolledProgram {
     /// Results for given inputs; `fused(a, b, c)` is `a · b + c`.
     ///
     /// # Panics
@@ -24,7 +24,7 @@ impl LoopProgram {
             });
             let mut carried: Vec<S> = starts.collect();
             for k in 0..count {
-                let back = block.repeat.as_ref().is_some_and(|r| r.way == Some(Way::Back));
+                let back = block.repeat.as_ref().is_some_and(|r| r.way == Some(SweepDirection::TipToBase));
                 let turn = if back { count - 1 - k } else { k };
                 let values = block.inputs.iter().map(|place| match *place {
                     Place::Given(k) => inputs[k],

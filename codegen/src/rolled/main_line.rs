@@ -2,9 +2,9 @@
 
 use super::link::Link;
 use super::runs::Run;
-use super::stage::{Stage, Way};
+use super::stage::{PassState, SweepDirection};
 use crate::symbolic::{Expr, Graph};
-use crate::trace::Given;
+use crate::trace::SymbolicInputs;
 
 /// A pass over a run, as the rest of the tree sees it.
 pub struct Event<'m> {
@@ -25,9 +25,9 @@ pub struct MainLine<'m, 'a> {
     /// Graph of everything outside runs.
     pub graph: &'m Graph,
     /// Its tree.
-    pub stage: Stage<'m>,
+    pub stage: PassState<'m>,
     /// Its inputs.
-    pub given: Given<'m>,
+    pub given: SymbolicInputs<'m>,
     /// Runs, inner first.
     pub runs: &'a [Run],
     /// Passes over runs, in order.
@@ -38,11 +38,11 @@ pub struct MainLine<'m, 'a> {
 
 impl<'m> MainLine<'m, '_> {
     /// One pass over the whole tree.
-    pub fn pass(&mut self, pass: usize, way: Way, links: &mut [Link<'_>]) {
+    pub fn pass(&mut self, pass: usize, way: SweepDirection, links: &mut [Link<'_>]) {
         self.stage.begin(pass, &self.given);
         let n = self.stage.tree.nodes.len();
         match way {
-            Way::Back => {
+            SweepDirection::TipToBase => {
                 for run in self.runs {
                     // The first turn adds the body itself.
                     self.stage.carried(pass, run.last()).into_iter().for_each(|e| *e = Expr::Const(0.0));
@@ -62,7 +62,7 @@ impl<'m> MainLine<'m, '_> {
                     }
                 }
             }
-            Way::Forth => {
+            SweepDirection::BaseToTip => {
                 let mut runs = self.runs.iter().enumerate().peekable();
                 let mut i = 0;
                 while i < n {
@@ -82,12 +82,12 @@ impl<'m> MainLine<'m, '_> {
         self.stage.end(pass, &self.given);
     }
 
-    fn run(&mut self, k: usize, pass: usize, way: Way, links: &mut [Link<'_>]) {
+    fn run(&mut self, k: usize, pass: usize, way: SweepDirection, links: &mut [Link<'_>]) {
         let run = &self.runs[k];
         let Some(parent) = self.stage.tree.nodes[run.nodes.start].parent else { return };
         let (from, to) = match way {
-            Way::Back => (run.last(), parent),
-            Way::Forth => (parent, run.last()),
+            SweepDirection::TipToBase => (run.last(), parent),
+            SweepDirection::BaseToTip => (parent, run.last()),
         };
         let mut start: Vec<Expr<'m>> = self.stage.carried(pass, from).into_iter().map(|e| *e).collect();
         let local = start.len();
@@ -113,8 +113,8 @@ impl<'m> MainLine<'m, '_> {
         let out: Vec<Expr<'m>> = end.iter().zip(negative).map(signed).collect();
         for (place, out) in self.stage.carried(pass, to).into_iter().zip(&out[..local]) {
             *place = match way {
-                Way::Back => *place + *out,
-                Way::Forth => *out,
+                SweepDirection::TipToBase => *place + *out,
+                SweepDirection::BaseToTip => *out,
             };
         }
         for (place, out) in self.stage.running(pass).into_iter().zip(&out[local..]) {

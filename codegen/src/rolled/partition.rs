@@ -8,7 +8,7 @@ use mbd_runtime::Scalar;
 use super::link::{Link, LinkInput};
 use super::runs::Run;
 use super::{Place, Target};
-use crate::symbolic::{Expr, Graph, Op, Operand, Output, Program};
+use crate::symbolic::{Expr, Graph, Op, Operand, ProgramResult, Program};
 
 /// Body of one loop.
 pub struct Body {
@@ -33,7 +33,7 @@ pub struct Code {
 }
 
 /// What is wanted of a run.
-pub struct Wanted<'a, 'g> {
+pub struct Requests<'a, 'g> {
     /// Results of a turn and where they go.
     pub results: Vec<(Expr<'g>, Target)>,
     /// Live places of what every pass carries.
@@ -54,10 +54,10 @@ enum Rank {
 }
 
 /// Result as an output of a program.
-pub fn output(e: Expr) -> Output {
+pub fn output(e: Expr) -> ProgramResult {
     match e {
-        Expr::Const(x) => Output::Const(x),
-        Expr::Node { id, neg, .. } => Output::Node(id, neg),
+        Expr::Const(x) => ProgramResult::Const(x),
+        Expr::Node { id, neg, .. } => ProgramResult::Node(id, neg),
     }
 }
 
@@ -70,7 +70,7 @@ pub fn assemble(
     graph: &Graph,
     own: &BTreeSet<u32>,
     place: impl Fn(u32) -> Place,
-    results: &[(Output, Target)],
+    results: &[(ProgramResult, Target)],
 ) -> (Program, Vec<Place>, Vec<Target>) {
     let (mut inputs, mut steps, mut known) = (Vec::new(), Vec::new(), BTreeSet::new());
     let mut fetch = |id: u32, steps: &mut Vec<_>| {
@@ -85,7 +85,7 @@ pub fn assemble(
         steps.push((id, op, label));
     }
     for (output, _) in results {
-        if let Output::Node(id, _) = output {
+        if let ProgramResult::Node(id, _) = output {
             fetch(*id, &mut steps);
         }
     }
@@ -96,12 +96,12 @@ pub fn assemble(
 }
 
 /// Cuts the graph of a turn.
-pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wanted: &Wanted<'_, '_>) -> Code {
+pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
     let ranks = ranks(graph, link);
     let passes = link.passes.len();
     let (columns, table) = columns(graph, link, run, live, &ranks);
     // Outputs of every pass that leave the turn.
-    let mut outputs: Vec<Vec<(Output, Target)>> = vec![Vec::new(); passes];
+    let mut outputs: Vec<Vec<(ProgramResult, Target)>> = vec![Vec::new(); passes];
     let mut places = BTreeMap::new();
     for (pass, carried) in link.passes.iter().enumerate() {
         let mut number = 0;
@@ -150,8 +150,8 @@ pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wante
     let sines = cut.turn_functions();
     if !sines.is_empty() {
         let own = cut.closure(sines.iter().copied(), |rank| rank == Rank::State);
-        let results: Vec<(Output, Target)> =
-            sines.iter().map(|id| (Output::Node(*id, false), Target::Row(rows[id]))).collect();
+        let results: Vec<(ProgramResult, Target)> =
+            sines.iter().map(|id| (ProgramResult::Node(*id, false), Target::Row(rows[id]))).collect();
         let (program, inputs, outputs) = assemble(graph, &own, |id| place(None, id), &results);
         bodies.push(Body { pass: None, program, inputs, outputs });
     }
@@ -160,7 +160,7 @@ pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wante
         let mut results = outputs.clone();
         let taken_in = |id: u32| ranks[id as usize] == Rank::Pass(pass) && matches!(graph.get(id).0, Op::Input(_));
         for (id, row) in rows.iter().filter(|(id, _)| own.contains(id) || taken_in(**id)) {
-            results.push((Output::Node(*id, false), Target::Row(*row)));
+            results.push((ProgramResult::Node(*id, false), Target::Row(*row)));
         }
         let (program, inputs, outputs) = assemble(graph, &own, |id| place(Some(pass), id), &results);
         bodies.push(Body { pass: Some(pass), program, inputs, outputs });
@@ -264,7 +264,7 @@ struct Cut<'a> {
     ranks: &'a [Rank],
     live: &'a [bool],
     passes: usize,
-    outputs: &'a [Vec<(Output, Target)>],
+    outputs: &'a [Vec<(ProgramResult, Target)>],
     /// Nodes computed in the pass that uses them although an earlier one could.
     sunk: BTreeSet<u32>,
 }
@@ -299,8 +299,8 @@ impl Cut<'_> {
         let is_op = |id: u32| !matches!(self.graph.get(id).0, Op::Input(_));
         let home = (0..self.ranks.len() as u32).filter(|&id| self.live[id as usize] && at_home(id) && is_op(id));
         let results = self.outputs[pass].iter().filter_map(|(o, _)| match o {
-            Output::Node(id, _) => Some(*id),
-            Output::Const(_) => None,
+            ProgramResult::Node(id, _) => Some(*id),
+            ProgramResult::Const(_) => None,
         });
         let mut open: Vec<u32> = home.chain(results).collect();
         while let Some(id) = open.pop() {
@@ -336,8 +336,8 @@ impl Cut<'_> {
                 .map(|pass| {
                     let own = self.own(pass);
                     let results = self.outputs[pass].iter().filter_map(|(o, _)| match o {
-                        Output::Node(id, _) => Some(*id),
-                        Output::Const(_) => None,
+                        ProgramResult::Node(id, _) => Some(*id),
+                        ProgramResult::Const(_) => None,
                     });
                     own.iter().flat_map(|&id| nodes(&self.graph.get(id).0)).chain(results).collect()
                 })

@@ -4,7 +4,7 @@ use super::rng::Rng;
 
 /// Probabilities and ranges of [`super::random_model`]. The fields are independent of each other.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knobs {
+pub struct Distribution {
     /// Smallest and largest number of bodies.
     pub bodies: (usize, usize),
     /// Probability that a body hangs on any earlier one instead of the latest.
@@ -41,10 +41,10 @@ pub struct Knobs {
     pub params: f64,
 }
 
-impl Default for Knobs {
+impl Default for Distribution {
     /// A plain open tree of pins under gravity: nothing else unless asked for.
     fn default() -> Self {
-        Knobs {
+        Distribution {
             bodies: (1, 6),
             branching: 0.0,
             roots: 0.0,
@@ -66,9 +66,9 @@ impl Default for Knobs {
     }
 }
 
-impl Knobs {
+impl Distribution {
     /// Everything there is, on up to `bodies` bodies; the mix itself is random.
-    pub fn everything(seed: u64, bodies: usize) -> Knobs {
+    pub fn everything(seed: u64, bodies: usize) -> Distribution {
         let mut rng = Rng::new(seed, 1);
         let all = [4.0, 2.0, 1.5, 1.5, 1.5, 1.5, 1.5, 1.0, 1.5];
         // One in three mechanisms has a few kinds of joints only.
@@ -80,7 +80,7 @@ impl Knobs {
         let single = if mimic > 0.0 { 3.0 } else { 1.0 };
         let kinds = std::array::from_fn(|k| if matches!(k, 0 | 1 | 3) { single * kinds[k] } else { kinds[k] });
         let mut some = |p: f64| if rng.chance(0.5) { 0.0 } else { p };
-        Knobs {
+        Distribution {
             bodies: (1, bodies),
             branching: some(0.5),
             roots: some(0.3),

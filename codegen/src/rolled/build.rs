@@ -7,31 +7,31 @@ use mbd_runtime::tree::{Bond, Source, Tree};
 
 use super::link::Link;
 use super::main_line::MainLine;
-use super::partition::{assemble, output, partition, Body, Wanted};
+use super::partition::{assemble, output, partition, Body, Requests};
 use super::runs::{find, Run};
-use super::stage::{passes, solves, Stage, Way};
-use super::{Block, Loop, LoopProgram, Place, Repeat, Start, Target};
-use crate::options::{Group, Options};
+use super::stage::{passes, solves, PassState, SweepDirection};
+use super::{Block, Loop, RolledProgram, Place, Repeat, Start, Target};
+use crate::options::{Output, Options};
 use crate::plan::Plan;
-use crate::symbolic::{passes, Expr, Graph, Op, Operand, Output};
-use crate::trace::{tolerance, Given};
+use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
+use crate::trace::{tolerance, SymbolicInputs};
 
 /// Builds the loop form; `None` where no run is long enough.
-pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Option<LoopProgram> {
+pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<RolledProgram> {
     let ways = passes(group, !plan.constraints.is_empty())?;
     let graph = Graph::default();
-    let given = Given::new(&graph, plan, group, options);
+    let given = SymbolicInputs::new(&graph, plan, group, options);
     let mut tree: Tree<Expr> = plan.tree(&given.params);
     tree.tolerance = Expr::Const(tolerance(options.precision));
     let tree = tree.regrouped();
     let (plan_of_tree, tree) = match (group, &plan.accelerations) {
-        (Group::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
+        (Output::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
         _ => (plan, tree),
     };
     if !carried(group, &tree) {
         return None;
     }
-    let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.looped).collect();
+    let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.rolled).collect();
     let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
         return None;
@@ -41,7 +41,7 @@ pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Opti
     let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, &tree, options.efforts));
     let mut links: Vec<Link> = links.collect();
     let next_input = given.arrays.iter().map(|a| a.len).sum();
-    let stage = Stage::new(group, &graph, tree, false);
+    let stage = PassState::new(group, &graph, tree, false);
     let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
     for (pass, way) in ways.iter().enumerate() {
         line.pass(pass, *way, &mut links);
@@ -55,7 +55,7 @@ pub fn build(plan: &Plan, group: Group, options: &Options, least: usize) -> Opti
 
 /// Whether loops can carry the constraints where they matter: joints to the ground, whose rows are constants of the last body, so
 /// that nothing pulls at the joints as they turn.
-fn carried(group: Group, tree: &Tree<Expr>) -> bool {
+fn carried(group: Output, tree: &Tree<Expr>) -> bool {
     let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.a.node.is_none() && cut.closure.is_joint());
     !solves(group) || tree.constraints.iter().all(|c| simple(&c.bond) && c.decay.is_none())
 }
@@ -81,7 +81,7 @@ fn steady(tree: &Tree<Expr>, run: &Run) -> bool {
 /// Results of one turn and where they go.
 fn results_of_turn<'g>(
     plan: &Plan,
-    group: Group,
+    group: Output,
     link: &mut Link<'g>,
     start: (usize, usize),
 ) -> Vec<(Expr<'g>, Target)> {
@@ -89,10 +89,10 @@ fn results_of_turn<'g>(
     let coordinates = (start.0, nq);
     let velocities = (start.1, nv);
     let lists = match group {
-        Group::Rates => vec![coordinates, (plan.dims.nq + start.1, nv)],
-        Group::Energy => Vec::new(),
-        Group::Settle => vec![velocities, (plan.dims.nv + start.1, nv)],
-        Group::Correction => vec![(plan.dims.rows + start.1, nv)],
+        Output::Rates => vec![coordinates, (plan.dims.nq + start.1, nv)],
+        Output::Energy => Vec::new(),
+        Output::ProjectMomenta => vec![velocities, (plan.dims.nv + start.1, nv)],
+        Output::PositionCorrection => vec![(plan.dims.rows + start.1, nv)],
         _ => vec![velocities],
     };
     let targets = lists
@@ -102,13 +102,13 @@ fn results_of_turn<'g>(
 }
 
 struct Build<'b, 'm, 'g> {
-    group: Group,
+    group: Output,
     line: &'b MainLine<'m, 'b>,
     graphs: &'g [Graph],
     links: &'b [Link<'g>],
     starts: &'b [(usize, usize)],
     own: Vec<Vec<(Expr<'g>, Target)>>,
-    ways: &'b [Way],
+    ways: &'b [SweepDirection],
     results: Vec<Expr<'m>>,
 }
 
@@ -178,7 +178,7 @@ impl<'m> Build<'_, 'm, '_> {
         }
     }
 
-    fn program(&mut self, options: &Options) -> LoopProgram {
+    fn program(&mut self, options: &Options) -> RolledProgram {
         let live = self.live();
         let mut loops = Vec::new();
         let mut bodies: Vec<BTreeMap<Option<usize>, Body>> = Vec::new();
@@ -186,7 +186,7 @@ impl<'m> Build<'_, 'm, '_> {
             let inputs = &self.line.given.arrays;
             let array = |name: &str| inputs.iter().take_while(|a| a.name != name).map(|a| a.len).sum::<usize>();
             let (q, v) = self.starts[k];
-            let wanted = Wanted {
+            let wanted = Requests {
                 results: self.own[k].clone(),
                 carried: &live.carried[k],
                 first: [q, inputs[0].len + v, array("a") + v, array("self.tau") + v],
@@ -221,7 +221,7 @@ impl<'m> Build<'_, 'm, '_> {
             let program = std::mem::take(&mut block.program);
             block.program = passes::run(program, options.arithmetic, options.plan.forms);
         }
-        LoopProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
+        RolledProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
     }
 
     /// Live nodes of the main line between loops.
@@ -306,7 +306,7 @@ impl<'m> Build<'_, 'm, '_> {
     }
 
     fn straight(&self, own: &BTreeSet<u32>, slots: &BTreeMap<u32, usize>, is_last: bool) -> Option<Block> {
-        let mut outputs: Vec<(Output, Target)> = Vec::new();
+        let mut outputs: Vec<(ProgramResult, Target)> = Vec::new();
         for (k, e) in self.results() {
             let here = match e {
                 Expr::Const(_) => is_last,
@@ -320,7 +320,7 @@ impl<'m> Build<'_, 'm, '_> {
         }
         for id in own {
             if let Some(slot) = slots.get(id) {
-                outputs.push((Output::Node(*id, false), Target::Kept(*slot)));
+                outputs.push((ProgramResult::Node(*id, false), Target::Kept(*slot)));
             }
         }
         let given = self.line.given.arrays.iter().map(|a| a.len).sum();

@@ -2,14 +2,14 @@
 //! taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Shared, Source, Tree, TreeFrame};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Unknown, Source, Tree, TreeFrame};
 use mbd_runtime::Scalar;
 
 use super::runs::{map_node, Run, Slot};
-use super::stage::{Stage, Way};
-use crate::options::Group;
+use super::stage::{PassState, SweepDirection};
+use crate::options::Output;
 use crate::symbolic::{Expr, Graph};
-use crate::trace::Given;
+use crate::trace::SymbolicInputs;
 
 /// What an input of a link's graph is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,8 +41,8 @@ pub struct LinkPass<'g> {
 /// One turn of a run on its way through the passes.
 pub struct Link<'g> {
     graph: &'g Graph,
-    stage: Stage<'g>,
-    given: Given<'g>,
+    stage: PassState<'g>,
+    given: SymbolicInputs<'g>,
     nodes: usize,
     /// What the graph's inputs are.
     pub inputs: Vec<LinkInput>,
@@ -54,7 +54,7 @@ pub struct Link<'g> {
 
 impl<'g> Link<'g> {
     /// Nothing done yet.
-    pub fn new(graph: &'g Graph, group: Group, run: &Run, tree: &Tree<Expr<'_>>, efforts: bool) -> Self {
+    pub fn new(graph: &'g Graph, group: Output, run: &Run, tree: &Tree<Expr<'_>>, efforts: bool) -> Self {
         let mut inputs = Vec::new();
         let mut symbols = |of: &dyn Fn(usize) -> LinkInput, n: usize| -> Vec<Expr<'g>> {
             let first = inputs.len();
@@ -75,11 +75,11 @@ impl<'g> Link<'g> {
             nodes.push(node);
         }
         let zero = Expr::zero();
-        let given = Given {
+        let given = SymbolicInputs {
             arrays: Vec::new(),
             q: symbols(&LinkInput::Q, nq),
             second: symbols(&LinkInput::Second, nv),
-            third: symbols(&LinkInput::Third, if group == Group::InverseDynamics { nv } else { 0 }),
+            third: symbols(&LinkInput::Third, if group == Output::InverseDynamics { nv } else { 0 }),
             tau: symbols(&LinkInput::Tau, if efforts { nv } else { 0 }),
             // What the dummy is driven by; nothing reads it.
             drive: [vec![zero; 3], vec![zero; 3], vec![zero; 3]],
@@ -90,12 +90,12 @@ impl<'g> Link<'g> {
         let dims = Dims { nq, nv, rows: tree.dims.rows, ..Dims::default() };
         let constraints: Vec<_> = tree.constraints.iter().map(|c| stand_in(c, run)).collect();
         // Numbered as in the tree; coordinates are open nowhere in a run.
-        let row = |shared: &Shared| if let Shared::Row(_) = shared { *shared } else { Shared::Row(0) };
-        let shared = if constraints.is_empty() { Vec::new() } else { tree.shared.iter().map(row).collect() };
+        let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
+        let shared = if constraints.is_empty() { Vec::new() } else { tree.unknowns.iter().map(row).collect() };
         let tree = Tree {
             nodes,
             dims,
-            shared,
+            unknowns: shared,
             solve_at_ground: Vec::new(),
             ground_moment: [zero; 3],
             wrenches: Vec::new(),
@@ -106,13 +106,13 @@ impl<'g> Link<'g> {
             accelerations: None,
             matrix_depth: 0,
         };
-        let stage = Stage::new(group, graph, tree, true);
+        let stage = PassState::new(group, graph, tree, true);
         Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) }
     }
 
     /// The next pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
     /// constant of the loop; the rest become symbols.
-    pub fn pass(&mut self, way: Way, first: &[Expr<'_>]) {
+    pub fn pass(&mut self, way: SweepDirection, first: &[Expr<'_>]) {
         let pass = self.passes.len();
         let mut known: Vec<Option<f64>> =
             first.iter().map(|e| if let Expr::Const(x) = e { Some(*x) } else { None }).collect();
@@ -154,7 +154,7 @@ impl<'g> Link<'g> {
         }
     }
 
-    fn turn(&self, stage: &mut Stage<'g>, pass: usize, way: Way, incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
+    fn turn(&self, stage: &mut PassState<'g>, pass: usize, way: SweepDirection, incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
         stage.begin(pass, &self.given);
         let (inner, outer) = (0, self.nodes);
         let (local, running) = incoming.split_at(stage.carried(pass, outer).len());
@@ -162,14 +162,14 @@ impl<'g> Link<'g> {
             *own = *from;
         }
         let mut out: Vec<Expr<'g>> = match way {
-            Way::Back => {
+            SweepDirection::TipToBase => {
                 for (own, from) in stage.carried(pass, outer).into_iter().zip(local) {
                     *own = *own + *from;
                 }
                 (1..=outer).rev().for_each(|i| stage.node(pass, i, &self.given));
                 stage.carried(pass, inner).into_iter().map(|e| *e).collect()
             }
-            Way::Forth => {
+            SweepDirection::BaseToTip => {
                 for (own, from) in stage.carried(pass, inner).into_iter().zip(local) {
                     *own = *from;
                 }
@@ -231,11 +231,11 @@ fn dummy<'g>() -> Node<Expr<'g>> {
         slide: Expr::zero(),
         inertia: RigidInertia::zero(),
         passive: Vec::new(),
-        shared: None,
+        unknown: None,
         deferred: false,
-        parent_side: false,
-        unturned: false,
-        gather: false,
+        before_joint: false,
+        non_rotating: false,
+        accumulates_momentum: false,
         ends: Vec::new(),
         screws: Vec::new(),
         open: Vec::new(),
