@@ -4164,17 +4164,17 @@ impl ::multibody::runtime::System for Chain100 {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 100] {
+    fn zero_momenta(&self) -> [f64; 100] {
         [0.0; 100]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 100], p: &[f64; 100], qd: &mut [f64; 100], pd: &mut [f64; 100]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 100], p: &[f64; 100], qd: &mut [f64; 100], pd: &mut [f64; 100]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -4187,7 +4187,7 @@ impl ::multibody::runtime::System for Chain100 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Chain100 {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 100], v: &[f64; 100], p: &mut [f64; 100]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 100], v: &[f64; 100], p: &mut [f64; 100]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -4195,7 +4195,7 @@ impl ::multibody::runtime::Conjugate for Chain100 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain100 {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 100], p: &[f64; 100]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 100], p: &[f64; 100]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }

@@ -5230,17 +5230,17 @@ impl ::multibody::runtime::System for Chain10Planar {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 10] {
+    fn zero_momenta(&self) -> [f64; 10] {
         [0.0; 10]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -5253,7 +5253,7 @@ impl ::multibody::runtime::System for Chain10Planar {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Chain10Planar {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 10], v: &[f64; 10], p: &mut [f64; 10]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -5261,7 +5261,7 @@ impl ::multibody::runtime::Conjugate for Chain10Planar {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain10Planar {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 10], p: &[f64; 10]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 10], p: &[f64; 10]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -5270,7 +5270,7 @@ impl ::multibody::runtime::Energetic for Chain10Planar {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Chain10Planar {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
         Self::accelerations(self, q, v, a);
     }
 }

@@ -5180,17 +5180,17 @@ impl ::multibody::runtime::System for Chain6 {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 6] {
+    fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -5203,7 +5203,7 @@ impl ::multibody::runtime::System for Chain6 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Chain6 {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -5211,7 +5211,7 @@ impl ::multibody::runtime::Conjugate for Chain6 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Chain6 {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -5220,7 +5220,7 @@ impl ::multibody::runtime::Energetic for Chain6 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Chain6 {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         Self::accelerations(self, q, v, a);
     }
 }

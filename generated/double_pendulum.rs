@@ -956,12 +956,12 @@ impl DoublePendulum {
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     /// 6 operations: 2 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
-    pub fn drifts(&self, q: &[f64; 2], v: &[f64; 2], drift: &mut [[f64; 6]; 3]) {
-        Self::drifts_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    pub fn bias_accelerations(&self, q: &[f64; 2], v: &[f64; 2], drift: &mut [[f64; 6]; 3]) {
+        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
     }
 
     #[inline(always)]
-    fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
@@ -1156,7 +1156,7 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
     #[inline(always)]
     fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::drifts_kernel::<A, LANES>(q, v, drift);
+        Self::bias_accelerations_kernel::<A, LANES>(q, v, drift);
     }
 }
 
@@ -1255,7 +1255,7 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     #[inline]
-    pub fn drifts(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], drift: &mut [[[f64; LANES]; 6]; 3]) {
+    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], drift: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
     }
 
@@ -1290,17 +1290,17 @@ impl ::multibody::runtime::System for DoublePendulum {
         [0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 2] {
+    fn zero_momenta(&self) -> [f64; 2] {
         [0.0; 2]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -1313,7 +1313,7 @@ impl ::multibody::runtime::System for DoublePendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for DoublePendulum {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 2], v: &[f64; 2], p: &mut [f64; 2]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 2], v: &[f64; 2], p: &mut [f64; 2]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -1321,7 +1321,7 @@ impl ::multibody::runtime::Conjugate for DoublePendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for DoublePendulum {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 2], p: &[f64; 2]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 2], p: &[f64; 2]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -1330,7 +1330,7 @@ impl ::multibody::runtime::Energetic for DoublePendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for DoublePendulum {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         Self::accelerations(self, q, v, a);
     }
 }

@@ -5350,17 +5350,17 @@ impl ::multibody::runtime::System for Panda {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 8] {
+    fn zero_momenta(&self) -> [f64; 8] {
         [0.0; 8]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -5373,7 +5373,7 @@ impl ::multibody::runtime::System for Panda {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Panda {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -5381,7 +5381,7 @@ impl ::multibody::runtime::Conjugate for Panda {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Panda {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 8], p: &[f64; 8]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 8], p: &[f64; 8]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -5390,7 +5390,7 @@ impl ::multibody::runtime::Energetic for Panda {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Panda {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
         Self::accelerations(self, q, v, a);
     }
 }

@@ -3751,12 +3751,12 @@ impl Satellite {
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     /// 85 operations: 33 additions, 52 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
-    pub fn drifts(&self, q: &[f64; 7], v: &[f64; 6], drift: &mut [[f64; 6]; 3]) {
-        Self::drifts_kernel::<::multibody::runtime::kernel::Plain, 1>(v, &self.drive_q, &self.drive_v, &self.drive_a, drift.as_flattened_mut());
+    pub fn bias_accelerations(&self, q: &[f64; 7], v: &[f64; 6], drift: &mut [[f64; 6]; 3]) {
+        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(v, &self.drive_q, &self.drive_v, &self.drive_a, drift.as_flattened_mut());
     }
 
     #[inline(always)]
-    fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let drive_q_0 = drive_q.get(0, l);
@@ -4147,7 +4147,7 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Read<f64> + ?Sized, P3: ::multibody::runtime::kernel::Read<f64> + ?Sized, P4: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a P2, &'a P3, &'a mut P4,)> for Satellite {
     #[inline(always)]
     fn run<A: ::multibody::runtime::kernel::Arithmetic>((v, drive_q, drive_v, drive_a, drift,): (&'a P0, &'a P1, &'a P2, &'a P3, &'a mut P4,)) {
-        Self::drifts_kernel::<A, LANES>(v, drive_q, drive_v, drive_a, drift);
+        Self::bias_accelerations_kernel::<A, LANES>(v, drive_q, drive_v, drive_a, drift);
     }
 }
 
@@ -4254,7 +4254,7 @@ impl<const LANES: usize> SatelliteLanes<LANES> {
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     #[inline]
-    pub fn drifts(&self, q: &[[f64; LANES]; 7], v: &[[f64; LANES]; 6], drift: &mut [[[f64; LANES]; 6]; 3]) {
+    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 7], v: &[[f64; LANES]; 6], drift: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<Satellite, 11, LANES, f64, _>((v, &self.drive_q, &self.drive_v, &self.drive_a, drift.as_flattened_mut(),));
     }
 
@@ -4289,17 +4289,17 @@ impl ::multibody::runtime::System for Satellite {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     }
 
-    fn rest(&self) -> [f64; 6] {
+    fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
-        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Pose, 0, 0)] }
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
+        const { &[::multibody::runtime::system::LieJoint::new(::multibody::runtime::system::LieGroup::SE3, 0, 0)] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 7], p: &[f64; 6], qd: &mut [f64; 7], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -4312,7 +4312,7 @@ impl ::multibody::runtime::System for Satellite {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Satellite {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 7], v: &[f64; 6], p: &mut [f64; 6]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 7], v: &[f64; 6], p: &mut [f64; 6]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -4320,7 +4320,7 @@ impl ::multibody::runtime::Conjugate for Satellite {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Satellite {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 7], p: &[f64; 6]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -4329,7 +4329,7 @@ impl ::multibody::runtime::Energetic for Satellite {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Satellite {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
         Self::accelerations(self, q, v, a);
     }
 }

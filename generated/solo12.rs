@@ -9976,17 +9976,17 @@ impl ::multibody::runtime::System for Solo12 {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 18] {
+    fn zero_momenta(&self) -> [f64; 18] {
         [0.0; 18]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
-        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Pose, 0, 0)] }
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
+        const { &[::multibody::runtime::system::LieJoint::new(::multibody::runtime::system::LieGroup::SE3, 0, 0)] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -9999,7 +9999,7 @@ impl ::multibody::runtime::System for Solo12 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Solo12 {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -10007,7 +10007,7 @@ impl ::multibody::runtime::Conjugate for Solo12 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Solo12 {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 19], p: &[f64; 18]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 19], p: &[f64; 18]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -10016,7 +10016,7 @@ impl ::multibody::runtime::Energetic for Solo12 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Solo12 {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
         Self::accelerations(self, q, v, a);
     }
 }

@@ -1855,12 +1855,12 @@ impl SphericalPendulum {
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     /// 35 operations: 10 additions, 25 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
-    pub fn drifts(&self, q: &[f64; 5], v: &[f64; 4], drift: &mut [[f64; 6]; 2]) {
-        Self::drifts_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    pub fn bias_accelerations(&self, q: &[f64; 5], v: &[f64; 4], drift: &mut [[f64; 6]; 2]) {
+        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
     }
 
     #[inline(always)]
-    fn drifts_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
@@ -2120,7 +2120,7 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
     #[inline(always)]
     fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::drifts_kernel::<A, LANES>(q, v, drift);
+        Self::bias_accelerations_kernel::<A, LANES>(q, v, drift);
     }
 }
 
@@ -2219,7 +2219,7 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
 
     /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
     #[inline]
-    pub fn drifts(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], drift: &mut [[[f64; LANES]; 6]; 2]) {
+    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], drift: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
     }
 
@@ -2254,17 +2254,17 @@ impl ::multibody::runtime::System for SphericalPendulum {
         [0.0, 0.0, 0.0, 1.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 4] {
+    fn zero_momenta(&self) -> [f64; 4] {
         [0.0; 4]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
-        const { &[::multibody::runtime::system::Group::new(::multibody::runtime::system::GroupKind::Rotation, 0, 0)] }
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
+        const { &[::multibody::runtime::system::LieJoint::new(::multibody::runtime::system::LieGroup::SO3, 0, 0)] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -2277,7 +2277,7 @@ impl ::multibody::runtime::System for SphericalPendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for SphericalPendulum {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 5], v: &[f64; 4], p: &mut [f64; 4]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 5], v: &[f64; 4], p: &mut [f64; 4]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -2285,7 +2285,7 @@ impl ::multibody::runtime::Conjugate for SphericalPendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for SphericalPendulum {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 5], p: &[f64; 4]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 5], p: &[f64; 4]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -2294,7 +2294,7 @@ impl ::multibody::runtime::Energetic for SphericalPendulum {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for SphericalPendulum {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
         Self::accelerations(self, q, v, a);
     }
 }

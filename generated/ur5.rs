@@ -2704,17 +2704,17 @@ impl ::multibody::runtime::System for Ur5 {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 6] {
+    fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 
@@ -2727,7 +2727,7 @@ impl ::multibody::runtime::System for Ur5 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Ur5 {
     #[inline]
-    fn state_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
+    fn conjugate_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
         Self::momenta(self, q, v, p);
     }
 }
@@ -2735,7 +2735,7 @@ impl ::multibody::runtime::Conjugate for Ur5 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Ur5 {
     #[inline]
-    fn state_energy(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {
+    fn energies(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
         (kinetic, potential)
     }
@@ -2744,7 +2744,7 @@ impl ::multibody::runtime::Energetic for Ur5 {
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Ur5 {
     #[inline]
-    fn state_accelerations(&mut self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
+    fn generalized_accelerations(&mut self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         Self::accelerations(self, q, v, a);
     }
 }

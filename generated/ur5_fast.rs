@@ -599,17 +599,17 @@ impl ::multibody::runtime::System for Ur5Fast {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
-    fn rest(&self) -> [f64; 6] {
+    fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
 
     #[inline]
-    fn groups(&self) -> &[::multibody::runtime::system::Group] {
+    fn lie_joints(&self) -> &[::multibody::runtime::system::LieJoint] {
         const { &[] }
     }
 
     #[inline]
-    fn state_rates(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
+    fn rates_at(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
     }
 
