@@ -11,7 +11,7 @@ use multibody::codegen::generate::trace;
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::Model;
 use multibody::codegen::plan::{EliminationStrategy, Plan, PlanOptions};
-use multibody::codegen::{Arithmetic, Output, Options};
+use multibody::codegen::{Arithmetic, Options, Output};
 use multibody::runtime::sweep::Quantity;
 
 const ARITHMETIC: [Arithmetic; 2] = [Arithmetic::Exact, Arithmetic::Fast];
@@ -164,7 +164,12 @@ fn what_is_generated_by_default_stays_below_its_limits() {
         ("solo12.urdf", Base::Floating, [2177, 2073]),
         ("g1.urdf", Base::Floating, [6646, 6559]),
     ] {
-        check(&format!("{name}, default"), None, limits, rates(&file(name, base, None), EliminationStrategy::default(), Scope::All));
+        check(
+            &format!("{name}, default"),
+            None,
+            limits,
+            rates(&file(name, base, None), EliminationStrategy::default(), Scope::All),
+        );
     }
 }
 

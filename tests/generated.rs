@@ -175,7 +175,11 @@ macro_rules! output {
     (drifts, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
         let count = $interpreter.tree().frames.len();
         let (mut ours, mut theirs) = ([[0.0; 6]; 3], vec![[0.0; 6]; count]);
-        $system.bias_accelerations(&$given.q, &$given.v, (&mut ours[..count]).try_into().expect("at most three frames"));
+        $system.bias_accelerations(
+            &$given.q,
+            &$given.v,
+            (&mut ours[..count]).try_into().expect("at most three frames"),
+        );
         $interpreter.bias_accelerations(&$given.q, &$given.v, &mut theirs);
         same("bias_accelerations", $given.state, &ours[..count].concat(), &theirs.concat());
     };

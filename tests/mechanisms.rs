@@ -130,7 +130,8 @@ fn they_close_and_have_the_mobility_that_mechanics_says() {
         assert_eq!(plan.dims.rows, case.rows, "{}", case.name);
         let independent = plan.dims.nv - case.mobility;
         assert_eq!(rank(&mut interpreter, &q), independent, "{}: rank of the rows", case.name);
-        let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
+        let (mut residual, mut dq, mut pivots) =
+            (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
         interpreter.position_correction(&q, &mut residual, &mut dq, &mut pivots);
         let used = pivots.iter().filter(|p| **p != 0.0).count();
         assert_eq!(used, independent, "{}: rows that are not left out: {pivots:?}", case.name);

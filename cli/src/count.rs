@@ -8,7 +8,7 @@ use multibody::codegen::generate::{trace, OutputProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
 use multibody::codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
 use multibody::codegen::symbolic::Counts;
-use multibody::codegen::{Arithmetic, Output, Options};
+use multibody::codegen::{Arithmetic, Options, Output};
 use serde_json::json;
 
 use super::args::CountArgs;

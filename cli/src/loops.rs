@@ -85,7 +85,8 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
             return Err(does_not_close(path, plan, interpreter, &q, error, free));
         }
     };
-    let (mut residual, mut dq, mut pivots) = (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
+    let (mut residual, mut dq, mut pivots) =
+        (interpreter.zero_rows(), interpreter.zero_momenta(), interpreter.zero_rows());
     interpreter.position_correction(&q, &mut residual, &mut dq, &mut pivots);
     let rows = interpreter.rows();
     let bonds: Vec<Bond> = (0..plan.model.constraints.len())
@@ -275,7 +276,8 @@ pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &
     }
     let q = q.to_vec();
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    let (mut p, mut allowed, mut sigma) = (interpreter.zero_momenta(), interpreter.zero_momenta(), interpreter.zero_rows());
+    let (mut p, mut allowed, mut sigma) =
+        (interpreter.zero_momenta(), interpreter.zero_momenta(), interpreter.zero_rows());
     interpreter.momenta(&q, v, &mut p);
     interpreter.project_momenta(0.0, &q, &mut p, &mut allowed, &mut sigma);
     interpreter.constraint_residuals(&q, &mut residual, &mut entries);

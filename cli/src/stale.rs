@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{self, Arithmetic, Output, RolledCode, Options, Precision};
+use multibody::codegen::{self, Arithmetic, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
@@ -122,9 +122,10 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
     };
     let forms = match entry.forms.as_deref() {
         None => EliminationStrategy::default(),
-        Some(name) => {
-            *EliminationStrategy::ALL.iter().find(|f| f.name() == name).ok_or_else(|| wrong(format!("`{name}` is no form")))?
-        }
+        Some(name) => *EliminationStrategy::ALL
+            .iter()
+            .find(|f| f.name() == name)
+            .ok_or_else(|| wrong(format!("`{name}` is no form")))?,
     };
     let loops = match entry.loops.as_deref() {
         None => RolledCode::default(),

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
-use multibody::codegen::{Output, Options};
+use multibody::codegen::{Options, Output};
 use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;

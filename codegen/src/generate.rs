@@ -2,13 +2,13 @@
 //! through here.
 
 use crate::emit;
-use crate::rolled::rolled;
 use crate::model::Model;
-pub use crate::options::{Arithmetic, Output, RolledCode, Options, Precision};
+pub use crate::options::{Arithmetic, Options, Output, Precision, RolledCode};
 use crate::plan::Plan;
+use crate::rolled::rolled;
 use crate::symbolic::{Counts, Operand, ProgramResult};
 use crate::trace::coordinate_map;
-pub use crate::trace::{chosen_frames, trace, OutputProgram, InputArray};
+pub use crate::trace::{chosen_frames, trace, InputArray, OutputProgram};
 
 /// Generated code and what is known about it.
 #[derive(Clone, Debug)]

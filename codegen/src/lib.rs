@@ -6,12 +6,12 @@ pub mod emit;
 pub mod generate;
 pub mod import;
 pub mod layout;
-pub mod rolled;
 pub mod model;
 pub mod options;
 pub mod plan;
+pub mod rolled;
 pub mod symbolic;
 pub mod trace;
 pub mod wide;
 
-pub use generate::{generate, Arithmetic, Generated, Output, RolledCode, Options, Precision};
+pub use generate::{generate, Arithmetic, Generated, Options, Output, Precision, RolledCode};

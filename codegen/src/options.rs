@@ -133,7 +133,8 @@ impl Output {
     ];
 
     /// Those that mechanisms with constraints have besides.
-    pub const CONSTRAINED: [Output; 4] = [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
+    pub const CONSTRAINED: [Output; 4] =
+        [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
 
     /// Both.
     pub fn every() -> impl Iterator<Item = Output> + Clone {

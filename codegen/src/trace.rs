@@ -8,10 +8,10 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use crate::rolled::RolledProgram;
 use crate::model::Gravity;
-use crate::options::{Output, Options, Precision};
+use crate::options::{Options, Output, Precision};
 use crate::plan::Plan;
+use crate::rolled::RolledProgram;
 use crate::symbolic::{passes, Counts, Expr, Graph, Program};
 
 /// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
@@ -97,7 +97,9 @@ impl<'g> SymbolicInputs<'g> {
             | Output::Derivatives
             | Output::ParameterDerivatives
             | Output::ProjectMomenta => symbols.array("p", dims.nv),
-            Output::MassMatrix | Output::Jacobians | Output::ConstraintResiduals | Output::PositionCorrection => Vec::new(),
+            Output::MassMatrix | Output::Jacobians | Output::ConstraintResiduals | Output::PositionCorrection => {
+                Vec::new()
+            }
             _ => symbols.array("v", dims.nv),
         };
         let third = if group == Output::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Gravity, JointKind, Model, JointMotion, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{Gravity, JointKind, JointMotion, Model, Placement, Rotation, Value, WrenchAxes};
 
 const EVERYTHING: &str = include_str!("everything.toml");
 const C: fn(f64) -> Value = Value::Const;

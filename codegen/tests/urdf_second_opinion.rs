@@ -2,7 +2,7 @@
 //! nearest `f64`, so the comparison is exact.
 
 use mbd_codegen::import::{urdf, Base, ImportOptions};
-use mbd_codegen::model::{Body, Joint, JointKind, Model, JointMotion, Placement, Rotation, Value};
+use mbd_codegen::model::{Body, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value};
 use std::path::{Path, PathBuf};
 use urdf_rs::JointType;
 

@@ -3,7 +3,7 @@
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::EliminationStrategy;
-use mbd_codegen::{Arithmetic, Output, RolledCode, Options, Precision};
+use mbd_codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
 use crate::literal;

@@ -11,7 +11,7 @@ use directions::DualRun;
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
 use crate::system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic};
-use crate::system::{LieJoint, LieGroup, Real, Row, System};
+use crate::system::{LieGroup, LieJoint, Real, Row, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -205,13 +205,7 @@ impl<S: Scalar> Interpreter<S> {
     }
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
-    pub fn momentum_derivatives(
-        &mut self,
-        q: &[S],
-        v: &[S],
-        d: &mut Derivatives<S>,
-        out: &mut MomentumDerivatives<S>,
-    ) {
+    pub fn momentum_derivatives(&mut self, q: &[S], v: &[S], d: &mut Derivatives<S>, out: &mut MomentumDerivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.momentum_derivatives(q, v, &self.inputs.view(), &mut self.work, d, out);
     }

@@ -228,7 +228,7 @@ pub struct Row {
 /// A [`System`] with constraints between its joints: closed loops, couplings, rolling.
 ///
 /// Its momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). Every `σ` belongs to the same motion, so that a one-step method
-/// may begin each step with `σ = 0` ([`Constrained::settle`]), and rates may leave out what changes `σ` alone: it is the
+/// may begin each step with `σ = 0` ([`Constrained::project_momenta`]), and rates may leave out what changes `σ` alone: it is the
 /// integral of `λ`, but for joints that close a loop to the ground.
 /// Constraints hold in the velocities of every evaluation, to round-off; redundant rows are recognised and left out. `Φ`
 /// is `rows × nv`, one column for each velocity, and the force of the constraints on the joints is `−Φᵀλ`. It is given by the

@@ -8,7 +8,7 @@ mod map;
 
 use alloc::vec::Vec;
 
-use crate::spatial::{Force, Motion, RigidInertia, ElementaryTransform, Vec3};
+use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
 /// What a node's joint can do, seen in the node frame.

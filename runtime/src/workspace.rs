@@ -4,7 +4,7 @@ use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::spatial::{ArticulatedInertia, Force, Mat3, Motion, RigidInertia, ElementaryTransform, Vec3};
+use crate::spatial::{ArticulatedInertia, ElementaryTransform, Force, Mat3, Motion, RigidInertia, Vec3};
 use crate::tree::Tree;
 use crate::Scalar;
 
@@ -59,7 +59,11 @@ pub struct JointSteps<S> {
 impl<S: Scalar> JointSteps<S> {
     /// No steps.
     pub fn new() -> Self {
-        JointSteps { steps: [ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4], len: 0, placing: 0 }
+        JointSteps {
+            steps: [ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4],
+            len: 0,
+            placing: 0,
+        }
     }
 
     /// Replaces the steps; those beyond four are dropped.

@@ -4,7 +4,7 @@ use mbd_runtime::integrate::{
     Chart, Composition, Doubled, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling,
     Stepper, Symmetric, Tolerances,
 };
-use mbd_runtime::system::{LieJoint, LieGroup};
+use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::System;
 
 /// An ordinary coordinate, a rotation, a pose, a planar joint: for charts alone.

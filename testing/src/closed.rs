@@ -1,7 +1,7 @@
 //! Random trees with constraints that are closed exactly in a given state.
 
 use mbd_codegen::model::{
-    Constraint, ConstraintKind, JointKind, LoopKind, Model, JointMotion, Mount, Param, Placement, Rotation, Value,
+    Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Param, Placement, Rotation, Value,
 };
 use mbd_codegen::options::RolledCode;
 use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions, DEFAULT_SNAP};
@@ -60,7 +60,8 @@ impl LoopKnobs {
         let mut tree = Distribution::everything(seed, bodies);
         tree.bodies.0 = 2.min(bodies);
         if planar {
-            tree = Distribution { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
+            tree =
+                Distribution { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
             // Axes that are made parallel may leave a body without mass motions that nothing feels.
             tree.massless = 0.0;
         }

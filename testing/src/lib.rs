@@ -9,7 +9,9 @@ pub mod random;
 pub mod state;
 pub mod toml;
 
-use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, JointMotion, Placement, Rotation, Value};
+use mbd_codegen::model::{
+    ConstraintKind, Gravity, JointKind, JointMotion, LoopKind, Model, Placement, Rotation, Value,
+};
 
 /// A number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {

@@ -1,6 +1,6 @@
 //! Newton and Euler, body by body: what the sweeps must agree with, from the motion of frames alone.
 
-use mbd_codegen::model::{JointKind, Model, JointMotion};
+use mbd_codegen::model::{JointKind, JointMotion, Model};
 use mbd_codegen::plan::{Plan, Rigid};
 use mbd_runtime::spatial::{add3, cross, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;

@@ -4,7 +4,7 @@ mod constraints;
 
 use std::fmt::Write;
 
-use mbd_codegen::model::{Gravity, Joint, JointKind, Model, JointMotion, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value, WrenchAxes};
 
 /// Order in which joints are written; the reader puts them depth first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -12,7 +12,7 @@ mod wide;
 use mbd_codegen::generate::trace;
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
-use mbd_codegen::{Arithmetic, Output, Options};
+use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use mbd_codegen::import::{load, ImportOptions};
-use mbd_codegen::{generate, Output, Options, Precision};
+use mbd_codegen::{generate, Options, Output, Precision};
 
 /// Runs the compiler that built this test, or the first on the path.
 fn rustc(arguments: &[&str], source: &Path, folder: &Path) {

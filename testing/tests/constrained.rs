@@ -5,7 +5,8 @@ use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{
-    close, complete, WithPostStep, Closing, Effort, Hold, RadauIndex2, CoordinatePartition, Rattle, OpenAndClosed, Stabilisation, Steady, Repartition,
+    close, complete, Closing, CoordinatePartition, Effort, Hold, OpenAndClosed, RadauIndex2, Rattle, Repartition,
+    Stabilisation, Steady, WithPostStep,
 };
 use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};

@@ -8,7 +8,7 @@ mod common;
 use std::collections::HashMap;
 
 use common::Emitted;
-use mbd_codegen::generate::{generate, Arithmetic, Output, Options};
+use mbd_codegen::generate::{generate, Arithmetic, Options, Output};
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::RolledCode;

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use mbd_codegen::model::{ConstraintKind, JointKind, Model, JointMotion};
+use mbd_codegen::model::{ConstraintKind, JointKind, JointMotion, Model};
 use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use mbd_runtime::constrained::CoordinatePartition;
 use mbd_runtime::{Accelerated, Constrained, Interpreter, System};
@@ -149,7 +149,12 @@ fn parameters_of_constraints_are_as_good_as_constants() {
         let distribution = LoopKnobs { tree: Distribution { params: 0.4, ..distribution.tree }, ..distribution };
         let Some(c) = apart(seed, random_loops(seed, &distribution)) else { continue };
         met += 1;
-        let options = PlanOptions { snap: 0.0, forms: EliminationStrategy::Single, accelerations: false, ..PlanOptions::default() };
+        let options = PlanOptions {
+            snap: 0.0,
+            forms: EliminationStrategy::Single,
+            accelerations: false,
+            ..PlanOptions::default()
+        };
         let s = &c.system.state;
         let ours = results(&Plan::new(&c.system.model, options), s, c.p.as_slice());
         let plain = Plan::new(&substituted(&c.system.model, &s.params), options);

@@ -4,7 +4,7 @@ use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
 use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
 use mbd_codegen::symbolic::Counts;
-use mbd_codegen::{Arithmetic, Output, Options};
+use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::sweep::Quantity;
 use mbd_testing::random::{random_model, Distribution};
 
@@ -23,7 +23,12 @@ fn counts(model: &Model, group: Output) -> Counts {
 
 /// Operations of the rates in the form that has the fewest.
 fn fewest(model: &Model) -> usize {
-    let plan = PlanOptions { forms: EliminationStrategy::Fewest, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
+    let plan = PlanOptions {
+        forms: EliminationStrategy::Fewest,
+        accelerations: false,
+        mass_matrix: false,
+        ..PlanOptions::default()
+    };
     let options = Options { efforts: false, arithmetic: Arithmetic::Fast, plan, ..Options::default() };
     trace(&Plan::new(model, plan), Output::Rates, &options).expect("no frames are named").program.counts().total()
 }
@@ -83,8 +88,14 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
     for seed in 0..100 {
         let mut model = random_model(seed, &Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6) });
         let all = |model: &Model, groups: &[Output]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
-        let kinematic =
-            [Output::Velocities, Output::Momenta, Output::MassMatrix, Output::Frames, Output::Jacobians, Output::BiasAccelerations];
+        let kinematic = [
+            Output::Velocities,
+            Output::Momenta,
+            Output::MassMatrix,
+            Output::Frames,
+            Output::Jacobians,
+            Output::BiasAccelerations,
+        ];
         let before = (all(&model, &kinematic), counts(&model, Output::Energy));
         model.wrenches.push(Wrench { name: "w".to_string(), body: 0, axes: WrenchAxes::World });
         assert_eq!(before, (all(&model, &kinematic), counts(&model, Output::Energy)), "seed {seed}: a wrench");

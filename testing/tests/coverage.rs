@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mbd_codegen::model::{Gravity, Joint, JointKind, Model, JointMotion, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Rotation, Value, WrenchAxes};
 use mbd_testing::random::{random_model, Distribution};
 
 fn kind(k: &JointKind) -> &'static str {

@@ -257,7 +257,8 @@ fn forms_do_not_matter() {
         let (model, findings) = load(file, &text, &ImportOptions { base: Base::Fixed, gravity: None });
         let model = model.unwrap_or_else(|| panic!("{findings}"));
         for seed in 0..20 {
-            let [a, b] = [EliminationStrategy::Fastest, EliminationStrategy::Single].map(|forms| Case::of_model(&model, seed, forms));
+            let [a, b] = [EliminationStrategy::Fastest, EliminationStrategy::Single]
+                .map(|forms| Case::of_model(&model, seed, forms));
             let [ours, theirs] = [&a, &b].map(|c| [&c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq]);
             for (ours, theirs) in ours.into_iter().zip(theirs) {
                 worst = worst.max(a.worst(file, ours, theirs));

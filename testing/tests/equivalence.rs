@@ -1,7 +1,7 @@
 //! The same mechanism described in two ways moves in one way.
 
 use mbd_codegen::import::toml::read;
-use mbd_codegen::model::{Model, JointMotion, Rotation, Value};
+use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
 use mbd_codegen::plan::{Plan, PlanOptions};
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Source;

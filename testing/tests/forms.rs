@@ -18,7 +18,7 @@ use std::fmt::Write;
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{JointKind, Model};
 use mbd_codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
-use mbd_codegen::{Arithmetic, Output, Options};
+use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::chains;
 use mbd_testing::random::{random_model, Distribution};

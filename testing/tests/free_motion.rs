@@ -146,7 +146,8 @@ struct Floating {
 impl Floating {
     fn new(seed: u64, gravity: f64) -> Floating {
         let kinds = [3.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, 0.0, 0.0];
-        let distribution = Distribution { bodies: (5, 5), kinds, branching: 0.5, springs: 0.5, ..Distribution::default() };
+        let distribution =
+            Distribution { bodies: (5, 5), kinds, branching: 0.5, springs: 0.5, ..Distribution::default() };
         let mut model = random_model(seed, &distribution);
         let root = model.joints.iter().position(|j| j.parent.is_none()).expect("a tree has a root");
         let joint = &mut model.joints[root];

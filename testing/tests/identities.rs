@@ -208,7 +208,8 @@ fn reactions_are_what_newton_and_euler_ask_for() {
 fn momentum_of_free_trees_is_constant() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
-        let distribution = Distribution { roots: 0.0, prescribed: 0.0, wrenches: 0.0, ..Distribution::everything(seed, 8) };
+        let distribution =
+            Distribution { roots: 0.0, prescribed: 0.0, wrenches: 0.0, ..Distribution::everything(seed, 8) };
         let mut model = random_model(seed, &Distribution { gravity: [0.0, 1.0, 0.0], ..distribution });
         // One base, free in space.
         let base = &mut model.joints[0];

@@ -118,7 +118,8 @@ struct Scene {
 impl Scene {
     /// Three or four bodies, springs and gravity, nothing that takes energy out or puts it in.
     fn new(name: &'static str, seed: u64, steps: u16, kinds: [f64; 9]) -> Scene {
-        let distribution = Distribution { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Distribution::default() };
+        let distribution =
+            Distribution { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Distribution::default() };
         let mut model = random_model(seed, &distribution);
         model.gravity = Gravity::Constant([Value::ZERO, Value::ZERO, Value::Const(-9.81)]);
         let plan = Plan::new(&model, Default::default());

@@ -3,10 +3,10 @@
 //! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
 
 use mbd_codegen::generate::trace;
-use mbd_codegen::rolled::{looped, RolledProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
-use mbd_codegen::{Arithmetic, Output, RolledCode, Options};
+use mbd_codegen::rolled::{looped, RolledProgram};
+use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::Constrained;
 use mbd_testing::chains::{general, planar};
 use mbd_testing::random::{random_model, Distribution, Rng};
@@ -113,7 +113,12 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
 fn forced(seed: u64) -> Options {
     let mut rng = Rng::new(seed, 9);
     // Blocks at the tips stay straight-line and leave little for loops in short chains.
-    let forms = rng.pick(&[EliminationStrategy::Single, EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest]);
+    let forms = rng.pick(&[
+        EliminationStrategy::Single,
+        EliminationStrategy::Single,
+        EliminationStrategy::Fewest,
+        EliminationStrategy::Fastest,
+    ]);
     Options {
         arithmetic: Arithmetic::Exact,
         efforts: rng.chance(0.7),
@@ -180,8 +185,12 @@ fn closed_chains() {
 fn rewritten_chains() {
     for seed in 0..12 {
         let n = 16 + seed as usize;
-        let distribution =
-            Distribution { bodies: (n, n), taper: 1.0, skew: if seed % 2 == 0 { 1.0 } else { 0.0 }, ..Distribution::default() };
+        let distribution = Distribution {
+            bodies: (n, n),
+            taper: 1.0,
+            skew: if seed % 2 == 0 { 1.0 } else { 0.0 },
+            ..Distribution::default()
+        };
         let options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
         compare(&random_model(seed, &distribution), seed, &options);
     }

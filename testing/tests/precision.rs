@@ -55,8 +55,10 @@ impl Scene {
         let ur5 = Plan::new(&wide::model("ur5.urdf", Base::Fixed), Default::default());
         let random = |seed| {
             let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-            let model =
-                random_model(seed, &Distribution { bodies: (4, 7), branching: 0.3, skew: 0.0, kinds, ..Distribution::default() });
+            let model = random_model(
+                seed,
+                &Distribution { bodies: (4, 7), branching: 0.3, skew: 0.0, kinds, ..Distribution::default() },
+            );
             Scene::new(Plan::new(&model, Default::default()), seed)
         };
         std::iter::once(Scene::new(ur5, 0)).chain((1..16).map(random)).collect()

@@ -3,7 +3,7 @@
 use mbd_codegen::diag::Severity;
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{
-    Constraint, ConstraintKind, JointKind, LoopKind, Model, JointMotion, Mount, Placement, Start, Value,
+    Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Placement, Start, Value,
 };
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::toml::{to_toml_in, Order};

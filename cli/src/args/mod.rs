@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
-use multibody::codegen::{Arithmetic, Output, RolledCode, Options, Precision};
+use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
 

@@ -6,7 +6,7 @@ use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{LoopType, RawConstraint, RawLoop, RawModel, RawNumber};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::quote;
-use crate::model::{Body, Constraint, ConstraintKind, Frame, Joint, LoopKind, JointMotion, Mount, Placement, Value};
+use crate::model::{Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, Mount, Placement, Value};
 
 /// Cosine up to which two axes pass for being at right angles: seven digits.
 const RIGHT_ANGLE: f64 = 1e-6;

@@ -4,7 +4,7 @@ use super::symmetric::full;
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
-use crate::model::{Body, JointKind, Model, JointMotion, Placement, Rotation, Value};
+use crate::model::{Body, JointKind, JointMotion, Model, Placement, Rotation, Value};
 
 type Mat3 = [[f64; 3]; 3];
 
@@ -96,7 +96,9 @@ fn about(kind: &JointKind, freedom: usize) -> &'static str {
         (JointKind::Universal { .. }, 0) => " about the first axis",
         (JointKind::Universal { .. }, _) => " about the second axis",
         (JointKind::Planar { .. }, _) => " about the normal",
-        (JointKind::Revolute { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => " about the axis",
+        (JointKind::Revolute { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => {
+            " about the axis"
+        }
         _ => "",
     }
 }

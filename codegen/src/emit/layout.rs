@@ -7,7 +7,7 @@ use mbd_runtime::tree::Source;
 
 use super::names::constant;
 use crate::model::{ConstraintKind, Gravity, JointKind, Mount, Value};
-use crate::options::{Output, Options};
+use crate::options::{Options, Output};
 use crate::plan::Plan;
 use crate::symbolic::Counts;
 use crate::trace::{chosen_frames, OutputProgram};

@@ -2,15 +2,15 @@
 
 mod lanes;
 mod layout;
-mod rolled;
 pub(crate) mod names;
 mod ports;
+mod rolled;
 mod statements;
 mod traits;
 
 use std::fmt::Write;
 
-use crate::options::{Output, Options};
+use crate::options::{Options, Output};
 use crate::plan::Plan;
 use crate::trace::OutputProgram;
 use statements::{Body, Head};

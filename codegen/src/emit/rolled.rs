@@ -6,9 +6,9 @@ use std::fmt::Write;
 
 use super::names::{identifier, quantity};
 use super::statements::{input, Head};
-use crate::rolled::{Block, Loop, RolledProgram, Place, Repeat, Start, Target, SweepDirection};
 use crate::options::Precision;
 use crate::plan::Plan;
+use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
 use crate::symbolic::{Op, ProgramResult};
 
 /// Bytes that the rows of eight lanes may take on the stack; beyond, lanes are computed one after the other.
@@ -120,7 +120,11 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "            for l in 0..LANES {{ carried{k}[l] = {start}; }}");
         }
         let turns = self.program.loops[repeat.run].table.len();
-        let order = if repeat.way == Some(SweepDirection::TipToBase) { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
+        let order = if repeat.way == Some(SweepDirection::TipToBase) {
+            format!("(0..{turns}).rev()")
+        } else {
+            format!("0..{turns}")
+        };
         let _ = writeln!(out, "            for k in {order} {{");
         let _ = writeln!(out, "                let row = &mut rows{}[k];", repeat.run);
         self.open_table(out, block, repeat.run);

@@ -13,8 +13,8 @@ use super::names::{identifier, quantity};
 use super::ports::{self, Port};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::plan::Plan;
-use crate::symbolic::{Fma, Label, Op, Operand, ProgramResult, FlooredReciprocal};
-use crate::trace::{OutputProgram, InputArray};
+use crate::symbolic::{FlooredReciprocal, Fma, Label, Op, Operand, ProgramResult};
+use crate::trace::{InputArray, OutputProgram};
 
 /// What every function begins with.
 pub struct Head<'a> {

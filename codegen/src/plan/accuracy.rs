@@ -134,7 +134,8 @@ impl ErrorEstimator {
     pub fn new(plan: &Plan, group: Output) -> ErrorEstimator {
         let mut judge = ErrorEstimator { parts: Vec::new(), samples: Vec::new(), articulated: Vec::new() };
         let plan = &turned(plan);
-        let [Ok(momenta), Ok(single)] = [Output::Momenta, group].map(|group| trace(plan, group, &options(group))) else {
+        let [Ok(momenta), Ok(single)] = [Output::Momenta, group].map(|group| trace(plan, group, &options(group)))
+        else {
             return judge;
         };
         let n = single.program.outputs.len();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::sweep::Sweeps;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Unknown, Source, Tree, TreeFrame};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
@@ -14,7 +14,7 @@ use super::placement::{direction, placement};
 use super::shared::ancestors;
 use super::{Plan, PlanFrame, PoseStep, Rigid};
 use crate::model::{ConstraintKind, JointKind, LoopKind, Model, Mount, Value};
-use crate::options::{Output, Options};
+use crate::options::{Options, Output};
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
 

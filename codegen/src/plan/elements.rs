@@ -52,9 +52,13 @@ pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) 
             JointKind::Fixed => Vec::new(),
             JointKind::Revolute { axis } => vec![(NodeKind::Revolute, Some(axis))],
             JointKind::Prismatic { axis } => vec![(NodeKind::Prismatic, Some(axis))],
-            JointKind::Cylindrical { axis } => vec![(NodeKind::Prismatic, Some(axis)), (NodeKind::Revolute, Some(axis))],
+            JointKind::Cylindrical { axis } => {
+                vec![(NodeKind::Prismatic, Some(axis)), (NodeKind::Revolute, Some(axis))]
+            }
             JointKind::Helical { axis, pitch } => vec![(NodeKind::Helical(pitch), Some(axis))],
-            JointKind::Universal { axes } => vec![(NodeKind::Revolute, Some(axes[0])), (NodeKind::Revolute, Some(axes[1]))],
+            JointKind::Universal { axes } => {
+                vec![(NodeKind::Revolute, Some(axes[0])), (NodeKind::Revolute, Some(axes[1]))]
+            }
             JointKind::Planar { normal } => vec![(NodeKind::Planar, Some(normal))],
             JointKind::Spherical => vec![(NodeKind::Spherical, None)],
             JointKind::Floating => vec![(NodeKind::Floating, None)],

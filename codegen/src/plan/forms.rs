@@ -9,12 +9,12 @@
 //! its rounding errors are not much larger than those of one joint at a time.
 
 use mbd_runtime::sweep::Quantity;
-use mbd_runtime::tree::{Unknown, Source};
+use mbd_runtime::tree::{Source, Unknown};
 
 use super::accuracy::{ErrorEstimator, LIMIT};
 use super::{NodeKind, Plan, PlanNode, PlanOptions, PoseStep};
+use crate::options::{Arithmetic, Options, Output, RolledCode};
 use crate::rolled;
-use crate::options::{Arithmetic, Output, RolledCode, Options};
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;
 
@@ -51,7 +51,8 @@ pub enum EliminationStrategy {
 
 impl EliminationStrategy {
     /// All of them.
-    pub const ALL: [EliminationStrategy; 3] = [EliminationStrategy::Fastest, EliminationStrategy::Fewest, EliminationStrategy::Single];
+    pub const ALL: [EliminationStrategy; 3] =
+        [EliminationStrategy::Fastest, EliminationStrategy::Fewest, EliminationStrategy::Single];
 
     /// Its name in options.
     pub fn name(self) -> &'static str {
@@ -267,7 +268,7 @@ struct Evaluation {
 impl Evaluation {
     /// Operations that lead to velocities.
     fn velocities(&self) -> usize {
-        use Quantity::{Inertia, Pivot, BiasMomentum, Velocity};
+        use Quantity::{BiasMomentum, Inertia, Pivot, Velocity};
         let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | BiasMomentum | Velocity);
         self.program.counts_where(velocities).total()
     }
@@ -413,7 +414,11 @@ impl<'a> Search<'a> {
             near.push(Form { accumulates_momentum: form.accumulates_momentum + 1, ..form.clone() });
         }
         if from_ground && form.split < form.base {
-            near.push(Form { split: form.split + 1, accumulates_momentum: form.accumulates_momentum.max(form.split + 1), ..form.clone() });
+            near.push(Form {
+                split: form.split + 1,
+                accumulates_momentum: form.accumulates_momentum.max(form.split + 1),
+                ..form.clone()
+            });
         }
         for k in 0..len.min(LONGEST) {
             let mut turned = form.turned.clone();
@@ -429,7 +434,8 @@ impl<'a> Search<'a> {
 fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
     let mut forms = Vec::new();
     let mut add = |split: usize, base: usize, from: usize, accumulates_momentum: usize| {
-        let form = Form { split, base, turned: (0..len).map(|k| k >= from).collect(), accumulates_momentum, rolled: false };
+        let form =
+            Form { split, base, turned: (0..len).map(|k| k >= from).collect(), accumulates_momentum, rolled: false };
         if !forms.contains(&form) {
             forms.push(form);
         }

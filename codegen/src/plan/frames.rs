@@ -12,7 +12,7 @@ use super::instantiate::body_inertia;
 use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
 use super::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
-use crate::model::{Model, JointMotion, Value};
+use crate::model::{JointMotion, Model, Value};
 
 /// Nodes with their frames chosen.
 pub struct Framed {

@@ -1,6 +1,6 @@
 //! From the plan to a tree of any scalar: numbers, symbols, duals. The fork is one type parameter.
 
-use mbd_runtime::spatial::{add3, Mat3, RigidInertia, ElementaryTransform, Vec3, SYM};
+use mbd_runtime::spatial::{add3, ElementaryTransform, Mat3, RigidInertia, Vec3, SYM};
 use mbd_runtime::system::Row;
 use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
 use mbd_runtime::{Interpreter, Scalar};

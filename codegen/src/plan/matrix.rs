@@ -1,7 +1,7 @@
 //! How far out the mass matrix carries screws.
 
 use super::Plan;
-use crate::options::{Output, Options};
+use crate::options::{Options, Output};
 use crate::trace::trace;
 
 /// Trees beyond this are not searched.

@@ -15,9 +15,9 @@ mod rigid;
 mod shared;
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Unknown, Source, WrenchAxes};
+use mbd_runtime::tree::{Dims, Source, Unknown, WrenchAxes};
 
-use crate::model::{Gravity, JointKind, Model, JointMotion, Param, Value};
+use crate::model::{Gravity, JointKind, JointMotion, Model, Param, Value};
 use crate::options::RolledCode;
 
 pub use constraints::{PlanBond, PlanConstraint};

@@ -1,6 +1,6 @@
 //! Placements of the model as steps, with right angles made exact.
 
-use mbd_runtime::spatial::{Axis, Mat3, ElementaryTransform, Vec3};
+use mbd_runtime::spatial::{Axis, ElementaryTransform, Mat3, Vec3};
 
 use super::{PoseStep, Rigid};
 use crate::model::{Placement, Rotation, Value};

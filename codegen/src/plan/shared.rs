@@ -1,6 +1,6 @@
 //! Coordinates shared by several joints: where their columns are open, and where they are solved.
 
-use mbd_runtime::tree::{Unknown, Source};
+use mbd_runtime::tree::{Source, Unknown};
 
 use super::Plan;
 use crate::model::JointMotion;

@@ -1,7 +1,7 @@
 //! What a loop form costs to run, in the terms of [`symbolic::cost`](crate::symbolic::cost()).
 
-use super::{rolled, Block, RolledProgram, Place, Target};
-use crate::options::{Output, Options};
+use super::{rolled, Block, Place, RolledProgram, Target};
+use crate::options::{Options, Output};
 use crate::plan::Plan;
 use crate::symbolic::machine::{latency, SINE, WIDTH};
 use crate::symbolic::{Cost, Operand, ProgramResult, BYTES};

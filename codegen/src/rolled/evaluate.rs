@@ -2,7 +2,7 @@
 
 use mbd_runtime::Scalar;
 
-use super::{RolledProgram, Place, Start, Target, SweepDirection};
+use super::{Place, RolledProgram, Start, SweepDirection, Target};
 
 impl RolledProgram {
     /// Results for given inputs; `fused(a, b, c)` is `a · b + c`.

@@ -2,7 +2,7 @@
 //! taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Unknown, Source, Tree, TreeFrame};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Source, Tree, TreeFrame, Unknown};
 use mbd_runtime::Scalar;
 
 use super::runs::{map_node, Run, Slot};
@@ -154,7 +154,13 @@ impl<'g> Link<'g> {
         }
     }
 
-    fn turn(&self, stage: &mut PassState<'g>, pass: usize, way: SweepDirection, incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
+    fn turn(
+        &self,
+        stage: &mut PassState<'g>,
+        pass: usize,
+        way: SweepDirection,
+        incoming: &[Expr<'g>],
+    ) -> Vec<Expr<'g>> {
         stage.begin(pass, &self.given);
         let (inner, outer) = (0, self.nodes);
         let (local, running) = incoming.split_at(stage.carried(pass, outer).len());

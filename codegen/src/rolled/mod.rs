@@ -16,9 +16,9 @@ mod stage;
 
 use std::collections::BTreeSet;
 
-use crate::options::{Output, RolledCode, Options};
+use crate::options::{Options, Output, RolledCode};
 use crate::plan::Plan;
-use crate::symbolic::{Counts, ProgramResult, Program};
+use crate::symbolic::{Counts, Program, ProgramResult};
 use crate::trace::InputArray;
 
 pub use cost::cost;

@@ -8,7 +8,7 @@ use mbd_runtime::Scalar;
 use super::link::{Link, LinkInput};
 use super::runs::Run;
 use super::{Place, Target};
-use crate::symbolic::{Expr, Graph, Op, Operand, ProgramResult, Program};
+use crate::symbolic::{Expr, Graph, Op, Operand, Program, ProgramResult};
 
 /// Body of one loop.
 pub struct Body {

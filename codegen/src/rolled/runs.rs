@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Bond, Kind, Node, Unknown, Source, Tree};
+use mbd_runtime::tree::{Bond, Kind, Node, Source, Tree, Unknown};
 
 use crate::symbolic::Expr;
 
@@ -226,7 +226,10 @@ fn merged(a: &[ElementaryTransform<f64>], b: &[ElementaryTransform<f64>]) -> Opt
 }
 
 /// A placement written with the steps of a longer one, identity steps let in.
-fn padded(place: &[ElementaryTransform<f64>], steps: &[ElementaryTransform<f64>]) -> Option<Vec<ElementaryTransform<f64>>> {
+fn padded(
+    place: &[ElementaryTransform<f64>],
+    steps: &[ElementaryTransform<f64>],
+) -> Option<Vec<ElementaryTransform<f64>>> {
     let mut rest = place.iter().copied().peekable();
     let mut out = Vec::new();
     for step in steps {

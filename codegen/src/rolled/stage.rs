@@ -24,12 +24,22 @@ pub enum SweepDirection {
 /// comes first.
 pub fn passes(group: Output, constrained: bool) -> Option<&'static [SweepDirection]> {
     match group {
-        Output::PositionCorrection if constrained => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip]),
-        Output::ProjectMomenta => Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip, SweepDirection::TipToBase]),
+        Output::PositionCorrection if constrained => {
+            Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip])
+        }
+        Output::ProjectMomenta => {
+            Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip, SweepDirection::TipToBase])
+        }
         Output::Accelerations if constrained => None,
-        Output::Rates | Output::Velocities | Output::Energy => Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip]),
-        Output::Momenta | Output::InverseDynamics | Output::Bias => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase]),
-        Output::Accelerations => Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip]),
+        Output::Rates | Output::Velocities | Output::Energy => {
+            Some(&[SweepDirection::TipToBase, SweepDirection::BaseToTip])
+        }
+        Output::Momenta | Output::InverseDynamics | Output::Bias => {
+            Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase])
+        }
+        Output::Accelerations => {
+            Some(&[SweepDirection::BaseToTip, SweepDirection::TipToBase, SweepDirection::BaseToTip])
+        }
         _ => None,
     }
 }
@@ -361,7 +371,10 @@ impl<'g> PassState<'g> {
 
 /// Whether a group solves for velocities.
 pub fn solves(group: Output) -> bool {
-    matches!(group, Output::Rates | Output::Velocities | Output::Energy | Output::ProjectMomenta | Output::PositionCorrection)
+    matches!(
+        group,
+        Output::Rates | Output::Velocities | Output::Energy | Output::ProjectMomenta | Output::PositionCorrection
+    )
 }
 
 /// Whether it needs masses and first moments.

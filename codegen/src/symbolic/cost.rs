@@ -3,7 +3,7 @@
 use super::machine::{latency, pipe, Pipe, PIPES, WIDTH};
 use super::passes::chains::{best_plan, Arrival};
 use super::passes::terms::Opened;
-use super::{Op, Operand, ProgramResult, Program};
+use super::{Op, Operand, Program, ProgramResult};
 
 /// Bytes of code for each instruction, fused products among them, spills included: 12.5 to 13.4.
 pub const BYTES: f64 = 12.5;
@@ -48,7 +48,8 @@ pub fn cost(program: &Program) -> Cost {
             tally.ready[*id as usize] = tally.step(op);
         }
     }
-    let last = |output: &ProgramResult| if let ProgramResult::Node(id, _) = output { tally.ready[*id as usize] } else { 0 };
+    let last =
+        |output: &ProgramResult| if let ProgramResult::Node(id, _) = output { tally.ready[*id as usize] } else { 0 };
     let busiest = f64::from(tally.multiply.max(tally.add)) / PIPES as f64;
     Cost {
         operations: program.counts().total(),

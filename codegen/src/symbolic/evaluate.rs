@@ -2,7 +2,7 @@
 
 use mbd_runtime::Scalar;
 
-use super::{Op, Operand, ProgramResult, Program};
+use super::{Op, Operand, Program, ProgramResult};
 
 impl Program {
     /// Results for given inputs, operation by operation in the program's order; `fused(a, b, c)` is `a · b + c`.

@@ -1,6 +1,6 @@
 //! The processor that programs are scheduled for and judged by: a Zen 4 or Skylake in outline.
 
-use super::{Op, Operand, ProgramResult, Program};
+use super::{Op, Operand, Program, ProgramResult};
 
 /// Cycles from the operands of an operation to its result.
 pub fn latency(op: &Op) -> u32 {
@@ -79,7 +79,8 @@ impl Program {
             let start = op.operands().map(|o| if let Operand::Node(k) = o { ready[k as usize] } else { 0 }).max();
             ready[*id as usize] = start.unwrap_or(0) + latency(op);
         }
-        let last = |output: &ProgramResult| if let ProgramResult::Node(id, _) = output { ready[*id as usize] } else { 0 };
+        let last =
+            |output: &ProgramResult| if let ProgramResult::Node(id, _) = output { ready[*id as usize] } else { 0 };
         self.outputs.iter().map(last).max().unwrap_or(0)
     }
 

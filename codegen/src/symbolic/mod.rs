@@ -12,5 +12,5 @@ pub mod passes;
 mod program;
 
 pub use cost::{cost, Cost, BYTES};
-pub use expr::{Expr, Fma, Graph, Label, Op, Operand, FlooredReciprocal};
-pub use program::{Counts, ProgramResult, Program};
+pub use expr::{Expr, FlooredReciprocal, Fma, Graph, Label, Op, Operand};
+pub use program::{Counts, Program, ProgramResult};

@@ -249,7 +249,8 @@ struct Repeated<'a> {
 impl crate::generated::VisitRates for Repeated<'_> {
     type Out = Box<dyn FnMut()>;
     fn visit<Y: System<Scalar = f64> + 'static>(self, mut system: Y) -> Box<dyn FnMut()> {
-        let (mut q, mut p, mut qd, mut pd) = (system.neutral(), system.zero_momenta(), system.neutral(), system.zero_momenta());
+        let (mut q, mut p, mut qd, mut pd) =
+            (system.neutral(), system.zero_momenta(), system.neutral(), system.zero_momenta());
         q.as_mut().copy_from_slice(self.q);
         p.as_mut().copy_from_slice(self.p);
         Box::new(move || {

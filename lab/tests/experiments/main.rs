@@ -76,7 +76,8 @@ fn every_way_leads_to_the_same_end() {
     let h = END / f64::from(steps);
 
     // Method 1: augmented momenta, multipliers begun anew at every step.
-    let (mut q, mut p, mut v, mut sigma) = (start.clone(), system.zero_momenta(), system.zero_momenta(), system.zero_rows());
+    let (mut q, mut p, mut v, mut sigma) =
+        (start.clone(), system.zero_momenta(), system.zero_momenta(), system.zero_rows());
     let mut method = Verner9::new(&system);
     let before = energy(&mut system, &q, &p);
     for k in 0..steps {

@@ -121,7 +121,7 @@ where
 
 /// Changes velocities by as little as possible so that they meet the constraints at coordinates `q` and time `t` (s), those
 /// of `held` staying as they are. Momenta follow by [`Conjugate`](crate::Conjugate); where none are held,
-/// [`Constrained::settle`] alone does it, least in the metric of the mass matrix.
+/// [`Constrained::project_momenta`] alone does it, least in the metric of the mass matrix.
 ///
 /// # Errors
 /// [`ConstraintError::Incompatible`] where what is held leaves no way, more than `tolerance` relative to the largest velocity

@@ -14,7 +14,7 @@ use crate::Scalar;
 pub enum Stabilisation {
     /// Nothing: multipliers `σ` add up in the momenta, positions drift.
     None,
-    /// Momenta are freed of `σ` ([`Constrained::settle`]); positions drift with the method's error.
+    /// Momenta are freed of `σ` ([`Constrained::project_momenta`]); positions drift with the method's error.
     Momenta,
     /// After that positions are moved back, least in the metric of the mass matrix ([`Constrained::correction`]); momenta stay.
     #[default]

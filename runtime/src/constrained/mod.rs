@@ -51,9 +51,9 @@ pub use error::ConstraintError;
 pub use hold::{Effort, Hold, Stabilisation};
 pub use index_two::RadauIndex2;
 #[cfg(feature = "alloc")]
-pub use minimal::{CoordinatePartition, Switch, Repartition};
+pub use minimal::{CoordinatePartition, Repartition, Switch};
 pub use rattle::Rattle;
-pub use split::{Unconstrained, OpenAndClosed};
+pub use split::{OpenAndClosed, Unconstrained};
 pub use steady::Steady;
 
 #[cfg(doc)]

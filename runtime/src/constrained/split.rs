@@ -76,7 +76,13 @@ impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     ) {
         self.closed.project_momenta(t, q, p, v, sigma);
     }
-    fn position_correction(&mut self, q: &C::Coordinates, residual: &mut C::Rows, dq: &mut C::Momenta, pivots: &mut C::Rows) {
+    fn position_correction(
+        &mut self,
+        q: &C::Coordinates,
+        residual: &mut C::Rows,
+        dq: &mut C::Momenta,
+        pivots: &mut C::Rows,
+    ) {
         self.closed.position_correction(q, residual, dq, pivots);
     }
     fn multipliers(&mut self, t: C::Scalar, q: &C::Coordinates, v: &C::Momenta, lambda: &mut C::Rows) {

@@ -6,7 +6,7 @@ use super::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, VariableAdams};
 use super::{BackwardEuler, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
 use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
 use super::{Composition, Doubled, StepDoubling, Symmetric};
-use super::{Limits, EnergyProjection, Solver, Statistics, Step, StepError, Stepper};
+use super::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::constrained::{PostStep, WithPostStep};
 use crate::system::{Differentiable, Energetic, Real, System};
 

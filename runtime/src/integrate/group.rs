@@ -1,7 +1,7 @@
 //! The formulas of [`super::chart`] for one joint.
 
 use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, ElementaryTransform, Vec3};
-use crate::system::{LieJoint, LieGroup};
+use crate::system::{LieGroup, LieJoint};
 use crate::Scalar;
 
 /// Three components from an index on.

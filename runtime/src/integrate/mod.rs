@@ -68,7 +68,8 @@ pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, 
 pub use field::Field;
 pub use fixed::FixedIterations;
 pub use formulas::{
-    formula, BackwardEuler, Formula, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
+    formula, BackwardEuler, Formula, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint,
+    Radau5,
 };
 pub use newton::{FixedPoint, Iteration, Newton};
 pub use projection::EnergyProjection;

@@ -5,7 +5,7 @@ extern crate std;
 use std::vec;
 use std::vec::Vec;
 
-use crate::spatial::{Axis, RigidInertia, ElementaryTransform};
+use crate::spatial::{Axis, ElementaryTransform, RigidInertia};
 use crate::system::{Blocks, Differentiable, LieJoint, Real, System};
 use crate::tree::{Dims, Kind, Node, Passive, Source, Tree};
 use crate::{Interpreter, Scalar};
@@ -28,7 +28,10 @@ pub fn joint<S: Scalar>(tree: &mut Tree<S>, back: usize, kind: Kind<S>, stiffnes
     let o = S::zero();
     let k = tree.nodes.len();
     let (s, c) = (S::constant(0.6), S::constant(0.8));
-    let place = vec![ElementaryTransform::Shift { axis: Axis::X, r: S::constant(0.4) }, ElementaryTransform::Turn { axis: Axis::X, c, s }];
+    let place = vec![
+        ElementaryTransform::Shift { axis: Axis::X, r: S::constant(0.4) },
+        ElementaryTransform::Turn { axis: Axis::X, c, s },
+    ];
     let passive = Passive { damping: S::constant(damping), stiffness: S::constant(stiffness), rest: o, armature: o };
     let size = 1.0 + 0.2 * k as f64;
     tree.nodes.push(Node {

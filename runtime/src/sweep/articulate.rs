@@ -1,7 +1,7 @@
 //! Joint coordinates to joint transforms.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, RigidInertia, ElementaryTransform};
+use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, ElementaryTransform, RigidInertia};
 use crate::tree::{quarter_turn, Kind, Source};
 use crate::workspace::{Poses, TurnedBody};
 use crate::Scalar;
@@ -37,7 +37,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Kind::Prismatic => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
             Kind::Helical { pitch } => w.joint[i].set(&[shift(Axis::Z, node.slide + pitch * x), turn(x)]),
             Kind::Planar => w.joint[i].set(&[shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
-            Kind::Spherical => w.joint[i].set(&[ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))]),
+            Kind::Spherical => {
+                w.joint[i].set(&[ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))])
+            }
             Kind::Floating => w.joint[i].set(&[
                 shift(Axis::X, q[0]),
                 shift(Axis::Y, q[1]),

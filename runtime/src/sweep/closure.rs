@@ -86,7 +86,7 @@ impl<S: Scalar> Closure<S> {
 
     /// Whether it leaves what a joint would: the motions of a group.
     pub fn is_joint(&self) -> bool {
-        use Closure::{Cylindrical, Fixed, Helical, Revolute, Planar, Prismatic, Spherical};
+        use Closure::{Cylindrical, Fixed, Helical, Planar, Prismatic, Revolute, Spherical};
         matches!(self, Revolute | Prismatic | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
     }
 

@@ -9,7 +9,7 @@
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
-use crate::tree::{Bond, Constraint, Cut, Unknown, Source, Tree, TreeFrame};
+use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
 use crate::workspace::{Factor, Poses, Relative, Workspace};
 use crate::Scalar;
 use alloc::vec::Vec;

@@ -3,7 +3,7 @@
 
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{Freedom, Unknown, Source};
+use crate::tree::{Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses, RowState};
 use crate::Scalar;
 

@@ -2,7 +2,7 @@
 
 use super::newton::{Accelerations, ClassicMotion};
 use super::{Inputs, Quantity, Sweeps, Trace};
-use crate::spatial::{add3, scale3, Mat3, ElementaryTransform, Vec3};
+use crate::spatial::{add3, scale3, ElementaryTransform, Mat3, Vec3};
 use crate::tree::{Freedom, Source, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;

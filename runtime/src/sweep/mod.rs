@@ -31,7 +31,7 @@ pub use kinematics::FrameState;
 pub use newton::Accelerations;
 pub use solve::Load;
 
-use crate::spatial::{Force, Motion, RigidInertia, ElementaryTransform};
+use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia};
 use crate::tree::{Node, Tree, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;

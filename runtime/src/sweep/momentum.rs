@@ -1,7 +1,7 @@
 //! Momenta from velocities, and kinetic energy.
 
 use super::{Quantity, Sweeps, Trace};
-use crate::tree::{Unknown, Source};
+use crate::tree::{Source, Unknown};
 use crate::workspace::Workspace;
 use crate::Scalar;
 

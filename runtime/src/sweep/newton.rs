@@ -5,7 +5,7 @@
 //! what the bodies' own wrenches are made of.
 
 use super::{Inputs, Quantity, Sweeps, Trace};
-use crate::spatial::{add3, cross, Axis, Force, Motion, RigidInertia, ElementaryTransform, Vec3};
+use crate::spatial::{add3, cross, Axis, ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;

@@ -6,7 +6,7 @@
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{Freedom, Unknown, Source};
+use crate::tree::{Freedom, Source, Unknown};
 use crate::workspace::{Factor, Poses, Solution, Workspace};
 use crate::Scalar;
 

@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 
 use super::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
-use crate::spatial::{RigidInertia, ElementaryTransform};
+use crate::spatial::{ElementaryTransform, RigidInertia};
 use crate::Scalar;
 
 impl<S: Scalar> Tree<S> {

@@ -1,7 +1,7 @@
 //! Stabilisation around every kind of method.
 
 use super::systems::*;
-use mbd_runtime::constrained::{WithPostStep, ConstraintError, Effort, Hold, Stabilisation};
+use mbd_runtime::constrained::{ConstraintError, Effort, Hold, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{
     Abm4, Dop853, Euler, Gauss12FixedPoint, Rk4, Solver, Step, StepDoubling, StepError, Stepper,
 };

@@ -2,7 +2,7 @@
 
 use super::holding::{apart, held, march};
 use super::systems::*;
-use mbd_runtime::constrained::{WithPostStep, ConstraintError, CoordinatePartition, Stabilisation, Repartition};
+use mbd_runtime::constrained::{ConstraintError, CoordinatePartition, Repartition, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{Abm4, Dop853, Rk4, Solver, Step, StepError, Stepper, Tolerances, Verner9};
 use mbd_runtime::{Energetic, System};
 
@@ -44,7 +44,10 @@ fn multipliers_are_a_gauge() {
 /// The same motion as method 1 with projection, with every method, to the tolerance; energy, closed at every step.
 #[test]
 fn the_same_motion_as_method_one() {
-    fn check<M: Stepper<CoordinatePartition<Closed<Sticks>>>>(name: &str, make: impl Fn(&CoordinatePartition<Closed<Sticks>>) -> M) {
+    fn check<M: Stepper<CoordinatePartition<Closed<Sticks>>>>(
+        name: &str,
+        make: impl Fn(&CoordinatePartition<Closed<Sticks>>) -> M,
+    ) {
         let (mut y, start) = crank();
         let fine = Verner9::new(&y);
         let mut fine = held(&y, fine, Stabilisation::Mass);

@@ -2,7 +2,7 @@
 
 use super::holding::{apart, held, march, State};
 use super::systems::*;
-use mbd_runtime::constrained::{RadauIndex2, Rattle, OpenAndClosed, Stabilisation};
+use mbd_runtime::constrained::{OpenAndClosed, RadauIndex2, Rattle, Stabilisation};
 use mbd_runtime::integrate::{Stepper, Verner9};
 
 fn split<T: Model + Clone>(model: T) -> OpenAndClosed<Open<T>, Closed<T>> {

@@ -1,7 +1,7 @@
 //! Small systems with constraints, written down by hand.
 
 use mbd_runtime::constrained::{close, Closing, ConstraintError};
-use mbd_runtime::system::{LieJoint, LieGroup, Row};
+use mbd_runtime::system::{LieGroup, LieJoint, Row};
 use mbd_runtime::{Conjugate, Constrained, Energetic, System};
 
 /// Gravity, m/s².

@@ -1,6 +1,6 @@
 //! Energy projection.
 
-use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, Field, Point, EnergyProjection, Rk4, Stepper};
+use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, EnergyProjection, Field, Point, Rk4, Stepper};
 use mbd_runtime::Energetic;
 
 use crate::systems::{body, pendulum, top, Sledge};

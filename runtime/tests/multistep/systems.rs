@@ -1,7 +1,7 @@
 //! Mechanisms written out by hand, and steps of them.
 
 use mbd_runtime::integrate::Stepper;
-use mbd_runtime::system::{LieJoint, LieGroup};
+use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::{Energetic, Real, Scalar, System};
 
 /// Two bars of length and mass 1, all mass at the ends: `H` is not a sum of parts of `q` and `p`.

@@ -1,8 +1,8 @@
 //! Random mechanisms and states.
 
 mod bodies;
-mod joints;
 mod distribution;
+mod joints;
 mod model;
 mod rng;
 

@@ -1,6 +1,6 @@
 //! The mechanism as a whole.
 
-use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, Model, JointMotion, Param, Value, Wrench, WrenchAxes};
+use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, JointMotion, Model, Param, Value, Wrench, WrenchAxes};
 
 use super::bodies::{weights, Weight};
 use super::{Distribution, Rng};
@@ -104,7 +104,8 @@ impl Builder<'_> {
         for &j in &can {
             // A leader of lower rank: chains, but no rings.
             let leaders: Vec<usize> = can.iter().copied().filter(|&l| rank[l] < rank[j]).collect();
-            if leaders.is_empty() || joints[j].motion != JointMotion::Free || !self.rng.chance(self.distribution.mimic) {
+            if leaders.is_empty() || joints[j].motion != JointMotion::Free || !self.rng.chance(self.distribution.mimic)
+            {
                 continue;
             }
             let ratio = match self.rng.below(4) {

@@ -41,7 +41,11 @@ pub fn system(seed: u64) -> LoopSystem {
 
 pub fn plan_of(system: &LoopSystem, seed: u64) -> Plan {
     // Most as they stand; some as the search lays them out.
-    let forms = if seed.is_multiple_of(7) { EliminationStrategy::ALL[seed as usize / 7 % 3] } else { EliminationStrategy::Single };
+    let forms = if seed.is_multiple_of(7) {
+        EliminationStrategy::ALL[seed as usize / 7 % 3]
+    } else {
+        EliminationStrategy::Single
+    };
     let searched = forms != EliminationStrategy::Single;
     let options = PlanOptions { forms, accelerations: searched, mass_matrix: false, ..PlanOptions::default() };
     Plan::new(&system.model, options)

@@ -1,7 +1,7 @@
 use super::read;
 use crate::diag::{Diagnostics, Severity};
 use crate::import::{Base, ImportOptions};
-use crate::model::{Gravity, JointKind, Model, JointMotion, Rotation, Value};
+use crate::model::{Gravity, JointKind, JointMotion, Model, Rotation, Value};
 use std::fmt::Write;
 
 const SOLID: &str =

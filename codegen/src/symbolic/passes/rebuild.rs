@@ -3,7 +3,7 @@
 use mbd_runtime::sweep::Trace;
 use mbd_runtime::Scalar;
 
-use crate::symbolic::{Expr, Graph, Label, Op, Operand, ProgramResult, Program};
+use crate::symbolic::{Expr, Graph, Label, Op, Operand, Program, ProgramResult};
 
 /// A program on its way into another graph: the expression of every node so far.
 pub struct Rebuilt<'g> {

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use crate::symbolic::machine::{latency, pipe, Pipe, PIPES};
-use crate::symbolic::{Op, Operand, ProgramResult, Program};
+use crate::symbolic::{Op, Operand, Program, ProgramResult};
 
 /// Limits of a schedule.
 #[derive(Clone, Copy, Debug)]

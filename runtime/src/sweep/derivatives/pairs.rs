@@ -1,7 +1,7 @@
 //! Columns of every freedom, carried inward and met by every freedom on the way.
 
 use super::{single, velocity, Derivatives};
-use crate::spatial::{cross, dot3, Force, Motion, RigidInertia, ElementaryTransform, Vec3};
+use crate::spatial::{cross, dot3, ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::sweep::{Inputs, Quantity, Sweeps, Trace};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::{Poses, Workspace};
@@ -9,7 +9,11 @@ use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Steps from the parent's node frame to the frame that the columns of node `i` are taken in.
-    fn to_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
+    fn to_columns<'b>(
+        &'b self,
+        poses: &'b Poses<S>,
+        i: usize,
+    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         let joint = &poses.joint[i];
         let steps = if single(&self.tree.nodes[i]) { joint.placing() } else { joint.get() };
         self.place(i).iter().chain(steps)

@@ -55,10 +55,10 @@ fn order(ours: &Model, plan: &Plan, theirs: &Model) -> (Vec<usize>, Vec<usize>, 
 }
 
 fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
-    use Output::{Accelerations, Closure, Correction, Momenta, Multipliers, Rates, Settle};
+    use Output::{Accelerations, ConstraintResiduals, Momenta, Multipliers, PositionCorrection, ProjectMomenta, Rates};
     let options = Options {
         type_name: "Kernel".to_string(),
-        outputs: vec![Rates, Momenta, Accelerations, Closure, Settle, Correction, Multipliers],
+        outputs: vec![Rates, Momenta, Accelerations, ConstraintResiduals, ProjectMomenta, PositionCorrection, Multipliers],
         source: name.to_string(),
         ..Options::default()
     };
