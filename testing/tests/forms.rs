@@ -158,45 +158,45 @@ const KINDS: [Kind; 5] = [
 const INTRODUCTION: &str = "\
 # Rounding errors of the generated code
 
-Generated code by default eliminates joints in the form that is fastest and rewrites its operations. This is what that
-costs in accuracy: errors of the default programs, with fused multiply-adds or without, whichever are larger, in multiples
-of those of the articulated form (one joint at a time, inward) with the operations as the sweeps make them. Medians and
-worst of 10,000 random states for each model; errors against double-double arithmetic (106 bits).
+By default, generated code eliminates joints by the strategy that the cost model finds fastest, and rewrites its operations. This report shows what that
+costs in accuracy. It compares the errors of the default programs, with fused multiply-adds or without, whichever are larger, with the errors of the
+articulated form (one joint at a time, from the tips to the base) with the operations in the order of the sweeps. The numbers are ratios of these
+errors: the median and the worst of 10,000 random states for each model. Errors are measured against double-double arithmetic (106 bits).
 
-- The error of a state is the largest in the array, relative to its largest entry, or to a tenth of the median of largest
-  entries where the array passes zero. Errors below 2.2e-16, two roundings, count as 2.2e-16.
-- The reference starts from the numbers of the model: constants that programs fold are rounded, and count.
-- Sines and cosines are the same 53 bits in all programs and in the reference: they are accurate to an ulp by themselves,
-  and the same in every form. What is compared are the roundings after them.
-- Limits: the median at most 2 times, the worst at most 3 times as large. The generator holds every form it would choose
-  to 1.6 times on 64 to 256 states (`codegen/src/plan/accuracy.rs`); `mbd count --candidates` shows what it measured.
-- Written by `cargo test --release -p mbd-testing --test forms -- --ignored --nocapture`.
+- The error of a state is the largest error in the array, relative to its largest entry, or to a tenth of the median of the largest
+  entries where the array passes through zero. Errors below 2.2e-16, two roundings, count as 2.2e-16.
+- The reference starts from the numbers of the model. Constants that the generator computes in advance are rounded, and these roundings count.
+- Sines and cosines have the same 53 bits in all programs and in the reference. They are accurate to an ulp, and what is compared are the
+  roundings after them.
+- Limits: the median ratio is at most 2, the worst at most 3. The generator accepts a candidate only if its error is at most 1.6 times that of the
+  articulated form on 64 to 256 states; `mbd count --candidates` shows the errors that it measured.
+- This report is written by `cargo test --release -p mbd-testing --test forms -- --ignored --nocapture`.
 ";
 
 const DEFAULT_HEAD: &str = "
 ## Default programs
 
-Median error of the articulated form; median and worst of the default in multiples of its.
+For each array: the median error of the articulated form, then the median and the worst error of the default program in multiples of the articulated form's.
 
 | model | q̇ | median | worst | ṗ | median | worst | v̇ | median | worst |
 |---|---|---|---|---|---|---|---|---|---|
 ";
 
 const CAUSES_HEAD: &str = "
-## EliminationStrategy and arithmetic by themselves
+## Elimination and arithmetic separately
 
-Median and worst, of the array in which they are largest. The forms with the fewest operations are chosen on request only,
-and not held to any limit.
+Median and worst ratio, of the array in which they are largest. The candidates with the fewest operations are chosen on request only, and no limit
+of accuracy applies to them.
 
 | model | default | worst | fastest forms, exact | worst | one by one, fast | worst | fewest operations, fast | worst |
 |---|---|---|---|---|---|---|---|---|
 ";
 
 const REFUSED_HEAD: &str = "
-## EliminationStrategy of the rates that were refused
+## Candidates for the rates that were refused
 
-The fastest of each branch: time by the cost model in multiples of the form that was taken, and error on the states of the
-generator.
+The fastest refused candidate of each branch: its time by the cost model in multiples of the chosen candidate's, and its error ratio on the
+generator's states.
 
 | model | branch | form | time | error |
 |---|---|---|---|---|
