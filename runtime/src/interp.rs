@@ -252,9 +252,11 @@ impl<S: Real> Interpreter<S> {
     pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.prepare(q, &self.inputs.view(), &mut self.work, false);
-        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| match (node.source, node.unknown) {
-            (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
-            _ => None,
+        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| {
+            match (node.source, node.elimination.unknown) {
+                (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
+                _ => None,
+            }
         });
         let own = own.flat_map(|(v, freedoms)| freedoms.enumerate().map(move |(k, f)| (v + k, f)));
         let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));

@@ -4,12 +4,15 @@
 //! (universal, cylindrical) are two nodes with a massless body between; all others keep a constant motion subspace `E`
 //! in the node frame, and turn about or slide along its z axis.
 
+mod elimination;
 mod map;
 
 use alloc::vec::Vec;
 
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
+
+pub use elimination::Elimination;
 
 /// What a node's joint can do, seen in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -172,29 +175,8 @@ pub struct Node<S> {
     pub inertia: RigidInertia<S>,
     /// Passive elements, one for each freedom.
     pub passive: Vec<Passive<S>>,
-    /// Coordinate shared by several nodes, or solved at another node: index into [`Tree::shared`].
-    pub unknown: Option<usize>,
-    /// The coordinate is this node's alone, only solved further inboard (with others, as a block).
-    pub deferred: bool,
-    /// Eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is divided by does not
-    /// wait for the turn. Joints about or along z only.
-    pub before_joint: bool,
-    /// The node frame does not turn with the joint: a pin whose children are all pins about parallel axes, placed by
-    /// shifts alone. The body turns in it, by the sum of the angles since the last frame that turned.
-    pub non_rotating: bool,
-    /// Momentum rate from the accumulated momentum `P*` instead of a quadratic form of the velocity.
-    pub accumulates_momentum: bool,
-    /// Shared coordinates whose columns are not carried further inward, because the screws of all freedoms inboard that
-    /// they meet are carried out to this node.
-    pub ends: Vec<usize>,
-    /// Those screws, by the coordinates they belong to (each of a deferred freedom).
-    pub screws: Vec<usize>,
-    /// Shared coordinates with members in the subtree of this node that are not solved below it.
-    pub open: Vec<usize>,
-    /// Those solved at this node, before its own freedoms (its subtrees hold all members).
-    pub solve_before: Vec<usize>,
-    /// Those solved at this node, after its own freedom, which is a member.
-    pub solve_after: Vec<usize>,
+    /// How its freedoms are eliminated.
+    pub elimination: Elimination,
 }
 
 /// A frame of interest, constant on a node or on the ground.

@@ -351,9 +351,9 @@ fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
     };
     let mut order = Vec::new();
     for node in tree.nodes.iter().rev() {
-        let open = node.solve_after.iter().chain(&node.open).chain(&node.ends);
-        join(&open.chain(&node.unknown).copied().collect::<Vec<_>>());
-        order.extend(node.solve_before.iter().chain(&node.solve_after).copied());
+        let open = node.elimination.solve_after.iter().chain(&node.elimination.open).chain(&node.elimination.ends);
+        join(&open.chain(&node.elimination.unknown).copied().collect::<Vec<_>>());
+        order.extend(node.elimination.solve_before.iter().chain(&node.elimination.solve_after).copied());
     }
     order.extend(&tree.solve_at_ground);
     for &g in &order {

@@ -240,12 +240,12 @@ fn forms_do_not_matter() {
         }
         for node in [&c, &others[0]].into_iter().flat_map(|c| &c.i.tree().nodes) {
             let forms = [
-                node.deferred,
-                node.before_joint,
-                node.non_rotating,
-                node.accumulates_momentum,
-                !node.ends.is_empty(),
-                !node.screws.is_empty(),
+                node.elimination.deferred,
+                node.elimination.before_joint,
+                node.elimination.non_rotating,
+                node.elimination.accumulates_momentum,
+                !node.elimination.ends.is_empty(),
+                !node.elimination.screws.is_empty(),
             ];
             met.iter_mut().zip(forms).for_each(|(met, here)| *met += usize::from(here));
         }
@@ -263,7 +263,7 @@ fn forms_do_not_matter() {
             for (ours, theirs) in ours.into_iter().zip(theirs) {
                 worst = worst.max(a.worst(file, ours, theirs));
             }
-            met[2] += a.i.tree().nodes.iter().filter(|node| node.non_rotating).count();
+            met[2] += a.i.tree().nodes.iter().filter(|node| node.elimination.non_rotating).count();
         }
     }
     println!("worst {worst:.1e}, met {met:?}");
@@ -285,7 +285,7 @@ fn the_trees_have_everything() {
                 Kind::Spherical => 4,
                 Kind::Floating => 5,
             }] += 1;
-            met[6] += usize::from(node.unknown.is_some() && !node.deferred);
+            met[6] += usize::from(node.elimination.unknown.is_some() && !node.elimination.deferred);
             met[7] += usize::from(matches!(node.source, mbd_runtime::tree::Source::Drive { .. }));
         }
         for wrench in &c.i.tree().wrenches {

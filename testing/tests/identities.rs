@@ -258,7 +258,7 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
         sweeps.articulate(&s.q, &s.drive[0], &mut w.poses);
         sweeps.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
         for (i, node) in tree.nodes.iter().enumerate() {
-            if node.unknown.is_some() || matches!(node.source, Source::Drive { .. }) {
+            if node.elimination.unknown.is_some() || matches!(node.source, Source::Drive { .. }) {
                 continue;
             }
             let m = &w.factor.m[i];

@@ -47,9 +47,9 @@ fn one(plan: &Plan, k: usize, node: &PlanNode, out: &mut dyn Write) -> Outcome {
     let way: Vec<String> = node.place.iter().map(|s| step(plan, s)).collect();
     writeln!(out, "    way: {}", if way.is_empty() { "none".to_string() } else { way.join("  ") })?;
     writeln!(out, "    joint: {}", motion(plan, node))?;
-    if node.deferred {
+    if node.elimination.deferred {
         writeln!(out, "    solved further inboard, in one block with other joints: fewer operations")?;
-    } else if node.unknown.is_some() {
+    } else if node.elimination.unknown.is_some() {
         writeln!(out, "    shares its coordinate with other joints: solved where all of them have met")?;
     }
     inertia(plan, node, out)

@@ -180,7 +180,7 @@ impl ErrorEstimator {
 /// The plan with frames that all turn.
 fn turned(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
-    plan.nodes.iter_mut().for_each(|node| node.non_rotating = false);
+    plan.nodes.iter_mut().for_each(|node| node.elimination.non_rotating = false);
     plan
 }
 

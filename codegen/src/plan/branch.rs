@@ -15,7 +15,7 @@ impl Plan {
         let mut next = 0..;
         let numbers: Vec<Option<usize>> = keep.iter().map(|k| if *k { next.next() } else { None }).collect();
         let follows: Vec<bool> = (0..self.unknowns.len())
-            .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.unknown == Some(g)))
+            .map(|g| self.nodes.iter().zip(&keep).any(|(node, keep)| *keep && node.elimination.unknown == Some(g)))
             .collect();
         let inside = |c: &PlanConstraint| c.nodes().all(|k| keep[k]);
         let constraints: Vec<PlanConstraint> =
@@ -24,14 +24,10 @@ impl Plan {
         let follows: Vec<bool> = follows.iter().enumerate().map(|(g, follows)| *follows || rows.contains(&g)).collect();
         let left = |list: &[usize]| list.iter().copied().filter(|&g| follows[g]).collect::<Vec<_>>();
         let kept = self.nodes.iter().zip(&keep).filter(|(_, keep)| **keep);
-        let nodes = kept.map(|(node, _)| PlanNode {
-            parent: node.parent.and_then(|p| numbers[p]),
-            ends: left(&node.ends),
-            screws: left(&node.screws),
-            open: left(&node.open),
-            solve_before: left(&node.solve_before),
-            solve_after: left(&node.solve_after),
-            ..node.clone()
+        let nodes = kept.map(|(node, _)| {
+            let mut node = PlanNode { parent: node.parent.and_then(|p| numbers[p]), ..node.clone() };
+            node.elimination.retain_columns(|g| follows[g]);
+            node
         });
         let mut plan = Plan { nodes: nodes.collect(), solve_at_ground: left(&self.solve_at_ground), ..self.clone() };
         // Frames matter for wrenches alone.
@@ -69,7 +65,7 @@ impl Plan {
             }
             letters.push(' ');
             letters.extend(node.inertia.iter().map(|x| number(*x)));
-            let joint = &self.model.joints[node.joint.0];
+            let (joint, elimination) = (&self.model.joints[node.joint.0], &node.elimination);
             for list in [&joint.damping, &joint.stiffness, &joint.rest, &joint.armature] {
                 letters.push(' ');
                 letters.extend(list.iter().map(value));
@@ -80,7 +76,7 @@ impl Plan {
                 number(node.slide),
                 node.variable.len(),
                 node.follow.len(),
-                [&node.open, &node.solve_before, &node.solve_after],
+                [&elimination.open, &elimination.solve_before, &elimination.solve_after],
             ));
         }
         letters.extend(self.wrenches.iter().map(|_| 'w'));

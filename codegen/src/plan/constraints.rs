@@ -171,9 +171,7 @@ pub fn rest_idle(plan: &mut Plan) {
     let idle: Vec<usize> =
         rows.filter(|(_, r)| matches!(pivots[*r], Expr::Const(x) if x == 0.0)).map(|(g, _)| *g).collect();
     for node in &mut plan.nodes {
-        for list in [&mut node.open, &mut node.solve_before, &mut node.solve_after] {
-            list.retain(|g| !idle.contains(g));
-        }
+        node.elimination.retain_columns(|g| !idle.contains(&g));
     }
     plan.solve_at_ground.retain(|g| !idle.contains(g));
 }
@@ -201,10 +199,13 @@ fn velocities(plan: &Plan, nodes: &[usize]) -> Vec<usize> {
 fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usize>]) {
     let ways: Vec<Vec<usize>> = members.iter().map(|i| i.map_or(Vec::new(), |i| ancestors(plan, i))).collect();
     let cycle = cycle(bond);
-    let shared: Vec<usize> = cycle.iter().filter_map(|&i| plan.nodes[i].unknown).collect();
+    let shared: Vec<usize> = cycle.iter().filter_map(|&i| plan.nodes[i].elimination.unknown).collect();
     let solved = |i: usize| {
         let node = &plan.nodes[i];
-        shared.iter().filter(|g| node.solve_before.contains(g) || node.solve_after.contains(g)).count()
+        shared
+            .iter()
+            .filter(|g| node.elimination.solve_before.contains(g) || node.elimination.solve_after.contains(g))
+            .count()
     };
     let at_ground = shared.iter().any(|g| plan.solve_at_ground.contains(g));
     let longest = ways.iter().max_by_key(|way| way.len()).cloned().unwrap_or_default();
@@ -219,8 +220,8 @@ fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usi
     let opened: Vec<usize> = opened.into_iter().filter(|&i| outboard(i)).collect();
     for i in opened {
         for g in slots {
-            if !plan.nodes[i].open.contains(g) {
-                plan.nodes[i].open.push(*g);
+            if !plan.nodes[i].elimination.open.contains(g) {
+                plan.nodes[i].elimination.open.push(*g);
             }
         }
     }
@@ -228,9 +229,9 @@ fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usi
         plan.solve_at_ground.extend(slots);
         return;
     };
-    let after = cycle.contains(&base) || plan.nodes[base].solve_after.iter().any(|g| shared.contains(g));
+    let after = cycle.contains(&base) || plan.nodes[base].elimination.solve_after.iter().any(|g| shared.contains(g));
     let node = &mut plan.nodes[base];
-    if after { &mut node.solve_after } else { &mut node.solve_before }.extend(slots);
+    if after { &mut node.elimination.solve_after } else { &mut node.elimination.solve_before }.extend(slots);
 }
 
 /// A kind of loop as the sweeps know it.

@@ -18,16 +18,16 @@ pub(super) fn choose(plan: &mut Plan, single: &Plan, goal: Objective) {
         let mut best = (goal.score(&part), None);
         for (accumulates_momentum, non_rotating) in [(true, false), (false, true), (true, true), (false, false)] {
             let mut trial = part.clone();
-            gathered.iter().for_each(|&i| trial.nodes[i].accumulates_momentum = accumulates_momentum);
-            frames.iter().for_each(|&i| trial.nodes[i].non_rotating = non_rotating);
+            gathered.iter().for_each(|&i| trial.nodes[i].elimination.accumulates_momentum = accumulates_momentum);
+            frames.iter().for_each(|&i| trial.nodes[i].elimination.non_rotating = non_rotating);
             let score = goal.score(&trial);
             if score < best.0 && goal.accepts(&trial, &self::part(single, &cycle).0) {
                 best = (score, Some((accumulates_momentum, non_rotating)));
             }
         }
         if let Some((accumulates_momentum, non_rotating)) = best.1 {
-            cycle.iter().for_each(|&i| plan.nodes[i].accumulates_momentum = accumulates_momentum);
-            inside.iter().for_each(|&i| plan.nodes[i].non_rotating = non_rotating);
+            cycle.iter().for_each(|&i| plan.nodes[i].elimination.accumulates_momentum = accumulates_momentum);
+            inside.iter().for_each(|&i| plan.nodes[i].elimination.non_rotating = non_rotating);
         }
     }
 }

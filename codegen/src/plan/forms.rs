@@ -240,9 +240,9 @@ fn toggle_unturned(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], goal: Ob
         }
         let (mut branch, numbers) = plan.branch(run[0]);
         let score = goal.score(&branch);
-        run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].non_rotating ^= true);
+        run.iter().filter_map(|&i| numbers[i]).for_each(|i| branch.nodes[i].elimination.non_rotating ^= true);
         if goal.score(&branch) < score && goal.accepts(&branch, &single.branch(run[0]).0) {
-            run.iter().for_each(|&i| plan.nodes[i].non_rotating ^= true);
+            run.iter().for_each(|&i| plan.nodes[i].elimination.non_rotating ^= true);
         }
     }
 }
@@ -459,7 +459,9 @@ fn first_forms(len: usize, from_ground: bool) -> Vec<Form> {
 /// A joint of one freedom that is solved by itself.
 fn eligible(node: &PlanNode) -> bool {
     let single = matches!(node.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
-    let plain = node.unknown.is_none() && node.solve_before.is_empty() && node.open.is_empty();
+    let plain = node.elimination.unknown.is_none()
+        && node.elimination.solve_before.is_empty()
+        && node.elimination.open.is_empty();
     single && plain && matches!(node.source, Source::State { .. })
 }
 
@@ -467,7 +469,7 @@ fn eligible(node: &PlanNode) -> bool {
 fn eligible_in_loop(plan: &Plan, i: usize) -> bool {
     let row = |g: &usize| matches!(plan.unknowns[*g], Unknown::Row(_));
     let mut node = plan.nodes[i].clone();
-    node.open.retain(|g| !row(g));
+    node.elimination.open.retain(|g| !row(g));
     eligible(&node)
 }
 
@@ -503,14 +505,14 @@ pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
     }
     for i in long.concat() {
         plan.nodes[i].rolled = true;
-        plan.nodes[i].before_joint = fastest && eligible_in_loop(plan, i);
+        plan.nodes[i].elimination.before_joint = fastest && eligible_in_loop(plan, i);
     }
 }
 
 /// Joints one behind the other, without branches, at least so many.
 fn paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
     let children = children(plan);
-    let own = |node: &PlanNode| node.unknown.is_none() && matches!(node.source, Source::State { .. });
+    let own = |node: &PlanNode| node.elimination.unknown.is_none() && matches!(node.source, Source::State { .. });
     let mut paths: Vec<Vec<usize>> = Vec::new();
     for (i, node) in plan.nodes.iter().enumerate().filter(|(_, n)| own(n)) {
         match paths.last_mut() {
@@ -541,34 +543,34 @@ fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
 
 fn apply(plan: &mut Plan, chain: &[usize], form: &Form) {
     for (&i, &turned) in chain.iter().zip(&form.turned) {
-        plan.nodes[i].before_joint = turned;
+        plan.nodes[i].elimination.before_joint = turned;
         plan.nodes[i].rolled |= form.rolled;
-        plan.nodes[i].non_rotating &= !form.rolled;
+        plan.nodes[i].elimination.non_rotating &= !form.rolled;
     }
     for &i in &chain[..form.accumulates_momentum] {
-        plan.nodes[i].accumulates_momentum = true;
+        plan.nodes[i].elimination.accumulates_momentum = true;
     }
     let met = form.split == form.base && form.split > 0;
     let first = if met { form.base } else { form.base + 1 };
     for k in (first..chain.len()).rev() {
         let Some(g) = defer(plan, chain[k]) else { continue };
         for &j in &chain[first.max(form.base + 1)..=k] {
-            plan.nodes[j].open.push(g);
+            plan.nodes[j].elimination.open.push(g);
         }
         if met {
-            plan.nodes[chain[form.base]].ends.push(g);
+            plan.nodes[chain[form.base]].elimination.ends.push(g);
             plan.solve_at_ground.push(g);
         } else {
-            plan.nodes[chain[form.base]].solve_before.push(g);
+            plan.nodes[chain[form.base]].elimination.solve_before.push(g);
         }
     }
     for k in (0..form.split).rev() {
         let Some(g) = defer(plan, chain[k]) else { continue };
-        plan.nodes[chain[k]].ends.push(g);
+        plan.nodes[chain[k]].elimination.ends.push(g);
         plan.solve_at_ground.push(g);
         let last = if met { form.split } else { form.split - 1 };
         for &j in &chain[k + 1..=last] {
-            plan.nodes[j].screws.push(g);
+            plan.nodes[j].elimination.screws.push(g);
         }
     }
 }
@@ -578,7 +580,7 @@ fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
     let Source::State { v, .. } = plan.nodes[i].source else { return None };
     let g = plan.unknowns.len();
     plan.unknowns.push(Unknown::Velocity(v));
-    plan.nodes[i].unknown = Some(g);
-    plan.nodes[i].deferred = true;
+    plan.nodes[i].elimination.unknown = Some(g);
+    plan.nodes[i].elimination.deferred = true;
     Some(g)
 }

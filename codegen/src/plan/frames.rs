@@ -5,7 +5,7 @@
 //! what is left of the turn goes into the joint angle.
 
 use mbd_runtime::spatial::Vec3;
-use mbd_runtime::tree::Source;
+use mbd_runtime::tree::{Elimination, Source};
 
 use super::elements::{Carried, Elements};
 use super::instantiate::body_inertia;
@@ -222,17 +222,8 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
         slide,
         inertia: [0.0; 10],
         variable: Vec::new(),
-        unknown: None,
-        deferred: false,
-        before_joint: false,
+        elimination: Elimination::default(),
         rolled: false,
-        non_rotating: false,
-        accumulates_momentum: false,
-        ends: Vec::new(),
-        screws: Vec::new(),
-        open: Vec::new(),
-        solve_before: Vec::new(),
-        solve_after: Vec::new(),
     }
 }
 

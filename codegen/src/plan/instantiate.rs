@@ -135,16 +135,7 @@ impl Plan {
             quarter: node.quarter,
             slide: S::constant(node.slide),
             inertia: self.inertia(node, params),
-            unknown: node.unknown,
-            deferred: node.deferred,
-            before_joint: node.before_joint,
-            non_rotating: node.non_rotating,
-            accumulates_momentum: node.accumulates_momentum,
-            ends: node.ends.clone(),
-            screws: node.screws.clone(),
-            open: node.open.clone(),
-            solve_before: node.solve_before.clone(),
-            solve_after: node.solve_after.clone(),
+            elimination: node.elimination.clone(),
         }
     }
 

@@ -15,7 +15,7 @@ mod rigid;
 mod shared;
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Source, Unknown, WrenchAxes};
+use mbd_runtime::tree::{Dims, Elimination, Source, Unknown, WrenchAxes};
 
 use crate::model::{Gravity, JointKind, JointMotion, Model, Param, Value};
 use crate::options::RolledCode;
@@ -136,28 +136,10 @@ pub struct PlanNode {
     pub inertia: [f64; 10],
     /// Bodies with parameters in their inertia or pose: body index and pose in the node frame.
     pub variable: Vec<(usize, Vec<PoseStep>)>,
-    /// Index of a coordinate shared with other nodes.
-    pub unknown: Option<usize>,
-    /// See [`mbd_runtime::tree::Node`].
-    pub deferred: bool,
-    /// See [`mbd_runtime::tree::Node`].
-    pub before_joint: bool,
-    /// See [`mbd_runtime::tree::Node`].
-    pub non_rotating: bool,
-    /// See [`mbd_runtime::tree::Node`].
-    pub accumulates_momentum: bool,
-    /// Whether the generator may make it part of a loop.
+    /// How its freedoms are eliminated.
+    pub elimination: Elimination,
+    /// Whether the generator may make it part of rolled code.
     pub rolled: bool,
-    /// See [`mbd_runtime::tree::Node`].
-    pub ends: Vec<usize>,
-    /// See [`mbd_runtime::tree::Node`].
-    pub screws: Vec<usize>,
-    /// See [`mbd_runtime::tree::Node`].
-    pub open: Vec<usize>,
-    /// See [`mbd_runtime::tree::Node`].
-    pub solve_before: Vec<usize>,
-    /// See [`mbd_runtime::tree::Node`].
-    pub solve_after: Vec<usize>,
 }
 
 /// A named frame.

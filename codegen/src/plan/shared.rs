@@ -21,7 +21,7 @@ pub fn share(plan: &mut Plan) {
         let g = plan.unknowns.len();
         plan.unknowns.push(Unknown::Velocity(v));
         for &i in &members {
-            plan.nodes[i].unknown = Some(g);
+            plan.nodes[i].elimination.unknown = Some(g);
         }
         open(plan, g, &members);
     }
@@ -37,14 +37,14 @@ fn open(plan: &mut Plan, g: usize, members: &[usize]) {
     let meeting = paths[0].iter().copied().find(|a| paths.iter().all(|path| path.contains(a)));
     for path in &paths {
         for &i in path.iter().take_while(|&&i| Some(i) != meeting) {
-            if !plan.nodes[i].open.contains(&g) {
-                plan.nodes[i].open.push(g);
+            if !plan.nodes[i].elimination.open.contains(&g) {
+                plan.nodes[i].elimination.open.push(g);
             }
         }
     }
     match meeting {
-        Some(i) if members.contains(&i) => plan.nodes[i].solve_after.push(g),
-        Some(i) => plan.nodes[i].solve_before.push(g),
+        Some(i) if members.contains(&i) => plan.nodes[i].elimination.solve_after.push(g),
+        Some(i) => plan.nodes[i].elimination.solve_before.push(g),
         None => plan.solve_at_ground.push(g),
     }
 }

@@ -2,7 +2,9 @@
 //! taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Dims, Kind, Node, Source, Tree, TreeFrame, Unknown};
+use mbd_runtime::tree::{
+    Bond, Closure, Constraint, Cut, Dims, Elimination, Kind, Node, Source, Tree, TreeFrame, Unknown,
+};
 use mbd_runtime::Scalar;
 
 use super::runs::{map_node, Run, Slot};
@@ -237,15 +239,6 @@ fn dummy<'g>() -> Node<Expr<'g>> {
         slide: Expr::zero(),
         inertia: RigidInertia::zero(),
         passive: Vec::new(),
-        unknown: None,
-        deferred: false,
-        before_joint: false,
-        non_rotating: false,
-        accumulates_momentum: false,
-        ends: Vec::new(),
-        screws: Vec::new(),
-        open: Vec::new(),
-        solve_before: Vec::new(),
-        solve_after: Vec::new(),
+        elimination: Elimination::default(),
     }
 }

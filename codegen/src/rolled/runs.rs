@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Bond, Kind, Node, Source, Tree, Unknown};
+use mbd_runtime::tree::{Bond, Elimination, Kind, Node, Source, Tree, Unknown};
 
 use crate::symbolic::Expr;
 
@@ -92,17 +92,16 @@ fn path_from(links: &[Option<Node<f64>>], children: &[usize], start: usize) -> R
 /// Node `i` with numbers for constants, if it can be in a loop.
 fn constant_link(tree: &Tree<Expr>, i: usize) -> Option<Node<f64>> {
     let node = &tree.nodes[i];
-    let plain = node.unknown.is_none()
-        && !node.deferred
-        && !node.accumulates_momentum
-        && !node.non_rotating
-        && !node.parent.is_some_and(|p| tree.nodes[p].accumulates_momentum || tree.nodes[p].non_rotating)
-        && node.open.iter().all(|&g| matches!(tree.unknowns[g], Unknown::Row(_)))
+    let Elimination { before_joint, open, .. } = node.elimination.clone();
+    let rows_only = open.iter().all(|&g| matches!(tree.unknowns[g], Unknown::Row(_)));
+    let plain_parent = |p: usize| {
+        let parent = &tree.nodes[p].elimination;
+        !parent.accumulates_momentum && !parent.non_rotating
+    };
+    let plain = rows_only
+        && node.elimination == Elimination { before_joint, open, ..Elimination::default() }
+        && node.parent.is_none_or(plain_parent)
         && !tree.constraints.iter().any(|c| ends_at(&c.bond, i))
-        && node.ends.is_empty()
-        && node.screws.is_empty()
-        && node.solve_before.is_empty()
-        && node.solve_after.is_empty()
         && matches!(node.source, Source::State { .. });
     let mut constant = true;
     let link = map_node(node, &mut |x| match x {
@@ -194,8 +193,7 @@ fn same_step(a: &ElementaryTransform<f64>, b: &ElementaryTransform<f64>) -> bool
 fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
     std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
         && a.quarter == b.quarter
-        && a.before_joint == b.before_joint
-        && a.open == b.open
+        && a.elimination == b.elimination
 }
 
 /// The same structure and zeros and ones in the same places.
@@ -311,15 +309,6 @@ pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -
             inertia: node.inertia.inertia.map(&mut *f),
         },
         passive,
-        unknown: node.unknown,
-        deferred: node.deferred,
-        before_joint: node.before_joint,
-        non_rotating: node.non_rotating,
-        accumulates_momentum: node.accumulates_momentum,
-        ends: node.ends.clone(),
-        screws: node.screws.clone(),
-        open: node.open.clone(),
-        solve_before: node.solve_before.clone(),
-        solve_after: node.solve_after.clone(),
+        elimination: node.elimination.clone(),
     }
 }

@@ -77,7 +77,7 @@ impl<'g> PassState<'g> {
         let energy = [Expr::zero(); 2];
         let bound = solves(group) && !tree.constraints.is_empty();
         let reaches = bound && group == Output::PositionCorrection;
-        let gathers = tree.nodes.iter().any(|n| n.accumulates_momentum);
+        let gathers = tree.nodes.iter().any(|n| n.elimination.accumulates_momentum);
         let (v, qd, pd, p) = (zeros(nv), zeros(nq), zeros(nv), zeros(nv));
         PassState { group, graph, bound, reaches, alone, gathers, work, v, qd, pd, p, energy, tree }
     }

@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use crate::spatial::{Axis, ElementaryTransform, RigidInertia};
 use crate::system::{Blocks, Differentiable, LieJoint, Real, System};
-use crate::tree::{Dims, Kind, Node, Passive, Source, Tree};
+use crate::tree::{Dims, Elimination, Kind, Node, Passive, Source, Tree};
 use crate::{Interpreter, Scalar};
 
 /// A body: mass, centre of mass, moments of inertia about it.
@@ -46,16 +46,7 @@ pub fn joint<S: Scalar>(tree: &mut Tree<S>, back: usize, kind: Kind<S>, stiffnes
         inertia: body(size, [0.2, 0.05, -0.1], [0.03, 0.05, 0.06]),
         passive: vec![passive; kind.nv()],
         kind,
-        unknown: None,
-        deferred: false,
-        before_joint: false,
-        non_rotating: false,
-        accumulates_momentum: false,
-        ends: vec![],
-        screws: vec![],
-        open: vec![],
-        solve_before: vec![],
-        solve_after: vec![],
+        elimination: Elimination::default(),
     });
     tree.dims.nq += kind.nq();
     tree.dims.nv += kind.nv();

@@ -69,9 +69,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let [px, py] = placing;
         let placed = if swung { 2 } else { 0 };
         let steps = [px, py, shift(Axis::Z, slide), turn];
-        let last = if node.non_rotating { 3 } else { 4 };
+        let last = if node.elimination.non_rotating { 3 } else { 4 };
         w.joint[i].set_with(placed, &steps[2 - placed..last]);
-        if node.non_rotating {
+        if node.elimination.non_rotating {
             let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }

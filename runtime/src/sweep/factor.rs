@@ -34,7 +34,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
         for (i, node) in self.tree.nodes.iter().enumerate() {
-            for g in Self::open_before(node, 0).chain(node.unknown) {
+            for g in node.elimination.open_before(0).chain(node.elimination.unknown) {
                 f.columns[g * n + i] = Force::zero();
             }
         }
@@ -59,9 +59,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
         let Some(p) = node.parent else { return };
         let inner = &self.tree.nodes[p];
-        for &g in &node.screws {
+        for &g in &node.elimination.screws {
             self.trace.at(Some(i), Quantity::Inertia);
-            let at_parent = match inner.unknown == Some(g) {
+            let at_parent = match inner.elimination.unknown == Some(g) {
                 true => inner.kind.axis(0).motion(S::one()),
                 false => self.leaving(poses, p).fold(f.screws[g * n + p], |m, step| step.motion(&m)),
             };
@@ -74,27 +74,27 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
         let mut m = f.m[i]; // M*_i (4.48)
-        if node.before_joint {
+        if node.elimination.before_joint {
             self.trace.at(Some(i), Quantity::Inertia);
             m = self.leaving(poses, i).rev().fold(m, |m, step| step.inertia(&m));
-            for g in Self::open_before(node, 0) {
+            for g in node.elimination.open_before(0) {
                 let column = f.columns[g * n + i];
                 f.columns[g * n + i] = self.leaving(poses, i).rev().fold(column, |f, step| step.force(&f));
             }
         }
         self.trace.at(Some(i), Quantity::Pivot);
-        for (k, &g) in node.solve_before.iter().enumerate() {
-            self.solve_unknown(g, Some(i), Self::open_before(node, k + 1), &mut m, f);
+        for (k, &g) in node.elimination.solve_before.iter().enumerate() {
+            self.solve_unknown(g, Some(i), node.elimination.open_before(k + 1), &mut m, f);
         }
         for k in 0..node.kind.nv() {
             self.eliminate(i, k, first[i] + k, &mut m, f);
         }
-        for (k, &g) in node.solve_after.iter().enumerate() {
-            self.solve_unknown(g, Some(i), Self::open_after(node, k + 1), &mut m, f);
+        for (k, &g) in node.elimination.solve_after.iter().enumerate() {
+            self.solve_unknown(g, Some(i), node.elimination.open_after(k + 1), &mut m, f);
         }
         f.m[i] = m; // M'_i (4.44)
         let ng = self.tree.unknowns.len();
-        for (&h, &g) in node.ends.iter().flat_map(|h| node.screws.iter().map(move |g| (h, g))) {
+        for (&h, &g) in node.elimination.ends.iter().flat_map(|h| node.elimination.screws.iter().map(move |g| (h, g))) {
             let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
             f.gram[g * ng + h] = x;
             f.gram[h * ng + g] = x;
@@ -103,7 +103,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Inertia);
         let carried = self.entering(poses, i).rev().fold(m, |m, step| step.inertia(&m));
         f.m[parent] = f.m[parent].plus(&carried);
-        for &g in &node.open {
+        for &g in &node.elimination.open {
             let column = self.entering(poses, i).rev().fold(f.columns[g * n + i], |f, step| step.force(&f));
             f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
         }
@@ -126,16 +126,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let e = node.kind.axis(k);
         let armature = node.passive[k].armature;
         let u = column(&e, m); // U = M* E
-        for h in Self::open_after(node, 0) {
+        for h in node.elimination.open_after(0) {
             f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
         }
-        if let Some(g) = node.unknown {
+        if let Some(g) = node.elimination.unknown {
             let a = node.ratio;
             let old = f.cross[freedom * ng + g];
             let column = f.columns[g * n + i].plus(&u.times(a));
             let rotor = a * a * armature;
             f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
-            for h in Self::open_after(node, 0).filter(|&h| h != g) {
+            for h in node.elimination.open_after(0).filter(|&h| h != g) {
                 let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
                 f.gram[g * ng + h] = x;
                 f.gram[h * ng + g] = x;
@@ -148,13 +148,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             return;
         }
         let pivot = reduce(&e, u, armature, m);
-        for h in Self::open_after(node, 0) {
+        for h in node.elimination.open_after(0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
             if let Unknown::Row(_) = self.tree.unknowns[h] {
                 f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             }
-            for h2 in Self::open_after(node, 0) {
+            for h2 in node.elimination.open_after(0) {
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
             }
         }

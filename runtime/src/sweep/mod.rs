@@ -32,7 +32,7 @@ pub use newton::Accelerations;
 pub use solve::Load;
 
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia};
-use crate::tree::{Node, Tree, TreeFrame};
+use crate::tree::{Tree, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -124,7 +124,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Whether the parent's frame does not turn, so that the way from it to node `i` does.
     fn swung(&self, i: usize) -> bool {
-        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].non_rotating)
+        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].elimination.non_rotating)
     }
 
     /// Constant steps from the parent frame to the joint of node `i`.
@@ -137,7 +137,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// Inertia of the body of node `i` in the node frame.
     fn inertia<'b>(&'b self, w: &'b crate::workspace::Poses<S>, i: usize) -> &'b RigidInertia<S> {
-        match self.tree.nodes[i].non_rotating {
+        match self.tree.nodes[i].elimination.non_rotating {
             true => &w.body[i].inertia,
             false => &self.tree.nodes[i].inertia,
         }
@@ -149,7 +149,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         w: &crate::workspace::Poses<S>,
         frame: &'b TreeFrame<S>,
     ) -> impl DoubleEndedIterator<Item = ElementaryTransform<S>> + 'b {
-        let body = frame.node.filter(|&i| self.tree.nodes[i].non_rotating).map(|i| w.body[i].step());
+        let body = frame.node.filter(|&i| self.tree.nodes[i].elimination.non_rotating).map(|i| w.body[i].step());
         body.into_iter().chain(frame.place.iter().copied())
     }
 
@@ -169,7 +169,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         i: usize,
     ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         let joint = &w.joint[i];
-        let steps = if self.tree.nodes[i].before_joint { joint.placing() } else { joint.get() };
+        let steps = if self.tree.nodes[i].elimination.before_joint { joint.placing() } else { joint.get() };
         self.place(i).iter().chain(steps)
     }
 
@@ -179,18 +179,9 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         w: &'b crate::workspace::Poses<S>,
         i: usize,
     ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
-        let own: &[ElementaryTransform<S>] = if self.tree.nodes[i].before_joint { w.joint[i].own() } else { &[] };
+        let own: &[ElementaryTransform<S>] =
+            if self.tree.nodes[i].elimination.before_joint { w.joint[i].own() } else { &[] };
         own.iter()
-    }
-
-    /// Shared coordinates still open after position `k` of `solve_before`.
-    fn open_before(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
-        node.solve_before[k..].iter().chain(&node.solve_after).chain(&node.open).chain(&node.ends).copied()
-    }
-
-    /// Shared coordinates still open after position `k` of `solve_after`.
-    fn open_after(node: &Node<S>, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
-        node.solve_after[k..].iter().chain(&node.open).chain(&node.ends).copied()
     }
 
     /// Momenta from velocities, `p = M(q) v`, without forming `M`. `p` has one entry for each velocity.

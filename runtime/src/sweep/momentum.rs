@@ -70,7 +70,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Energy);
         let rate = |k: usize| w.velocity.rate[w.first[i] + k];
         match node.source {
-            Source::State { v, .. } if node.unknown.is_none() => {
+            Source::State { v, .. } if node.elimination.unknown.is_none() => {
                 for k in 0..node.kind.nv() {
                     twice = twice + p[v + k] * rate(k);
                 }

@@ -144,7 +144,7 @@ impl<S: Scalar> ClassicMotion<S> {
             (Source::Drive { v, .. }, _) => node.ratio * u.drive_a[v + k],
             (Source::State { v, .. }, Accelerations::Given(a)) => node.ratio * a[v + k],
             (_, Accelerations::Zero) => S::zero(),
-            (_, Accelerations::Chosen) if node.unknown.is_some() && !node.deferred => S::zero(),
+            (_, Accelerations::Chosen) if node.elimination.unknown.is_some() && !node.elimination.deferred => S::zero(),
             (_, Accelerations::Chosen) => {
                 let (part, z) = match axis {
                     Freedom::Unit(z) if z < 3 => (&mut self.accel, z),

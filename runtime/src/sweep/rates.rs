@@ -25,7 +25,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
     /// node's own axis is known: `EᵀP* = p − armature · rate`, less what couplings hold of `p`.
     pub fn accumulate_momenta(&self, p: &[S], w: &mut Workspace<S>) {
-        for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].accumulates_momentum) {
+        for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].elimination.accumulates_momentum) {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
@@ -33,11 +33,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for i in (0..self.tree.nodes.len()).rev() {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Momentum);
-            if node.accumulates_momentum {
+            if node.elimination.accumulates_momentum {
                 w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
             }
-            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].accumulates_momentum) else { continue };
-            let mut total = match node.accumulates_momentum {
+            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].elimination.accumulates_momentum) else {
+                continue;
+            };
+            let mut total = match node.elimination.accumulates_momentum {
                 true => w.force[i],
                 false => {
                     let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
@@ -45,7 +47,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
             };
             if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
-                if node.unknown.is_none() || node.deferred {
+                if node.elimination.unknown.is_none() || node.elimination.deferred {
                     let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
                     *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
                 }
@@ -60,7 +62,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::MomentumRate);
-        if node.accumulates_momentum {
+        if node.elimination.accumulates_momentum {
             let mut motion = w.velocity.hat[i];
             node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
             let axis = node.kind.axis(0);

@@ -81,15 +81,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::BiasMomentum);
         let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
-        for (k, &g) in node.solve_before.iter().enumerate() {
-            let e = self.shared_remainder(g, f, load, sol, Self::open_before(node, k + 1));
+        for (k, &g) in node.elimination.solve_before.iter().enumerate() {
+            let e = self.shared_remainder(g, f, load, sol, node.elimination.open_before(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         for k in 0..node.kind.nv() {
             self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
         }
-        for (k, &g) in node.solve_after.iter().enumerate() {
-            let e = self.shared_remainder(g, f, load, sol, Self::open_after(node, k + 1));
+        for (k, &g) in node.elimination.solve_after.iter().enumerate() {
+            let e = self.shared_remainder(g, f, load, sol, node.elimination.open_after(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
@@ -122,7 +122,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ng = self.tree.unknowns.len();
         let axis = node.kind.axis(k);
         let pivot = &f.pivots[freedom];
-        if let Some(g) = node.unknown {
+        if let Some(g) = node.elimination.unknown {
             sol.unknown_rate[g] = sol.unknown_rate[g] + node.ratio * axis.dot(d);
             return;
         }
@@ -139,7 +139,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 rate
             }
         };
-        for h in Self::open_after(node, 0) {
+        for h in node.elimination.open_after(0) {
             sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
         }
         sol.e[freedom] = e;
@@ -194,14 +194,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let outer = node.parent.map_or(Motion::zero(), |p| sol.omega[p]);
         let hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
         sol.hat[i] = hat; // Ω̂_i
-        for (k, &g) in node.solve_after.iter().enumerate().rev() {
-            self.shared_motion(g, f, &hat, Self::open_after(node, k + 1), sol);
+        for (k, &g) in node.elimination.solve_after.iter().enumerate().rev() {
+            self.shared_motion(g, f, &hat, node.elimination.open_after(k + 1), sol);
         }
         let mut omega = hat;
         for k in (0..node.kind.nv()).rev() {
             let freedom = first[i] + k;
             let axis = node.kind.axis(k);
-            let rate = match (node.unknown, node.source) {
+            let rate = match (node.elimination.unknown, node.source) {
                 (Some(g), _) => node.ratio * sol.unknown_rate[g],
                 (None, Source::Drive { .. }) => sol.e[freedom],
                 (None, Source::State { .. }) => {
@@ -212,20 +212,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                         let mut row = pivot.k;
                         *row.get_mut(z) = -(pivot.armature * pivot.rho);
                         let total = sol.e[freedom] - row.dot(&omega);
-                        let total = Self::open_after(node, 0).fold(total, open);
+                        let total = node.elimination.open_after(0).fold(total, open);
                         sol.rate[freedom] = total - omega.get(z); // (4.40)
                         *omega.get_mut(z) = total;
                         continue;
                     }
                     let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
-                    Self::open_after(node, 0).fold(rate, open)
+                    node.elimination.open_after(0).fold(rate, open)
                 }
             };
             sol.rate[freedom] = rate;
             axis.add_to(&mut omega, rate);
         }
-        for (k, &g) in node.solve_before.iter().enumerate().rev() {
-            self.shared_motion(g, f, &omega, Self::open_before(node, k + 1), sol);
+        for (k, &g) in node.elimination.solve_before.iter().enumerate().rev() {
+            self.shared_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
         }
         sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m));
         // Ω_i
@@ -274,18 +274,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn acting(&self, first: &[usize], f: &Factor<S>, sol: &Solution<S>, i: usize) -> (Motion<S>, Force<S>) {
         let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
         let (mut motion, mut own) = (sol.hat[i], None);
-        if node.deferred {
+        if node.elimination.deferred {
             node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
-            own = node.unknown;
+            own = node.elimination.unknown;
         }
-        let open = node.open.iter().chain(&node.ends).filter(|&&g| Some(g) != own);
+        let open = node.elimination.open.iter().chain(&node.elimination.ends).filter(|&&g| Some(g) != own);
         (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
     }
 
     /// Rates of the state's velocities out of the nodes.
     pub fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
         for (i, node) in self.tree.nodes.iter().enumerate() {
-            if let (Source::State { v: at, .. }, None) = (node.source, node.unknown) {
+            if let (Source::State { v: at, .. }, None) = (node.source, node.elimination.unknown) {
                 let nv = node.kind.nv();
                 v[at..at + nv].copy_from_slice(&sol.rate[first[i]..first[i] + nv]);
             }

@@ -79,16 +79,7 @@ impl<S: Scalar> Node<S> {
                     armature: of(p.armature),
                 })
                 .collect(),
-            unknown: self.unknown,
-            deferred: self.deferred,
-            before_joint: self.before_joint,
-            non_rotating: self.non_rotating,
-            accumulates_momentum: self.accumulates_momentum,
-            ends: self.ends.clone(),
-            screws: self.screws.clone(),
-            open: self.open.clone(),
-            solve_before: self.solve_before.clone(),
-            solve_after: self.solve_after.clone(),
+            elimination: self.elimination.clone(),
         }
     }
 }

@@ -4,7 +4,7 @@
 use mbd_runtime::integrate::{Solver, Step, StepError, Stepper, Tolerances};
 use mbd_runtime::spatial::RigidInertia;
 use mbd_runtime::system::LieJoint;
-use mbd_runtime::tree::{Dims, Kind, Node, Passive, Source, Tree};
+use mbd_runtime::tree::{Dims, Elimination, Kind, Node, Passive, Source, Tree};
 use mbd_runtime::{Interpreter, Real, Scalar, System};
 
 /// Equations with `N` coordinates and no groups, by their rates `(t, q, p) → (q̇, ṗ)`.
@@ -103,16 +103,7 @@ pub fn rotor() -> Interpreter<f64> {
         slide: o,
         inertia: RigidInertia { mass: one, moment: [o; 3], inertia: [1.0, o, o, 2.0, o, 3.0] },
         passive: vec![passive; 3],
-        unknown: None,
-        deferred: false,
-        before_joint: false,
-        non_rotating: false,
-        accumulates_momentum: false,
-        ends: vec![],
-        screws: vec![],
-        open: vec![],
-        solve_before: vec![],
-        solve_after: vec![],
+        elimination: Elimination::default(),
     };
     let tree = Tree {
         nodes: vec![node],
