@@ -1,22 +1,22 @@
-//! How generated code meets the processor: one source text, compiled for what the machine has.
+//! Generated code for the instructions of the processor: one source text, compiled for several levels.
 //!
-//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it
-//! compiled for the best the processor offers. With feature `std` that is found out at run time, once, so that a plain
-//! `cargo build --release` is fast everywhere; without it, kernels are plain code of the target.
+//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it in
+//! the version for the best level that the processor supports. With feature `std` the level is detected at run time, once,
+//! so that a plain `cargo build --release` is fast everywhere. Without it, kernels are plain code of the target.
 //!
 //! | arithmetic | `a · b + c` | where |
 //! | --- | --- | --- |
 //! | [`Plain`] | two roundings | everywhere; the only one without `std` |
 //! | `Fused` | one rounding | x86-64 with AVX2 and FMA, and aarch64; with `std` |
 //!
-//! Vectors come from the compiler: a kernel is a loop over lanes whose body is straight-line code, and the loop is
-//! compiled into vector instructions. Where AVX-512 is there and the compiler is 1.89 or later, lanes that fill its
+//! The compiler makes the vector instructions: a kernel is a loop over lanes whose body is straight-line code, and the
+//! compiler vectorises this loop. If the processor has AVX-512 and the compiler is 1.89 or later, lanes that fill its
 //! registers use it.
 //!
-//! The only `unsafe` code of the project stands at the end of this file. It calls functions that are compiled for more
-//! than the baseline of the target, which is sound where the processor has been asked; [`level`] is asked each time.
+//! The only `unsafe` code of the project is at the end of this file. It calls functions that are compiled for more than the
+//! baseline of the target. This is sound because every call first asks [`level`] which instructions the processor has.
 
-/// What a kernel computes with. The numbers are ordinary ones; what differs is how a product is added.
+/// The arithmetic of a kernel: how `a · b + c` is rounded. The numbers are `f64` or `f32` in every case.
 pub trait Arithmetic: Copy {
     /// Whether `a · b + c` is rounded once.
     const FUSED: bool;
@@ -42,7 +42,7 @@ impl Arithmetic for Plain {
     }
 }
 
-/// Products are added without being rounded. Quick only where the processor can do it, right everywhere.
+/// `a · b + c` is rounded once. This is correct on every processor, and fast where the processor has the instruction.
 #[cfg(feature = "std")]
 #[derive(Clone, Copy, Debug)]
 pub struct Fused;
@@ -60,14 +60,15 @@ impl Arithmetic for Fused {
     }
 }
 
-/// Body number `ID` of a generated type, for `L` lanes. `run` must be `#[inline(always)]`: so it is compiled as part of its caller, for
-/// the caller's processor.
+/// Body number `ID` of a generated type, for `L` lanes.
+///
+/// `run` must be `#[inline(always)]`: it is then compiled as part of its caller, for the instructions that the caller enables.
 pub trait Kernel<const ID: usize, const L: usize, Arguments> {
     /// Runs it.
     fn run<A: Arithmetic>(arguments: Arguments);
 }
 
-/// Numbers that a kernel reads: number `k` of lane `l`.
+/// An array of numbers that a kernel reads.
 ///
 /// An array of numbers is the same in every lane; an array of arrays has one number for each lane.
 pub trait Read<T> {
@@ -75,7 +76,7 @@ pub trait Read<T> {
     fn get(&self, k: usize, l: usize) -> T;
 }
 
-/// Numbers that a kernel writes: number `k` of lane `l`.
+/// An array of numbers that a kernel writes.
 pub trait Write<T> {
     /// Sets number `k` of lane `l`.
     fn set(&mut self, k: usize, l: usize, x: T);
@@ -131,8 +132,8 @@ macro_rules! places {
 places!(f64);
 places!(f32);
 
-/// Own arrays of a kernel: `N` rows of `L` lanes, where vectors do not straddle cache lines. (Without `std` there are no
-/// wide vectors, and the stack is dear.)
+/// A local array of a kernel: `N` rows of `L` lanes, aligned so that no vector crosses a cache line. (Without `std` there are
+/// no wide vectors, and stack memory is scarce; the array is then not aligned.)
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "std", repr(align(64)))]
 pub struct Rows<T, const L: usize, const N: usize>(pub [[T; L]; N]);
@@ -152,7 +153,7 @@ impl<T, const L: usize, const N: usize> core::ops::DerefMut for Rows<T, L, N> {
     }
 }
 
-/// What the processor offers.
+/// Instructions that kernels use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Nothing beyond the baseline of the target.
@@ -163,7 +164,7 @@ pub enum Level {
     Wide,
 }
 
-/// What the processor offers, as far as kernels make use of it.
+/// The best level that the processor supports.
 #[inline]
 pub fn level() -> Level {
     processor::level()
@@ -186,7 +187,7 @@ pub fn call_lanes<K: Kernel<ID, L, X>, const ID: usize, const L: usize, T, X>(ar
     }
 }
 
-/// Found out at run time.
+/// The level is detected at run time.
 #[cfg(all(feature = "std", target_arch = "x86_64"))]
 #[allow(unsafe_code)]
 mod processor {
@@ -194,7 +195,7 @@ mod processor {
 
     use super::{Fused, Kernel, Level, Plain};
 
-    /// 0: not asked yet; else one more than the level.
+    /// 0: not detected yet; otherwise one more than the level.
     static LEVEL: AtomicU8 = AtomicU8::new(0);
 
     #[inline]
@@ -225,7 +226,7 @@ mod processor {
     pub fn call<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X, const WIDE: bool>(arguments: X) {
         #[cfg(all(target_feature = "avx2", target_feature = "fma"))]
         if !WIDE {
-            // The whole program is compiled for such a processor: nothing to ask, and the kernel can be inlined.
+            // The whole program is compiled for such a processor: nothing has to be detected, and the kernel can be inlined.
             return K::run::<Fused>(arguments);
         }
         match level() {
@@ -259,7 +260,7 @@ mod processor {
     }
 }
 
-/// Known when the program is compiled.
+/// The level is known at compile time.
 #[cfg(not(all(feature = "std", target_arch = "x86_64")))]
 mod processor {
     use super::{Kernel, Level};

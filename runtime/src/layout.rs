@@ -1,7 +1,7 @@
-//! States in the order and form of other programs.
+//! States in the order and representation of other programs ("there"), and their conversion to this project's ("here").
 //!
-//! Velocities, momenta and joint forces are permuted; coordinates are also rewritten where a program stores a rotation
-//! in another way. Both layouts describe the same frames, so nothing else changes.
+//! Velocities, momenta and joint forces are permuted. Coordinates are also converted where the other program represents a
+//! rotation differently. Both layouts describe the same frames, so that nothing else changes.
 
 use alloc::vec::Vec;
 
@@ -11,9 +11,9 @@ use crate::system::Real;
 /// How another program stores the coordinates of one joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// As here, this many coordinates and velocities.
+    /// As in this project.
     Same {
-        /// Coordinates and velocities.
+        /// Number of coordinates and of velocities.
         n: usize,
     },
     /// An angle as cosine and sine (Pinocchio, unbounded revolute joints).
@@ -26,12 +26,12 @@ pub enum Form {
     QuaternionWxyz,
     /// Position, quaternion x, y, z, w, velocities in body axes, as here (Pinocchio).
     Floating,
-    /// Position, quaternion w, x, y, z, linear velocity in outer axes, angular in body axes (MuJoCo).
+    /// Position, quaternion w, x, y, z, linear velocity in the parent's axes, angular velocity in body axes (MuJoCo).
     FloatingWorld,
 }
 
 impl Form {
-    /// Number of coordinates here and there, and of velocities.
+    /// Number of coordinates here, number of coordinates there, number of velocities.
     pub fn sizes(self) -> (usize, usize, usize) {
         match self {
             Form::Same { n } => (n, n, n),
@@ -43,18 +43,20 @@ impl Form {
     }
 }
 
-/// One joint's place here and there.
+/// The place of one joint in both layouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part {
-    /// Form there.
+    /// Representation there.
     pub form: Form,
-    /// First coordinate here and there.
+    /// Index of the first coordinate, here and there.
     pub q: (usize, usize),
-    /// First velocity here and there.
+    /// Index of the first velocity, here and there.
     pub v: (usize, usize),
 }
 
-/// A correspondence of states. Slices must have the lengths of both sides; missing entries are left alone.
+/// A correspondence of states in two layouts.
+///
+/// The slices that are converted must have the lengths of their layouts. Entries that no joint refers to are not changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.
@@ -74,7 +76,7 @@ impl Layout {
         sizes.fold((0, 0), |(q, v), (_, nq, nv)| (q + nq, v + nv))
     }
 
-    /// Coordinates from there to here. An angle comes back in (−π, π].
+    /// Converts coordinates from there to here. An angle that is stored as cosine and sine is returned in (−π, π] rad.
     pub fn q_from(&self, there: &[f64], here: &mut [f64]) {
         for part in &self.parts {
             let (at, to) = (part.q.1, part.q.0);
@@ -99,7 +101,7 @@ impl Layout {
         }
     }
 
-    /// Coordinates from here to there.
+    /// Converts coordinates from here to there.
     pub fn q_to(&self, here: &[f64], there: &mut [f64]) {
         for part in &self.parts {
             let (at, to) = part.q;
@@ -124,7 +126,7 @@ impl Layout {
         }
     }
 
-    /// Coordinate rates from here to there; `q` are the coordinates here.
+    /// Converts coordinate rates from here to there; `q` are the coordinates here.
     pub fn qd_to(&self, q: &[f64], here: &[f64], there: &mut [f64]) {
         self.q_to(here, there);
         for part in &self.parts {
@@ -141,7 +143,7 @@ impl Layout {
         }
     }
 
-    /// Velocities, momenta or joint forces from there to here; `q` are the coordinates here.
+    /// Converts velocities, momenta or joint forces from there to here; `q` are the coordinates here.
     pub fn v_from(&self, q: &[f64], there: &[f64], here: &mut [f64]) {
         for part in &self.parts {
             let (_, _, n) = part.form.sizes();
@@ -152,7 +154,7 @@ impl Layout {
         }
     }
 
-    /// Velocities, momenta or joint forces from here to there; `q` are the coordinates here.
+    /// Converts velocities, momenta or joint forces from here to there; `q` are the coordinates here.
     pub fn v_to(&self, q: &[f64], here: &[f64], there: &mut [f64]) {
         for part in &self.parts {
             let (_, _, n) = part.form.sizes();
@@ -164,7 +166,7 @@ impl Layout {
     }
 }
 
-/// Turns the first three numbers between body and outer axes of a floating joint.
+/// Transforms the first three numbers between the body axes and the parent's axes of a floating joint.
 fn turn<S: Real>(q: &[S], part: &Part, x: &mut [S], by: impl Fn(&ElementaryTransform<S>, [S; 3]) -> [S; 3]) {
     let at = part.q.0 + 3;
     let step = ElementaryTransform::Rotate(quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]));

@@ -1,8 +1,9 @@
 //! Sweeps, interpreter and integrators of the multibody project.
 //!
-//! `no_std` unless asked, no allocation on the hot path. Generated code needs [`System`], [`integrate`], [`kernel`],
-//! [`batch`] and [`trig`] only; the tree, its workspace and the interpreter (feature `alloc`) live in vectors that are
-//! sized once. Feature `std` lets generated code use what the processor turns out to have.
+//! The crate is `no_std` by default and does not allocate on the hot path. Generated code needs [`System`], [`integrate`],
+//! [`kernel`], [`batch`] and [`trig`] only. The tree, its workspace and the interpreter (feature `alloc`) allocate their
+//! vectors once, when they are made. With feature `std`, generated code uses the vector instructions that it detects at run
+//! time.
 #![no_std]
 
 #[cfg(feature = "alloc")]

@@ -1,17 +1,17 @@
-//! The numbers a sweep may be run with.
+//! The number types with which a sweep can be run.
 
 use crate::integrate::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A field with sine, cosine, square root and a guarded reciprocal, and nothing else: no comparison and no way out to
-/// `f64`, so a sweep written over it cannot branch on a value and every instance performs the same operations in the same
-/// order.
+/// A number type with the four operations, sine, cosine, square root and a guarded reciprocal. There is no comparison and no
+/// conversion to `f64`. A sweep over a `Scalar` therefore cannot branch on a value: with every type it performs the same
+/// operations in the same order.
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
     /// A constant, rounded to the precision of the type.
     fn constant(x: f64) -> Self;
-    /// A constant of more digits than a double has, rounded to the precision of the type.
+    /// A constant with more digits than a double, rounded to the precision of the type.
     #[inline]
     fn rounded(x: Constant) -> Self {
         Self::constant(x.hi()) + Self::constant(x.lo())
@@ -20,10 +20,12 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
-    /// `1 / self` where `self` is above `floor`, and zero elsewhere: the pivot of a row that may be redundant, and is left
-    /// out where too little remains of its diagonal. The floor is not negative. Where `self` is NaN, so is the result.
+    /// `1 / self` where `self` is above `floor`, and zero elsewhere: the inverse of the pivot of a row that may be redundant.
+    /// Zero leaves the row out, where too little of its diagonal entry remains. `floor` must not be negative. If `self` is
+    /// NaN, so is the result.
     fn reciprocal_above(self, floor: Self) -> Self;
-    /// Part of a row's diagonal below which what is left of it by the rows before it is taken for round-off.
+    /// Fraction of a row's diagonal entry: where less than this fraction remains after the rows before it have been
+    /// eliminated, the rest counts as round-off.
     fn rank_tolerance() -> Self {
         Self::constant(1e-10)
     }
@@ -53,7 +55,7 @@ impl Scalar for f64 {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        // Both are rounded correctly: the same bits.
+        // Both square roots are correctly rounded and give the same bits.
         #[cfg(feature = "std")]
         return f64::sqrt(self);
         #[cfg(not(feature = "std"))]
@@ -61,7 +63,7 @@ impl Scalar for f64 {
     }
     #[inline]
     fn reciprocal_above(self, floor: Self) -> Self {
-        // A mask on the quotient, no branch: lanes stay together. NaN is not below the floor.
+        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the floor.
         let reciprocal = 1.0 / self;
         if self <= floor {
             0.0
@@ -86,7 +88,7 @@ impl Scalar for f32 {
     }
     #[inline]
     fn sqrt(self) -> Self {
-        // Both are rounded correctly: the same bits.
+        // Both square roots are correctly rounded and give the same bits.
         #[cfg(feature = "std")]
         return f32::sqrt(self);
         #[cfg(not(feature = "std"))]
@@ -94,7 +96,7 @@ impl Scalar for f32 {
     }
     #[inline]
     fn reciprocal_above(self, floor: Self) -> Self {
-        // A mask on the quotient, no branch: lanes stay together. NaN is not below the floor.
+        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the floor.
         let reciprocal = 1.0 / self;
         if self <= floor {
             0.0

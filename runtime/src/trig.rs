@@ -1,35 +1,38 @@
 //! Sine and cosine together, in plain additions and multiplications: the same bits on every target.
 //!
-//! `core` has no trigonometry, and the usual stand-in computes its single-precision versions in double precision, which a
-//! Cortex-M4F has to emulate. Here `f32` stays in `f32`. No table and no branch on the main path, so a loop over lanes
-//! vectorises; one branch sends large, infinite and NaN arguments to an exact integer reduction.
+//! `core` has no trigonometric functions, and `libm` computes its single-precision versions in double precision, which a
+//! Cortex-M4F has to emulate. The functions of this module compute `f32` in `f32`. Their main path has no table and no branch,
+//! so that a loop over lanes vectorises; one branch sends large, infinite and NaN arguments to an exact integer reduction.
 //!
-//! Written over an [`Arithmetic`]: plain for single calls, the same bits everywhere; in kernels with fused
-//! multiply-adds where the processor has them. Generated code has all its angles at the start, and computes their sines
-//! and cosines side by side in vector registers ([`pairs_f64`], [`pairs_f32`]).
+//! The functions are generic over an [`Arithmetic`]. Single calls use plain arithmetic and give the same bits everywhere;
+//! kernels use fused multiply-adds where the processor has them. Generated code has all its angles at the start of a function
+//! and computes their sines and cosines together in vector registers ([`pairs_f64`], [`pairs_f32`]).
 //!
 //! Main path (|x| <= 10^6 for `f64`, <= 1600 for `f32`):
 //! 1. `n = round(x · 2/π)` by adding and subtracting 1.5 · 2^(mantissa bits); the low bits of the sum are the quadrant.
 //! 2. `y0 + y1 = x − n·π/2` with π/2 in four parts (Cody and Waite). The first three have so few bits that their
-//!    products with `n` are exact; what the two subtractions round away is recovered exactly and becomes `y1`, with the last
-//!    part. So the reduced argument is good to well below an ulp even next to a multiple of π/2. Fused, the first part is a whole
-//!    float and three parts do: `x − n·p1` is a multiple of the last place of `p1` or `x` below 1, so it is exact.
+//!    products with `n` are exact. The rounding errors of the two subtractions are recovered exactly; together with the last part
+//!    they are `y1`. The error of the reduced argument is therefore well below an ulp even next to a multiple of π/2. With fused
+//!    multiply-adds, the first part is a whole float and three parts suffice: `x − n·p1` is below 1 and a multiple of the last
+//!    place of `p1` or `x`, so that it is exact.
 //! 3. Polynomials for both functions on |y| <= π/4; for `f64` those of fdlibm, in both cases with fdlibm's use of `y1`.
 //! 4. Quadrant: exchange by a select, signs by their bit.
 //!
-//! Beyond: Payne and Hanek. Only the bits of 2/π that matter for `x · 2/π mod 4` are multiplied, as integers.
+//! Larger arguments use the reduction of Payne and Hanek: only the bits of 2/π that contribute to `x · 2/π mod 4` are
+//! multiplied, as integers.
 //!
-//! Largest errors seen by the tests of this module over random and hard arguments, plain and fused, in units in the last
-//! place: `f64` 0.80, `f32` 0.82.
+//! The largest errors that the tests of this module find over random and difficult arguments, plain and fused, are 0.80 units
+//! in the last place for `f64` and 0.82 for `f32`.
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
 #![allow(clippy::excessive_precision, clippy::approx_constant)]
 
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
 
-/// Whether blocks of angles pay: without vectors, lanes that only fill a block cost as much as the others.
+/// Whether angles are computed in blocks. Without vector instructions, the unused lanes of a block would cost as much as the
+/// others.
 const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
-/// 2/π as a binary fraction behind 64 zero bits: enough for the largest `f64`.
+/// 2/π as a binary fraction after 64 zero bits, with enough bits for the largest `f64`.
 const TWO_OVER_PI: [u32; 40] = [
     0x00000000, 0x00000000, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab,
     0xdebbc561, 0xb7246e3a, 0x424dd2e0, 0x06492eea, 0x09d1921c, 0xfe1deb1c, 0xb129a73e, 0xe88235f5, 0x2ebb4484,
@@ -52,7 +55,7 @@ fn chunk64(at: u32) -> u64 {
     (u64::from(chunk32(at)) << 32) | u64::from(chunk32(at.wrapping_add(32)))
 }
 
-/// One float type's functions. Written once: only constants, polynomials and the integer types differ.
+/// The functions for one float type. Constants, polynomials and the integer types are arguments.
 macro_rules! sincos {
     (
         float $float:ident, bits $uint:ident, wide $wide:ident, chunk $chunk:ident, mantissa $mant:literal;
@@ -126,8 +129,8 @@ macro_rules! sincos {
             (sin, cos)
         }
 
-        /// The main path in blocks as wide as the widest vectors, the rest in narrower ones; whether there is an angle
-        /// beyond it.
+        /// The main path: blocks as wide as the widest vectors, then the rest in narrower blocks. Returns whether an angle is
+        /// beyond the main path.
         #[inline(always)]
         fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
             if !VECTORS {
@@ -153,7 +156,7 @@ macro_rules! sincos {
             large | rest
         }
 
-        /// Up to `W` angles on the main path; whether there is one beyond it.
+        /// Up to `W` angles on the main path. Returns whether one of them is beyond it.
         #[inline(always)]
         fn $block<A: Arithmetic, const W: usize>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
             let (mut angles, mut s, mut c, mut beyond) = ([0.0; W], [0.0; W], [0.0; W], [false; W]);
@@ -172,7 +175,7 @@ macro_rules! sincos {
             beyond.iter().fold(false, |any, x| any | x)
         }
 
-        /// Computes anew what the main path cannot.
+        /// Computes the angles beyond the main path again.
         #[cold]
         #[inline(never)]
         fn $repair(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
@@ -186,27 +189,28 @@ macro_rules! sincos {
         /// Whether `x` is beyond the main path: large, infinite or NaN.
         #[inline]
         fn $large(x: $float) -> bool {
-            // On the bits, so that NaN is on the far side too.
+            // The comparison is on the bits, so that NaN counts as large.
             (x.to_bits() & ($uint::MAX >> 1)) > <$float>::to_bits($limit)
         }
 
-        /// The main path. Nonsense (but no panic) beyond its range.
+        /// The main path. Beyond its range the result is meaningless, but there is no panic.
         #[inline(always)]
         fn $fast<A: Arithmetic>(x: $float) -> ($float, $float) {
             let shifted = A::$fma(x, $inv, $magic);
             let n = shifted - $magic;
             if A::FUSED {
-                // Exact: see above.
+                // This is exact; see the module's documentation.
                 let a = A::$fma(-n, $f1, x);
-                // An exact product, and as below an exact remainder.
+                // The product is exact, and so is the remainder, for the reason given below.
                 let w = n * $f2;
                 let b = a - w;
                 let lost = (a - b) - w;
                 return $kernel::<A>(b, A::$fma(-n, $f3, lost), shifted.to_bits());
             }
-            // Exact: the product, and the difference by Sterbenz's lemma.
+            // The product is exact; so is the difference, by Sterbenz's lemma.
             let a = x - n * $p1;
-            // Exact products; `a` and `b` are multiples of the last place of `w` and `v`, so both remainders are exact.
+            // The products are exact. `a` and `b` are multiples of the last place of `w` and `v`, so that both remainders are
+            // exact.
             let w = n * $p2;
             let b = a - w;
             let lost_b = (a - b) - w;
@@ -216,14 +220,14 @@ macro_rules! sincos {
             $kernel::<A>(c, (lost_b + lost_c) - n * $p4, shifted.to_bits())
         }
 
-        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| <= π/4 and a little more. `y1` is some ulps of `y0` at
-        /// most; where both are tiny it may be more.
+        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4. `y1` is at most some ulps of `y0`,
+        /// except where both are tiny.
         #[inline(always)]
         fn $kernel<A: Arithmetic>(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
             let z = y0 * y0;
             let sin = {
                 let ($zs, $fs) = (z, A::$fma);
-                // Subtracted, so that the sine of -0 is -0.
+                // The correction is subtracted, so that the sine of -0 is -0.
                 let bend = A::$fma(0.5 * z, y1, -y1);
                 y0 - A::$fma(-(z * y0), A::$fma(z, $sin_tail, $s1), bend)
             };
@@ -235,7 +239,7 @@ macro_rules! sincos {
             };
             let odd = quadrant & 1 != 0;
             let (s, c) = (if odd { cos } else { sin }, if odd { sin } else { cos });
-            // Quadrant bit 1 is the sign of the sine; that of the cosine is the same bit one quadrant on.
+            // Bit 1 of the quadrant is the sign of the sine; the sign of the cosine is the same bit of the next quadrant.
             let to_sign = |bits: $uint| (bits & 2) << ($uint::BITS - 2);
             (
                 <$float>::from_bits(s.to_bits() ^ to_sign(quadrant)),
@@ -256,20 +260,20 @@ macro_rules! sincos {
                 return (<$float>::NAN, <$float>::NAN);
             }
             let m = (magnitude & ((1 << MANT) - 1)) | (1 << MANT);
-            // x = m · 2^e. Bits of 2/π worth 4·2^-e and more only add full turns; the window starts behind them and is three
-            // words long, so x · 2/π mod 4 = (m · window mod 2^(3 BITS)) · 2^(2 − 3 BITS), good to 2^(MANT + 3 − 3 BITS).
-            // Here e >= −MANT + 10, and the 64 zero bits ahead of the table keep `at` positive.
+            // x = m · 2^e. Bits of 2/π with a value of 4·2^-e or more only add full turns. The window starts after them and is
+            // three words long: x · 2/π mod 4 = (m · window mod 2^(3 BITS)) · 2^(2 − 3 BITS), with an error below
+            // 2^(MANT + 3 − 3 BITS). Here e >= −MANT + 10, and the 64 zero bits at the start of the table keep `at` positive.
             let at = biased.wrapping_add(62).wrapping_sub(BIAS + MANT);
             let word = |k: u32| $wide::from($chunk(at.wrapping_add(k * BITS)));
             let low = $wide::from(m).wrapping_mul(word(2));
             let mid = $wide::from(m).wrapping_mul(word(1)).wrapping_add(low >> BITS);
             let high = $wide::from(m).wrapping_mul(word(0)).wrapping_add(mid >> BITS) as $uint;
-            // Two bits of quadrant, then the fraction of a quadrant, signed so as to be nearest.
+            // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around the nearest.
             let quadrant = high >> (BITS - 2);
             let fraction = ($wide::from(high) << (BITS + 2)) | ((mid as $uint as $wide) << 2) | ((low as $uint >> (BITS - 2)) as $wide);
             let negative = fraction >> (2 * BITS - 1) != 0;
             let fraction = if negative { fraction.wrapping_neg() } else { fraction };
-            // No float is close enough to a multiple of π/2 for fewer than BITS significant bits to be left.
+            // No float is so close to a multiple of π/2 that fewer than BITS significant bits remain.
             let zeros = fraction.leading_zeros();
             let leading = (fraction.wrapping_shl(zeros) >> BITS) as $uint;
             let angle = (($wide::from(leading) * $pi_int) >> BITS) as $uint;
@@ -306,8 +310,8 @@ sincos! {
     scalar sincos_f64;
     /// [`sincos_f64`] of each lane, with the same bits.
     lanes sincos_lanes_f64;
-    /// Sines and cosines of as many angles, radians, as the shortest of the slices has, each within one unit in the last
-    /// place; with what the processor has, so the bits depend on it.
+    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last place.
+    /// It uses the instructions of the processor, so that the last bits depend on the machine.
     slice sincos_slice_f64, SliceF64;
     /// [`sincos_f64`] for kernels.
     pair pair_f64;
@@ -330,8 +334,8 @@ sincos! {
     scalar sincos_f32;
     /// [`sincos_f32`] of each lane, with the same bits.
     lanes sincos_lanes_f32;
-    /// Sines and cosines of as many angles, radians, as the shortest of the slices has, each within one unit in the last
-    /// place; with what the processor has, so the bits depend on it.
+    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last place.
+    /// It uses the instructions of the processor, so that the last bits depend on the machine.
     slice sincos_slice_f32, SliceF32;
     /// [`sincos_f32`] for kernels.
     pair pair_f32;

@@ -1,4 +1,4 @@
-//! Double-double numbers as a scalar: reference solutions, and what rounding errors are measured against.
+//! Double-double numbers as a scalar, for reference solutions and as the reference of rounding errors.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -8,11 +8,15 @@ use crate::integrate::constant::list;
 use crate::integrate::Constant;
 use crate::{Real, Scalar};
 
-/// A double-double number, about 106 bits: sums, products, quotients and roots are good to 1e-31 relative, sines and cosines
-/// of angles below 1000 rad to 1e-31 absolute (above, to what the angle's own last bit means; NaN above 2⁵⁰ rad).
+/// A double-double number of about 106 bits.
 ///
-/// With `COARSE`, sines and cosines are those of programs on doubles, of the angle rounded to a double. Then they are inputs
-/// of the algebra, the same for both, and what is compared are the roundings after them.
+/// Sums, products, quotients and roots have a relative error of at most 1e-31. Sines and cosines of angles below 1000 rad
+/// have an absolute error of at most 1e-31; of larger angles, an error of the size of the angle's last bit. They are NaN above
+/// 2⁵⁰ rad.
+///
+/// With `COARSE`, sines and cosines are those that a program on doubles computes for the angle rounded to a double. They are
+/// then the same inputs of the following operations in both programs, and a comparison shows the roundings of these
+/// operations only.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Wide<const COARSE: bool = false>(pub TwoFloat);
 
@@ -33,8 +37,8 @@ operator!(Mul, mul);
 
 impl<const COARSE: bool> Div for Wide<COARSE> {
     type Output = Self;
-    /// Long division, a double at a time. (That of the crate needs the residual of a reciprocal fused and does not fuse it:
-    /// 1e-16.)
+    /// Long division, one double after the other. (The crate's own division computes the residual of a reciprocal without a
+    /// fused multiply-add, which leaves an error of 1e-16.)
     fn div(self, other: Self) -> Self {
         let (above, below) = (self.0, other.0);
         let first = above.hi() / below.hi();
@@ -95,16 +99,16 @@ impl<const COARSE: bool> Real for Wide<COARSE> {
 /// π/2 in three doubles.
 const QUARTER: [f64; 3] = [core::f64::consts::FRAC_PI_2, 6.123233995736766e-17, -1.4973849048591698e-33];
 
-/// Largest angle, rad, whose quarter turns are counted exactly.
+/// Largest angle, rad, whose number of quarter turns is exact.
 const LARGEST: f64 = (1_u64 << 50) as f64;
 
-/// Taylor series of (sin x)/x in x², from the last term on; below π/4 the next one is under 1e-34.
+/// Taylor series of (sin x)/x in x², last term first; for x below π/4 the first omitted term is below 1e-34.
 const SINE: [Constant; 14] = list(
     "-1/10888869450418352160768000000 1/15511210043330985984000000 -1/25852016738884976640000 1/51090942171709440000 \
      -1/121645100408832000 1/355687428096000 -1/1307674368000 1/6227020800 -1/39916800 1/362880 -1/5040 1/120 -1/6 1",
 );
 
-/// Taylor series of cos x in x², from the last term on.
+/// Taylor series of cos x in x², last term first.
 const COSINE: [Constant; 15] = list(
     "1/304888344611713860501504000000 -1/403291461126605635584000000 1/620448401733239439360000 \
      -1/1124000727777607680000 1/2432902008176640000 -1/6402373705728000 1/20922789888000 -1/87178291200 1/479001600 \
@@ -115,7 +119,7 @@ fn series<const N: usize>(terms: &[Constant; N], square: TwoFloat) -> TwoFloat {
     terms.iter().fold(TwoFloat::from(0.0), |sum, c| sum * square + c.get::<Wide>().0)
 }
 
-/// Sine and cosine: quarter turns are taken off, the rest is a Taylor series.
+/// Sine and cosine: quarter turns are subtracted, and the rest is the argument of a Taylor series.
 fn sin_cos(angle: TwoFloat) -> (TwoFloat, TwoFloat) {
     if !(-LARGEST..=LARGEST).contains(&angle.hi()) {
         return (TwoFloat::NAN, TwoFloat::NAN);

@@ -7,36 +7,36 @@ use crate::Scalar;
 pub const SYM: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
 
 /// Inertia of a rigid body at a frame: mass (kg), first moment `m c` (kg m), inertia about the frame origin (kg m²) as
-/// `[xx, xy, xz, yy, yz, zz]`. Ten numbers in which the equations of motion are linear.
+/// `[xx, xy, xz, yy, yz, zz]`. The equations of motion are linear in these ten numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RigidInertia<S> {
-    /// Mass.
+    /// Mass, kg.
     pub mass: S,
-    /// First moment.
+    /// First moment `m c`, kg m.
     pub moment: Vec3<S>,
-    /// Inertia about the frame origin.
+    /// Inertia about the frame origin, kg m², as `[xx, xy, xz, yy, yz, zz]`.
     pub inertia: [S; 6],
 }
 
-/// A symmetric 6×6 inertia `[[A, Hᵀ], [H, J]]`; `H` maps linear velocity to angular momentum.
+/// A symmetric 6×6 inertia `[[A, Hᵀ], [H, J]]` at a frame; `H` maps linear velocity to angular momentum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArticulatedInertia<S> {
-    /// Linear block.
+    /// Linear block, kg, as `[xx, xy, xz, yy, yz, zz]`.
     pub a: [S; 6],
-    /// Coupling block, `h[angular][linear]`.
+    /// Coupling block `h[angular][linear]`, kg m.
     pub h: Mat3<S>,
-    /// Angular block.
+    /// Angular block, kg m², as `[xx, xy, xz, yy, yz, zz]`.
     pub j: [S; 6],
 }
 
 impl<S: Scalar> RigidInertia<S> {
-    /// No body.
+    /// The inertia of no body: all numbers zero.
     pub fn zero() -> Self {
         let o = S::zero();
         RigidInertia { mass: o, moment: [o; 3], inertia: [o; 6] }
     }
 
-    /// Sum of two bodies at one frame.
+    /// Sum of the inertias of two bodies at the same frame.
     pub fn plus(&self, o: &Self) -> Self {
         RigidInertia {
             mass: self.mass + o.mass,
@@ -45,7 +45,7 @@ impl<S: Scalar> RigidInertia<S> {
         }
     }
 
-    /// Momentum `M Ω`.
+    /// Momentum `M Ω` at the frame, N s and N m s.
     pub fn momentum(&self, w: &Motion<S>) -> Force<S> {
         let (m, s, i) = (self.mass, self.moment, &self.inertia);
         let spin: Vec3<S> =
@@ -60,20 +60,20 @@ impl<S: Scalar> RigidInertia<S> {
         ArticulatedInertia { a: [m, o, o, m, o, m], h: [[o, -z, y], [z, o, -x], [-y, x, o]], j: self.inertia }
     }
 
-    /// The ten numbers back from a 6×6 inertia that is known to be rigid.
+    /// The ten numbers of a 6×6 inertia that is known to be that of a rigid body.
     pub fn from_articulated(m: &ArticulatedInertia<S>) -> Self {
         RigidInertia { mass: m.a[0], moment: [m.h[2][1], m.h[0][2], m.h[1][0]], inertia: m.j }
     }
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
-    /// No inertia.
+    /// All entries zero.
     pub fn zero() -> Self {
         let o = S::zero();
         ArticulatedInertia { a: [o; 6], h: [[o; 3]; 3], j: [o; 6] }
     }
 
-    /// Sum.
+    /// Sum of two inertias at the same frame.
     pub fn plus(&self, o: &Self) -> Self {
         ArticulatedInertia {
             a: core::array::from_fn(|k| self.a[k] + o.a[k]),
@@ -92,7 +92,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
         }
     }
 
-    /// Entry `(i, k)` and its mirror image, to be changed.
+    /// Entry `(i, k)`, which is also entry `(k, i)`, for changing it.
     pub fn get_mut(&mut self, i: usize, k: usize) -> &mut S {
         match (i < 3, k < 3) {
             (true, true) => &mut self.a[SYM[i][k]],

@@ -25,12 +25,12 @@ pub fn scale3<S: Scalar>(s: S, a: Vec3<S>) -> Vec3<S> {
     [s * a[0], s * a[1], s * a[2]]
 }
 
-/// A spatial velocity or acceleration: `lin` m/s at the frame origin, `ang` rad/s.
+/// A spatial velocity or acceleration at the frame origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<S> {
-    /// Linear part.
+    /// Linear part, m/s or m/s².
     pub lin: Vec3<S>,
-    /// Angular part.
+    /// Angular part, rad/s or rad/s².
     pub ang: Vec3<S>,
 }
 
@@ -43,7 +43,7 @@ pub struct Force<S> {
     pub ang: Vec3<S>,
 }
 
-/// What motions and forces share: components and sums. They stay two types: one never takes the place of the other.
+/// Components and sums, which motions and forces have in common. They are two types, because they transform differently.
 macro_rules! six_components {
     ($name:ident) => {
         impl<S: Scalar> $name<S> {
@@ -61,7 +61,7 @@ macro_rules! six_components {
                 }
             }
 
-            /// Component `k`, to be changed.
+            /// Component `k`, for changing it: 0–2 linear, 3–5 angular.
             pub fn get_mut(&mut self, k: usize) -> &mut S {
                 if k < 3 {
                     &mut self.lin[k]
@@ -104,7 +104,7 @@ impl<S: Scalar> Force<S> {
         Force { lin: scale3(s, self.lin), ang: scale3(s, self.ang) }
     }
 
-    /// Power `F · Ω`.
+    /// `F · Ω`: the power of a wrench, W, or twice the kinetic energy of a momentum, J.
     pub fn dot(&self, v: &Motion<S>) -> S {
         dot3(self.lin, v.lin) + dot3(self.ang, v.ang)
     }

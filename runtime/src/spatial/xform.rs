@@ -1,7 +1,8 @@
-//! Elementary transforms and how each quantity passes through them.
+//! Elementary transforms, applied to each spatial quantity.
 //!
-//! A placement is a list of steps from the parent frame to the child frame. Velocities go down the list
-//! ([`ElementaryTransform::motion`]), momenta, wrenches and inertia come back up it ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
+//! A placement is a list of elementary transforms from the parent frame to the child frame. Velocities are transformed in the
+//! order of the list ([`ElementaryTransform::motion`]); momenta, wrenches and inertias in the reverse order, from child to
+//! parent ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
 
 use super::{cross, ArticulatedInertia, Force, Mat3, Motion, Vec3, SYM};
 use crate::Scalar;
@@ -18,7 +19,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Indices `(a, b, n)`, cyclic, `n` the axis itself.
+    /// Indices `(a, b, n)` in cyclic order; `n` is the axis itself.
     #[inline]
     pub fn cyclic(self) -> (usize, usize, usize) {
         match self {
@@ -29,7 +30,7 @@ impl Axis {
     }
 }
 
-/// One elementary transform.
+/// One elementary transform between a parent frame and a child frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ElementaryTransform<S> {
     /// Rotation about an axis by the angle with cosine `c` and sine `s`.
@@ -86,7 +87,7 @@ fn congruence_sym<S: Scalar>(r: &Mat3<S>, m: &[S; 6]) -> [S; 6] {
     [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
 }
 
-/// Rotation of a symmetric 2×2 block through `t = s (xx − yy) + 2 c xy`.
+/// Rotation of a symmetric matrix about axis `n`; its 2×2 block is computed from `t = s (xx − yy) + 2 c xy`.
 fn turn_sym<S: Scalar>(c: S, s: S, m: &mut [S; 6], a: usize, b: usize, n: usize) {
     let (aa, ab, bb) = (SYM[a][a], SYM[a][b], SYM[b][b]);
     let t = s * (m[aa] - m[bb]) + (c + c) * m[ab];
@@ -98,7 +99,7 @@ fn turn_sym<S: Scalar>(c: S, s: S, m: &mut [S; 6], a: usize, b: usize, n: usize)
     (m[SYM[a][n]], m[SYM[b][n]]) = pair(c, s, m[SYM[a][n]], m[SYM[b][n]]);
 }
 
-/// Rotation of a general matrix about axis `n`, its 2×2 block through `t = s (xx − yy) + c (xy + yx)`.
+/// Rotation of a general matrix about axis `n`; its 2×2 block is computed from `t = s (xx − yy) + c (xy + yx)`.
 fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: usize) {
     let t = s * (h[a][a] - h[b][b]) + c * (h[a][b] + h[b][a]);
     let (st, ct) = (s * t, c * t);
@@ -140,7 +141,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Velocity of the parent frame as seen at the child frame, in child axes: `X Ω`.
+    /// Velocity `X Ω` at the child's origin, in the child's axes, of a motion `Ω` given at the parent frame.
     pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
         match self {
             ElementaryTransform::Shift { axis, r } => {
@@ -154,7 +155,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Momentum or wrench of the child at the parent frame: `Xᵀ P`.
+    /// Momentum or wrench `Xᵀ P` at the parent frame, of `P` given at the child frame.
     pub fn force(&self, f: &Force<S>) -> Force<S> {
         match self {
             ElementaryTransform::Shift { axis, r } => {
@@ -168,7 +169,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Wrench of the parent expressed at the child frame: the inverse of [`ElementaryTransform::force`].
+    /// Inverse of [`ElementaryTransform::force`]: a momentum or wrench given at the parent frame, at the child frame.
     pub fn force_back(&self, f: &Force<S>) -> Force<S> {
         match self {
             ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis: *axis, r: -*r }.force(f),
@@ -176,7 +177,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// First moment of mass `m` in the parent frame.
+    /// First moment in the parent frame, kg m, of a mass `m`, kg, whose first moment in the child frame is `s`.
     pub fn moment(&self, m: S, s: Vec3<S>) -> Vec3<S> {
         match self {
             ElementaryTransform::Shift { axis, r } => {
@@ -189,7 +190,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Inertia of the child at the parent frame: `Xᵀ M X`.
+    /// Inertia `Xᵀ M X` at the parent frame, of `M` given at the child frame.
     pub fn inertia(&self, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
         match self {
             ElementaryTransform::Turn { axis, c, s } => {
@@ -207,7 +208,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// A symmetric tensor of the child `[xx, xy, xz, yy, yz, zz]` in the parent's axes.
+    /// A symmetric tensor `[xx, xy, xz, yy, yz, zz]` given in the child's axes, in the parent's axes.
     pub fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
         match self {
             ElementaryTransform::Turn { axis, c, s } => {
@@ -221,7 +222,8 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Appends the step to the pose `(R, r)` of a frame.
+    /// Appends this transform to the pose `(R, r)` of a frame: `R` takes the frame's components to those of the reference
+    /// frame, `r` is the frame's origin in the reference frame, m.
     pub fn pose(&self, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
         match self {
             ElementaryTransform::Turn { axis, c, s } => {
@@ -245,7 +247,7 @@ impl<S: Scalar> ElementaryTransform<S> {
     }
 }
 
-/// `H'a* = Ha* − r A b*`, `H'b* = Hb* + r A a*`, then `J` from old and new `H`: no product is formed twice.
+/// `H'a* = Ha* − r A b*`, `H'b* = Hb* + r A a*`, then `J` from the old and the new `H`. No product is computed twice.
 fn shift_inertia<S: Scalar>(axis: Axis, r: S, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
     let (a, b, n) = axis.cyclic();
     let mut o = *m;
@@ -261,7 +263,7 @@ fn shift_inertia<S: Scalar>(axis: Axis, r: S, m: &ArticulatedInertia<S>) -> Arti
     o
 }
 
-/// `R Rᵀ`-free rotation matrix of a unit quaternion `(x, y, z, w)`, child components to parent components (A.55).
+/// Rotation matrix of a unit quaternion `(x, y, z, w)`, from child components to parent components (A.55).
 pub fn quaternion_matrix<S: Scalar>(q: [S; 4]) -> Mat3<S> {
     let [x, y, z, w] = q;
     let (x2, y2, z2) = (x + x, y + y, z + z);
@@ -272,7 +274,7 @@ pub fn quaternion_matrix<S: Scalar>(q: [S; 4]) -> Mat3<S> {
     [[one - (yy + zz), xy - wz, xz + wy], [xy + wz, one - (xx + zz), yz - wx], [xz - wy, yz + wx, one - (xx + yy)]]
 }
 
-/// Rate of a unit quaternion whose frame turns with `w` rad/s in its own axes (A.58).
+/// Rate, 1/s, of a unit quaternion whose frame rotates with angular velocity `w`, rad/s, in its own axes (A.58).
 pub fn quaternion_rate<S: Scalar>(q: [S; 4], w: Vec3<S>) -> [S; 4] {
     let half = S::constant(0.5);
     let v = cross([q[0], q[1], q[2]], w);
