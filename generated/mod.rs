@@ -18,12 +18,6 @@ pub mod chain10_planar;
 /// From models/chain100.toml.
 pub mod chain100;
 
-/// From models/ur5.urdf.
-pub mod ur5;
-
-/// From models/ur5.urdf.
-pub mod ur5_fast;
-
 /// From models/panda.urdf.
 pub mod panda;
 

@@ -1,11 +1,21 @@
 //! Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 //!
 //! [`mbd_model!`] turns the description of a mechanism, a TOML or URDF file, into a type with straight-line functions while
-//! your program compiles. The same generator is in [`codegen`] for build scripts; [`runtime`] has the integrators, and an
-//! interpreter for models that are known at run time only.
+//! your program compiles. The same generator is in `codegen` for build scripts; [`runtime`] has the integrators, and an
+//! interpreter for models that are known at run time only. [`prelude`] brings what most programs use.
+//!
+//! # Features
+//! | feature | default | adds |
+//! | --- | --- | --- |
+//! | `macros` | yes | the macro [`mbd_model!`]; the generator runs in the compiler and is no part of the program |
+//! | `std` | yes | generated code uses what the processor turns out to have (AVX2, FMA, AVX-512) |
+//! | `codegen` | no | the module `codegen`: readers, checks and generator as a library, for build scripts and the interpreter |
+//! | `rayon` | no | batches of states on several threads |
+//! | `diffsol` | no | the module `diffsol`: the stiff methods of the crate of that name |
 
 #[cfg(feature = "diffsol")]
 pub mod diffsol;
+pub mod prelude;
 
 #[cfg(feature = "codegen")]
 pub use mbd_codegen as codegen;

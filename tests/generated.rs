@@ -1,4 +1,4 @@
-//! The committed code of `generated/` against the interpreter: every function, bit for bit, on twenty random states.
+//! The committed code of `generated/` and of the tour against the interpreter: every function, bit for bit, on twenty random states.
 //!
 //! The generator rewrites exactly, so both compute the same operations in the same order; only the sign of zeros may
 //! differ, which `+ 0.0` levels.
@@ -6,6 +6,9 @@
 #[path = "../generated/mod.rs"]
 #[rustfmt::skip]
 mod generated;
+#[path = "../cli/tour/mod.rs"]
+#[rustfmt::skip]
+mod tour;
 
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::plan::{Plan, PlanOptions};
@@ -65,7 +68,7 @@ macro_rules! check {
             assert_eq!((plan.dims.nq, plan.dims.nv), (NQ, NV));
             assert_eq!(plan.coordinate_names(), <$type>::COORDINATES);
             assert_eq!(plan.velocity_names(), <$type>::VELOCITIES);
-            assert_eq!(System::groups(&system), System::groups(&interpreter));
+            assert_eq!(System::lie_joints(&system), System::lie_joints(&interpreter));
             assert_eq!(System::neutral(&system).to_vec(), System::neutral(&interpreter));
             let mut random = Random(0x9e37_79b9_7f4a_7c15);
             for state in 0..STATES {
@@ -172,7 +175,7 @@ macro_rules! output {
         $interpreter.jacobians(&$given.q, &mut theirs);
         same("jacobians", $given.state, &ours[..count].concat().concat(), &theirs);
     };
-    (drifts, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
+    (bias_accelerations, $type:ty, $system:ident, $interpreter:ident, $given:ident) => {
         let count = $interpreter.tree().frames.len();
         let (mut ours, mut theirs) = ([[0.0; 6]; 3], vec![[0.0; 6]; count]);
         $system.bias_accelerations(
@@ -211,7 +214,7 @@ check!(
     inputs: [tau],
     outputs: [
         rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
-        drifts
+        bias_accelerations
     ]
 );
 check!(
@@ -222,7 +225,7 @@ check!(
     inputs: [tau],
     outputs: [
         rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
-        drifts
+        bias_accelerations
     ]
 );
 check!(
@@ -233,7 +236,7 @@ check!(
     inputs: [tau, drive_q, drive_v, drive_a, wrenches],
     outputs: [
         rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians,
-        drifts
+        bias_accelerations
     ]
 );
 check!(
@@ -262,7 +265,7 @@ check!(
 );
 check!(
     ur5,
-    generated::ur5::Ur5,
+    tour::ur5::Ur5,
     "models/ur5.urdf",
     Base::Fixed,
     inputs: [tau],

@@ -10,11 +10,10 @@ use multibody::codegen::plan::Plan;
 use multibody::runtime::constrained::{ConstraintError, Effort, Hold, PostStep, Stabilisation};
 use multibody::runtime::integrate::catalogue::{self, Drive, Start};
 use multibody::runtime::integrate::{EnergyProjection, Statistics, Step, StepError};
-use multibody::runtime::interp::RankLoss;
 use multibody::runtime::{Constrained, Interpreter};
 
 use super::timed::Timed;
-use super::{loops, Failure, Outcome};
+use super::{loops, source, Failure, Outcome};
 
 /// How to simulate.
 pub struct Settings<'a> {
@@ -183,7 +182,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         Gravity::Constant(_) => plan.gravity(&params),
     };
     let mut interpreter = Interpreter::new(plan.tree(&params), gravity);
-    interpreter.check_rank(&q).map_err(|e| rank_failure(plan, &e))?;
+    interpreter.check_rank(&q).map_err(|e| source::rank_failure(plan, &e))?;
     let mut p = vec![0.0; plan.dims.nv];
     interpreter.momenta(&q, &v, &mut p);
     let (mut residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
@@ -311,15 +310,6 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
         }
     };
     Failure::new(what, help)
-}
-
-/// A mechanism that cannot move by its own laws.
-pub fn rank_failure(plan: &Plan, e: &RankLoss) -> Failure {
-    let name = plan.velocity_names().get(e.velocity).cloned().unwrap_or_default();
-    Failure::new(
-        format!("the mass matrix is singular: freedom `{name}` moves an inertia of {:e}", e.inertia),
-        "give the bodies behind this joint mass and inertia, or the joint an armature",
-    )
 }
 
 /// A line on a terminal that tells how far a long run is.

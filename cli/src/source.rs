@@ -6,6 +6,7 @@ use std::path::Path;
 use multibody::codegen::import::{load, words, ImportOptions};
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::interp::RankLoss;
 
 use super::args::ModelArgs;
 use super::output::note;
@@ -88,4 +89,13 @@ pub fn tell_notices(path: &Path, notices: &[String]) {
     for notice in notices {
         note(format_args!("{}: notice: {notice}", path.display()));
     }
+}
+
+/// The failure of a model whose mass matrix is singular: the mechanism cannot be moved by its own laws.
+pub fn rank_failure(plan: &Plan, e: &RankLoss) -> Failure {
+    let name = plan.velocity_names().get(e.velocity).cloned().unwrap_or_default();
+    Failure::new(
+        format!("the mass matrix is singular: freedom `{name}` moves an inertia of {:e}", e.inertia),
+        "give the bodies behind this joint mass and inertia, or the joint an armature",
+    )
 }

@@ -17,18 +17,14 @@ use super::output::{note, write_file};
 use super::simulate::{default_start, panels, title};
 use super::{count, plot, Failure, Outcome};
 
-#[path = "../../generated/ur5.rs"]
+#[path = "../tour/mod.rs"]
 #[rustfmt::skip]
-mod ur5;
-use ur5::Ur5;
-
-#[path = "../../generated/ur5_fast.rs"]
-#[rustfmt::skip]
-mod ur5_fast;
-use ur5_fast::Ur5Fast;
+mod robot;
+use robot::ur5::Ur5;
+use robot::ur5_fast::Ur5Fast;
 
 const FILE: &str = "models/ur5.urdf";
-const TEXT: &str = include_str!("../../models/ur5.urdf");
+const TEXT: &str = include_str!("../tour/ur5.urdf");
 const PLOT: &str = "mbd-tour.svg";
 const STATES: usize = 1000;
 const TIME: f64 = 10.0;
@@ -63,7 +59,7 @@ pub fn run(out: &mut dyn Write) -> Outcome {
     let mut generated = Ur5::new();
     let states = states();
     let numbers = compare(&states, &mut generated, &mut interpreter)?;
-    writeln!(out, "\n3. The generated code (generated/ur5.rs, exact arithmetic, compiled in) against the interpreter, which runs the same sweeps on numbers:")?;
+    writeln!(out, "\n3. The generated code (cli/tour/ur5.rs, exact arithmetic, compiled in) against the interpreter, which runs the same sweeps on numbers:")?;
     writeln!(out, "   {numbers} results on {STATES} random states, equal bit for bit\n")?;
     out.flush()?;
     let record = ten_seconds(&plan, &mut generated, out)?;
@@ -121,7 +117,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
             true => Ok(()),
             false => Err(Failure::new(
                 format!("state {state}: `{what}` of generated code and interpreter differ: {a:?} and {b:?}"),
-                "generated/ur5.rs is stale: run `mbd check --generated --update` in the sources and build anew",
+                "cli/tour/ur5.rs is stale: run `mbd check --generated cli/tour --update` in the sources and build anew",
             )),
         }
     };
@@ -213,7 +209,7 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
         if off.is_nan() || off > 1e-11 * size {
             return Err(Failure::new(
                 format!("fast and exact arithmetic differ by {off:e} where rates are {size:e}"),
-                "generated/ur5_fast.rs is stale: run `mbd check --generated --update` in the sources and build anew",
+                "cli/tour/ur5_fast.rs is stale: run `mbd check --generated cli/tour --update` in the sources and build anew",
             ));
         }
     }

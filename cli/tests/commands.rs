@@ -2,6 +2,7 @@
 
 mod command;
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use command::*;
@@ -284,6 +285,8 @@ fn explains() {
 #[test]
 fn committed_code_is_fresh() {
     good(run(&["check", "--generated"]));
+    good(run(&["check", "--generated", "cli/tour"]));
+    assert_eq!(read(Path::new(ROOT), "cli/tour/ur5.urdf"), read(Path::new(ROOT), "models/ur5.urdf"), "copied anew");
 }
 
 #[test]

@@ -163,7 +163,7 @@ impl Floating {
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
         i.momenta(&s.q, &s.v, &mut p);
-        let group = *i.groups().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
+        let group = *i.lie_joints().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
         let weights = model.joints.iter().map(|j| {
             let body = &model.bodies[j.child];
             (mbd_testing::value(body.mass, &[]), body.com.map(|x| mbd_testing::value(x, &[])))

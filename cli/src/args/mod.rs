@@ -116,16 +116,20 @@ const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
   inverse_dynamics (q, v, v') -> tau
   bias           (q, v) -> h, with M v' + h = tau
   jacobians      q -> Jacobians of bodies and frames
-  drifts         (q, v) -> accelerations of bodies and frames at v' = 0
+  bias_accelerations
+                 (q, v) -> accelerations of bodies and frames at v' = 0
   derivatives    (q, p) -> v, p' and their derivatives with respect to q and p
   momentum_derivatives
                  (q, v) -> p, p' and their derivatives with respect to q and v
   parameter_derivatives
                  (q, p) -> derivatives of v and p' with respect to parameters
 Of models with loops or couplings (they get these beside the defaults):
-  closure        q -> residuals of the constraints, and their Jacobian
-  settle         (q, p) -> v, momenta freed of multipliers, multipliers sigma
-  correction     q -> residuals, Newton's step onto closed positions, its pivots
+  constraint_residuals
+                 q -> residuals of the constraints, and their Jacobian
+  project_momenta
+                 (q, p) -> v, momenta freed of multipliers, multipliers sigma
+  position_correction
+                 q -> residuals, Newton's step onto closed positions, its pivots
   multipliers    (q, v) -> forces of the constraints
 such models have no `momentum_derivatives`.";
 

@@ -11,7 +11,6 @@ use multibody::runtime::{Constrained, Interpreter};
 use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
-use super::motion::rank_failure;
 use super::output::{note, write_file};
 use super::{loops, source, Failure, Outcome};
 use input::{Inputs, State};
@@ -115,7 +114,7 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
     for (k, state) in inputs.states.iter().enumerate() {
         state.apply(&mut interpreter);
         if needs_rank {
-            interpreter.check_rank(&state.q).map_err(|e| (k, rank_failure(plan, &e)))?;
+            interpreter.check_rank(&state.q).map_err(|e| (k, source::rank_failure(plan, &e)))?;
         }
         for open in loops::violated(plan, &mut interpreter, &state.q, &state.v) {
             note(format_args!("states[{k}]: warning: {open}"));

@@ -6,7 +6,7 @@ use std::io::Write;
 use multibody::codegen::emit::quantity;
 use multibody::codegen::generate::OutputProgram;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::symbolic::{Op, Operand, Output};
+use multibody::codegen::symbolic::{Op, Operand, ProgramResult};
 
 use crate::Outcome;
 
@@ -80,8 +80,8 @@ pub fn statements(plan: &Plan, group: &OutputProgram, out: &mut dyn Write) -> Ou
     writeln!(out, "  results, in order")?;
     for output in &group.program.outputs {
         match output {
-            Output::Const(x) => writeln!(out, "    {x}")?,
-            Output::Node(id, neg) => writeln!(out, "    {}{}", if *neg { "-" } else { "" }, name(*id))?,
+            ProgramResult::Const(x) => writeln!(out, "    {x}")?,
+            ProgramResult::Node(id, neg) => writeln!(out, "    {}{}", if *neg { "-" } else { "" }, name(*id))?,
         }
     }
     Ok(writeln!(out)?)
@@ -128,7 +128,7 @@ fn alive(group: &OutputProgram) -> (usize, usize) {
         }
     }
     for output in &group.program.outputs {
-        if let Output::Node(id, _) = output {
+        if let ProgramResult::Node(id, _) = output {
             last.insert(*id, steps.len());
         }
     }

@@ -19,9 +19,9 @@ pub fn system(out: &mut String, plan: &Plan, options: &Options) {
         .filter_map(|s| {
             let Some(Source::State { q, v }) = s.at else { return None };
             let kind = match plan.model.joints[s.joint].kind {
-                JointKind::Spherical => "Rotation",
-                JointKind::Floating => "Pose",
-                JointKind::Planar { .. } => "Plane",
+                JointKind::Spherical => "SO3",
+                JointKind::Floating => "SE3",
+                JointKind::Planar { .. } => "SE2",
                 _ => return None,
             };
             Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{kind}, {q}, {v})"))

@@ -25,7 +25,7 @@ where
     Y: Constrained<Scalar = f64> + Conjugate,
 {
     let mut random = Random(0x9E37_79B9_7F4A_7C15 ^ (seed + 1).wrapping_mul(0xBF58_476D_1CE4_E5B9));
-    let groups: Vec<(usize, usize)> = system.groups().iter().map(|g| (g.q, g.kind.sizes().0)).collect();
+    let groups: Vec<(usize, usize)> = system.lie_joints().iter().map(|g| (g.q, g.kind.sizes().0)).collect();
     loop {
         for (q, start) in q.as_mut().iter_mut().zip(start) {
             *q = start + far * random.next();
