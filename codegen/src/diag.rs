@@ -1,19 +1,19 @@
-//! Findings about an input file: what, where, what to do.
+//! Findings about an input file: what is wrong, where, and what to do.
 
 use std::fmt;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Severity {
-    /// Nothing can be made of the file.
+    /// The file cannot be used.
     Error,
-    /// Something is ignored or suspicious.
+    /// Something in the file is ignored or suspicious.
     Warning,
-    /// Something was changed on the way, for the better.
+    /// The reader changed something, for example an angle close to a right angle.
     Notice,
 }
 
-/// One finding: `file:line:column: message`, and a help line. Lines and columns start at 1; 0 means the file as a whole.
+/// One finding: `file:line:column: message`, and a help line. Lines and columns start at 1; line 0 stands for the file as a whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Severity.

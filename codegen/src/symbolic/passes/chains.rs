@@ -1,29 +1,29 @@
-//! How the terms of one sum are shared out to chains of additions.
+//! Distribution of the terms of one sum over chains of additions that run in parallel.
 
 use crate::symbolic::machine::{PRODUCT, SUM};
 
-/// Chains of one sum at the most.
+/// Largest number of chains for one sum.
 const CHAINS: usize = 3;
 
-/// Cycles that one more operation has to save.
+/// Cycles that an additional operation must save.
 const WORTH: u32 = 1;
 
-/// A term: when it, or the factors of its last product, can be used.
+/// A term of a sum, and the time at which it, or the factors of its last product, are available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Arrival {
-    /// Cycle.
+    /// Time, in cycles.
     pub ready: u32,
-    /// Whether a product is to be fused with the addition.
+    /// Whether the term is a product that is fused with the addition.
     pub is_product: bool,
 }
 
-/// Terms shared out to chains.
+/// An assignment of terms to chains.
 pub struct Plan {
-    /// When the sum is there.
+    /// Time at which the sum is available, in cycles.
     pub ready: u32,
-    /// Instructions: additions, fused or not, and the products at the head of chains.
+    /// Number of instructions: additions, fused or not, and the products that start a chain.
     pub instructions: u32,
-    /// Those of them that multiply.
+    /// Number of these instructions that multiply.
     pub products: u32,
     /// Number of chains.
     pub chains: usize,
@@ -31,13 +31,13 @@ pub struct Plan {
     pub places: Vec<usize>,
 }
 
-/// The best plan for terms in order of arrival; nothing for no terms.
+/// The best plan for terms in the order in which they become available; `None` if there are no terms.
 pub fn best_plan(terms: &[Arrival]) -> Option<Plan> {
     let plans = (1..=CHAINS.min(terms.len())).map(|k| plan(terms, k));
     plans.min_by_key(|p| p.ready + WORTH * p.instructions)
 }
 
-/// Each term goes to the chain that is free first.
+/// The plan in which each term goes to the chain that is free first.
 fn plan(terms: &[Arrival], chains: usize) -> Plan {
     let mut free: Vec<u32> = Vec::with_capacity(chains);
     let mut places = Vec::with_capacity(terms.len());

@@ -1,10 +1,10 @@
-//! Constant factors moved together: `c·(d·x)` becomes `(c·d)·x`, though `d·x` may be needed elsewhere too. Costs nothing and
-//! waits for one product less.
+//! Collects constant factors: `c·(d·x)` becomes `(c·d)·x`, even where `d·x` is needed elsewhere too. The number of operations
+//! does not grow, and the critical path has one product less.
 
 use super::rebuild::Rebuilt;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
-/// Moves constant factors together.
+/// Collects the constant factors of products.
 pub fn gather(program: &Program) -> Program {
     let graph = Graph::default();
     let mut new = Rebuilt::new(&graph, program);

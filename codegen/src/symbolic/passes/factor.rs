@@ -1,7 +1,8 @@
-//! Common factors taken out of sums: `a·b + a·c` becomes `a·(b + c)`.
+//! Takes common factors out of sums: `a·b + a·c` becomes `a·(b + c)`.
 //!
-//! Only products that are used once are opened, so that every factor taken out of `n` terms saves `n − 1` products and
-//! nothing is computed twice. The factor that saves most goes first; what is left in brackets is treated in the same way.
+//! Only products that are used once are split into factors. Every factor that is taken out of `n` terms then saves `n − 1`
+//! products, and nothing is computed twice. The factor that saves most is taken first; the sum in brackets is treated in the
+//! same way.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +10,7 @@ use super::rebuild::Rebuilt;
 use super::terms::Opened;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
-/// Factors all sums.
+/// Takes common factors out of all sums.
 pub fn factor(program: &Program) -> Program {
     let opened = Opened::new(program);
     let graph = Graph::default();
@@ -28,7 +29,7 @@ pub fn factor(program: &Program) -> Program {
     new.finish(program)
 }
 
-/// A product with its sign; the factors in order.
+/// A product with its sign; its factors are sorted.
 #[derive(Clone, Debug)]
 struct Term {
     minus: bool,
@@ -74,9 +75,9 @@ fn total<'g>(graph: &'g Graph, mut terms: Vec<Term>) -> Expr<'g> {
     values.reduce(|a, b| a + b).unwrap_or(Expr::Const(0.0))
 }
 
-/// The factor that saves most products, if any saves one; of equals, the oldest.
+/// The factor that saves most products, if one saves any; among equals the oldest.
 fn best(terms: &[Term]) -> Option<Operand> {
-    // Terms with the factor, and those of them that are products.
+    // For each factor: the number of terms with it, and how many of them are products.
     let mut found: BTreeMap<Operand, (usize, usize)> = BTreeMap::new();
     for term in terms {
         for (k, factor) in term.factors.iter().enumerate() {
@@ -87,7 +88,7 @@ fn best(terms: &[Term]) -> Option<Operand> {
             }
         }
     }
-    // The product that is left costs one.
+    // The product with the bracket costs one.
     let gain = |(all, products): (usize, usize)| if all > 1 { products.saturating_sub(1) } else { 0 };
     let mut best: Option<(usize, Operand)> = None;
     for (factor, counts) in found {
@@ -126,7 +127,7 @@ mod tests {
     #[test]
     fn what_saves_nothing_stays() {
         assert_eq!(factored(|[a, b, ..]| a + a * b), (1, 1));
-        // The product is used twice: to open it would compute it again.
+        // The product is used twice; if it were split, it would be computed again.
         assert_eq!(factored(|[a, b, c, ..]| (a * b + a * c) / (a * b)), (1, 2));
     }
 

@@ -1,4 +1,4 @@
-//! Rewriting of whole programs, for [`Arithmetic::Fast`]: other rounding, the same value.
+//! Rewriting of whole programs, for [`Arithmetic::Fast`]: the values are the same up to rounding.
 
 pub(super) mod chains;
 pub mod constants;
@@ -18,22 +18,23 @@ use crate::plan::EliminationStrategy;
 pub(super) use rebuild::width;
 use schedule::Limits;
 
-/// Rounds of rewriting at the most; two or three are enough for everything met so far.
+/// Largest number of rounds of rewriting; two or three have been enough for all models so far.
 const ROUNDS: usize = 4;
 
-/// Registers that a schedule fills: of the 32 of AVX-512, or of 16 with some in memory, which costs little.
+/// Number of values that a schedule keeps alive: of the 32 registers of AVX-512, or of 16 registers with some values in memory,
+/// which costs little.
 const LIMITS: Limits = Limits { registers: 24, search: 64 };
 
-/// Long programs whose pipes are busy this many times as long as their longest path takes keep the order of the sweeps:
-/// there is always something to do, and values that are used where they are made stay in registers. (Derivatives of a
-/// general chain, Panda and Solo12 then take less time, the last two a fifth with fused operations; iiwa's, with fewer
-/// instructions, take more.)
+/// Long programs keep the order of the sweeps if the work of their busiest pipe takes this many times as long as their critical
+/// path. There is then always an operation that is ready, and values that are used soon after they are computed stay in
+/// registers. (The derivatives of a general chain, of the Panda and of Solo12 take less time in this order, those of the last two
+/// a fifth less with fused operations; those of the iiwa, with fewer instructions, take more.)
 const WIDE: f64 = 2.0;
 
-/// Instructions of a long program.
+/// Number of instructions from which a program counts as long.
 const LONG: usize = 1400;
 
-/// The program as it is to be emitted. Whoever wants the fewest operations gets none twice to save time.
+/// The program as it is emitted. Where the fewest operations are asked for, nothing is computed twice to save time.
 pub fn run(program: Program, arithmetic: Arithmetic, forms: EliminationStrategy) -> Program {
     match arithmetic {
         Arithmetic::Exact => program,
@@ -60,7 +61,7 @@ pub fn run(program: Program, arithmetic: Arithmetic, forms: EliminationStrategy)
     }
 }
 
-/// Fewer operations: common factors and common pairs in turn, until neither saves any.
+/// Reduces the number of operations: takes out common factors and common pairs in turn, until neither saves any.
 pub fn fewer(mut program: Program) -> Program {
     for _ in 0..ROUNDS {
         let next = share::share(&factor::factor(&program));

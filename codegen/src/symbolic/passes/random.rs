@@ -5,7 +5,7 @@ use crate::symbolic::{Expr, Graph, Program};
 /// Inputs of a random program.
 pub const INPUTS: usize = 6;
 
-/// Numbers that look random; the same for the same seed.
+/// Pseudo-random numbers, the same for the same seed.
 pub struct Rng(u64);
 
 impl Rng {
@@ -18,21 +18,21 @@ impl Rng {
         ((self.0 >> 33) as usize) % n
     }
 
-    /// Small integers that are not zero.
+    /// A small integer that is not zero.
     pub fn inputs(&mut self) -> [f64; INPUTS] {
         std::array::from_fn(|_| [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0][self.below(6)])
     }
 }
 
-/// A value, and a limit to the sum of magnitudes that it is made of, whatever the order.
+/// A value, and an upper bound of the sum of the magnitudes of its terms in every order of evaluation.
 #[derive(Clone, Copy)]
 struct Made<'g> {
     value: Expr<'g>,
     most: f64,
 }
 
-/// A program of sums and products of integers. No number in it, in whatever order it is evaluated, is too large to be
-/// exact, so passes must give exactly its values.
+/// A program of sums and products of integers. In every order of evaluation all numbers are small enough to be exact, so that
+/// a pass must give exactly the same values.
 pub fn integer_program(seed: u64, operations: usize) -> Program {
     let mut rng = Rng::new(seed);
     let graph = Graph::default();
@@ -41,7 +41,7 @@ pub fn integer_program(seed: u64, operations: usize) -> Program {
         pool.push(Made { value: Expr::Const(c), most: 5.0 });
     }
     while pool.len() < INPUTS + 4 + operations {
-        // Recent values more often, so that programs get deep.
+        // Recent values are chosen more often, so that programs get deep.
         let mut pick = || {
             let recent = pool.len().min(12);
             if rng.below(3) > 0 {
@@ -56,7 +56,7 @@ pub fn integer_program(seed: u64, operations: usize) -> Program {
             2 | 3 => Made { value: a.value + b.value, most: a.most + b.most },
             _ => Made { value: a.value - b.value, most: a.most + b.most },
         };
-        // 2^49: with room for what factoring may multiply out of order.
+        // 2^49 leaves room for the products that factoring may form in another order.
         if made.most < 5e14 {
             pool.push(made);
         } else {
@@ -68,7 +68,7 @@ pub fn integer_program(seed: u64, operations: usize) -> Program {
 }
 
 /// A well-conditioned program with every kind of operation: sums of positive numbers near one, averaged so that they stay
-/// there. Errors of its results are a few roundings for each operation, in whatever order.
+/// there. In every order, the errors of its results are a few roundings for each operation.
 pub fn real_program(seed: u64, operations: usize) -> Program {
     use mbd_runtime::Scalar;
     let mut rng = Rng::new(seed);
@@ -77,7 +77,8 @@ pub fn real_program(seed: u64, operations: usize) -> Program {
     while pool.len() < operations {
         let (a, b) = (pool[rng.below(pool.len())], pool[pool.len() - 1 - rng.below(pool.len().min(9))]);
         let made = match rng.below(8) {
-            // Kept and dropped pivots: all values are positive, and the floor is well below or well above.
+            // Pivots that are kept and pivots that are dropped: all values are positive, and the floor is well below or well
+            // above them.
             6 => (a * b).reciprocal_above(Expr::Const(0.1) * a * b) + Expr::Const(1.0),
             7 => (b - a - b).reciprocal_above(b) + a,
             0 => a / b + Expr::Const(1.0),
@@ -93,7 +94,7 @@ pub fn real_program(seed: u64, operations: usize) -> Program {
     Program::new(&graph, &outputs)
 }
 
-/// Whether a pass keeps the values of random programs: exactly for integers, to rounding for others.
+/// Asserts that a pass keeps the values of random programs: exactly for integers, to rounding for others.
 pub fn keeps_values(pass: impl Fn(&Program) -> Program) {
     let fused = |a: f64, b: f64, c: f64| a.mul_add(b, c);
     for seed in 0..200 {
@@ -119,7 +120,7 @@ pub fn keeps_values(pass: impl Fn(&Program) -> Program) {
     }
 }
 
-/// Whether a pass makes programs cheaper or leaves them.
+/// Asserts that a pass never makes a program more expensive.
 pub fn counts_never_grow(pass: impl Fn(&Program) -> Program) {
     for seed in 0..200 {
         let old = integer_program(seed, 10 + seed as usize % 150);
@@ -128,7 +129,7 @@ pub fn counts_never_grow(pass: impl Fn(&Program) -> Program) {
     }
 }
 
-/// Operands come before their use, ids are unique.
+/// Asserts that operands come before their use and that ids are unique.
 fn in_order(program: &Program) {
     let mut seen = std::collections::BTreeSet::new();
     for (id, op, _) in &program.steps {

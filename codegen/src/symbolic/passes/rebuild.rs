@@ -1,11 +1,11 @@
-//! What every pass starts from: a program's values in a new graph, and who uses what.
+//! The basis of every pass: it rebuilds a program's values in a new graph, and counts the uses of each value.
 
 use mbd_runtime::sweep::Trace;
 use mbd_runtime::Scalar;
 
 use crate::symbolic::{Expr, Graph, Label, Op, Operand, Program, ProgramResult};
 
-/// A program on its way into another graph: the expression of every node so far.
+/// A program that is being rebuilt in a new graph: the new expression of every node so far.
 pub struct Rebuilt<'g> {
     /// The new graph.
     pub graph: &'g Graph,
@@ -17,7 +17,7 @@ impl<'g> Rebuilt<'g> {
         Rebuilt { graph, values: vec![None; width(program)] }
     }
 
-    /// The expression of an operand.
+    /// The new expression of an operand.
     pub fn get(&self, operand: Operand) -> Expr<'g> {
         match operand {
             Operand::Const(bits) => Expr::Const(f64::from_bits(bits)),
@@ -25,17 +25,17 @@ impl<'g> Rebuilt<'g> {
         }
     }
 
-    /// Says what has become of a node.
+    /// Sets the new expression of a node.
     pub fn set(&mut self, id: u32, value: Expr<'g>) {
         self.values[id as usize] = Some(value);
     }
 
-    /// New nodes carry this label from now on.
+    /// Sets the label of all nodes that are made from now on.
     pub fn at(&self, label: Label) {
         self.graph.at(label.0, label.1);
     }
 
-    /// The same operation on the new operands, by the exact rules.
+    /// The same operation on the new operands, simplified by the exact rules.
     pub fn copy(&self, op: Op) -> Expr<'g> {
         let node = |id| self.get(Operand::Node(id));
         let signed = |x: Expr<'g>, minus: bool| if minus { -x } else { x };
@@ -59,7 +59,7 @@ impl<'g> Rebuilt<'g> {
         }
     }
 
-    /// The program that the new graph makes of the old one's results.
+    /// The new program with the results of the old one.
     pub fn finish(&self, old: &Program) -> Program {
         let result = |output: &ProgramResult| match *output {
             ProgramResult::Const(x) => Expr::Const(x),
@@ -84,7 +84,7 @@ pub fn width(program: &Program) -> usize {
     program.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
 }
 
-/// How often each node is used, by operations and results together.
+/// Number of uses of each node by operations and results together.
 pub fn uses(program: &Program) -> Vec<u32> {
     let mut uses = vec![0; width(program)];
     for (_, op, _) in &program.steps {
@@ -102,7 +102,7 @@ pub fn uses(program: &Program) -> Vec<u32> {
     uses
 }
 
-/// Operations by node id.
+/// The operations, by node id.
 pub fn by_id(program: &Program) -> Vec<Option<Op>> {
     let mut ops = vec![None; width(program)];
     for (id, op, _) in &program.steps {

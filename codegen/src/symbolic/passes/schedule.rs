@@ -1,4 +1,4 @@
-//! The order of operations: longest way to a result first, as long as registers last.
+//! Schedules operations: those with the longest path to a result come first, as long as registers are free.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -9,13 +9,13 @@ use crate::symbolic::{Op, Operand, Program, ProgramResult};
 /// Limits of a schedule.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Values alive at once.
+    /// Largest number of values that are alive at the same time.
     pub registers: usize,
-    /// Operations that are looked at for one that frees a register.
+    /// Number of operations that are examined to find one that frees a register.
     pub search: usize,
 }
 
-/// Orders a program: inputs, sines and cosines first, then cycle by cycle what is ready.
+/// Orders a program: inputs, sines and cosines first, then, cycle by cycle, the operations that are ready.
 pub fn schedule(program: &Program, limits: Limits) -> Program {
     let scheduler = Scheduler::new(program, limits);
     let order = scheduler.run();
@@ -80,14 +80,14 @@ struct Scheduler<'p> {
 /// What changes from cycle to cycle.
 struct State {
     order: Vec<u32>,
-    /// Operands that are still to be computed.
+    /// For each step, the number of operands that are still to be computed.
     missing: Vec<u32>,
-    /// Uses still to come.
+    /// For each step, the number of uses that are still to come.
     left: Vec<u32>,
     finish: Vec<u32>,
-    /// Ready to start, by pipe: greatest height first, then oldest.
+    /// Steps that are ready to start, for each pipe: greatest height first, then oldest.
     ready: [BinaryHeap<(u32, Reverse<u32>)>; 2],
-    /// All operands under way, by the cycle when they are there.
+    /// Steps whose operands have all been started, by the cycle in which they are available.
     future: BinaryHeap<Reverse<(u32, u32)>>,
     alive: usize,
 }
@@ -168,7 +168,7 @@ impl<'p> Scheduler<'p> {
             if issued == 0 {
                 match state.future.peek() {
                     Some(&Reverse((at, _))) => cycle = at,
-                    // Only operations that need one more register are left: the most urgent one gets it.
+                    // Only operations that need one more register are left; the most urgent one gets it.
                     None => {
                         let lane = usize::from(state.ready[1].peek() > state.ready[0].peek());
                         let Some((_, Reverse(step))) = state.ready[lane].pop() else { break };
@@ -221,7 +221,7 @@ impl<'p> Scheduler<'p> {
         found
     }
 
-    /// By how much the values alive grow.
+    /// Change of the number of values that are alive.
     fn growth(&self, state: &State, step: u32) -> i32 {
         let frees = |o: &&u32| state.left[**o as usize] == 1 && !self.in_memory(**o) && !self.is_result[**o as usize];
         1 - self.operands[step as usize].iter().filter(frees).count() as i32
@@ -229,7 +229,7 @@ impl<'p> Scheduler<'p> {
 
     fn issue(&self, state: &mut State, step: u32, cycle: u32) {
         if !self.in_memory(step) {
-            // Results are stored at once: one that is not used again needs no register.
+            // Results are stored immediately; a result that is not used again needs no register.
             state.alive += usize::from(!self.users[step as usize].is_empty());
         }
         for &o in &self.operands[step as usize] {
@@ -263,7 +263,7 @@ mod tests {
 
     const LIMITS: Limits = Limits { registers: 16, search: 64 };
 
-    /// Most values between their definition and their last use; inputs, sines and cosines are in memory.
+    /// Largest number of values between definition and last use; inputs, sines and cosines are in memory and do not count.
     fn alive(program: &Program) -> usize {
         let mut last = std::collections::BTreeMap::new();
         for (at, (_, op, _)) in program.steps.iter().enumerate() {
@@ -294,7 +294,7 @@ mod tests {
         keeps_values(|p| schedule(p, LIMITS));
     }
 
-    /// Sums of products that are all ready at once would all be alive at once without the limit.
+    /// Without the limit, sums of products that are all ready at the same time would all be alive at the same time.
     #[test]
     fn registers_are_respected() {
         let graph = crate::symbolic::Graph::default();

@@ -1,7 +1,7 @@
-//! Pairs of terms that several sums have in common, added once.
+//! Adds pairs of terms that several sums have in common only once.
 //!
-//! Binary sums hide them: `(a + b) + c` and `(a + c) + d` share `a + c`. Sums that are used once, by a sum, are opened; the
-//! pair that most sums contain is taken first. A pair in `n` sums saves `n − 1` additions.
+//! Binary sums hide such pairs: `(a + b) + c` and `(a + c) + d` share `a + c`. Sums that are used once, by a sum, are therefore
+//! split into terms. The pair that most sums contain is taken first. A pair in `n` sums saves `n − 1` additions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 /// Two terms in order, and whether their signs differ.
 type Pair = (Operand, Operand, bool);
 
-/// Sums with more terms than this are left alone: their pairs are too many to list.
+/// Sums with more terms than this are not changed, because they have too many pairs.
 const LONGEST: usize = 64;
 
 /// Shares common pairs.
@@ -35,13 +35,13 @@ fn choose(opened: &Opened, sums: &mut BTreeMap<u32, Vec<(Operand, bool)>>, next:
     }
     places.retain(|_, at| at.len() > 1);
     let mut chosen = Vec::new();
-    // Most frequent first; counts only fall, except for pairs with a new operand, which later rounds find.
+    // The most frequent pair comes first. Counts only decrease, except for pairs with a new operand; later rounds find these.
     let mut queue: Vec<(usize, Pair)> = places.iter().map(|(pair, at)| (at.len(), *pair)).collect();
     queue.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
     for (_, pair) in queue {
         let has = |terms: &[(Operand, bool)]| pairs_of(opened, terms).any(|p| p == pair);
         let at: Vec<u32> = places[&pair].iter().copied().filter(|id| has(&sums[id])).collect();
-        // A sum that is nothing but the pair stays what it is, and the others use it.
+        // A sum that consists of the pair alone is not changed, and the other sums use it.
         if at.len() < 2 {
             continue;
         }
@@ -58,13 +58,13 @@ fn choose(opened: &Opened, sums: &mut BTreeMap<u32, Vec<(Operand, bool)>>, next:
     chosen
 }
 
-/// Where the members of a pair stand in a sum. A term may stand there twice, with either sign.
+/// Positions of the members of a pair in a sum. A sum may contain a term twice, with either sign.
 fn places_of(terms: &[(Operand, bool)], pair: Pair) -> Option<(usize, usize)> {
     let of = |o: Operand| (0..terms.len()).filter(move |&k| terms[k].0 == o);
     of(pair.0).flat_map(|a| of(pair.1).map(move |b| (a, b))).find(|&(a, b)| (terms[a].1 != terms[b].1) == pair.2)
 }
 
-/// The pairs of one sum whose members could stand in other sums, too.
+/// The pairs of one sum whose members may also occur in other sums.
 fn pairs_of<'a>(opened: &'a Opened, terms: &'a [(Operand, bool)]) -> impl Iterator<Item = Pair> + 'a {
     let terms = if terms.len() > LONGEST { &[] } else { terms };
     let shared = |o: Operand| opened.summand(o).is_none();
@@ -132,7 +132,7 @@ mod tests {
         let program = Program::new(&graph, &[(a + b) + c, (a + d) + b, d - (a + b)]);
         assert_eq!(program.counts().additions, 5);
         assert_eq!(share(&program).counts().additions, 4);
-        // Signs: a − b and b − a are one.
+        // a − b and b − a are one pair, with different signs.
         let program = Program::new(&graph, &[(a + c) - b, (b + d) - a]);
         assert_eq!(share(&program).counts().additions, 3);
     }

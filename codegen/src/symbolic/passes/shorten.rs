@@ -1,22 +1,22 @@
-//! Products computed again where a shared one makes the longest path wait.
+//! Computes a shared product again where waiting for it lengthens the critical path.
 //!
-//! A product that several operations use is computed once. If it lies on the longest path, its users are better off with
-//! its factors: a sum fuses the product, `M − u·(v·r)` with a late `r` becomes `M − (u·v)·r`. Each costs an operation or
-//! two and saves a product's latency. Only programs that wait more than they compute are treated, and only changes that
-//! pay are kept.
+//! A product that several operations use is computed once. If it lies on the critical path, its users can become faster by
+//! using its factors instead: a sum fuses the product, and `M − u·(v·r)` with a late `r` becomes `M − (u·v)·r`. Each change
+//! costs one or two operations and saves the latency of a product. Only programs that are limited by latency are changed, and
+//! only changes that save time are kept.
 
 use super::rebuild::{by_id, uses};
 use super::sums::{regroup_copying, Copies, Regrouped};
 use crate::symbolic::machine::{self, waiting, PRODUCT};
 use crate::symbolic::{Op, Program};
 
-/// Rounds at the most; each finds the paths that the last one left.
+/// Largest number of rounds; each round finds the critical paths that the last one left.
 const ROUNDS: usize = 24;
 
-/// Products with more slack than this are left alone.
+/// Products with more slack than this, in cycles, are not changed.
 const SLACK: u32 = 1;
 
-/// Regroups a program, with copies of products where they shorten it.
+/// Regroups a program, with copies of products where they shorten the critical path.
 pub fn regroup_short(program: &Program) -> Program {
     let (ops, uses) = (by_id(program), uses(program));
     let shared: Vec<usize> =
@@ -43,7 +43,7 @@ pub fn regroup_short(program: &Program) -> Program {
     best
 }
 
-/// Marks a product as one to be computed again; says whether that is new.
+/// Marks a product to be computed again. Returns whether it was not marked before.
 fn copy(copies: &mut Copies, id: usize, now: &Regrouped) -> bool {
     let uneven = now.spread[id] >= PRODUCT;
     let changed = !copies.in_sums[id] || (uneven && !copies.in_products[id]);
@@ -52,7 +52,7 @@ fn copy(copies: &mut Copies, id: usize, now: &Regrouped) -> bool {
     changed
 }
 
-/// Cycles of a regrouped program.
+/// Estimated time of a regrouped program, in cycles.
 fn cycles(program: &Program) -> f64 {
     machine::cycles(program.critical_path(), program.throughput(), program.instructions())
 }
@@ -64,8 +64,8 @@ mod tests {
     use super::*;
     use crate::symbolic::{Expr, Graph};
 
-    /// A continued fraction whose every step waits for a quotient, a product of it that is used twice, and a sum; beside it
-    /// nothing but what makes the program long.
+    /// A continued fraction: every step waits for a quotient, a product with it that is used twice, and a sum. The other
+    /// operations only make the program long.
     fn staircase(graph: &Graph) -> Program {
         let x: Vec<Expr> = (0..8).map(|k| graph.input(k)).collect();
         let (mut late, mut others) = (x[0], Vec::new());

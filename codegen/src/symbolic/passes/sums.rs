@@ -1,8 +1,8 @@
-//! Sums and products in the order in which their operands arrive, products fused with sums.
+//! Orders sums and products by the times at which their operands become available, and fuses products with sums.
 //!
-//! A sum of many terms is one value that many orders give. The terms that are ready first are added first; where that is
-//! faster, in two or three chains at once. Likewise the factors of a product: what is late is multiplied last. A product
-//! that is used once, by the sum, is fused with its addition.
+//! Many orders of addition give the same sum, up to rounding. The terms that are available first are added first, in two or
+//! three parallel chains where that is faster. In a product, the latest factor is multiplied last. A product that is used
+//! once, by a sum, is fused with its addition.
 
 use super::chains::{best_plan, Arrival, Plan};
 use super::rebuild::Rebuilt;
@@ -10,34 +10,34 @@ use super::terms::Opened;
 use crate::symbolic::machine::latency;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
-/// Regroups all sums and products.
+/// Regroups all sums and products of a program.
 pub fn regroup(program: &Program) -> Program {
     regroup_copying(program, &Copies::none(super::rebuild::width(program))).program
 }
 
-/// Shared products that are computed again by their users, by node id.
+/// Shared products that their users compute again, by node id.
 #[derive(Clone, Debug)]
 pub struct Copies {
-    /// By sums.
+    /// Those that sums compute again.
     pub in_sums: Vec<bool>,
-    /// By products.
+    /// Those that products compute again.
     pub in_products: Vec<bool>,
 }
 
 impl Copies {
-    /// None, for ids below `width`.
+    /// No product, for ids below `width`.
     pub fn none(width: usize) -> Copies {
         Copies { in_sums: vec![false; width], in_products: vec![false; width] }
     }
 }
 
-/// A regrouped program, and the times of the old program's nodes in it.
+/// A regrouped program, and the times of the old program's nodes in it, in cycles.
 pub struct Regrouped {
     /// The program.
     pub program: Program,
-    /// Cycles by which a node may be late; the largest number where it is not computed.
+    /// Cycles by which a node may be late without delaying a result; the largest number where it is not computed.
     pub slack: Vec<u32>,
-    /// Cycles between the operands of a product.
+    /// Cycles between the times at which the two operands of a product are available.
     pub spread: Vec<u32>,
 }
 
@@ -87,7 +87,8 @@ pub fn regroup_copying(program: &Program, copies: &Copies) -> Regrouped {
     Regrouped { program: regrouped, slack, spread }
 }
 
-/// Cycles by which each node may be late; the largest number for nodes that are not in the program.
+/// Cycles by which each node may be late without delaying a result; the largest number for nodes that are not in the
+/// program.
 fn slacks(program: &Program, width: usize) -> Vec<u32> {
     let (mut ready, mut after, mut slack) = (vec![0; width], vec![0; width], vec![u32::MAX; width]);
     let nodes = |op: &Op| {
@@ -118,7 +119,7 @@ enum Term<'g> {
 
 struct Pass<'g, 'p> {
     new: Rebuilt<'g>,
-    /// When each new node is ready.
+    /// Time at which each new node is available, in cycles.
     arrival: Vec<u32>,
     opened: &'p Opened,
 }
@@ -132,7 +133,7 @@ impl<'g> Pass<'g, '_> {
         }
     }
 
-    /// A product up to its last multiplication. What is ready first is multiplied first.
+    /// A product up to its last multiplication. The factors that are available first are multiplied first.
     fn product(&mut self, factors: Vec<Operand>) -> Term<'g> {
         let mut factors: Vec<Expr<'g>> = factors.into_iter().map(|f| self.new.get(f)).collect();
         loop {
@@ -150,7 +151,7 @@ impl<'g> Pass<'g, '_> {
     }
 
     fn ready(&mut self, e: Expr<'g>) -> u32 {
-        // Nodes of this graph come in order, so the table is extended to what is there.
+        // The ids of this graph are consecutive, so the table is extended to its length.
         while self.arrival.len() < self.new.graph.len() {
             let (op, _) = self.new.graph.get(self.arrival.len() as u32);
             let start =
@@ -176,7 +177,7 @@ impl<'g> Pass<'g, '_> {
                 Term::Product(x, y) => (Arrival { ready: self.ready(x).max(self.ready(y)), is_product: true }, term),
             });
         }
-        // Stable: equal times keep the order of the sweep.
+        // The sort is stable: terms with equal times keep the order of the sweep.
         timed.sort_by_key(|t| t.0);
         let arrivals: Vec<Arrival> = timed.iter().map(|t| t.0).collect();
         match best_plan(&arrivals) {

@@ -1,9 +1,9 @@
-//! Sums opened into terms, terms into factors.
+//! Splits sums into terms and terms into factors.
 
 use super::rebuild::{by_id, uses};
 use crate::symbolic::{Op, Operand, Program};
 
-/// What may be opened without computing anything twice.
+/// The operations that can be split without computing anything twice.
 pub struct Opened {
     /// Operations by node id.
     pub ops: Vec<Option<Op>>,
@@ -39,7 +39,7 @@ impl Opened {
         opened
     }
 
-    /// The operation of an operand that is opened by a sum.
+    /// The operation of an operand, if a sum may split it.
     pub fn summand(&self, operand: Operand) -> Option<Op> {
         match operand {
             Operand::Node(id) if self.in_sum.get(id as usize) == Some(&true) => self.ops[id as usize],
@@ -47,7 +47,7 @@ impl Opened {
         }
     }
 
-    /// The terms of a sum, its sums opened: operands with their signs, in the order in which they stand.
+    /// The terms of a sum, with inner sums split: operands with their signs, in order.
     pub fn terms(&self, op: Op) -> Vec<(Operand, bool)> {
         let mut terms = Vec::new();
         let mut open = vec![(op, false)];
@@ -67,7 +67,7 @@ impl Opened {
         terms
     }
 
-    /// The factors of a term: those of its product if it is opened by the sum, or the operand itself.
+    /// The factors of a term: those of its product if the sum may split it, otherwise the operand itself.
     pub fn factors(&self, operand: Operand) -> Vec<Operand> {
         match self.summand(operand) {
             Some(Op::Mul(a, b)) => [self.factors_of_product(a), self.factors_of_product(b)].concat(),
