@@ -1,4 +1,4 @@
-//! RolledCode, couplings and starts of valid TOML models.
+//! Loops, couplings and starts of valid TOML models.
 
 use mbd_codegen::import::raw::LoopType;
 use mbd_codegen::import::toml::read;

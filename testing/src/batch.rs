@@ -1,4 +1,4 @@
-//! Trees that the build script generates code for; it and the test that runs the code both read this file.
+//! Trees for which the build script generates code. The build script and the test that runs the code both include this file.
 
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
@@ -7,10 +7,10 @@ use mbd_codegen::{Output, RolledCode};
 
 use crate::random::{random_model, Distribution, Rng};
 
-/// Number of trees: as many as compile in well under a minute.
+/// Number of trees, limited so that they compile in well under a minute.
 pub const TREES: u64 = 44;
 
-/// From this one on, trees are chains, and code takes loops wherever links repeat.
+/// From this index on, the trees are chains with rolled code wherever links repeat.
 pub const FIRST_CHAIN: u64 = 40;
 
 /// Every fourth tree is generated in single precision.
@@ -18,7 +18,7 @@ pub fn is_single(k: u64) -> bool {
     k % 4 == 3
 }
 
-/// Tree `k` and how code is made for it.
+/// Tree `k` and the options of its code.
 pub fn tree(k: u64) -> (Model, Options) {
     let seed = 5000 + k;
     let mut rng = Rng::new(seed, 5);
@@ -40,7 +40,8 @@ pub fn tree(k: u64) -> (Model, Options) {
     (random_model(seed, &Distribution::everything(seed, 2 + k as usize % 4)), options)
 }
 
-/// Chains of pins, of pins in right angles with springs and dampers, of ball joints, and of pins again.
+/// Chains of revolute joints, of revolute joints at right angles with springs and dampers, of spherical joints, and of
+/// revolute joints again.
 fn chain(k: u64) -> Distribution {
     let n = 7 - k as usize;
     let mut kinds = [0.0; 9];

@@ -1,20 +1,20 @@
-//! Chains of pins: general, planar, ill-conditioned.
+//! Chains of revolute joints: general, planar, ill-conditioned.
 
 use mbd_codegen::model::{JointKind, Model, Rotation, Value};
 
 use crate::random::{random_model, Distribution, Rng};
 use crate::value;
 
-/// A chain of `n` pins, general in every number.
+/// A chain of `n` revolute joints without special values: all numbers are random.
 pub fn general(seed: u64, n: usize) -> Model {
     general_tapered(seed, n, 0.9)
 }
 
-/// The same, masses and lengths `taper` times those of the link before.
+/// The same chain with masses and lengths `taper` times those of the link before.
 pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
     let distribution = Distribution { bodies: (n, n), taper, gravity: [0.0, 1.0, 0.0], ..Distribution::default() };
     let mut model = random_model(seed, &distribution);
-    // Identity placements happen one time in six; here nothing may be aligned.
+    // The generator makes an identity placement one time in six; a general chain must not have any.
     for (k, joint) in model.joints.iter_mut().enumerate() {
         if joint.placement.rotation == Rotation::NONE {
             joint.placement.rotation = Rotation::Rpy([0.3, 0.7, 1.1 + k as f64].map(Value::Const));
@@ -23,7 +23,7 @@ pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
     model
 }
 
-/// The same in a plane: vertical axes, placements turned about them.
+/// The same chain in a plane: vertical axes, placements rotated about them.
 pub fn planar(seed: u64, n: usize) -> Model {
     let mut model = general(seed, n);
     for joint in &mut model.joints {
@@ -34,7 +34,7 @@ pub fn planar(seed: u64, n: usize) -> Model {
     model
 }
 
-/// Makes masses and inertias of body `k` of `n` larger by `factor(k / (n − 1))`.
+/// Multiplies the mass and the inertia of body `k` of `n` by `factor(k / (n − 1))`.
 pub fn weigh(mut model: Model, factor: impl Fn(f64) -> f64) -> Model {
     let last = (model.joints.len() - 1).max(1) as f64;
     for (k, joint) in model.joints.iter().enumerate() {
@@ -46,8 +46,8 @@ pub fn weigh(mut model: Model, factor: impl Fn(f64) -> f64) -> Model {
     model
 }
 
-/// Thin rods of 1 m end to end: what resists a turn about a rod is `thin` times what resists one across, and every other
-/// joint turns about its rod.
+/// Thin rods of 1 m end to end. The moment of inertia about a rod is `thin` times that across it, and every second joint
+/// rotates about its rod.
 pub fn rods(seed: u64, n: usize, thin: f64) -> Model {
     let mut model = general(seed, n);
     for k in 0..n {
@@ -88,7 +88,7 @@ pub fn ill_conditioned() -> Vec<(String, Model)> {
     all
 }
 
-/// Axes that are parallel but for angles of about `angle`, placements along them and across.
+/// A chain whose axes are parallel except for angles of about `angle`, rad, with placements along and across them.
 pub fn nearly_parallel(seed: u64, n: usize, angle: f64) -> Model {
     let (mut model, mut rng) = (general(seed, n), Rng::new(seed, 7));
     for joint in &mut model.joints {

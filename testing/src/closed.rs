@@ -1,4 +1,4 @@
-//! Random trees with constraints that are closed exactly in a given state.
+//! Random trees with constraints that are satisfied exactly in a given state.
 
 use mbd_codegen::model::{
     Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Param, Placement, Rotation, Value,
@@ -14,31 +14,32 @@ use crate::random::{random_model, rotation_matrix, Distribution, Rng};
 use crate::state::{random_state, State};
 use crate::value;
 
-/// What constraints a random mechanism may have.
+/// Distribution of the constraints of a random mechanism.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoopKnobs {
-    /// The tree.
+    /// Distribution of the tree.
     pub tree: Distribution,
-    /// Pins and slides of one plane only: loops closed by whole joints have redundant rows.
+    /// Whether all joints are revolute and prismatic joints of one plane; loops that are closed by joints then have redundant
+    /// rows.
     pub planar: bool,
     /// Smallest and largest number of constraints.
     pub count: (usize, usize),
-    /// Probability that a loop goes by the ground.
+    /// Probability that one end of a loop is on the ground.
     pub ground: f64,
-    /// Probability that a constraint stands there twice.
+    /// Probability that a constraint is present twice.
     pub twice: f64,
     /// Probability that a constraint couples joints.
     pub coupling: f64,
     /// Weights of the kinds of loops, in the order of [`LoopKind`].
     pub kinds: [f64; 16],
-    /// Probability that errors of positions are made to decay.
+    /// Probability that a constraint has a `decay`.
     pub decay: f64,
-    /// Probability that a loop leaves its own joints no motion.
+    /// Probability that a loop leaves its joints no motion.
     pub locked: f64,
 }
 
 impl LoopKnobs {
-    /// Spatial trees of pins with loops of every kind.
+    /// Spatial trees of revolute joints with loops of every kind.
     pub fn plain() -> LoopKnobs {
         LoopKnobs {
             tree: Distribution { bodies: (3, 8), ..Distribution::default() },
@@ -53,7 +54,7 @@ impl LoopKnobs {
         }
     }
 
-    /// Everything there is, on up to `bodies` bodies; the mix itself is random.
+    /// All kinds of joints and constraints on up to `bodies` bodies; the probabilities themselves are random.
     pub fn everything(seed: u64, bodies: usize) -> LoopKnobs {
         let mut rng = Rng::new(seed, 5);
         let planar = rng.chance(0.25);
@@ -62,7 +63,7 @@ impl LoopKnobs {
         if planar {
             tree =
                 Distribution { kinds: [4.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5], mimic: tree.mimic / 2.0, ..tree };
-            // Axes that are made parallel may leave a body without mass motions that nothing feels.
+            // With parallel axes, a body without mass may have motions without inertia.
             tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
@@ -82,21 +83,21 @@ impl LoopKnobs {
     }
 }
 
-/// A mechanism with constraints, and a state where they are closed. The same for the same seed and distribution.
+/// A mechanism with constraints, and a state that satisfies them. Both are the same for the same seed and distribution.
 #[derive(Clone, Debug)]
 pub struct LoopSystem {
-    /// Seed.
+    /// Seed from which it was made.
     pub seed: u64,
     /// The mechanism.
     pub model: Model,
-    /// Without its constraints.
+    /// Plan of the mechanism without its constraints.
     pub open: Plan,
-    /// Coordinates on which they are closed, velocities that do not care, inputs.
+    /// Coordinates that satisfy the constraints, velocities that need not satisfy them, inputs.
     pub state: State,
 }
 
-/// A random mechanism that can still move: `Φ` has fewer independent rows than there are velocities. Where drives and loops
-/// contradict one another, the drives stand still.
+/// A random mechanism that can move: `Φ` has fewer independent rows than there are velocities. Where prescribed motions and
+/// loops contradict each other, the prescribed joints are at rest.
 pub fn random_loops(seed: u64, distribution: &LoopKnobs) -> LoopSystem {
     for attempt in 0..1000 {
         if let Some(system) = attempted(seed, attempt, distribution) {
@@ -138,7 +139,7 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
     Some(LoopSystem { seed, model, open, state })
 }
 
-/// One joint after the other: neither the search for a form nor what it finds is part of a reference.
+/// Elimination one joint at a time: a reference must not depend on the search for an elimination.
 const PLAIN: PlanOptions = PlanOptions {
     snap: DEFAULT_SNAP,
     forms: EliminationStrategy::Single,
@@ -147,10 +148,10 @@ const PLAIN: PlanOptions = PlanOptions {
     loops: RolledCode::Never,
 };
 
-/// Rows with less left of them than this are dependent on others.
+/// A row of unit length depends on other rows if less than this remains of it after their elimination.
 const RANK: f64 = 1e-7;
 
-/// All axes along z, all turns about z.
+/// Makes a model planar: all axes along z, all rotations about z.
 fn flatten(model: &mut Model, rng: &mut Rng) {
     let z = [0.0, 0.0, 1.0];
     for joint in &mut model.joints {
@@ -182,19 +183,19 @@ fn transposed(a: &Mat3<f64>) -> Mat3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|k| a[k][i]))
 }
 
-/// The rotation in words of the description; exact to rounding.
+/// A rotation matrix in a form of the model description, exact to rounding.
 fn described(r: &Mat3<f64>) -> Rotation {
     let pitch = (-r[2][0]).atan2((r[2][1] * r[2][1] + r[2][2] * r[2][2]).sqrt());
     let (roll, yaw) = if pitch.cos() > 1e-3 {
         (r[2][1].atan2(r[2][2]), r[1][0].atan2(r[0][0]))
     } else {
-        // Near the poles roll and yaw do the same: all of it is given to yaw.
+        // Near the poles roll and yaw are rotations about the same axis; roll is set to zero.
         (0.0, (-r[0][1]).atan2(r[1][1]))
     };
     Rotation::Rpy([roll, pitch, yaw].map(Value::Const))
 }
 
-/// Adds constraints to a model in a state.
+/// Adds constraints to a model so that they hold in a state.
 struct Closer<'a> {
     rng: Rng,
     distribution: &'a LoopKnobs,
@@ -205,7 +206,7 @@ struct Closer<'a> {
 }
 
 impl Closer<'_> {
-    /// A constant, or a parameter that has this value in the state.
+    /// A constant, or a parameter with this value in the state.
     fn value(&mut self, x: f64) -> Value {
         if !self.rng.chance(self.distribution.tree.params) {
             return Value::Const(x);
@@ -252,7 +253,7 @@ impl Closer<'_> {
         Some(ConstraintKind::Coupling { terms, offset: self.value(sum) })
     }
 
-    /// Velocities of the free joints between two bodies, mimics counted as their own.
+    /// Number of velocities of the free joints between two bodies; a mimic joint counts as a joint of its own.
     fn between(&self, a: Option<usize>, b: Option<usize>) -> usize {
         let path = |mut body: Option<usize>| {
             let mut joints = Vec::new();
@@ -282,7 +283,7 @@ impl Closer<'_> {
                 ends.swap(0, 1);
             }
             let free = self.between(ends[0], ends[1]);
-            // In a plane at most three rows count.
+            // In a plane at most three rows are independent.
             let needed = if self.distribution.planar { rows(&kind).min(3) } else { rows(&kind) };
             if free == 0 || (free <= needed && !self.rng.chance(self.distribution.locked)) {
                 continue;
@@ -317,7 +318,7 @@ impl Closer<'_> {
         Placement { xyz, rotation }
     }
 
-    /// The second frame, which is turned and displaced from the first, on its body.
+    /// Mount of the second frame on its body: rotated by `turn` and displaced by `offset` from the first frame.
     fn second(&mut self, body: Option<usize>, a: &Pose<f64>, turn: &Mat3<f64>, offset: Vec3<f64>) -> Mount {
         let at = Mount { body, placement: Placement::IDENTITY };
         let carrier = mounted(self.open, &self.state.params, &self.frames, &at);
@@ -329,7 +330,7 @@ impl Closer<'_> {
         Mount { body, placement: Placement { xyz: xyz.map(|x| self.value(x)), rotation } }
     }
 
-    /// Any direction: in a plane that of its normal.
+    /// A random direction; in a planar model the normal of the plane.
     fn direction(&mut self) -> Vec3<f64> {
         if self.distribution.planar {
             return [0.0, 0.0, self.rng.pick(&[1.0, -1.0, 2.0])];
@@ -347,7 +348,7 @@ impl Closer<'_> {
         }
     }
 
-    /// Any direction: in a plane one of it.
+    /// A random direction; in a planar model one in the plane.
     fn sideways(&mut self) -> Vec3<f64> {
         if self.distribution.planar {
             flat_direction(&mut self.rng)
@@ -392,7 +393,7 @@ impl Closer<'_> {
         about(axis, self.rng.around(3.0))
     }
 
-    /// A turn and an offset of the second frame in axes of the first that a kind leaves free.
+    /// A random rotation and offset of the second frame, in axes of the first, that a kind of loop allows.
     fn allowed(&mut self, kind: &LoopKind) -> (Mat3<f64>, Vec3<f64>) {
         let none = about([1.0, 0.0, 0.0], 0.0);
         let (angle, slide) = (self.rng.around(2.5), self.rng.around(0.6));
@@ -442,7 +443,7 @@ impl Closer<'_> {
     }
 }
 
-/// Rows of a kind of loop.
+/// Number of rows of a kind of loop.
 pub fn rows(kind: &LoopKind) -> usize {
     match kind {
         LoopKind::Fixed => 6,

@@ -1,5 +1,5 @@
-//! Constraints written in ground axes from their definitions: residuals of positions, and rates of every row as functions of
-//! the poses and velocities of both frames. Nothing of the sweeps is in here but the motion of frames of the open tree.
+//! Constraints in ground axes from their definitions: residuals of the positions, and rates of every row as functions of the
+//! poses and velocities of both frames. Of the sweeps, only the motion of frames of the open tree is used.
 
 use mbd_codegen::model::{ConstraintKind, LoopKind, Model, Mount};
 use mbd_codegen::plan::Plan;
@@ -13,10 +13,10 @@ use crate::random::rotation_matrix;
 use crate::state::State;
 use crate::value;
 
-/// A frame in the ground, in ground axes: columns of `axes` are its directions.
+/// Pose and velocity of a frame, in ground axes; the columns of `axes` are the directions of its axes.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose<S> {
-    /// Its components to ground components.
+    /// Rotation matrix from the frame's components to ground components.
     pub axes: Mat3<S>,
     /// Origin, m.
     pub origin: Vec3<S>,
@@ -47,29 +47,29 @@ pub fn across(a: Vec3<f64>) -> [Vec3<f64>; 2] {
 }
 
 impl<S: Scalar> Pose<S> {
-    /// The ground.
+    /// The pose of the ground.
     pub fn ground() -> Pose<S> {
         Pose::of(&FrameState::ground())
     }
 
-    /// A frame of the tree.
+    /// The pose of a frame of the tree.
     pub fn of(at: &FrameState<S>) -> Pose<S> {
         let mut pose = Pose { axes: at.rotation, origin: at.position, lin: [S::zero(); 3], ang: [S::zero(); 3] };
         (pose.lin, pose.ang) = (pose.turn(at.velocity.lin), pose.turn(at.velocity.ang));
         pose
     }
 
-    /// A vector of the frame in ground axes.
+    /// A vector given in the frame's axes, in ground axes.
     pub fn turn(&self, x: Vec3<S>) -> Vec3<S> {
         self.axes.map(|row| dot3(row, x))
     }
 
-    /// A constant direction of the frame in ground axes.
+    /// A constant direction given in the frame's axes, in ground axes.
     pub fn direction(&self, x: Vec3<f64>) -> Vec3<S> {
         self.turn(x.map(S::constant))
     }
 
-    /// A frame on it.
+    /// The pose of a frame that is fixed to this one.
     pub fn carried(&self, rotation: &Mat3<f64>, xyz: Vec3<f64>) -> Pose<S> {
         let arm = self.direction(xyz);
         let column = |k: usize| self.direction([rotation[0][k], rotation[1][k], rotation[2][k]]);
@@ -83,7 +83,7 @@ impl<S: Scalar> Pose<S> {
     }
 }
 
-/// The frame a constraint acts at; `frames` are those of the plan.
+/// The pose of the frame on which a constraint acts; `frames` are those of the plan.
 pub fn mounted<S: Scalar>(plan: &Plan, params: &[f64], frames: &[FrameState<S>], mount: &Mount) -> Pose<S> {
     let body = mount.body.map_or(Pose::ground(), |b| Pose::of(&frames[body_frames(plan)[b]]));
     let rotation = rotation_matrix(&mount.placement.rotation, params);
@@ -103,7 +103,7 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
         LoopKind::Prismatic { axis } => [across_offset(axis), turned(a, b)].concat(),
         LoopKind::Cylindrical { axis } => [across_offset(axis), parallel(axis)].concat(),
         LoopKind::Helical { axis, pitch } => {
-            // The angle as seen by two directions across the axis; its difference to that of the slide, by its sine.
+            // The angle from two directions across the axis, and the sine of its difference from the angle of the displacement.
             let (slide, pitch) = (along(unit(axis)), num(pitch));
             let [n, m] = across(axis);
             let (c, s) = (dot3(a.direction(n), b.direction(n)), dot3(a.direction(m), b.direction(n)));
@@ -133,22 +133,23 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
     }
 }
 
-/// Three numbers that vanish where both frames have the same axes.
+/// Three numbers that are zero where both frames have the same axes.
 fn turned<S: Scalar>(a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let e = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
     (0..3).map(|k| dot3(a.direction(e((k + 1) % 3)), b.direction(e(k)))).collect()
 }
 
-/// Rates of all rows: first those of [`residuals`], in their order, on closed positions; then those that bind velocities alone.
+/// Rates of all rows at closed positions: first those of [`residuals`], in their order, then those that constrain velocities
+/// only.
 pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let d = less(b.origin, a.origin);
     let num = |x: mbd_codegen::model::Value| S::constant(value(x, params));
-    // Velocity of the second origin and rotation of the second frame, as the first frame sees them, in ground axes.
+    // Velocity of the second origin and angular velocity of the second frame relative to the first, in ground axes.
     let v = less(less(b.lin, a.lin), cross(a.ang, d));
     let w = less(b.ang, a.ang);
     let along = |n: Vec3<f64>| dot3(a.direction(n), v);
     let across_rate = |n: Vec3<f64>| across(n).map(along).to_vec();
-    // d/dt (m · c) with m on the first frame, c on the second.
+    // d/dt (m · c), where m is fixed to the first frame and c to the second.
     let between = |m: Vec3<S>, c: Vec3<S>| dot3(w, cross(c, m));
     let parallel = |n: Vec3<f64>| across(n).map(|m| between(a.direction(m), b.direction(unit(n)))).to_vec();
     let e = |k: usize| std::array::from_fn::<f64, 3, _>(|i| f64::from(u8::from(i == k)));
@@ -193,16 +194,16 @@ pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S
     }
 }
 
-/// Velocity of a contact point along the normal and across.
+/// Velocity of a contact point along the normal and in two directions across it.
 fn contact<S: Scalar>(a: &Pose<S>, normal: Vec3<f64>, v: Vec3<S>) -> Vec<S> {
     let [n, m] = across(normal);
     [unit(normal), n, m].map(|n| dot3(a.direction(n), v)).to_vec()
 }
 
-/// Constraints of a plan's model at a state, by the open tree.
+/// Constraints of a model at a state, computed from the motion of the open tree.
 #[derive(Clone, Debug)]
 pub struct Rows<'a> {
-    /// The open tree; its model has the constraints nevertheless.
+    /// Plan of the tree without constraints.
     pub plan: &'a Plan,
     /// The constraints.
     pub model: &'a Model,
@@ -223,7 +224,7 @@ impl Rows<'_> {
         self.model.constraints.iter().map(|c| both(&c.kind)).collect()
     }
 
-    /// Coordinates (`of_velocity` false) or velocities of a coupling's joints, in a sum.
+    /// Sum of a coupling over the coordinates (`of_velocity` false) or the velocities of its joints.
     fn coupled<S: Scalar>(&self, terms: &[(usize, mbd_codegen::model::Value)], list: &[S], of_velocity: bool) -> S {
         let at = |joint: usize| match self.plan.slots.iter().find(|s| s.joint == joint).and_then(|s| s.at) {
             Some(Source::State { q, v }) => list[if of_velocity { v } else { q }],
@@ -248,7 +249,7 @@ impl Rows<'_> {
         self.model.constraints.iter().zip(poses).map(one).collect()
     }
 
-    /// Rates of all rows at given velocities of the state and those of the drives that `i` has.
+    /// Rates of all rows at given velocities of the state and at the drives' velocities, which `i` has.
     pub fn rates<S: Scalar>(&self, i: &mut Interpreter<S>, q: &[S], v: &[S]) -> Vec<Vec<S>> {
         let poses = self.poses(i, q, v);
         let params = &self.state.params;
@@ -291,7 +292,7 @@ impl Rows<'_> {
         (rows, gamma)
     }
 
-    /// The open tree in motion: inputs with their rates, coordinates with theirs.
+    /// The open tree in motion, as dual numbers: inputs with their rates, coordinates with their rates.
     pub fn moving(&self, v: &[f64]) -> (Interpreter<Dual<f64>>, Vec<Dual<f64>>) {
         let q = &self.state.q;
         let mut qd = vec![0.0; q.len()];
@@ -301,13 +302,13 @@ impl Rows<'_> {
     }
 }
 
-/// One at `k`, zero elsewhere.
+/// A unit vector of length `n`: one at `k`, zero elsewhere.
 pub fn unit_of(n: usize, k: usize) -> Vec<f64> {
     (0..n).map(|j| f64::from(u8::from(j == k))).collect()
 }
 
-/// Rank of rows, each scaled to unit length (what is rounding of unit directions is zero), by elimination with pivots of the
-/// largest remainder.
+/// Rank of a matrix by elimination, with the largest remaining row as pivot. Rows are scaled to unit length first, so that a
+/// remainder of the size of round-off counts as zero.
 pub fn rank(rows: &[Vec<f64>], tolerance: f64) -> usize {
     let norm = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
     let scaled = |r: &Vec<f64>| {

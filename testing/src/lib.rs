@@ -13,7 +13,7 @@ use mbd_codegen::model::{
     ConstraintKind, Gravity, JointKind, JointMotion, LoopKind, Model, Placement, Rotation, Value,
 };
 
-/// A number of the model at given parameters.
+/// Value of a number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {
     match v {
         Value::Const(x) => x,
@@ -21,7 +21,7 @@ pub fn value(v: Value, params: &[f64]) -> f64 {
     }
 }
 
-/// The model with constants for its parameters.
+/// The model with its parameters replaced by constants.
 pub fn substituted(model: &Model, params: &[f64]) -> Model {
     let of = |v: &mut Value| *v = Value::Const(value(*v, params));
     let rotation = |r: &mut Rotation| match r {

@@ -1,4 +1,4 @@
-//! Newton and Euler, body by body: what the sweeps must agree with, from the motion of frames alone.
+//! Newton's and Euler's laws, body by body, from the motion of frames alone: a reference for the sweeps.
 
 use mbd_codegen::model::{JointKind, JointMotion, Model};
 use mbd_codegen::plan::{Plan, Rigid};
@@ -20,14 +20,14 @@ pub fn body_frames(plan: &Plan) -> Vec<usize> {
     plan.model.bodies.iter().map(|b| find(&b.name)).collect()
 }
 
-/// Mass of a body and its centre of mass in the ground.
+/// Mass of a body, kg, and its centre of mass in ground axes, m.
 pub fn mass_centre<S: Scalar>(model: &Model, params: &[f64], body: usize, at: &FrameState<S>) -> (S, Vec3<S>) {
     let b = &model.bodies[body];
     let com = b.com.map(|x| S::constant(value(x, params)));
     (S::constant(value(b.mass, params)), add3(at.position, apply(&at.rotation, com)))
 }
 
-/// Inertia about the centre of mass in body axes.
+/// Inertia about the centre of mass in body axes, kg m².
 fn inertia(model: &Model, params: &[f64], body: usize) -> Mat3<f64> {
     let b = &model.bodies[body];
     let [xx, yy, zz, xy, xz, yz] = b.inertia.map(|x| value(x, params));
@@ -55,12 +55,12 @@ pub fn twice_kinetic(model: &Model, params: &[f64], body: usize, at: &FrameState
     let [p, l] = momentum(model, params, body, at);
     let w = apply(&other.rotation, other.velocity.ang);
     let origin = apply(&other.rotation, other.velocity.lin);
-    // Velocity of the point of the body that is at the origin of the ground.
+    // Velocity of the body's point that coincides with the origin of the ground.
     let v = add3(origin, cross(other.position, w));
     (0..3).map(|k| p[k] * v[k] + l[k] * w[k]).sum()
 }
 
-/// Model joint whose coordinates a joint follows in the end, factor and offset.
+/// The joint at the end of a chain of mimic joints, with the total factor and offset.
 pub fn leader(model: &Model, params: &[f64], joint: usize) -> (usize, f64, f64) {
     match model.joints[joint].motion {
         JointMotion::Mimic { leader: next, ratio, offset } => {
@@ -72,13 +72,13 @@ pub fn leader(model: &Model, params: &[f64], joint: usize) -> (usize, f64, f64) 
     }
 }
 
-/// Where the coordinates of a joint come from in the end.
+/// Source of the coordinates of a joint, through all mimic joints.
 pub fn source(plan: &Plan, joint: usize) -> Option<Source> {
     let (end, _, _) = leader(&plan.model, &plan.default_params(), joint);
     plan.slots.iter().find(|s| s.joint == end).and_then(|s| s.at)
 }
 
-/// Rates (or accelerations) of every model joint, out of those of the state and of the drives.
+/// Rates (or accelerations) of every joint of the model, from those of the state and of the drives.
 pub fn joint_rates(plan: &Plan, params: &[f64], state: &[f64], drives: &[f64]) -> Vec<Vec<f64>> {
     let rates = |j: usize| {
         let (_, ratio, _) = leader(&plan.model, params, j);
@@ -93,7 +93,7 @@ pub fn joint_rates(plan: &Plan, params: &[f64], state: &[f64], drives: &[f64]) -
     (0..plan.model.joints.len()).map(rates).collect()
 }
 
-/// Coordinates of every model joint.
+/// Coordinates of every joint of the model.
 pub fn joint_coordinates(plan: &Plan, params: &[f64], state: &[f64], drives: &[f64]) -> Vec<Vec<f64>> {
     let coordinates = |j: usize| {
         let (_, ratio, offset) = leader(&plan.model, params, j);
@@ -108,7 +108,8 @@ pub fn joint_coordinates(plan: &Plan, params: &[f64], state: &[f64], drives: &[f
     (0..plan.model.joints.len()).map(coordinates).collect()
 }
 
-/// Motion `[linear; angular]` of the child frame per unit of each freedom, in its own axes, at joint coordinates `q`.
+/// Motion `[linear; angular]` of the child frame for a unit velocity of each degree of freedom, in its own axes, at joint
+/// coordinates `q`.
 pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
     let unit = |a: Vec3<f64>| {
         let n = a.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -125,7 +126,7 @@ pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
         }
         JointKind::Universal { axes: [a, b] } => {
             let (a, b) = (unit(a), unit(b));
-            // The first axis, seen from behind the second turn (Rodrigues).
+            // The first axis in the axes after the second rotation (Rodrigues).
             let (s, c) = (-q[1]).sin_cos();
             let along = (1.0 - c) * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
             let across = cross(b, a);
@@ -144,7 +145,7 @@ pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
     }
 }
 
-/// Bodies that a joint carries.
+/// Bodies of the subtree of a joint.
 pub fn subtree(model: &Model, joint: usize) -> Vec<usize> {
     let mut bodies = vec![model.joints[joint].child];
     // Joints are depth first: parents come before children.

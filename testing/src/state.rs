@@ -8,7 +8,7 @@ use mbd_runtime::{Dual, Interpreter, Scalar};
 
 use crate::random::Rng;
 
-/// A state, and everything given beside it.
+/// A state and all inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Coordinates, quaternions of unit length.
@@ -91,8 +91,8 @@ impl State {
         self.interpreter_of(plan, |x, _| x)
     }
 
-    /// The same over any scalar: `lift` makes it out of a number and its rate of change, which only prescribed positions
-    /// and rates have.
+    /// The same interpreter over any scalar. `lift` makes a scalar of a number and its rate of change; only prescribed positions
+    /// and rates have a rate that is not zero.
     pub fn interpreter_of<S: Scalar>(&self, plan: &Plan, lift: impl Fn(f64, f64) -> S) -> Interpreter<S> {
         let all = |list: &[f64]| list.iter().map(|x| lift(*x, 0.0)).collect::<Vec<S>>();
         let mut i = Interpreter::new(plan.tree(&all(&self.params)), self.gravity.map(|x| lift(x, 0.0)));
@@ -106,7 +106,8 @@ impl State {
     }
 }
 
-/// Derivatives of the rates by parameter `k`, by the sweeps, at what `at` was computed for; and the varied interpreter.
+/// Derivatives of the rates with respect to parameter `k` by the sweeps, at the state for which `at` was computed, and the
+/// interpreter with the varied parameter.
 pub fn parameter<S: Scalar>(
     plan: &Plan,
     s: &State,
@@ -134,7 +135,7 @@ pub fn parameter<S: Scalar>(
     (column, varied)
 }
 
-/// Rates of the prescribed positions that belong to the prescribed rates, joint by joint.
+/// Rates of the prescribed coordinates for given prescribed velocities, joint by joint.
 pub fn drive_rates(plan: &Plan, q: &[f64], v: &[f64]) -> Vec<f64> {
     use mbd_runtime::spatial::{quaternion_matrix, quaternion_rate};
     let mut qd = vec![0.0; q.len()];

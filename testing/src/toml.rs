@@ -1,4 +1,4 @@
-//! Models written in the TOML format: to show a failing case, and to hold the reader against.
+//! A writer of the TOML format: it shows failing cases and tests the reader.
 
 mod constraints;
 
@@ -6,12 +6,12 @@ use std::fmt::Write;
 
 use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value, WrenchAxes};
 
-/// Order in which joints are written; the reader puts them depth first.
+/// Order in which joints are written; the reader sorts them depth first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// As in the model.
     DepthFirst,
-    /// Generation after generation.
+    /// Breadth first: all joints of one depth, then those of the next.
     BreadthFirst,
 }
 
@@ -81,7 +81,7 @@ fn line(out: &mut String, key: &str, value: String) {
     let _ = writeln!(out, "{key} = {value}");
 }
 
-/// As a basic string; names have nothing in them that needs an escape.
+/// A name as a basic TOML string; the names of the tests need no escapes.
 fn quoted(text: &str) -> String {
     format!("\"{text}\"")
 }
@@ -91,7 +91,7 @@ struct Writer<'m> {
 }
 
 impl Writer<'_> {
-    /// Degrees where they give the same number again.
+    /// A number; an angle is written in degrees where that reads back to the same number.
     fn number(&self, v: Value, angle: bool) -> String {
         match v {
             Value::Param(k) => format!("{{ param = {} }}", quoted(&self.model.params[k].name)),

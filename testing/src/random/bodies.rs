@@ -1,4 +1,4 @@
-//! Masses and inertias, and who may be massless.
+//! Masses and inertias, and the choice of massless bodies.
 
 use mbd_codegen::model::{Body, Joint, JointKind, Rotation, Value};
 use mbd_runtime::spatial::Mat3;
@@ -13,15 +13,16 @@ pub enum Weight {
     Full,
     /// A mass without extension.
     Point,
-    /// Nothing.
+    /// No mass.
     None,
 }
 
 /// Weights that keep the mass matrix regular, and the joints that need a rotor for it.
 ///
-/// Kinetic energy is zero only if every body of full weight stands still. A body of less weight has a parent of full
-/// weight (or the ground), so if all those stand still it moves by its own joint alone. That joint cannot move if it has a
-/// rotor on every freedom, or if a child of full weight hangs on it by a joint whose motion can never undo its own.
+/// The mass matrix is regular if the kinetic energy is zero only at rest. It is zero only if every body of full weight is at
+/// rest. A body of less weight has a parent of full weight (or the ground); if the parent is at rest, the body moves by its
+/// own joint only. This joint cannot move either if it has a rotor on every degree of freedom, or if a child of full weight is
+/// connected by a joint whose motion can never cancel its own.
 pub fn weights(b: &mut Builder, s: &Skeleton, joints: &[Joint], params: &[f64]) -> (Vec<Weight>, Vec<bool>) {
     let n = joints.len();
     let mut weight = vec![Weight::Full; n];
@@ -45,7 +46,7 @@ pub fn weights(b: &mut Builder, s: &Skeleton, joints: &[Joint], params: &[f64]) 
     (weight, rotor)
 }
 
-/// Whether the motion of a child's joint can never undo that of `kind`.
+/// Whether the motion of a child's joint can never cancel that of a joint of `kind`.
 fn independent(kind: &JointKind, child: &Joint, params: &[f64]) -> bool {
     let single = |k: &JointKind| match *k {
         JointKind::Revolute { axis } | JointKind::Helical { axis, .. } => Some((true, axis)),
@@ -56,7 +57,7 @@ fn independent(kind: &JointKind, child: &Joint, params: &[f64]) -> bool {
         return true;
     }
     let (Some((turns, a)), Some((child_turns, b))) = (single(kind), single(&child.kind)) else { return false };
-    // In the axes of the body between them, where both axes stand still.
+    // The comparison is in the axes of the body between them, where both axes are constant.
     let r = matrix(&child.placement.rotation, params);
     let b: [f64; 3] = std::array::from_fn(|i| r[i][0] * b[0] + r[i][1] * b[1] + r[i][2] * b[2]);
     turns != child_turns || sine(a, b) > 0.5
@@ -98,7 +99,7 @@ impl Builder<'_> {
         if weight == Weight::Point {
             return Body { name, mass: self.value(mass), com, inertia: [Value::ZERO; 6], inertia_axes: none };
         }
-        // A box. Its edges differ by less than a factor of two, so parameters may vary and it stays a possible body.
+        // A box whose edges differ by less than a factor of two: its inertia stays valid when parameters vary.
         let mut edges: [f64; 3] = std::array::from_fn(|_| length * self.rng.range(0.6, 1.0));
         if self.rng.chance(0.3) {
             edges[1] = edges[0]; // symmetric about z

@@ -1,4 +1,4 @@
-//! What a random mechanism may contain.
+//! Distribution of random mechanisms.
 
 use super::rng::Rng;
 
@@ -7,23 +7,23 @@ use super::rng::Rng;
 pub struct Distribution {
     /// Smallest and largest number of bodies.
     pub bodies: (usize, usize),
-    /// Probability that a body hangs on any earlier one instead of the latest.
+    /// Probability that a body's parent is any earlier body instead of the latest.
     pub branching: f64,
-    /// Probability of a further root on the ground.
+    /// Probability of another body that is connected to the ground.
     pub roots: f64,
     /// Probability that a placement or axis is general rather than along the axes.
     pub skew: f64,
     /// Factor on masses and lengths from parent to child.
     pub taper: f64,
-    /// Weights of pin, slider, cylindrical, helical, universal, planar, spherical, floating, fixed.
+    /// Weights of revolute, prismatic, cylindrical, helical, universal, planar, spherical, floating, fixed.
     pub kinds: [f64; 9],
-    /// Probability that a joint is driven.
+    /// Probability that a joint is prescribed.
     pub prescribed: f64,
-    /// Probability that a joint of one freedom follows another.
+    /// Probability that a joint of one degree of freedom is a mimic joint.
     pub mimic: f64,
-    /// Probability that a body between others has no inertia, or that of a point.
+    /// Probability that an inner body has no mass, or is a point mass.
     pub massless: f64,
-    /// Probability that an inertia is general: products, own axes.
+    /// Probability that an inertia has products and axes of its own.
     pub products: f64,
     /// Probability of damping on a joint.
     pub damping: f64,
@@ -35,14 +35,14 @@ pub struct Distribution {
     pub wrenches: f64,
     /// Probability of a further named frame, for each body.
     pub frames: f64,
-    /// Weights of constant, zero and given gravity.
+    /// Weights of constant gravity, zero gravity, and gravity as an input.
     pub gravity: [f64; 3],
     /// Probability that a number is a run-time parameter.
     pub params: f64,
 }
 
 impl Default for Distribution {
-    /// A plain open tree of pins under gravity: nothing else unless asked for.
+    /// An open tree of revolute joints under gravity, without anything else.
     fn default() -> Self {
         Distribution {
             bodies: (1, 6),
@@ -67,16 +67,16 @@ impl Default for Distribution {
 }
 
 impl Distribution {
-    /// Everything there is, on up to `bodies` bodies; the mix itself is random.
+    /// All kinds of joints and elements on up to `bodies` bodies; the probabilities themselves are random.
     pub fn everything(seed: u64, bodies: usize) -> Distribution {
         let mut rng = Rng::new(seed, 1);
         let all = [4.0, 2.0, 1.5, 1.5, 1.5, 1.5, 1.5, 1.0, 1.5];
-        // One in three mechanisms has a few kinds of joints only.
+        // One in three mechanisms has only a few kinds of joints.
         let few = rng.chance(0.33);
         let kinds = all.map(|w| if few && rng.chance(0.6) { 0.0 } else { w });
         let kinds = if kinds[..8].iter().all(|w| *w == 0.0) { all } else { kinds };
         let mimic = if rng.chance(0.5) { 0.8 } else { 0.0 };
-        // Only joints of one freedom can lead and follow.
+        // Only joints of one degree of freedom can be mimics and their leaders.
         let single = if mimic > 0.0 { 3.0 } else { 1.0 };
         let kinds = std::array::from_fn(|k| if matches!(k, 0 | 1 | 3) { single * kinds[k] } else { kinds[k] });
         let mut some = |p: f64| if rng.chance(0.5) { 0.0 } else { p };

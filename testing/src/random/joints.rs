@@ -14,7 +14,7 @@ pub fn sine(a: [f64; 3], b: [f64; 3]) -> f64 {
 }
 
 impl Builder<'_> {
-    /// Any vector of about the given size, or one along an axis.
+    /// A random vector of about the given size, or one along an axis.
     pub fn vector(&mut self, size: f64) -> [f64; 3] {
         if self.rng.chance(self.distribution.skew) {
             return std::array::from_fn(|_| self.rng.around(size));
@@ -41,7 +41,7 @@ impl Builder<'_> {
         }
     }
 
-    /// An angle of a placement; on aligned ones a multiple of 90°, once in a while written with few digits.
+    /// An angle of a placement. For aligned placements it is a multiple of 90°, sometimes written with few digits.
     fn angle(&mut self, general: bool) -> Value {
         if general {
             let x = self.rng.around(3.1);
@@ -55,7 +55,7 @@ impl Builder<'_> {
         }
     }
 
-    /// Orientation, in one of the ways to write it.
+    /// A random orientation in one of the forms of the description.
     pub fn rotation(&mut self) -> Rotation {
         let general = self.rng.chance(self.distribution.skew);
         if self.rng.chance(0.25) {
@@ -94,7 +94,7 @@ impl Builder<'_> {
         }
     }
 
-    /// One number per freedom: the same for all, or each its own, some of them zero.
+    /// One number for each degree of freedom: all the same, or different, some of them zero.
     pub fn per_freedom(&mut self, n: usize, chance: f64, low: f64, high: f64) -> Vec<Value> {
         if !self.rng.chance(chance) {
             return vec![Value::ZERO; n];

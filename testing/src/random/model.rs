@@ -1,21 +1,21 @@
-//! The mechanism as a whole.
+//! Random mechanisms: bodies, joints and inputs together.
 
 use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, JointMotion, Model, Param, Value, Wrench, WrenchAxes};
 
 use super::bodies::{weights, Weight};
 use super::{Distribution, Rng};
 
-/// What a model is made with.
+/// State of the construction of a model.
 pub struct Builder<'k> {
-    /// Randomness.
+    /// Random numbers.
     pub rng: Rng,
-    /// What is allowed.
+    /// Probabilities and ranges.
     pub distribution: &'k Distribution,
     /// Parameters so far.
     params: Vec<Param>,
 }
 
-/// Who hangs on whom; parents come first.
+/// The tree; parents come before their children.
 pub struct Skeleton {
     /// Parent of each body.
     pub parent: Vec<Option<usize>>,
@@ -23,7 +23,7 @@ pub struct Skeleton {
     pub depth: Vec<i32>,
 }
 
-/// Names that generated code could trip over; some bodies and joints get them.
+/// Names that could collide with words of generated code; some bodies and joints get them.
 const ODD_NAMES: [&str; 12] =
     ["type", "self", "q", "kept", "tau", "Upper arm", "link-7", "Größe 2", "new", "rates", "kinetic", "7th"];
 
@@ -38,7 +38,7 @@ impl Builder<'_> {
         Value::Param(k)
     }
 
-    /// The same, but zero stays a constant.
+    /// The same, except that zero is always a constant.
     pub fn value_or_zero(&mut self, x: f64) -> Value {
         if x == 0.0 {
             Value::ZERO
@@ -102,7 +102,7 @@ impl Builder<'_> {
         let can: Vec<usize> = (0..joints.len()).filter(|&j| joints[j].kind.nv() == 1).collect();
         let rank: Vec<u64> = joints.iter().map(|_| self.rng.bits()).collect();
         for &j in &can {
-            // A leader of lower rank: chains, but no rings.
+            // The leader has a lower rank, so that there are chains of mimic joints but no cycles.
             let leaders: Vec<usize> = can.iter().copied().filter(|&l| rank[l] < rank[j]).collect();
             if leaders.is_empty() || joints[j].motion != JointMotion::Free || !self.rng.chance(self.distribution.mimic)
             {
@@ -186,7 +186,7 @@ pub fn random_model(seed: u64, distribution: &Distribution) -> Model {
     let mut bodies: Vec<_> = (0..n).map(body).collect();
     let mut joints: Vec<Joint> = depth_first(&s.parent).into_iter().map(|j| joints[j].clone()).collect();
     b.mimics(&mut joints);
-    // Bodies in any order: nothing may depend on it.
+    // The bodies are shuffled, because nothing may depend on their order.
     let mut place: Vec<usize> = (0..n).collect();
     for i in (1..n).rev() {
         place.swap(i, b.rng.below(i + 1));

@@ -1,11 +1,11 @@
-//! A small deterministic source of randomness: the same numbers everywhere, for ever.
+//! A small deterministic random number generator: the same numbers on every machine and in every version.
 
-/// Splitmix64: passes every test this project could put to it, and a seed of one word says it all.
+/// The generator SplitMix64, whose state is one word.
 #[derive(Clone, Debug)]
 pub struct Rng(u64);
 
 impl Rng {
-    /// A source; streams of different `stream` have nothing to do with each other.
+    /// A generator. Generators with different `stream` are independent of each other.
     pub fn new(seed: u64, stream: u64) -> Rng {
         let mut rng = Rng(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ stream.wrapping_mul(0xd1b5_4a32_d192_ed03));
         rng.bits();
@@ -20,22 +20,22 @@ impl Rng {
         z ^ (z >> 31)
     }
 
-    /// Evenly from `[0, 1)`.
+    /// Uniformly distributed in `[0, 1)`.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Evenly from `[low, high)`.
+    /// Uniformly distributed in `[low, high)`.
     pub fn range(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
-    /// Evenly from `[-size, size)`.
+    /// Uniformly distributed in `[-size, size)`.
     pub fn around(&mut self, size: f64) -> f64 {
         self.range(-size, size)
     }
 
-    /// Evenly from `0..n`; `n` is positive.
+    /// Uniformly distributed in `0..n`; `n` is positive.
     pub fn below(&mut self, n: usize) -> usize {
         (self.unit() * n as f64) as usize
     }
@@ -45,12 +45,12 @@ impl Rng {
         self.unit() < p
     }
 
-    /// One of a few.
+    /// One of the elements, with equal probability.
     pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
         from[self.below(from.len())]
     }
 
-    /// Index with the probability of its weight.
+    /// An index, with a probability proportional to its weight.
     pub fn weighted(&mut self, weights: &[f64]) -> usize {
         let mut x = self.unit() * weights.iter().sum::<f64>();
         for (k, w) in weights.iter().enumerate() {

@@ -1,11 +1,11 @@
-//! RolledCode, couplings and starts.
+//! Loops, couplings and starts in the TOML format.
 
 use mbd_codegen::model::{Constraint, ConstraintKind, Joint, JointKind, LoopKind, Mount, Placement, Start, Value};
 
 use super::{line, quoted, Writer};
 
 impl Writer<'_> {
-    /// Every constraint, behind frames for those ends of loops that are neither bodies nor frames of the model.
+    /// Writes every constraint, preceded by frames for those ends of loops that are neither bodies nor frames of the model.
     pub(super) fn constraints(&self, out: &mut String) {
         for constraint in &self.model.constraints {
             if let ConstraintKind::Loop { first, second, .. } = &constraint.kind {
@@ -18,7 +18,7 @@ impl Writer<'_> {
         }
     }
 
-    /// What an end is called, if it is a body or a frame of the model.
+    /// Name of an end of a loop, if it is a body or a frame of the model.
     fn end(&self, mount: &Mount) -> Option<&str> {
         if mount.placement == Placement::IDENTITY {
             return Some(mount.body.map_or("ground", |b| &self.model.bodies[b].name));
@@ -124,7 +124,7 @@ impl Writer<'_> {
         }
     }
 
-    /// Start of a joint, if it has one.
+    /// Writes the start of a joint, if it has one.
     pub(super) fn start(&self, out: &mut String, joint: usize) {
         let Some(Start { q, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
         let turns = matches!(self.model.joints[joint].kind, JointKind::Revolute { .. } | JointKind::Helical { .. });
