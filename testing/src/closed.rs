@@ -4,7 +4,9 @@ use mbd_codegen::model::{
     Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Param, Placement, Rotation, Value,
 };
 use mbd_codegen::options::RolledCode;
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions, DEFAULT_SNAP};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::spatial::{add3, dot3, scale3, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
@@ -114,7 +116,7 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
     if distribution.planar {
         flatten(&mut tree, &mut rng);
     }
-    let open = Plan::new(&tree, PLAIN);
+    let open = search::plan(&tree, PLAIN);
     let mut state = random_state(&open, own);
     let mut frames = vec![FrameState::ground(); open.frames.len()];
     state.interpreter(&open).frames(&state.q, &state.v, &mut frames);
@@ -141,10 +143,10 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
 /// One joint after the other: neither the search for a form nor what it finds is part of a reference.
 const PLAIN: PlanOptions = PlanOptions {
     snap: DEFAULT_SNAP,
-    forms: EliminationStrategy::Single,
+    elimination: EliminationStrategy::Single,
     accelerations: false,
     mass_matrix: false,
-    loops: RolledCode::Never,
+    rolled: RolledCode::Never,
 };
 
 /// Rows with less left of them than this are dependent on others.
