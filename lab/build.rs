@@ -19,7 +19,7 @@ mod generated {
 
     use multibody::codegen::import::{load, ImportOptions};
     use multibody::codegen::model::Model;
-    use multibody::codegen::plan::PlanOptions;
+    use multibody::codegen::options::PlanOptions;
     use multibody::codegen::{generate, Group, Loops, Options, Precision};
 
     use super::scenes;
@@ -94,7 +94,7 @@ mod generated {
             outputs: outputs.to_vec(),
             precision,
             efforts: false,
-            plan: PlanOptions { loops, ..default.plan },
+            plan: PlanOptions { rolled: loops, ..default.plan },
             runtime: "::multibody::runtime".to_string(),
             source: format!("scene {name}"),
             ..default

@@ -9,7 +9,7 @@ pub use crate::mbd_model;
 #[cfg(feature = "codegen")]
 pub use crate::codegen::import::{load, Base, ImportOptions};
 #[cfg(feature = "codegen")]
-pub use crate::codegen::plan::{Plan, PlanOptions};
+pub use crate::codegen::{options::PlanOptions, plan::Plan, search};
 
 pub use crate::runtime::constrained::{close, Closing, Stabilisation};
 pub use crate::runtime::integrate::{

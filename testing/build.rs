@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use mbd_codegen::model::{Gravity, Value};
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 
 // The generator of random trees belongs to the crate this script builds, so it is taken in as source.
 #[path = "src/batch.rs"]
@@ -32,7 +32,7 @@ fn main() {
         let code = mbd_codegen::generate(&model, &options).unwrap_or_else(|e| panic!("tree {k}: {e}"));
         let file = out.join(format!("tree{k}.rs"));
         std::fs::write(&file, code.source).expect("OUT_DIR can be written");
-        let plan = Plan::new(&model, options.plan);
+        let plan = search::plan(&model, options.plan);
         let mut fields = Vec::new();
         if options.efforts && plan.dims.nv > 0 {
             fields.push("tau");

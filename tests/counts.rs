@@ -10,7 +10,8 @@ use std::fmt::Write as _;
 use multibody::codegen::generate::trace;
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::Model;
-use multibody::codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions};
+use multibody::codegen::search;
 use multibody::codegen::{Arithmetic, Options, Output};
 use multibody::runtime::sweep::Quantity;
 
@@ -40,8 +41,9 @@ enum Scope {
 
 /// Operations of the rates without joint forces, exact and fast.
 fn rates(model: &Model, forms: EliminationStrategy, scope: Scope) -> [usize; 2] {
-    let plan_options = PlanOptions { forms, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
-    let plan = Plan::new(model, plan_options);
+    let plan_options =
+        PlanOptions { elimination: forms, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
+    let plan = search::plan(model, plan_options);
     ARITHMETIC.map(|arithmetic| {
         let options = Options { plan: plan_options, efforts: false, arithmetic, ..Options::default() };
         let program = trace(&plan, Output::Rates, &options).expect("rates").program;
@@ -177,7 +179,7 @@ fn what_is_generated_by_default_stays_below_its_limits() {
 fn joint_forces_cost_one_addition_each_at_most() {
     for (name, nv) in [("ur5.urdf", 6), ("panda_arm.urdf", 7)] {
         let model = file(name, Base::Fixed, None);
-        let plan = Plan::new(&model, PlanOptions::default());
+        let plan = search::plan(&model, PlanOptions::default());
         let [with, without] = [true, false].map(|efforts| {
             let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
             trace(&plan, Output::Rates, &options).expect("rates").program.counts().total()
@@ -203,7 +205,7 @@ fn derivatives_stay_below_their_limits() {
         ("g1.urdf", Base::Floating, 56500),
     ] {
         let model = self::file(file, base, None);
-        let plan = Plan::new(&model, PlanOptions::default());
+        let plan = search::plan(&model, PlanOptions::default());
         let program = trace(&plan, Output::Derivatives, &Options::default()).expect("derivatives").program;
         let count = program.counts().total();
         println!("{file}: {count}");

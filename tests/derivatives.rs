@@ -1,7 +1,7 @@
 //! Derivatives in use: implicit midpoint steps by Newton's method, over generated code and the interpreter alike.
 
 use multibody::codegen::import::{load, Base, ImportOptions};
-use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::{Blocks, Differentiable, Interpreter};
 
 multibody::mbd_model! {
@@ -85,7 +85,7 @@ fn newton_converges_quadratically_in_implicit_steps() {
 
     let text = std::fs::read_to_string("models/double_pendulum.toml").expect("the model");
     let (read, findings) = load("double_pendulum.toml", &text, &ImportOptions { base: Base::Fixed, gravity: None });
-    let plan = Plan::new(&read.unwrap_or_else(|| panic!("{findings}")), Default::default());
+    let plan = search::plan(&read.unwrap_or_else(|| panic!("{findings}")), Default::default());
     let mut interpreter = Interpreter::new(plan.tree::<f64>(&[]), plan.gravity(&[]));
     for _ in 0..200 {
         assert_newton(&midpoint(&mut interpreter, 0.02, &mut q_there, &mut p_there));

@@ -1,7 +1,7 @@
 //! The methods of diffsol, feature `diffsol`, against a method of order 9 at tight tolerances.
 
 use multibody::codegen::import::toml::read;
-use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::diffsol::{Diffsol, Failure, Stiff};
 use multibody::runtime::integrate::{Solver, Statistics, Step, Tolerances, Verner9};
 use multibody::runtime::{Interpreter, System};
@@ -16,7 +16,7 @@ struct Scene {
 impl Scene {
     fn new(text: &str, q: &[f64], v: &[f64], time: f64) -> Scene {
         let (model, findings) = read("scene.toml", text);
-        let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
+        let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
         let mut p = i.zero_momenta();
         i.momenta(q, v, &mut p);

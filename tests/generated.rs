@@ -11,7 +11,9 @@ mod generated;
 mod tour;
 
 use multibody::codegen::import::{load, Base, ImportOptions};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::{Interpreter, System};
 
@@ -21,7 +23,7 @@ const STATES: u64 = 20;
 fn interpreter(file: &str, base: Base) -> (Plan, Interpreter<f64>) {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
-    let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
     let params = plan.default_params();
     let interpreter = Interpreter::new(plan.tree(&params), plan.gravity(&params));
     (plan, interpreter)

@@ -2,7 +2,8 @@
 #![deny(warnings, missing_docs, unused, nonstandard_style, unreachable_pub)]
 
 use multibody::codegen::import::{load, Base, ImportOptions};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::search;
 use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::{Interpreter, System};
 
@@ -75,7 +76,7 @@ mod warned {
 fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
-    let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
     let params = plan.default_params();
     let gravity = plan.gravity(&params);
     Interpreter::new(plan.tree(&params), gravity)

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{load, ImportOptions};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::constrained::{close, complete, Closing, Effort, Hold, Stabilisation};
 use multibody::runtime::integrate::{catalogue, Step, Tolerances};
 use multibody::runtime::tree::Source;
@@ -47,7 +49,7 @@ fn plan(name: &str) -> Plan {
     let text = std::fs::read_to_string(folder().join(&file)).expect("the file");
     let (model, findings) = load(&file, &text, &ImportOptions::default());
     assert!(findings.0.is_empty(), "{findings}");
-    Plan::new(&model.expect("a model"), PlanOptions::default())
+    search::plan(&model.expect("a model"), PlanOptions::default())
 }
 
 /// The mechanism and the coordinates that close it.

@@ -1,8 +1,10 @@
 //! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames and reactions of nineteen mechanisms (`tests/reference/README.md`).
 
 use multibody::codegen::import::{load, Base, ImportOptions};
-use multibody::codegen::layout;
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::state_layout;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::tree::Source;
@@ -50,14 +52,14 @@ impl Case {
             }
         }
         // Every number as it stands: Pinocchio knows nothing of snapped angles.
-        let plan = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let plan = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let mut params = plan.default_params();
         for (value, param) in params.iter_mut().zip(plan.params()) {
             *value = data["params"][&param.name].as_f64().unwrap_or(*value);
         }
         let gravity: Vec<f64> = numbers(&data["gravity"]);
         let interpreter = Interpreter::new(plan.tree(&params), [gravity[0], gravity[1], gravity[2]]);
-        let mut layout = layout::pinocchio(&plan);
+        let mut layout = state_layout::pinocchio(&plan);
         if file.ends_with(".toml") {
             // The data's own order is the file's; only the form of the coordinates is Pinocchio's.
             layout = by_name(&plan, &data, layout);

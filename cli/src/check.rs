@@ -6,7 +6,8 @@ use std::path::Path;
 
 use multibody::codegen::emit::joint_word;
 use multibody::codegen::model::{ConstraintKind, Model, Value};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::search;
 use multibody::runtime::tree::Source;
 use multibody::runtime::Interpreter;
 
@@ -48,7 +49,7 @@ fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
 }
 
 fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
-    let plan = Plan::new(model, PlanOptions::default());
+    let plan = search::plan(model, PlanOptions::default());
     source::tell_notices(path, &plan.notices);
     let params = plan.default_params();
     let closed = match model.constraints.is_empty() {

@@ -6,7 +6,9 @@ use std::io::Write;
 use multibody::codegen::emit::quantity;
 use multibody::codegen::generate::{trace, OutputProgram};
 use multibody::codegen::model::{Gravity, Model, Value};
-use multibody::codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions};
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search::{self, Candidate, Chosen};
 use multibody::codegen::symbolic::Counts;
 use multibody::codegen::{Arithmetic, Options, Output};
 use serde_json::json;
@@ -77,8 +79,8 @@ struct Part {
 
 /// Counts and prints.
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
-    let plan = source::plan(&args.model, args.code.plan_options())?;
-    let options = args.code.options(&plan.model.name).of_model(&plan.model);
+    let Chosen { plan, candidates: tried } = source::chosen(&args.model, args.code.plan_options())?;
+    let options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
     let counts = all(&plan, &options)?;
     let parts = match options.outputs.first() {
         Some(&group) => parts(&plan, &options, group)?,
@@ -98,7 +100,7 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     )?;
     table(&counts, &options.outputs, out)?;
     speed_table(&speeds, out)?;
-    candidates(&plan, options.plan.forms, args.candidates, out)?;
+    candidates(&plan, &tried, &options, args.candidates, out)?;
     rivals(&plan, &counts, out)?;
     let group = options.outputs.first().map_or("", |g| g.name());
     if !parts.is_empty() {
@@ -115,20 +117,21 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     Ok(())
 }
 
-/// Elimination forms that were tried: the best of every branch, or all.
-fn candidates(plan: &Plan, forms: EliminationStrategy, all: bool, out: &mut dyn Write) -> Outcome {
-    let mut rest = &plan.candidates[..];
+/// Eliminations that were tried: the best of every branch, or all.
+fn candidates(plan: &Plan, tried: &[Candidate], options: &Options, all: bool, out: &mut dyn Write) -> Outcome {
+    let strategy = options.plan.elimination;
+    let mut rest = tried;
     while let Some(first) = rest.first() {
         let n = rest.iter().take_while(|c| c.branch == first.branch).count();
         let mut branch: Vec<&Candidate> = rest[..n].iter().collect();
         rest = &rest[n..];
-        let key = |c: &Candidate| match forms {
+        let key = |c: &Candidate| match strategy {
             EliminationStrategy::Fastest => c.cost.cycles(),
             _ => c.cost.operations as f64,
         };
         branch.sort_by(|a, b| key(a).total_cmp(&key(b)).then(b.taken.cmp(&a.taken)));
         let [from, to] = first.branch.map(|k| plan.nodes[k].name.as_str());
-        let why = match forms {
+        let why = match strategy {
             EliminationStrategy::Fastest => "fewest cycles for one state",
             _ => "fewest operations",
         };
@@ -231,7 +234,7 @@ fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
     let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
         let mut model = plan.model.clone();
         change(&mut model);
-        total(&Plan::new(&model, options.searches()), options)
+        total(&search::plan(&model, options.searches()), options)
     };
     // What the sweeps do; rewriting would blur the differences.
     let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
@@ -253,9 +256,10 @@ fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
     part("joint forces", here.abs_diff(other), options.efforts);
     part("external wrenches", here.saturating_sub(changed(&|m| m.wrenches.clear())?), true);
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
-    let exact = Plan::new(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+    let exact = search::plan(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
-    let single = Plan::new(&plan.model, PlanOptions { forms: EliminationStrategy::Single, ..options.searches() });
+    let single =
+        search::plan(&plan.model, PlanOptions { elimination: EliminationStrategy::Single, ..options.searches() });
     part(FORMS, total(&single, options)?.saturating_sub(here), true);
     Ok(parts)
 }

@@ -5,7 +5,9 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use multibody::codegen::model::{JointKind, Value};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::catalogue;
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
@@ -37,7 +39,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
     }
-    let plan = Plan::new(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() });
+    let plan = search::plan(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() });
     source::tell_notices(path, &plan.notices);
     if plan.dims.drive_v > 0 {
         note(format_args!("{}: notice: prescribed joints are held at zero", path.display()));

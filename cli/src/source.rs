@@ -5,7 +5,9 @@ use std::path::Path;
 
 use multibody::codegen::import::{load, words, ImportOptions};
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search::{self, Chosen};
 use multibody::runtime::interp::RankLoss;
 
 use super::args::ModelArgs;
@@ -77,11 +79,16 @@ pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
     Ok(model)
 }
 
+/// The plan of a model and what was tried on the way to it, with its notices told.
+pub fn chosen(args: &ModelArgs, options: PlanOptions) -> Outcome<Chosen> {
+    let chosen = search::best(Plan::new(&model_of(args)?, options.snap), options);
+    tell_notices(&args.model, &chosen.plan.notices);
+    Ok(chosen)
+}
+
 /// The plan of a model, with its notices told.
 pub fn plan(args: &ModelArgs, options: PlanOptions) -> Outcome<Plan> {
-    let plan = Plan::new(&model_of(args)?, options);
-    tell_notices(&args.model, &plan.notices);
-    Ok(plan)
+    Ok(chosen(args, options)?.plan)
 }
 
 /// Notices of a plan.

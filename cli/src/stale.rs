@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{self, Arithmetic, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
 
@@ -141,7 +141,12 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         arithmetic,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
-        plan: PlanOptions { snap: entry.snap.unwrap_or(DEFAULT_SNAP), forms, loops, ..PlanOptions::default() },
+        plan: PlanOptions {
+            snap: entry.snap.unwrap_or(DEFAULT_SNAP),
+            elimination: forms,
+            rolled: loops,
+            ..PlanOptions::default()
+        },
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),

@@ -6,7 +6,9 @@ use std::path::Path;
 use std::time::Instant;
 
 use multibody::codegen::import::{load, ImportOptions};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::codegen::{Options, Output};
 use multibody::runtime::constrained::Stabilisation;
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
@@ -79,7 +81,7 @@ fn plan() -> Outcome<Plan> {
         note(format_args!("{findings}"));
         return Err(Failure::Shown);
     };
-    Ok(Plan::new(&model, PlanOptions::default()))
+    Ok(search::plan(&model, PlanOptions::default()))
 }
 
 fn counts(plan: &Plan, out: &mut dyn Write) -> Outcome {

@@ -6,6 +6,7 @@ use crate::model::Model;
 pub use crate::options::{Arithmetic, Options, Output, Precision, RolledCode};
 use crate::plan::Plan;
 use crate::rolled::rolled;
+use crate::search;
 use crate::symbolic::{Counts, Operand, ProgramResult};
 use crate::trace::coordinate_map;
 pub use crate::trace::{chosen_frames, trace, InputArray, OutputProgram};
@@ -27,8 +28,8 @@ pub struct Generated {
 /// An unknown frame name in the options, an output that the model does not have, or a number that is not finite in the code (a freedom without inertia, which the
 /// checks cannot see where parameters are involved), as a message.
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, String> {
-    let options = &options.of_model(model);
-    let plan = Plan::new(model, options.searches());
+    let options = &options.of_model(!model.constraints.is_empty());
+    let plan = search::plan(model, options.searches());
     let groups = options.outputs.iter().map(|&g| match rolled(&plan, g, options) {
         Some(program) => Ok(OutputProgram::rolled(program)),
         None => trace(&plan, g, options),

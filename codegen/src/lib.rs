@@ -5,13 +5,12 @@ pub mod diag;
 pub mod emit;
 pub mod generate;
 pub mod import;
-pub mod layout;
 pub mod model;
 pub mod options;
 pub mod plan;
 pub mod rolled;
+pub mod search;
 pub mod symbolic;
 pub mod trace;
-pub mod wide;
 
 pub use generate::{generate, Arithmetic, Generated, Options, Output, Precision, RolledCode};

@@ -1,8 +1,5 @@
 //! What is to be generated, and how.
 
-use crate::model::Model;
-use crate::plan::PlanOptions;
-
 /// Number type of the generated code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
@@ -64,6 +61,66 @@ impl RolledCode {
             RolledCode::Auto => "auto",
             RolledCode::Always => "always",
             RolledCode::Never => "never",
+        }
+    }
+}
+
+/// How the joints are eliminated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum EliminationStrategy {
+    /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of those whose
+    /// rounding errors are not much larger than those of one joint at a time.
+    #[default]
+    Fastest,
+    /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding errors.
+    Fewest,
+    /// Every joint by itself.
+    Single,
+}
+
+impl EliminationStrategy {
+    /// All of them.
+    pub const ALL: [EliminationStrategy; 3] =
+        [EliminationStrategy::Fastest, EliminationStrategy::Fewest, EliminationStrategy::Single];
+
+    /// Its name in options.
+    pub fn name(self) -> &'static str {
+        match self {
+            EliminationStrategy::Fastest => "fastest",
+            EliminationStrategy::Fewest => "fewest",
+            EliminationStrategy::Single => "single",
+        }
+    }
+}
+
+/// Angles this close to a multiple of 90° are taken as one, rad (see [`PlanOptions::snap`]).
+pub const DEFAULT_SNAP: f64 = 1e-6;
+
+/// How the structure is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlanOptions {
+    /// Angles of placements and directions of axes closer than this to right angles become exact, rad. 0 keeps every
+    /// number of the description. A decimal π/2 costs a term wherever an exact zero would have stood.
+    pub snap: f64,
+    /// Joints that are solved together.
+    pub elimination: EliminationStrategy,
+    /// Whether accelerations get a search of their own. Without it they are right, and cost what the elimination chosen for the
+    /// rates makes them cost.
+    pub accelerations: bool,
+    /// Whether the mass matrix gets one.
+    pub mass_matrix: bool,
+    /// Rolled code for runs of like links: long chains are laid out for it.
+    pub rolled: RolledCode,
+}
+
+impl Default for PlanOptions {
+    fn default() -> Self {
+        PlanOptions {
+            snap: DEFAULT_SNAP,
+            elimination: EliminationStrategy::default(),
+            accelerations: true,
+            mass_matrix: true,
+            rolled: RolledCode::default(),
         }
     }
 }
@@ -211,13 +268,13 @@ impl Options {
     /// What is computed unless something else is asked for; and, where there are constraints, [`Output::CONSTRAINED`].
     pub const OUTPUTS: [Output; 3] = [Output::Rates, Output::Momenta, Output::Energy];
 
-    /// The options for a model: where the outputs are [`Options::OUTPUTS`] or all of them, one with constraints also gets
-    /// [`Output::CONSTRAINED`], and not what such models lack.
-    pub fn of_model(&self, model: &Model) -> Options {
+    /// The options for a model with or without constraints: where the outputs are [`Options::OUTPUTS`] or all of them, one with
+    /// constraints also gets [`Output::CONSTRAINED`], and not what such models lack.
+    pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
         let asked =
             |groups: &[Output]| groups.len() == self.outputs.len() && groups.iter().all(|g| self.outputs.contains(g));
-        if !model.constraints.is_empty() && (asked(&Options::OUTPUTS) || asked(&Output::ALL)) {
+        if constrained && (asked(&Options::OUTPUTS) || asked(&Output::ALL)) {
             options.outputs.retain(|g| !g.of_trees());
             options.outputs.extend(Output::CONSTRAINED);
         }

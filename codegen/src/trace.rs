@@ -9,10 +9,10 @@ use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
 use crate::model::Gravity;
-use crate::options::{Options, Output, Precision};
+use crate::options::{Arithmetic, EliminationStrategy, Options, Output, Precision};
 use crate::plan::Plan;
 use crate::rolled::RolledProgram;
-use crate::symbolic::{passes, Counts, Expr, Graph, Program};
+use crate::symbolic::{passes, Counts, Expr, Graph, Program, Rewrite};
 
 /// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -171,6 +171,15 @@ pub(crate) fn tolerance(precision: Precision) -> f64 {
     }
 }
 
+/// How the programs of some options are rewritten. Whoever wants the fewest operations gets none twice to save time.
+pub(crate) fn rewrite(options: &Options) -> Rewrite {
+    match (options.arithmetic, options.plan.elimination) {
+        (Arithmetic::Exact, _) => Rewrite::None,
+        (Arithmetic::Fast, EliminationStrategy::Fewest) => Rewrite::Fewest,
+        (Arithmetic::Fast, EliminationStrategy::Fastest | EliminationStrategy::Single) => Rewrite::Shortest,
+    }
+}
+
 /// Runs the sweeps of one group on symbols.
 ///
 /// # Errors
@@ -193,7 +202,7 @@ pub fn trace(plan: &Plan, group: Output, options: &Options) -> Result<OutputProg
         }
         _ => run(&graph, [&tree, &physical], group, state, &given.inputs(), &frames),
     };
-    let program = passes::run(Program::new(&graph, &outputs), options.arithmetic, options.plan.forms);
+    let program = passes::run(Program::new(&graph, &outputs), rewrite(options));
     Ok(OutputProgram { group, inputs: given.arrays, program, loops: None })
 }
 

@@ -106,7 +106,7 @@ mod generated {
         visit_differentiable_f32, visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable,
     };
     use mbd_lab::scenes::Dynamics;
-    use multibody::codegen::wide::Wide;
+    use multibody::codegen::search::Wide;
     use multibody::runtime::{Blocks, Differentiable, Scalar};
 
     use super::*;

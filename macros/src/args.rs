@@ -2,7 +2,7 @@
 
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
-use mbd_codegen::plan::EliminationStrategy;
+use mbd_codegen::options::EliminationStrategy;
 use mbd_codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
@@ -159,11 +159,11 @@ impl Args {
             }
             "forms" => {
                 let choices = EliminationStrategy::ALL.map(|f| (f.name(), f));
-                self.options.plan.forms = choice("forms", value, &choices)?;
+                self.options.plan.elimination = choice("forms", value, &choices)?;
             }
             "loops" => {
                 let choices = RolledCode::ALL.map(|l| (l.name(), l));
-                self.options.plan.loops = choice("loops", value, &choices)?;
+                self.options.plan.rolled = choice("loops", value, &choices)?;
             }
             "base" => {
                 let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];

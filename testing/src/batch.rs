@@ -2,7 +2,7 @@
 
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
-use mbd_codegen::plan::PlanOptions;
+use mbd_codegen::options::PlanOptions;
 use mbd_codegen::{Output, RolledCode};
 
 use crate::random::{random_model, Distribution, Rng};
@@ -29,7 +29,7 @@ pub fn tree(k: u64) -> (Model, Options) {
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
         efforts: rng.chance(0.8),
         plan: PlanOptions {
-            loops: if k < FIRST_CHAIN { RolledCode::Auto } else { RolledCode::Always },
+            rolled: if k < FIRST_CHAIN { RolledCode::Auto } else { RolledCode::Always },
             ..PlanOptions::default()
         },
         ..Options::default()

@@ -12,6 +12,7 @@ mod wide;
 use mbd_codegen::generate::trace;
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::random::{random_model, Distribution};
@@ -79,7 +80,7 @@ fn check(name: &str, plan: &Plan, group: Output, states: u64) {
 fn rates_of_the_models() {
     for (file, base) in MODELS {
         let states = if base == Base::Floating { 400 } else { 1000 };
-        check(file, &Plan::new(&model(file, base), Options::default().plan), Output::Rates, states);
+        check(file, &search::plan(&model(file, base), Options::default().plan), Output::Rates, states);
     }
 }
 
@@ -87,7 +88,7 @@ fn rates_of_the_models() {
 fn every_output_of_random_trees() {
     for seed in 0..20 {
         let model = random_model(seed, &Distribution::everything(seed, 6));
-        let plan = Plan::new(&model, Options::default().plan);
+        let plan = search::plan(&model, Options::default().plan);
         for group in Output::ALL {
             check(&format!("tree {seed}"), &plan, group, 1000);
         }

@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use common::Emitted;
 use mbd_codegen::generate::{generate, Arithmetic, Options, Output};
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
 use mbd_runtime::{Interpreter, System};
 use mbd_testing::random::{random_model, Distribution, Rng};
@@ -38,7 +39,7 @@ impl Case {
             efforts: rng.chance(0.8),
             ..Options::default()
         };
-        let plan = Plan::new(&model, options.plan);
+        let plan = search::plan(&model, options.plan);
         let source = generate(&model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         Case { seed, plan, efforts: options.efforts, derivatives, emitted: Emitted::parse(&source) }
     }

@@ -163,6 +163,7 @@ mod batch {
 
 use batch::{Results, RUNNERS};
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives, ParameterDerivatives};
 use mbd_runtime::{Interpreter, Scalar};
 use mbd_testing::batch::{is_single, tree};
@@ -238,7 +239,7 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
 /// Plan, state and momenta of tree `k`, both rounded to the precision of its code.
 fn case(k: u64, state: u64) -> (Plan, State, Vec<f64>) {
     let (model, options) = tree(k);
-    let plan = Plan::new(&model, options.plan);
+    let plan = search::plan(&model, options.plan);
     let mut s = random_state(&plan, 100 * k + state);
     if !options.efforts {
         s.tau.fill(0.0);

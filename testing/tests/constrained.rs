@@ -3,7 +3,7 @@
 
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::constrained::{
     close, complete, Closing, CoordinatePartition, Effort, Hold, OpenAndClosed, RadauIndex2, Rattle, Repartition,
     Stabilisation, Steady, WithPostStep,
@@ -141,7 +141,7 @@ fn model(text: &str) -> Model {
 }
 
 fn interpreter(model: &Model) -> Mechanism {
-    let plan = Plan::new(model, Default::default());
+    let plan = search::plan(model, Default::default());
     plan.interpreter(&[])
 }
 
@@ -444,7 +444,7 @@ fn past_the_change_point() {
 fn single_precision() {
     let (y, (q, p)) = crank("type = \"point_on_line\"\naxis = [0, 1, 0]");
     drop(y);
-    let plan = Plan::new(&model(&four_bar("type = \"point_on_line\"\naxis = [0, 1, 0]")), Default::default());
+    let plan = search::plan(&model(&four_bar("type = \"point_on_line\"\naxis = [0, 1, 0]")), Default::default());
     let mut y: Interpreter<f32> = Interpreter::new(plan.tree(&[]), [0.0, 0.0, -9.81]);
     let single = |x: &[f64]| x.iter().map(|x| *x as f32).collect::<Vec<f32>>();
     let (mut q, mut p) = (single(&q), single(&p));

@@ -11,6 +11,7 @@ use common::Emitted;
 use mbd_codegen::generate::{generate, Arithmetic, Options, Output};
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_codegen::RolledCode;
 use mbd_runtime::{Accelerated, Constrained, Dual, Interpreter, Scalar, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
@@ -47,8 +48,8 @@ impl Case {
         }
         let mut options =
             Options { arithmetic: Arithmetic::Exact, outputs, efforts: rng.chance(0.7), ..Options::default() };
-        options.plan.loops = RolledCode::Never;
-        let plan = Plan::new(&system.model, options.searches());
+        options.plan.rolled = RolledCode::Never;
+        let plan = search::plan(&system.model, options.searches());
         system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
         let source = generate(&system.model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         let mut state = system.state;

@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 
 use mbd_codegen::model::{ConstraintKind, JointKind, JointMotion, Model};
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::constrained::CoordinatePartition;
 use mbd_runtime::{Accelerated, Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
@@ -151,13 +153,13 @@ fn parameters_of_constraints_are_as_good_as_constants() {
         met += 1;
         let options = PlanOptions {
             snap: 0.0,
-            forms: EliminationStrategy::Single,
+            elimination: EliminationStrategy::Single,
             accelerations: false,
             ..PlanOptions::default()
         };
         let s = &c.system.state;
-        let ours = results(&Plan::new(&c.system.model, options), s, c.p.as_slice());
-        let plain = Plan::new(&substituted(&c.system.model, &s.params), options);
+        let ours = results(&search::plan(&c.system.model, options), s, c.p.as_slice());
+        let plain = search::plan(&substituted(&c.system.model, &s.params), options);
         let s = State { params: Vec::new(), ..s.clone() };
         let d = difference(&ours, &results(&plain, &s, c.p.as_slice()));
         assert!(d < 1e-10, "seed {seed}: {d:e}");
@@ -174,7 +176,7 @@ fn forms_of_elimination_do_not_matter() {
         let Some(c) = apart(seed, system(seed)) else { continue };
         met += 1;
         let of = |forms| {
-            let plan = Plan::new(&c.system.model, PlanOptions { forms, ..PlanOptions::default() });
+            let plan = search::plan(&c.system.model, PlanOptions { elimination: forms, ..PlanOptions::default() });
             results(&plan, &c.system.state, c.p.as_slice())
         };
         let [first, others @ ..] = EliminationStrategy::ALL.map(of);

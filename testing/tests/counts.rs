@@ -2,7 +2,8 @@
 
 use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::search;
 use mbd_codegen::symbolic::Counts;
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::sweep::Quantity;
@@ -12,9 +13,9 @@ const NONE: Gravity = Gravity::Constant([Value::ZERO; 3]);
 
 /// Joints one by one: what is said of loads and outputs does not depend on the form.
 fn program(model: &Model, group: Output, efforts: bool) -> mbd_codegen::symbolic::Program {
-    let plan = PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() };
+    let plan = PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() };
     let options = Options { efforts, arithmetic: Arithmetic::Exact, plan, ..Options::default() };
-    trace(&Plan::new(model, plan), group, &options).expect("no frames are named").program
+    trace(&search::plan(model, plan), group, &options).expect("no frames are named").program
 }
 
 fn counts(model: &Model, group: Output) -> Counts {
@@ -24,13 +25,13 @@ fn counts(model: &Model, group: Output) -> Counts {
 /// Operations of the rates in the form that has the fewest.
 fn fewest(model: &Model) -> usize {
     let plan = PlanOptions {
-        forms: EliminationStrategy::Fewest,
+        elimination: EliminationStrategy::Fewest,
         accelerations: false,
         mass_matrix: false,
         ..PlanOptions::default()
     };
     let options = Options { efforts: false, arithmetic: Arithmetic::Fast, plan, ..Options::default() };
-    trace(&Plan::new(model, plan), Output::Rates, &options).expect("no frames are named").program.counts().total()
+    trace(&search::plan(model, plan), Output::Rates, &options).expect("no frames are named").program.counts().total()
 }
 
 /// A chain of `n` pins, general in every number.
@@ -109,7 +110,7 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
 fn efforts_cost_one_addition_each() {
     for seed in 0..100 {
         let model = random_model(seed, &Distribution::everything(seed, 6));
-        let nv = Plan::new(&model, Options::default().plan).dims.nv;
+        let nv = search::plan(&model, Options::default().plan).dims.nv;
         let [with, without] = [true, false].map(|efforts| program(&model, Output::Rates, efforts).counts());
         assert!(with.additions <= without.additions + nv, "seed {seed}");
         assert_eq!((with.multiplications, with.divisions), (without.multiplications, without.divisions), "seed {seed}");
@@ -145,7 +146,7 @@ fn frames_are_chosen_one_by_one() {
     let model = random_model(3, &Distribution { bodies: (6, 6), ..Distribution::default() });
     let count = |frames: Vec<String>| {
         let options = Options { frames, arithmetic: Arithmetic::Exact, ..Options::default() };
-        let plan = Plan::new(&model, options.plan);
+        let plan = search::plan(&model, options.plan);
         trace(&plan, Output::Frames, &options).expect("the frames exist").program.counts().total()
     };
     let names: Vec<String> = model.joints.iter().map(|j| model.bodies[j.child].name.clone()).collect();

@@ -4,7 +4,9 @@
 
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::{Model, Value};
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::sweep::{Derivatives, MomentumDerivatives, Sweeps};
 use mbd_runtime::tree::Kind;
 use mbd_runtime::workspace::Workspace;
@@ -44,7 +46,7 @@ impl Case {
     }
 
     fn of_model(model: &Model, seed: u64, forms: EliminationStrategy) -> Case {
-        let plan = Plan::new(model, PlanOptions { forms, ..PlanOptions::default() });
+        let plan = search::plan(model, PlanOptions { elimination: forms, ..PlanOptions::default() });
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; plan.dims.nv];
@@ -182,7 +184,7 @@ fn conservative_trees_with_coordinate_rates_are_canonical() {
         let mut model = random_model(seed, &Distribution::everything(seed, 6));
         model.wrenches.clear();
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
-        let plan = Plan::new(&model, Default::default());
+        let plan = search::plan(&model, Default::default());
         if plan.tree::<f64>(&plan.default_params()).nodes.iter().any(|n| n.kind.nv() > 1) {
             continue;
         }

@@ -2,7 +2,9 @@
 
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
-use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_codegen::options::PlanOptions;
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Source;
 use mbd_runtime::workspace::Workspace;
@@ -78,9 +80,9 @@ fn parameters_are_as_good_as_constants() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
         let model = random_model(seed, &Distribution { params: 0.4, ..Distribution::everything(seed, 8) });
-        let plan = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let plan = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let s = random_state(&plan, seed);
-        let plain = Plan::new(&substituted(&model, &s.params), PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let plain = search::plan(&substituted(&model, &s.params), PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let mut s2 = s.clone();
         s2.params.clear();
         worst = worst.max(compare(seed, &model, &results(&plan, &s), &results(&plain, &s2), 1e-11));
@@ -94,7 +96,7 @@ fn regrouped_trees_move_as_described_ones() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
         let model = random_model(seed, &Distribution::everything(seed, 8));
-        let plan = Plan::new(&model, PlanOptions::default());
+        let plan = search::plan(&model, PlanOptions::default());
         let s = random_state(&plan, seed);
         let regrouped = results(&plan, &s);
         let tree = plan.tree(&s.params);
@@ -139,7 +141,7 @@ fn mimics_are_projections_of_free_joints() {
     let (mut worst, mut seen) = (0.0_f64, 0);
     for seed in 0..2 * TREES {
         let model = random_model(seed, &Distribution { mimic: 0.7, ..Distribution::everything(seed, 8) });
-        let plan = Plan::new(&model, PlanOptions::default());
+        let plan = search::plan(&model, PlanOptions::default());
         seen += usize::from(!plan.unknowns.is_empty());
         let s = random_state(&plan, seed);
         let mut released = model.clone();
@@ -148,7 +150,7 @@ fn mimics_are_projections_of_free_joints() {
                 joint.motion = JointMotion::Free;
             }
         }
-        let free = Plan::new(&released, PlanOptions::default());
+        let free = search::plan(&released, PlanOptions::default());
         let n = free.dims.nv;
         let at = |v: &[f64], drive: &[f64]| on_free(&free, &joint_rates(&plan, &s.params, v, drive));
         let mut s_free = s.clone();
@@ -241,8 +243,8 @@ fn snapping_changes_no_more_than_the_angles() {
                 *angle = Value::Const(value(*angle, &[]) + rng.around(OFF));
             }
         }
-        let snapped = Plan::new(&model, PlanOptions::default());
-        let exact = Plan::new(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let snapped = search::plan(&model, PlanOptions::default());
+        let exact = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         noticed += usize::from(!snapped.notices.is_empty());
         assert!(exact.notices.is_empty(), "seed {seed}: {:?}", exact.notices);
         let s = random_state(&exact, seed);
@@ -265,7 +267,7 @@ fn coupled_pendulums_on_the_ground_feel_gravity() {
     let coupled = alone.clone() + &body(1) + &joint(1) + "xyz = [1, 2, 3]\nmimic = { joint = \"j0\" }\n";
     let acceleration = |text: &str| {
         let (model, findings) = read("pendulum.toml", text);
-        let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+        let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
         let mut a = [0.0];
         i.accelerations(&[0.4], &[0.7], &mut a);

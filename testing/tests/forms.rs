@@ -17,7 +17,9 @@ use std::fmt::Write;
 
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{JointKind, Model};
-use mbd_codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search::{self, Candidate, Chosen};
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::chains;
@@ -34,8 +36,9 @@ type Kind = (EliminationStrategy, Arithmetic);
 const ARTICULATED: Kind = (EliminationStrategy::Single, Arithmetic::Exact);
 const DEFAULT: Kind = (EliminationStrategy::Fastest, Arithmetic::Fast);
 
-fn plan(model: &Model, forms: EliminationStrategy) -> Plan {
-    Plan::new(model, PlanOptions { forms, ..PlanOptions::default() })
+fn chosen(model: &Model, elimination: EliminationStrategy) -> Chosen {
+    let options = PlanOptions { elimination, ..PlanOptions::default() };
+    search::best(Plan::new(model, options.snap), options)
 }
 
 /// Errors in each array of programs of one model, kind by kind.
@@ -132,7 +135,7 @@ fn default_forms_do_not_cost_accuracy() {
         if name.starts_with("g1") || name.starts_with("20") {
             continue;
         }
-        let plans = [EliminationStrategy::Single, EliminationStrategy::Fastest].map(|forms| plan(&model, forms));
+        let plans = [EliminationStrategy::Single, EliminationStrategy::Fastest].map(|forms| chosen(&model, forms).plan);
         let errors = measure(&plans, &[ARTICULATED, DEFAULT], 300);
         all.extend(beyond(&name, &ratios(&errors[1], &errors[0])));
     }
@@ -212,10 +215,12 @@ struct Lines {
 }
 
 fn lines(name: &str, model: &Model) -> Result<Lines, std::fmt::Error> {
-    let plans = KINDS.map(|(forms, _)| plan(model, forms));
+    let all = KINDS.map(|(forms, _)| chosen(model, forms));
+    let refused = refusals(name, &all[1])?;
+    let plans = all.map(|chosen| chosen.plan);
     let measured = measure(&plans, &KINDS, MANY);
     let ratios: Vec<[Spread; 3]> = measured.iter().map(|m| ratios(m, &measured[0])).collect();
-    let mut lines = Lines { beyond: beyond(name, &ratios[1]), refused: refusals(name, &plans[1])?, ..Lines::default() };
+    let mut lines = Lines { beyond: beyond(name, &ratios[1]), refused, ..Lines::default() };
     write!(lines.errors, "| {name} |")?;
     for (articulated, times) in measured[0].iter().zip(&ratios[1]) {
         write!(lines.errors, " {:.1e} | {:.2} | {:.2} |", articulated.median, times.median, times.worst)?;
@@ -266,10 +271,10 @@ fn report() -> Result<(), std::fmt::Error> {
 }
 
 /// The fastest form of each branch that was refused.
-fn refusals(name: &str, plan: &Plan) -> Result<String, std::fmt::Error> {
+fn refusals(name: &str, Chosen { plan, candidates }: &Chosen) -> Result<String, std::fmt::Error> {
     let mut text = String::new();
-    for taken in plan.candidates.iter().filter(|c| c.taken) {
-        let refused = plan.candidates.iter().filter(|c| c.branch == taken.branch && c.refused);
+    for taken in candidates.iter().filter(|c| c.taken) {
+        let refused = candidates.iter().filter(|c| c.branch == taken.branch && c.refused);
         let time = |c: &Candidate| c.cost.cycles() / taken.cost.cycles();
         let Some(first) = refused.min_by(|a, b| time(a).total_cmp(&time(b))) else { continue };
         let [from, to] = taken.branch.map(|k| plan.nodes[k].name.as_str());

@@ -6,7 +6,7 @@
 
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::integrate::{
     Composition, Doubled, Euler, Gauss6, ImplicitMidpoint, Midpoint, Radau5, Rk4, Rodas5P, SemiImplicitEuler,
     StepDoubling, Stepper, Symmetric, Verner9,
@@ -65,7 +65,7 @@ fn rotor() -> (Interpreter<f64>, Vec<f64>, Vec<f64>) {
         child = "rotor"
     "#;
     let (model, findings) = read("rotor.toml", text);
-    let plan = Plan::new(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
+    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
     let mut i: Interpreter<f64> = plan.interpreter(&[]);
     let q = [0.1, -0.5, 0.5, 0.7];
     let length = q.iter().map(|x: &f64| x * x).sum::<f64>().sqrt();
@@ -157,7 +157,7 @@ impl Floating {
             list.clear();
         }
         model.gravity = Gravity::Constant([Value::ZERO, Value::ZERO, Value::Const(gravity)]);
-        let plan = Plan::new(&model, Default::default());
+        let plan = search::plan(&model, Default::default());
         let mut s = random_state(&plan, seed);
         s.tau.fill(0.0);
         let mut i = s.interpreter(&plan);

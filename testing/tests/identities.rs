@@ -4,7 +4,7 @@
 //! which owes nothing to the sweep for `ṗ`.
 
 use mbd_codegen::model::JointKind;
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::spatial::cross;
 use mbd_runtime::sweep::Sweeps;
 use mbd_runtime::tree::{Kind, Source};
@@ -228,7 +228,7 @@ fn momentum_of_free_trees_is_constant() {
                 joint.motion = mbd_codegen::model::JointMotion::Free;
             }
         }
-        let plan = Plan::new(&model, Default::default());
+        let plan = search::plan(&model, Default::default());
         let mut s = random_state(&plan, seed);
         s.tau[..6].fill(0.0);
         let c = Case::of(seed, plan, s);
@@ -250,7 +250,7 @@ fn momentum_of_free_trees_is_constant() {
 fn reduced_inertia_has_nothing_along_its_freedoms() {
     for seed in 0..TREES {
         let distribution = Distribution { armature: 0.0, massless: 0.0, ..Distribution::everything(seed, 8) };
-        let plan = Plan::new(&random_model(seed, &distribution), Default::default());
+        let plan = search::plan(&random_model(seed, &distribution), Default::default());
         let s = random_state(&plan, seed);
         let tree = plan.tree(&s.params).regrouped();
         let mut w = Workspace::new(&tree);

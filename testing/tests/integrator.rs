@@ -3,7 +3,7 @@
 //! A new method is a row of [`methods`].
 
 use mbd_codegen::model::{Gravity, Value};
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::integrate::{
     Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Composition, Dop853, Doubled, Euler, Gauss12, Gauss4, Gauss6,
     ImplicitMidpoint, Midpoint, Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper,
@@ -122,7 +122,7 @@ impl Scene {
             Distribution { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Distribution::default() };
         let mut model = random_model(seed, &distribution);
         model.gravity = Gravity::Constant([Value::ZERO, Value::ZERO, Value::Const(-9.81)]);
-        let plan = Plan::new(&model, Default::default());
+        let plan = search::plan(&model, Default::default());
         let mut s = random_state(&plan, seed);
         s.tau.fill(0.0);
         let mut i = s.interpreter(&plan);

@@ -4,8 +4,9 @@
 
 use mbd_codegen::generate::trace;
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::rolled::{looped, RolledProgram};
+use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::Constrained;
 use mbd_testing::chains::{general, planar};
@@ -37,7 +38,7 @@ fn inputs(program: &RolledProgram, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> 
 
 /// Compares every group that has loops; gives the number of nodes in loops.
 fn compare(model: &Model, seed: u64, options: &Options) -> usize {
-    let plan = Plan::new(model, options.plan);
+    let plan = search::plan(model, options.plan);
     let mut s = random_state(&plan, seed);
     if !options.efforts {
         s.tau.fill(0.0);
@@ -122,7 +123,7 @@ fn forced(seed: u64) -> Options {
     Options {
         arithmetic: Arithmetic::Exact,
         efforts: rng.chance(0.7),
-        plan: PlanOptions { forms, loops: RolledCode::Always, ..PlanOptions::default() },
+        plan: PlanOptions { elimination: forms, rolled: RolledCode::Always, ..PlanOptions::default() },
         ..Options::default()
     }
 }
@@ -162,15 +163,15 @@ fn closed_chains() {
         model.constraints.push(Constraint { name: "loop".to_string(), kind, decay });
         let mut options = forced(seed);
         // Frames that do not turn keep their nodes out of loops.
-        if options.plan.forms == EliminationStrategy::Fewest {
-            options.plan.forms = EliminationStrategy::Single;
+        if options.plan.elimination == EliminationStrategy::Fewest {
+            options.plan.elimination = EliminationStrategy::Single;
         }
         let nodes = compare(&model, seed, &options);
         if seed % 4 == 0 {
             // With a decay the rows ask for the pose of the tip, and pull at the joints: straight-line code.
             continue;
         }
-        let plan = Plan::new(&model, options.plan);
+        let plan = search::plan(&model, options.plan);
         for group in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
             let looped = looped(&plan, group, &options).is_some();
             assert!(looped, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);

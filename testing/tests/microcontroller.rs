@@ -5,7 +5,7 @@ mod wide;
 
 use mbd_codegen::import::Base;
 use mbd_codegen::model::Value;
-use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::integrate::{Ab6, EnergyProjection, Stepper};
 use mbd_testing::state::random_state;
 
@@ -18,7 +18,7 @@ use mbd_testing::state::random_state;
 fn energy_error(speed: f32, projected: bool) -> f64 {
     let mut model = wide::model("ur5.urdf", Base::Fixed);
     model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
-    let plan = Plan::new(&model, Default::default());
+    let plan = search::plan(&model, Default::default());
     let mut state = random_state(&plan, 0);
     state.tau.fill(0.0);
     let (mut single, mut double) = (state.interpreter_of(&plan, |x, _| x as f32), state.interpreter(&plan));

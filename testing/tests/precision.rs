@@ -5,6 +5,7 @@ mod wide;
 
 use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::integrate::{Dop853, Point, Rk4, Stepper, Tsit5, Verner9};
 use mbd_runtime::wide::Wide;
 use mbd_runtime::{Interpreter, Real, Scalar};
@@ -52,14 +53,14 @@ impl Scene {
     /// Six pins, or a tree of pins and sliders, with inertias of every kind. Axes are along those of frames: cosine and sine
     /// of a constant turn between them are doubles, whose squares make one to 53 bits only.
     fn all() -> Vec<Scene> {
-        let ur5 = Plan::new(&wide::model("ur5.urdf", Base::Fixed), Default::default());
+        let ur5 = search::plan(&wide::model("ur5.urdf", Base::Fixed), Default::default());
         let random = |seed| {
             let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
             let model = random_model(
                 seed,
                 &Distribution { bodies: (4, 7), branching: 0.3, skew: 0.0, kinds, ..Distribution::default() },
             );
-            Scene::new(Plan::new(&model, Default::default()), seed)
+            Scene::new(search::plan(&model, Default::default()), seed)
         };
         std::iter::once(Scene::new(ur5, 0)).chain((1..16).map(random)).collect()
     }

@@ -1,8 +1,9 @@
 //! Generates the code of the robots listed in the file that `RIVALS_ROBOTS` names.
 
+use mbd_codegen::search;
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::import::{load, Base, ImportOptions};
-use mbd_codegen::layout::pinocchio;
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::plan::state_layout::pinocchio;
 use mbd_codegen::{generate, Output, Options};
 use std::fmt::Write as _;
 
@@ -42,7 +43,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     let generated = generate(&model, &options).expect("code");
     write(&format!("{name}.rs"), &generated.source);
     // For the order of coordinates, which no form changes.
-    let plan = Plan::new(&model, PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() });
+    let plan = search::plan(&model, PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() });
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
-use multibody::codegen::plan::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
@@ -200,8 +200,8 @@ impl CodeArgs {
             frames: self.frames.clone(),
             plan: PlanOptions {
                 snap: self.snap,
-                forms: self.forms.forms(),
-                loops: self.loops.loops(),
+                elimination: self.forms.forms(),
+                rolled: self.loops.loops(),
                 ..PlanOptions::default()
             },
             chunk: self.chunk as usize,

@@ -6,7 +6,8 @@ mod outer;
 use std::io::{Read, Write};
 
 use clap::ValueEnum;
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
 use multibody::runtime::{Constrained, Interpreter};
 use serde::Serialize;
 

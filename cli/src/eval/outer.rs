@@ -1,8 +1,10 @@
 //! States as the file has them: another program's order and form.
 
-use multibody::codegen::layout;
 use multibody::codegen::model::{JointKind, JointMotion};
-use multibody::codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions};
+use multibody::codegen::plan::state_layout;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::layout::{Form, Layout, Part};
 use multibody::runtime::tree::Source;
 
@@ -32,8 +34,8 @@ impl Outer {
     pub fn new(plan: &Plan, layout: LayoutArg) -> Outer {
         let layout = match layout {
             LayoutArg::Mbd => own(plan),
-            LayoutArg::Pinocchio => layout::pinocchio(plan),
-            LayoutArg::Mujoco => layout::mujoco(plan),
+            LayoutArg::Pinocchio => state_layout::pinocchio(plan),
+            LayoutArg::Mujoco => state_layout::mujoco(plan),
         };
         let mut outer = Outer { q_names: Vec::new(), v_names: Vec::new(), layout };
         let (nq, nv) = outer.layout.sizes();
@@ -65,8 +67,8 @@ impl Outer {
             };
         }
         // Only its names are used: no search for blocks.
-        let options = PlanOptions { forms: EliminationStrategy::Single, ..PlanOptions::default() };
-        Outer::new(&Plan::new(&model, options), LayoutArg::Mbd)
+        let options = PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() };
+        Outer::new(&search::plan(&model, options), LayoutArg::Mbd)
     }
 
     /// Coordinates from there to here.

@@ -15,7 +15,7 @@ use super::{source, Outcome};
 /// Prints one stage.
 pub fn run(args: &ExplainArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, args.code.plan_options())?;
-    let options: Options = args.code.options(&plan.model.name).of_model(&plan.model);
+    let options: Options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
     if args.after == Stage::Frames {
         return frames::print(&plan, out);
     }

@@ -1,12 +1,12 @@
 //! A branch by itself: what a form costs there hardly depends on what else the tree carries.
 
-use super::{NodeKind, Plan, PlanConstraint, PlanNode, PoseStep};
+use super::structure::{NodeKind, Plan, PlanConstraint, PlanNode, PoseStep};
 use crate::model::Value;
 
 impl Plan {
     /// The same mechanism without all that neither carries node `i` nor is carried by it, and the number in it of every
     /// node. What is cut off leaves no trace: results of such a plan are those of another mechanism.
-    pub(super) fn branch(&self, i: usize) -> (Plan, Vec<Option<usize>>) {
+    pub(crate) fn branch(&self, i: usize) -> (Plan, Vec<Option<usize>>) {
         let mut keep = vec![false; self.nodes.len()];
         std::iter::successors(Some(i), |&k| self.nodes[k].parent).for_each(|k| keep[k] = true);
         for k in i + 1..self.nodes.len() {
@@ -42,7 +42,7 @@ impl Plan {
     }
 
     /// All of a plan that decides which form is best, in letters: two plans with the same letters differ in numbers only.
-    pub(super) fn letters(&self) -> String {
+    pub(crate) fn letters(&self) -> String {
         let value = |v: &Value| match v {
             Value::Const(x) if *x == 0.0 => '0',
             Value::Const(x) if x.abs() == 1.0 => '1',

@@ -1,7 +1,7 @@
 //! Splits joints into elementary ones and merges what fixed joints hold together.
 
-use super::placement::{direction, placement};
-use super::{NodeKind, PlanOptions, PoseStep};
+use super::placement::{direction, placement, rotation};
+use super::structure::{NodeKind, PoseStep};
 use crate::model::{JointKind, Model};
 
 /// An elementary joint. Its *element frame* is the child body's frame, or for the first half of a joint of two halves
@@ -39,8 +39,7 @@ pub struct Elements {
 }
 
 /// Elementary joints, merged bodies, snapped angles.
-pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) -> Elements {
-    let snap = options.snap;
+pub fn elements(model: &Model, snap: f64, notices: &mut Vec<String>) -> Elements {
     let mut list: Vec<Element> = Vec::new();
     let mut bodies: Vec<Carried> = vec![(None, Vec::new()); model.bodies.len()];
     for (k, joint) in model.joints.iter().enumerate() {
@@ -83,6 +82,6 @@ pub fn elements(model: &Model, options: PlanOptions, notices: &mut Vec<String>) 
         (carrier, pose)
     });
     let frames = frames.collect();
-    let axes = model.bodies.iter().map(|b| super::placement::rotation(&b.inertia_axes, snap, &mut |_| {}));
+    let axes = model.bodies.iter().map(|b| rotation(&b.inertia_axes, snap, &mut |_| {}));
     Elements { inertia_axes: axes.collect(), list, bodies, frames }
 }

@@ -11,7 +11,7 @@ use super::elements::{Carried, Elements};
 use super::instantiate::body_inertia;
 use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
-use super::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
+use super::structure::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
 use crate::model::{JointMotion, Model, Value};
 
 /// Nodes with their frames chosen.

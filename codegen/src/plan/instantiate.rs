@@ -2,21 +2,22 @@
 
 use mbd_runtime::spatial::{add3, ElementaryTransform, Mat3, RigidInertia, Vec3, SYM};
 use mbd_runtime::system::Row;
-use mbd_runtime::tree::{Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
 use mbd_runtime::{Interpreter, Scalar};
 
-use super::{NodeKind, Plan, PlanNode, PoseStep};
-use crate::model::Value;
+use super::placement::rotation;
+use super::structure::{NodeKind, Plan, PlanBond, PlanConstraint, PlanNode, PoseStep};
+use crate::model::{Gravity, LoopKind, Value};
 
 /// A number of the model as a scalar.
-pub(super) fn value<S: Scalar>(v: Value, params: &[S]) -> S {
+fn value<S: Scalar>(v: Value, params: &[S]) -> S {
     match v {
         Value::Const(x) => S::constant(x),
         Value::Param(k) => params[k],
     }
 }
 
-pub(super) fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<ElementaryTransform<S>> {
+fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<ElementaryTransform<S>> {
     pose.iter()
         .map(|step| match *step {
             PoseStep::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: S::constant(c), s: S::constant(s) },
@@ -63,6 +64,14 @@ impl Plan {
     /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
     pub fn interpreter(&self, params: &[f64]) -> Interpreter<f64> {
         Interpreter::new(self.tree(params), self.gravity(params))
+    }
+
+    /// Gravity of the model at given parameters; zero where it is an input, to be set with every call.
+    pub fn gravity(&self, params: &[f64]) -> [f64; 3] {
+        match self.model.gravity {
+            Gravity::Constant(g) => g.map(|v| value(v, params)),
+            Gravity::Input => [0.0; 3],
+        }
     }
 
     /// Rows of the constraints.
@@ -152,10 +161,57 @@ impl Plan {
             for step in steps(pose, params) {
                 step.pose(&mut rot, &mut pos);
             }
-            for step in steps(&super::placement::rotation(&body.inertia_axes, 0.0, &mut |_| {}), params) {
+            for step in steps(&rotation(&body.inertia_axes, 0.0, &mut |_| {}), params) {
                 step.pose(&mut axes, &mut nowhere);
             }
             sum.plus(&body_inertia(of(body.mass), body.com.map(of), body.inertia.map(of), &axes, &rot, pos))
         })
+    }
+}
+
+/// A kind of loop as the sweeps know it.
+pub(super) fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
+    let of = |v: Value| match v {
+        Value::Const(x) => S::constant(x),
+        // The number of rows is asked for without parameters.
+        Value::Param(k) => params.get(k).copied().unwrap_or(S::one()),
+    };
+    match *kind {
+        LoopKind::Revolute { .. } => Closure::Revolute,
+        LoopKind::Prismatic { .. } => Closure::Prismatic,
+        LoopKind::Cylindrical { .. } => Closure::Cylindrical,
+        LoopKind::Helical { pitch, .. } => Closure::Helical { pitch: of(pitch) },
+        LoopKind::Universal { .. } => Closure::Universal,
+        LoopKind::Planar { .. } => Closure::Planar,
+        LoopKind::Spherical => Closure::Spherical,
+        LoopKind::Fixed => Closure::Fixed,
+        LoopKind::Distance { length } => Closure::Distance { length: of(length) },
+        LoopKind::PointOnLine { .. } => Closure::PointOnLine,
+        LoopKind::PointOnPlane { .. } => Closure::PointOnPlane,
+        LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius: of(radius) },
+        LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius: of(radius) },
+        LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius: of(radius) },
+        LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
+        LoopKind::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
+    }
+}
+
+impl PlanConstraint {
+    /// The constraint over any scalar.
+    fn instantiate<S: Scalar>(&self, params: &[S]) -> Constraint<S> {
+        let bond = match &self.bond {
+            PlanBond::Cut { kind, frames, paths: [path_a, path_b] } => {
+                let [a, b] = frames.each_ref().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) });
+                let closure = closure(kind, params);
+                Bond::Cut(Cut { closure, a, b, path_a: path_a.clone(), path_b: path_b.clone() })
+            }
+            PlanBond::Coupling { terms, offset } => Bond::Coupling {
+                terms: terms.iter().map(|(i, ratio)| (*i, value(*ratio, params))).collect(),
+                offset: value(*offset, params),
+            },
+        };
+        let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
+        let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
+        Constraint { bond, slots, first: self.first, velocities, decay, compliance: None }
     }
 }

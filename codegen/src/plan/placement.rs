@@ -2,7 +2,8 @@
 
 use mbd_runtime::spatial::{Axis, ElementaryTransform, Mat3, Vec3};
 
-use super::{PoseStep, Rigid};
+use super::rigid::Rigid;
+use super::structure::PoseStep;
 use crate::model::{Placement, Rotation, Value};
 
 /// Cosine and sine of an angle, exact at multiples of 90° that are closer than `snap`.

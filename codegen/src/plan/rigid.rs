@@ -2,7 +2,7 @@
 
 use mbd_runtime::spatial::{Axis, Mat3, Vec3};
 
-use super::PoseStep;
+use super::structure::PoseStep;
 use crate::model::Value;
 
 /// Below this, relative to one, a sine, cosine or ratio of lengths is round-off.

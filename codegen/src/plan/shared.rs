@@ -2,7 +2,7 @@
 
 use mbd_runtime::tree::{Source, Unknown};
 
-use super::Plan;
+use super::structure::Plan;
 use crate::model::JointMotion;
 
 /// Marks the nodes of every coordinate that more than one node follows.
@@ -27,13 +27,8 @@ pub fn share(plan: &mut Plan) {
     }
 }
 
-/// Ancestors of node `i`, itself first, then outward to the ground.
-pub(super) fn ancestors(plan: &Plan, i: usize) -> Vec<usize> {
-    std::iter::successors(Some(i), |&i| plan.nodes[i].parent).collect()
-}
-
 fn open(plan: &mut Plan, g: usize, members: &[usize]) {
-    let paths: Vec<Vec<usize>> = members.iter().map(|&i| ancestors(plan, i)).collect();
+    let paths: Vec<Vec<usize>> = members.iter().map(|&i| plan.ancestors(i)).collect();
     let meeting = paths[0].iter().copied().find(|a| paths.iter().all(|path| path.contains(a)));
     for path in &paths {
         for &i in path.iter().take_while(|&&i| Some(i) != meeting) {

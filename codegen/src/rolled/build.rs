@@ -14,7 +14,7 @@ use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::{Options, Output};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
-use crate::trace::{tolerance, SymbolicInputs};
+use crate::trace::{rewrite, tolerance, SymbolicInputs};
 
 /// Builds the loop form; `None` where no run is long enough.
 pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<RolledProgram> {
@@ -219,7 +219,7 @@ impl<'m> Build<'_, 'm, '_> {
         let inputs = self.line.given.arrays.clone();
         for block in &mut blocks {
             let program = std::mem::take(&mut block.program);
-            block.program = passes::run(program, options.arithmetic, options.plan.forms);
+            block.program = passes::run(program, rewrite(options));
         }
         RolledProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
     }

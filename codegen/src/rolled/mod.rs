@@ -187,7 +187,7 @@ impl RolledProgram {
 
 /// The loop form of a group; `None` where there is none, or straight-line code is better.
 pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<RolledProgram> {
-    let least = match options.plan.loops {
+    let least = match options.plan.rolled {
         RolledCode::Never => return None,
         RolledCode::Auto => LEAST,
         RolledCode::Always => LEAST_ALWAYS,

@@ -14,7 +14,7 @@ const CACHE: f64 = 32768.0;
 /// Bytes of such code that one cycle brings.
 const FETCH: f64 = 24.0;
 
-/// Cost of a program, as [`Arithmetic::Fast`](crate::options::Arithmetic::Fast) will regroup and fuse it. Sines and
+/// Cost of a program, as [`Rewrite::Shortest`](super::passes::Rewrite::Shortest) will regroup and fuse it. Sines and
 /// cosines are in the critical path, and left out of all other figures: forms do not differ in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {

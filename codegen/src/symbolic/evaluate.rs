@@ -10,7 +10,7 @@ impl Program {
     /// # Panics
     /// If an input is missing from `inputs`.
     pub fn evaluate<S: Scalar>(&self, inputs: &[S], fused: impl Fn(S, S, S) -> S) -> Vec<S> {
-        let mut values = vec![S::zero(); super::passes::width(self)];
+        let mut values = vec![S::zero(); self.width()];
         for (id, op, _) in &self.steps {
             let get = |o: Operand| match o {
                 Operand::Const(bits) => S::constant(f64::from_bits(bits)),

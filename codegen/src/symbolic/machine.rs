@@ -74,7 +74,7 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
 impl Program {
     /// Cycles from the inputs to the last result, if nothing but operands is waited for.
     pub fn critical_path(&self) -> u32 {
-        let mut ready = vec![0; super::passes::width(self)];
+        let mut ready = vec![0; self.width()];
         for (id, op, _) in &self.steps {
             let start = op.operands().map(|o| if let Operand::Node(k) = o { ready[k as usize] } else { 0 }).max();
             ready[*id as usize] = start.unwrap_or(0) + latency(op);

@@ -13,4 +13,5 @@ mod program;
 
 pub use cost::{cost, Cost, BYTES};
 pub use expr::{Expr, FlooredReciprocal, Fma, Graph, Label, Op, Operand};
+pub use passes::Rewrite;
 pub use program::{Counts, Program, ProgramResult};

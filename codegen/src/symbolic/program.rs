@@ -111,6 +111,11 @@ impl Program {
         program
     }
 
+    /// One more than the largest node id.
+    pub fn width(&self) -> usize {
+        self.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
+    }
+
     /// Operations that are executed.
     pub fn counts(&self) -> Counts {
         self.counts_where(|_| true)

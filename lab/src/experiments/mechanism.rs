@@ -2,7 +2,9 @@
 
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::model::Model;
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::search;
 use multibody::runtime::Interpreter;
 
 use mbd_cli::{Failure, Outcome};
@@ -19,7 +21,7 @@ pub struct Mechanism {
 pub fn read(text: &str) -> Outcome<Mechanism> {
     let (model, findings) = load("model.toml", text, &ImportOptions::default());
     let model = model.ok_or_else(|| Failure::new(findings.to_string(), "report this: the model is built in"))?;
-    let plan = Plan::new(&model, PlanOptions::default());
+    let plan = search::plan(&model, PlanOptions::default());
     let params = plan.default_params();
     let gravity = plan.gravity(&params);
     let system = Interpreter::new(plan.tree(&params), gravity);

@@ -1,9 +1,10 @@
 //! What benchmarks ask of a system, by one name for the interpreter and for generated code.
 
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::search;
 use std::fmt::Debug;
 
 use super::Scene;
-use multibody::codegen::plan::{Plan, PlanOptions};
 use multibody::runtime::{Accelerated, Conjugate, Energetic, Interpreter, Scalar};
 
 /// A system with energy, accelerations and momenta.
@@ -14,7 +15,7 @@ impl<Y: Energetic + Accelerated + Conjugate> Dynamics for Y {}
 impl Scene {
     /// The interpreter of its model, in any number type.
     pub fn interpreter<S: Scalar + Debug>(&self) -> Interpreter<S> {
-        let plan = Plan::new(&self.model, PlanOptions::default());
+        let plan = search::plan(&self.model, PlanOptions::default());
         let params = plan.default_params();
         let gravity = plan.gravity(&params).map(S::constant);
         let params: Vec<S> = params.into_iter().map(S::constant).collect();

@@ -9,7 +9,8 @@ use std::path::Path;
 use biped::{absolute, relative, Biped, Vector};
 use command::{files, folder, good, out, read, run_in};
 use multibody::codegen::import::{load, ImportOptions};
-use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::search;
 use multibody::runtime::constrained::CoordinatePartition;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
 use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
@@ -22,7 +23,7 @@ fn shipped() -> (Interpreter<f64>, Vec<f64>) {
     let (model, findings) = load("biped.toml", &text, &ImportOptions::default());
     let model = model.unwrap_or_else(|| panic!("{findings}"));
     assert!(findings.0.is_empty(), "{findings}");
-    let plan = Plan::new(&model, PlanOptions::default());
+    let plan = search::plan(&model, PlanOptions::default());
     let params = plan.default_params();
     let system = Interpreter::new(plan.tree(&params), plan.gravity(&params));
     let mut q = system.neutral();

@@ -1,6 +1,7 @@
 //! Random trees of everything in a random state, with their motion.
 
 use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::spatial::{cross, Motion};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::{Dual, Interpreter, System};
@@ -29,7 +30,7 @@ pub struct Case {
 
 impl Case {
     pub fn new(seed: u64) -> Case {
-        let plan = Plan::new(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
+        let plan = search::plan(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
         let s = random_state(&plan, seed);
         Case::of(seed, plan, s)
     }

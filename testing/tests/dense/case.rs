@@ -1,6 +1,8 @@
 //! Random systems in a state, and what is compared of them.
 
-use mbd_codegen::plan::{EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
 use mbd_runtime::{Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
 use mbd_testing::random::{Distribution, Rng};
@@ -47,8 +49,9 @@ pub fn plan_of(system: &LoopSystem, seed: u64) -> Plan {
         EliminationStrategy::Single
     };
     let searched = forms != EliminationStrategy::Single;
-    let options = PlanOptions { forms, accelerations: searched, mass_matrix: false, ..PlanOptions::default() };
-    Plan::new(&system.model, options)
+    let options =
+        PlanOptions { elimination: forms, accelerations: searched, mass_matrix: false, ..PlanOptions::default() };
+    search::plan(&system.model, options)
 }
 
 impl Case {

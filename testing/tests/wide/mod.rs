@@ -6,7 +6,7 @@
 use mbd_codegen::generate::OutputProgram;
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
-pub use mbd_codegen::wide::Wide;
+pub use mbd_codegen::search::Wide;
 use mbd_runtime::Scalar;
 use mbd_testing::state::State;
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
+use mbd_codegen::search;
+use mbd_codegen::options::PlanOptions;
 use mbd_codegen::import::{load, Base, ImportOptions};
-use mbd_codegen::layout::pinocchio;
-use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_codegen::plan::state_layout::pinocchio;
 use mbd_codegen::{generate, Output, Options};
 
 fn main() {
@@ -48,7 +49,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     };
     let generated = generate(&model, &options).expect("code");
     write(&format!("{name}.rs"), &generated.source);
-    let plan = Plan::new(&model, PlanOptions::default());
+    let plan = search::plan(&model, PlanOptions::default());
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();

@@ -1,4 +1,4 @@
-//! Rewriting of whole programs, for [`Arithmetic::Fast`]: the values are the same up to rounding.
+//! Rewriting of whole programs, for [`Rewrite`]: the values are the same up to rounding.
 
 pub(super) mod chains;
 pub mod constants;
@@ -13,9 +13,6 @@ pub mod sums;
 pub(super) mod terms;
 
 use super::Program;
-use crate::options::Arithmetic;
-use crate::plan::EliminationStrategy;
-pub(super) use rebuild::width;
 use schedule::Limits;
 
 /// Largest number of rounds of rewriting; two or three have been enough for all models so far.
@@ -34,30 +31,36 @@ const WIDE: f64 = 2.0;
 /// Number of instructions from which a program counts as long.
 const LONG: usize = 1400;
 
-/// The program as it is emitted. Where the fewest operations are asked for, nothing is computed twice to save time.
-pub fn run(program: Program, arithmetic: Arithmetic, forms: EliminationStrategy) -> Program {
-    match arithmetic {
-        Arithmetic::Exact => program,
-        Arithmetic::Fast => {
+/// How a program is rewritten.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rewrite {
+    /// Not at all.
+    None,
+    /// For the shortest time; operations may be made twice to save time.
+    Shortest,
+    /// For the fewest operations.
+    Fewest,
+}
+
+/// The program as it is to be emitted.
+pub fn run(program: Program, rewrite: Rewrite) -> Program {
+    let program = match rewrite {
+        Rewrite::None => return program,
+        Rewrite::Shortest => shorten::regroup_short(&constants::gather(&fewer(program))),
+        Rewrite::Fewest => {
             let program = fewer(program);
-            let gathered = constants::gather(&program);
-            let program = match forms {
-                EliminationStrategy::Fewest => {
-                    let [a, b] = [sums::regroup(&gathered), sums::regroup(&program)];
-                    if a.counts().total() <= b.counts().total() {
-                        a
-                    } else {
-                        b
-                    }
-                }
-                EliminationStrategy::Fastest | EliminationStrategy::Single => shorten::regroup_short(&gathered),
-            };
-            let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
-            match wide && program.instructions() >= LONG {
-                true => program,
-                false => schedule::schedule(&program, LIMITS),
+            let [a, b] = [sums::regroup(&constants::gather(&program)), sums::regroup(&program)];
+            if a.counts().total() <= b.counts().total() {
+                a
+            } else {
+                b
             }
         }
+    };
+    let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
+    match wide && program.instructions() >= LONG {
+        true => program,
+        false => schedule::schedule(&program, LIMITS),
     }
 }
 
@@ -79,16 +82,16 @@ mod tests {
 
     #[test]
     fn values_stay() {
-        for forms in EliminationStrategy::ALL {
-            random::keeps_values(|p| run(p.clone(), Arithmetic::Fast, forms));
+        for rewrite in [Rewrite::Shortest, Rewrite::Fewest] {
+            random::keeps_values(|p| run(p.clone(), rewrite));
         }
         random::keeps_values(|p| fewer(p.clone()));
     }
 
     #[test]
     fn counts_do_not_grow() {
-        for forms in EliminationStrategy::ALL {
-            random::counts_never_grow(|p| run(p.clone(), Arithmetic::Fast, forms));
+        for rewrite in [Rewrite::Shortest, Rewrite::Fewest] {
+            random::counts_never_grow(|p| run(p.clone(), rewrite));
         }
         random::counts_never_grow(|p| fewer(p.clone()));
     }
@@ -97,7 +100,7 @@ mod tests {
     fn the_same_program_gives_the_same_program() {
         for seed in 0..20 {
             let program = random::integer_program(seed, 100);
-            let [a, b] = [0; 2].map(|_| run(program.clone(), Arithmetic::Fast, EliminationStrategy::default()));
+            let [a, b] = [0; 2].map(|_| run(program.clone(), Rewrite::Shortest));
             assert_eq!((a.steps, a.outputs), (b.steps, b.outputs));
         }
     }
@@ -105,7 +108,7 @@ mod tests {
     #[test]
     fn exact_programs_are_left_alone() {
         let program = random::integer_program(1, 100);
-        let exact = run(program.clone(), Arithmetic::Exact, EliminationStrategy::default());
+        let exact = run(program.clone(), Rewrite::None);
         assert_eq!((exact.steps, exact.outputs), (program.steps, program.outputs));
     }
 }

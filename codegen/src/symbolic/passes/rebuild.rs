@@ -14,7 +14,7 @@ pub struct Rebuilt<'g> {
 
 impl<'g> Rebuilt<'g> {
     pub fn new(graph: &'g Graph, program: &Program) -> Self {
-        Rebuilt { graph, values: vec![None; width(program)] }
+        Rebuilt { graph, values: vec![None; program.width()] }
     }
 
     /// The new expression of an operand.
@@ -79,14 +79,9 @@ impl<'g> Rebuilt<'g> {
     }
 }
 
-/// One more than the largest node id.
-pub fn width(program: &Program) -> usize {
-    program.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
-}
-
-/// Number of uses of each node by operations and results together.
+/// How often each node is used, by operations and results together.
 pub fn uses(program: &Program) -> Vec<u32> {
-    let mut uses = vec![0; width(program)];
+    let mut uses = vec![0; program.width()];
     for (_, op, _) in &program.steps {
         for operand in op.operands() {
             if let Operand::Node(id) = operand {
@@ -104,7 +99,7 @@ pub fn uses(program: &Program) -> Vec<u32> {
 
 /// The operations, by node id.
 pub fn by_id(program: &Program) -> Vec<Option<Op>> {
-    let mut ops = vec![None; width(program)];
+    let mut ops = vec![None; program.width()];
     for (id, op, _) in &program.steps {
         ops[*id as usize] = Some(*op);
     }

@@ -24,7 +24,7 @@ pub fn schedule(program: &Program, limits: Limits) -> Program {
 
 /// Positions in the old program, in the new order, become ids.
 fn renumber(program: &Program, order: &[u32]) -> Program {
-    let mut new = vec![0; super::rebuild::width(program)];
+    let mut new = vec![0; program.width()];
     for (k, &at) in order.iter().enumerate() {
         new[program.steps[at as usize].0 as usize] = k as u32;
     }
@@ -95,7 +95,7 @@ struct State {
 impl<'p> Scheduler<'p> {
     fn new(program: &'p Program, limits: Limits) -> Self {
         let n = program.steps.len();
-        let mut position = vec![0; super::rebuild::width(program)];
+        let mut position = vec![0; program.width()];
         for (at, (id, ..)) in program.steps.iter().enumerate() {
             position[*id as usize] = at as u32;
         }

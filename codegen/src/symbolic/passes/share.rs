@@ -21,7 +21,7 @@ pub fn share(program: &Program) -> Program {
     let roots = |(id, op, _): &&(u32, Op, _)| !opened.in_sum[*id as usize] && matches!(op, Op::Add(..) | Op::Sub(..));
     let mut sums: BTreeMap<u32, Vec<(Operand, bool)>> =
         program.steps.iter().filter(roots).map(|(id, op, _)| (*id, opened.terms(*op))).collect();
-    let pairs = choose(&opened, &mut sums, super::rebuild::width(program) as u32);
+    let pairs = choose(&opened, &mut sums, program.width() as u32);
     build(program, &opened, &sums, &pairs)
 }
 
@@ -79,7 +79,7 @@ fn pairs_of<'a>(opened: &'a Opened, terms: &'a [(Operand, bool)]) -> impl Iterat
 fn build(program: &Program, opened: &Opened, sums: &BTreeMap<u32, Vec<(Operand, bool)>>, pairs: &[Pair]) -> Program {
     let graph = Graph::default();
     let mut new = Rebuilt::new(&graph, program);
-    let first = super::rebuild::width(program) as u32;
+    let first = program.width() as u32;
     for (id, op, label) in &program.steps {
         if opened.in_sum[*id as usize] && !matches!(op, Op::Mul(..)) {
             continue;

@@ -12,7 +12,7 @@ use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
 /// Regroups all sums and products of a program.
 pub fn regroup(program: &Program) -> Program {
-    regroup_copying(program, &Copies::none(super::rebuild::width(program))).program
+    regroup_copying(program, &Copies::none(program.width())).program
 }
 
 /// Shared products that their users compute again, by node id.

@@ -7,8 +7,10 @@ mod theirs;
 
 use std::fmt::Write as _;
 
+use mbd_codegen::search;
+use mbd_codegen::options::PlanOptions;
 use mbd_codegen::model::Model;
-use mbd_codegen::plan::{Plan, PlanOptions};
+use mbd_codegen::plan::Plan;
 use mbd_codegen::{generate, Output, Options};
 use mbd_runtime::tree::Source;
 
@@ -64,7 +66,7 @@ fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
     };
     let generated = generate(model, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
     write(&format!("{name}.rs"), &generated.source);
-    let plan = Plan::new(model, PlanOptions::default());
+    let plan = search::plan(model, PlanOptions::default());
     let (q, v, start) = order(model, &plan, theirs);
     let count = |group: Output| generated.counts.iter().find(|c| c.0 == group).map_or(0, |c| c.1.total());
     let (rates, accelerations) = (count(Rates), count(Accelerations));

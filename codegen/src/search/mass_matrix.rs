@@ -1,20 +1,20 @@
-//! How far out the mass matrix carries screws.
+//! How far outward the mass matrix carries screws.
 
-use super::Plan;
 use crate::options::{Options, Output};
+use crate::plan::Plan;
 use crate::trace::trace;
 
-/// Trees beyond this are not searched.
+/// Trees with more nodes than this are not searched.
 const LARGEST: usize = 60;
 
-/// Sets [`Plan::matrix_depth`] to the depth with the fewest operations; the search ends where they grow twice.
+/// Sets [`Plan::matrix_depth`] to the depth with the fewest operations. The search ends where they grow twice.
 pub fn choose(plan: &mut Plan) {
     if plan.nodes.len() > LARGEST {
         return;
     }
     let cost = |plan: &Plan| {
-        let program = trace(plan, Output::MassMatrix, &Options::default());
-        program.map_or(usize::MAX, |g| g.program.counts().total())
+        let traced = trace(plan, Output::MassMatrix, &Options::default());
+        traced.map_or(usize::MAX, |traced| traced.program.counts().total())
     };
     let mut candidate = plan.clone();
     let (mut best, mut worse) = (cost(plan), 0);

@@ -1,0 +1,80 @@
+//! From the model to its plan.
+
+use mbd_runtime::tree::{Dims, Source, WrenchAxes};
+
+use super::structure::{Plan, PlanFrame, Slot};
+use super::{constraints, elements, frames, shared};
+use crate::model::{self, JointKind, JointMotion, Model};
+
+impl Plan {
+    /// The plan of a model, with its freedoms eliminated one joint at a time. Angles of placements and directions of axes closer
+    /// than `snap` to right angles become exact, rad; 0 keeps every number of the description.
+    pub fn new(model: &Model, snap: f64) -> Plan {
+        let mut notices = Vec::new();
+        let elements = elements::elements(model, snap, &mut notices);
+        let (dims, slots) = slots(model);
+        let mounts = constraints::mounts(model, &elements, snap);
+        let framed = frames::choose(model, &elements, &slots, &mounts);
+        let mut plan = Plan {
+            model: model.clone(),
+            nodes: framed.nodes,
+            dims: Dims { wrenches: model.wrenches.len(), ..dims },
+            unknowns: Vec::new(),
+            solve_at_ground: Vec::new(),
+            frames: framed.frames,
+            joint_nodes: framed.joint_nodes,
+            slots,
+            wrenches: Vec::new(),
+            constraints: Vec::new(),
+            notices,
+            matrix_depth: 0,
+            accelerations: None,
+        };
+        plan.wrenches = wrenches(model, &plan.frames);
+        shared::share(&mut plan);
+        constraints::constrain(&mut plan, framed.mounts);
+        plan
+    }
+}
+
+/// Frame index and axes of each wrench.
+fn wrenches(model: &Model, frames: &[PlanFrame]) -> Vec<(usize, WrenchAxes)> {
+    let of = |w: &model::Wrench| {
+        let frame = frames.iter().position(|f| f.name == model.bodies[w.body].name);
+        let axes = match w.axes {
+            model::WrenchAxes::Body => WrenchAxes::Frame,
+            model::WrenchAxes::World => WrenchAxes::Ground,
+        };
+        (frame.unwrap_or_default(), axes)
+    };
+    model.wrenches.iter().map(of).collect()
+}
+
+/// State and drive indices of the moving joints, depth first.
+fn slots(model: &Model) -> (Dims, Vec<Slot>) {
+    let mut dims = Dims::default();
+    let mut slots = Vec::new();
+    for (k, joint) in model.joints.iter().enumerate() {
+        let (nq, nv) = (joint.kind.nq(), joint.kind.nv());
+        if joint.kind == JointKind::Fixed {
+            continue;
+        }
+        let at = match joint.motion {
+            JointMotion::Free => {
+                let at = Source::State { q: dims.nq, v: dims.nv };
+                dims.nq += nq;
+                dims.nv += nv;
+                Some(at)
+            }
+            JointMotion::Prescribed => {
+                let at = Source::Drive { q: dims.drive_q, v: dims.drive_v };
+                dims.drive_q += nq;
+                dims.drive_v += nv;
+                Some(at)
+            }
+            JointMotion::Mimic { .. } => None,
+        };
+        slots.push(Slot { joint: k, at });
+    }
+    (dims, slots)
+}

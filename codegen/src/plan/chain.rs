@@ -1,0 +1,104 @@
+//! The freedoms of a chain of single-freedom joints: which are eliminated one by one, which together, and where.
+
+use mbd_runtime::tree::{Source, Unknown};
+
+use super::structure::Plan;
+
+/// How the freedoms of a chain are eliminated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChainElimination {
+    /// Joints before this one (of a chain that starts at the ground) keep their screws, which are carried outward; they
+    /// are solved together at the ground.
+    pub split: usize,
+    /// Joints from this one on are solved together: at `base`, or with those before `split` where the two meet. The last
+    /// joint stands for no block.
+    pub base: usize,
+    /// For every joint, whether it is eliminated before its own motion.
+    pub before_joint: Vec<bool>,
+    /// Joints before this one get their momentum rates from accumulated momenta.
+    pub accumulating: usize,
+    /// Whether the joints are laid out for rolled code.
+    pub rolled: bool,
+}
+
+impl ChainElimination {
+    /// A chain of `len` joints as rolled code, whose time is that of the shortest way through a link: one joint at a time,
+    /// before its motion.
+    pub fn rolled(len: usize) -> ChainElimination {
+        ChainElimination { split: 0, base: len - 1, before_joint: vec![true; len], accumulating: 0, rolled: true }
+    }
+
+    /// In words, for a chain of `len` joints.
+    pub fn words(&self, len: usize) -> String {
+        if self.rolled {
+            return "a loop".to_string();
+        }
+        let mut words = Vec::new();
+        let met = self.split == self.base && self.split > 0;
+        match (met, len - self.base) {
+            (true, k) => words.push(format!("all at the ground: {} screws out, {k} columns in", self.split)),
+            (false, 1) if self.split == 0 => words.push("one by one".to_string()),
+            (false, 1) => {}
+            (false, k) => words.push(format!("last {k} together")),
+        }
+        if !met && self.split > 0 {
+            words.push(format!("first {} at the ground", self.split));
+        }
+        let before = self.before_joint.iter().filter(|before| **before).count();
+        if before > 0 {
+            words.push(format!("{before} on the parent's side"));
+        }
+        if self.accumulating > 0 {
+            words.push(format!("momenta of {}", self.accumulating));
+        }
+        words.join("; ")
+    }
+
+    /// Eliminates the freedoms of a chain in this way. `chain` has the nodes of `plan`, inner joint first; each eliminates its
+    /// freedom by itself so far.
+    pub fn apply(&self, plan: &mut Plan, chain: &[usize]) {
+        for (&i, &before_joint) in chain.iter().zip(&self.before_joint) {
+            let node = &mut plan.nodes[i];
+            node.elimination.before_joint = before_joint;
+            node.rolled |= self.rolled;
+            node.elimination.non_rotating &= !self.rolled;
+        }
+        for &i in &chain[..self.accumulating] {
+            plan.nodes[i].elimination.accumulates_momentum = true;
+        }
+        let met = self.split == self.base && self.split > 0;
+        let first = if met { self.base } else { self.base + 1 };
+        for k in (first..chain.len()).rev() {
+            let Some(g) = defer(plan, chain[k]) else { continue };
+            for &j in &chain[first.max(self.base + 1)..=k] {
+                plan.nodes[j].elimination.open.push(g);
+            }
+            let base = &mut plan.nodes[chain[self.base]].elimination;
+            if met {
+                base.ends.push(g);
+                plan.solve_at_ground.push(g);
+            } else {
+                base.solve_before.push(g);
+            }
+        }
+        for k in (0..self.split).rev() {
+            let Some(g) = defer(plan, chain[k]) else { continue };
+            plan.nodes[chain[k]].elimination.ends.push(g);
+            plan.solve_at_ground.push(g);
+            let last = if met { self.split } else { self.split - 1 };
+            for &j in &chain[k + 1..=last] {
+                plan.nodes[j].elimination.screws.push(g);
+            }
+        }
+    }
+}
+
+/// Makes the freedom of node `i` one that is solved further inboard; returns its number among the unknowns.
+fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
+    let Source::State { v, .. } = plan.nodes[i].source else { return None };
+    let g = plan.unknowns.len();
+    plan.unknowns.push(Unknown::Velocity(v));
+    plan.nodes[i].elimination.unknown = Some(g);
+    plan.nodes[i].elimination.deferred = true;
+    Some(g)
+}

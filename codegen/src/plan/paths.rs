@@ -1,0 +1,88 @@
+//! Paths of the tree that are eliminated or laid out as one: chains to the tips, unbranched paths, runs of parallel joints.
+
+use mbd_runtime::tree::{Source, Unknown};
+
+use super::structure::{NodeKind, Plan, PlanNode, PoseStep};
+
+/// Number of children of every node.
+fn children(plan: &Plan) -> Vec<usize> {
+    let mut children = vec![0; plan.nodes.len()];
+    for parent in plan.nodes.iter().filter_map(|n| n.parent) {
+        children[parent] += 1;
+    }
+    children
+}
+
+/// Whether a node has one freedom of the state, which is solved by itself.
+fn is_single(node: &PlanNode) -> bool {
+    let elimination = &node.elimination;
+    let single = matches!(node.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
+    let plain = elimination.unknown.is_none() && elimination.solve_before.is_empty() && elimination.open.is_empty();
+    single && plain && matches!(node.source, Source::State { .. })
+}
+
+/// Whether node `i` has one freedom of the state, which is solved by itself, though columns of constraints may pass through.
+pub fn is_single_but_for_rows(plan: &Plan, i: usize) -> bool {
+    let mut node = plan.nodes[i].clone();
+    node.elimination.open.retain(|g| !matches!(plan.unknowns[*g], Unknown::Row(_)));
+    is_single(&node)
+}
+
+/// Runs of single-freedom joints that end at a tip, inner joint first.
+pub fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
+    let children = children(plan);
+    let single = |i: usize| is_single(&plan.nodes[i]);
+    let tips = (0..plan.nodes.len()).filter(|&i| children[i] == 0 && single(i));
+    tips.map(|tip| {
+        let inward = |&i: &usize| plan.nodes[i].parent.filter(|&p| children[p] == 1 && single(p));
+        let mut chain: Vec<usize> = std::iter::successors(Some(tip), inward).collect();
+        chain.reverse();
+        chain
+    })
+    .collect()
+}
+
+/// Paths of at least `least` nodes without branches, each node with coordinates of its own, inner node first.
+pub fn unbranched_paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
+    let children = children(plan);
+    let own = |node: &PlanNode| node.elimination.unknown.is_none() && matches!(node.source, Source::State { .. });
+    let mut paths: Vec<Vec<usize>> = Vec::new();
+    for (i, node) in plan.nodes.iter().enumerate().filter(|(_, n)| own(n)) {
+        match paths.last_mut() {
+            Some(path) if path.last().copied() == node.parent && node.parent.is_some_and(|p| children[p] == 1) => {
+                path.push(i)
+            }
+            _ => paths.push(vec![i]),
+        }
+    }
+    paths.retain(|path| path.len() >= least);
+    paths
+}
+
+/// Runs of revolute joints about parallel axes: the nodes whose frames need not rotate, because all that they carry next
+/// turns about the same axis.
+pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
+    let swings = |i: usize| {
+        let node = &plan.nodes[i];
+        node.kind == NodeKind::Revolute && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
+    };
+    let mut runs: Vec<Vec<usize>> = Vec::new();
+    for (i, node) in plan.nodes.iter().enumerate() {
+        let mut children = plan.nodes.iter().enumerate().filter(|(_, n)| n.parent == Some(i)).peekable();
+        if node.kind != NodeKind::Revolute || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
+            continue;
+        }
+        match runs.iter_mut().find(|run| node.parent.is_some_and(|p| run.contains(&p)) && swings(i)) {
+            Some(run) => run.push(i),
+            None => runs.push(vec![i]),
+        }
+    }
+    runs
+}
+
+/// Whether one of these nodes, or of their children, is laid out for rolled code: a frame that does not rotate leaves its turn
+/// to its children.
+pub fn touches_rolled(plan: &Plan, nodes: &[usize]) -> bool {
+    let touches = |k: usize, i: usize| k == i || plan.nodes[k].parent == Some(i);
+    (0..plan.nodes.len()).any(|k| plan.nodes[k].rolled && nodes.iter().any(|&i| touches(k, i)))
+}

@@ -1,0 +1,332 @@
+//! The structure of a mechanism: nodes, frames, wrenches, constraints. Numbers stay [`Value`]s.
+
+use mbd_runtime::spatial::{Axis, Mat3};
+use mbd_runtime::tree::{Dims, Elimination, Source, Unknown, WrenchAxes};
+
+use crate::model::{JointKind, LoopKind, Model, Param, Value};
+
+/// One elementary step of a pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PoseStep {
+    /// A constant turn.
+    Turn {
+        /// Axis.
+        axis: Axis,
+        /// Cosine.
+        c: f64,
+        /// Sine.
+        s: f64,
+    },
+    /// A turn by a number of the model.
+    TurnBy {
+        /// Axis.
+        axis: Axis,
+        /// Angle, rad.
+        angle: Value,
+    },
+    /// A displacement, m.
+    Shift {
+        /// Axis.
+        axis: Axis,
+        /// Displacement.
+        r: Value,
+    },
+    /// A constant rotation, child components to parent components.
+    Rotate(Mat3<f64>),
+}
+
+/// Kind of a node's joint; the turn or slide is about z of the node frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NodeKind {
+    /// Turn.
+    Revolute,
+    /// Slide.
+    Prismatic,
+    /// Turn with a slide.
+    Helical(Value),
+    /// Two slides and a turn.
+    Planar,
+    /// Rotation.
+    Spherical,
+    /// Any motion.
+    Floating,
+}
+
+impl NodeKind {
+    /// Number of velocities.
+    pub fn nv(self) -> usize {
+        match self {
+            NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_) => 1,
+            NodeKind::Planar | NodeKind::Spherical => 3,
+            NodeKind::Floating => 6,
+        }
+    }
+}
+
+/// A joint of the tree and the bodies that move with it.
+#[derive(Clone, Debug)]
+pub struct PlanNode {
+    /// Name for people: the child body; the joint for the massless body inside a universal or cylindrical joint.
+    pub name: String,
+    /// Parent node.
+    pub parent: Option<usize>,
+    /// Constant part of the placement in the parent's frame.
+    pub place: Vec<PoseStep>,
+    /// Joint.
+    pub kind: NodeKind,
+    /// Model joint and index of the node's first freedom in it.
+    pub joint: (usize, usize),
+    /// Coordinates.
+    pub source: Source,
+    /// Ratios and offsets of a mimic, leader first.
+    pub follow: Vec<(Value, Value)>,
+    /// Constant turn added to the angle, rad.
+    pub phase: f64,
+    /// Further right angles.
+    pub quarter: u8,
+    /// Constant slide along z, m.
+    pub slide: f64,
+    /// Constant inertia `[m, mcx, mcy, mcz, xx, xy, xz, yy, yz, zz]` at the node frame.
+    pub inertia: [f64; 10],
+    /// Bodies with parameters in their inertia or pose: body index and pose in the node frame.
+    pub variable: Vec<(usize, Vec<PoseStep>)>,
+    /// How its freedoms are eliminated.
+    pub elimination: Elimination,
+    /// Whether the generator may make it part of rolled code.
+    pub rolled: bool,
+}
+
+/// A named frame.
+#[derive(Clone, Debug)]
+pub struct PlanFrame {
+    /// Name.
+    pub name: String,
+    /// Node, `None` for the ground.
+    pub node: Option<usize>,
+    /// Pose in the node frame.
+    pub pose: Vec<PoseStep>,
+}
+
+/// A joint's place in the state.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Slot {
+    /// Model joint.
+    pub joint: usize,
+    /// First coordinate and first velocity, of the state or of the drives; `None` for mimics.
+    pub at: Option<Source>,
+}
+
+/// The structure of a mechanism.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The model it was made from.
+    pub model: Model,
+    /// Nodes, parents first.
+    pub nodes: Vec<PlanNode>,
+    /// Dimensions.
+    pub dims: Dims,
+    /// Shared coordinates, and rows of constraints.
+    pub unknowns: Vec<Unknown>,
+    /// Shared coordinates solved at the ground.
+    pub solve_at_ground: Vec<usize>,
+    /// Frames of the moving joints' child bodies, in joint order, then those of all other bodies and frames.
+    pub frames: Vec<PlanFrame>,
+    /// Last node of every moving joint.
+    pub joint_nodes: Vec<usize>,
+    /// Moving joints in state order.
+    pub slots: Vec<Slot>,
+    /// Frame index and axes of each wrench.
+    pub wrenches: Vec<(usize, WrenchAxes)>,
+    /// Loops and couplings.
+    pub constraints: Vec<PlanConstraint>,
+    /// What was changed on the way.
+    pub notices: Vec<String>,
+    /// See [`mbd_runtime::tree::Tree`].
+    pub matrix_depth: usize,
+    /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
+    pub accelerations: Option<Box<Plan>>,
+}
+
+/// What a constraint binds, on nodes.
+#[derive(Clone, Debug)]
+pub enum PlanBond {
+    /// Two frames.
+    Cut {
+        /// What it binds.
+        kind: LoopKind,
+        /// First and second frame, axes along z, or along x and y for a universal joint. The ground, if it is one of them
+        /// and the kind is that of a joint, is the first: rows are constants of the body then. Of a rod it is the second.
+        frames: Box<[PlanFrame; 2]>,
+        /// Nodes from the innermost common one, which is left out, to those of the frames.
+        paths: [Vec<usize>; 2],
+    },
+    /// Freedoms of nodes, with ratios.
+    Coupling {
+        /// Node and ratio.
+        terms: Vec<(usize, Value)>,
+        /// Offset.
+        offset: Value,
+    },
+}
+
+/// A constraint.
+#[derive(Clone, Debug)]
+pub struct PlanConstraint {
+    /// Name.
+    pub name: String,
+    /// What it binds.
+    pub bond: PlanBond,
+    /// Its place among [`Plan::shared`], one for each row.
+    pub slots: Vec<usize>,
+    /// Its first row.
+    pub first: usize,
+    /// Velocities that it binds, in ascending order.
+    pub velocities: Vec<usize>,
+    /// See [`mbd_runtime::tree::Constraint`].
+    pub decay: Value,
+}
+
+impl Plan {
+    /// Run-time parameters.
+    pub fn params(&self) -> &[Param] {
+        &self.model.params
+    }
+
+    /// Default values of the run-time parameters.
+    pub fn default_params(&self) -> Vec<f64> {
+        self.model.params.iter().map(|p| p.default).collect()
+    }
+
+    /// Names of the coordinates, in state order.
+    pub fn coordinate_names(&self) -> Vec<String> {
+        self.state_names(|kind| match kind {
+            JointKind::Planar { .. } => &["x", "y", "angle"],
+            JointKind::Cylindrical { .. } => &["slide", "angle"],
+            JointKind::Universal { .. } => &["angle1", "angle2"],
+            JointKind::Spherical => &["qx", "qy", "qz", "qw"],
+            JointKind::Floating => &["x", "y", "z", "qx", "qy", "qz", "qw"],
+            _ => &[],
+        })
+    }
+
+    /// Names of the velocities (momenta, joint forces), in state order.
+    pub fn velocity_names(&self) -> Vec<String> {
+        self.state_names(|kind| match kind {
+            JointKind::Planar { .. } => &["vx", "vy", "wz"],
+            JointKind::Cylindrical { .. } => &["slide", "angle"],
+            JointKind::Universal { .. } => &["angle1", "angle2"],
+            JointKind::Spherical => &["wx", "wy", "wz"],
+            JointKind::Floating => &["vx", "vy", "vz", "wx", "wy", "wz"],
+            _ => &[],
+        })
+    }
+
+    fn state_names(&self, parts: impl Fn(&JointKind) -> &'static [&'static str]) -> Vec<String> {
+        let free = self.slots.iter().filter(|s| matches!(s.at, Some(Source::State { .. })));
+        free.flat_map(|slot| {
+            let joint = &self.model.joints[slot.joint];
+            let parts = parts(&joint.kind);
+            match parts.is_empty() {
+                true => vec![joint.name.clone()],
+                false => parts.iter().map(|p| format!("{}.{p}", joint.name)).collect(),
+            }
+        })
+        .collect()
+    }
+
+    /// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
+    pub fn start(&self) -> Vec<f64> {
+        let mut q = vec![0.0; self.dims.nq];
+        for slot in &self.slots {
+            let Some(Source::State { q: at, .. }) = slot.at else { continue };
+            let kind = self.model.joints[slot.joint].kind;
+            let stated = self.model.starts.iter().find(|s| s.joint == slot.joint);
+            if let Some(stated) = stated {
+                q[at..].iter_mut().zip(&stated.q).for_each(|(q, stated)| *q = *stated);
+            }
+            if let JointKind::Spherical | JointKind::Floating = kind {
+                let turn = &mut q[at + kind.nq() - 4..at + kind.nq()];
+                match turn.iter().fold(0.0_f64, |n, x| n.hypot(*x)) {
+                    0.0 => turn[3] = 1.0,
+                    norm => turn.iter_mut().for_each(|x| *x /= norm),
+                }
+            }
+        }
+        q
+    }
+
+    /// Velocities of joints that stay where they start when loops are closed.
+    pub fn held(&self) -> Vec<bool> {
+        let mut held = vec![false; self.dims.nv];
+        for start in self.model.starts.iter().filter(|s| s.held) {
+            let slot = self.slots.iter().find(|s| s.joint == start.joint);
+            if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
+                held[v..v + self.model.joints[start.joint].kind.nv()].fill(true);
+            }
+        }
+        held
+    }
+
+    /// Ancestors of node `i`: itself first, then inward.
+    pub(crate) fn ancestors(&self, i: usize) -> Vec<usize> {
+        std::iter::successors(Some(i), |&i| self.nodes[i].parent).collect()
+    }
+
+    /// Closes the columns of some unknowns, which are then solved nowhere.
+    pub(crate) fn close_columns(&mut self, unknowns: &[usize]) {
+        for node in &mut self.nodes {
+            node.elimination.retain_columns(|g| !unknowns.contains(&g));
+        }
+        self.solve_at_ground.retain(|g| !unknowns.contains(g));
+    }
+}
+
+impl PlanBond {
+    /// Nodes whose freedoms it binds.
+    pub(crate) fn cycle(&self) -> Vec<usize> {
+        match self {
+            PlanBond::Cut { paths, .. } => paths.concat(),
+            PlanBond::Coupling { terms, .. } => terms.iter().map(|(i, _)| *i).collect(),
+        }
+    }
+}
+
+impl PlanConstraint {
+    /// Nodes that it acts on.
+    pub(crate) fn nodes(&self) -> impl Iterator<Item = usize> + '_ {
+        let (frames, terms) = match &self.bond {
+            PlanBond::Cut { frames, .. } => (Some(frames.iter().filter_map(|f| f.node)), None),
+            PlanBond::Coupling { terms, .. } => (None, Some(terms.iter().map(|(i, _)| *i))),
+        };
+        frames.into_iter().flatten().chain(terms.into_iter().flatten())
+    }
+
+    /// Nodes whose freedoms it binds.
+    pub(crate) fn cycle(&self) -> Vec<usize> {
+        self.bond.cycle()
+    }
+
+    /// With other numbers for the nodes, all of which have one.
+    pub(crate) fn renumbered(&self, numbers: &[Option<usize>]) -> PlanConstraint {
+        let mut out = self.clone();
+        let renumber = |i: &mut usize| *i = numbers[*i].unwrap_or_default();
+        match &mut out.bond {
+            PlanBond::Cut { frames, paths, .. } => {
+                frames.iter_mut().filter_map(|f| f.node.as_mut()).for_each(renumber);
+                paths.iter_mut().flatten().for_each(renumber);
+            }
+            PlanBond::Coupling { terms, .. } => terms.iter_mut().map(|(i, _)| i).for_each(renumber),
+        }
+        out
+    }
+
+    /// What of it decides which form is best.
+    pub(crate) fn letters(&self) -> String {
+        match &self.bond {
+            PlanBond::Cut { kind, frames, paths } => {
+                format!("c{:?}{:?}{paths:?}", std::mem::discriminant(kind), frames.each_ref().map(|f| f.node))
+            }
+            PlanBond::Coupling { terms, .. } => format!("g{}", terms.len()),
+        }
+    }
+}

@@ -1,0 +1,36 @@
+//! One output of a candidate plan, as the sweeps compute it, and its cost.
+
+use mbd_runtime::sweep::Quantity;
+
+use crate::options::{Arithmetic, Options, Output};
+use crate::plan::Plan;
+use crate::symbolic::{self, Cost, Label, Program};
+use crate::trace::trace;
+
+/// The options that candidates are compared with. Joint forces cost the rates an addition each, whatever the elimination.
+pub fn options(output: Output) -> Options {
+    Options { efforts: output != Output::Rates, arithmetic: Arithmetic::Exact, ..Options::default() }
+}
+
+/// The program of one output and its cost.
+pub struct Evaluation {
+    /// The operations of the sweeps, not rewritten.
+    pub program: Program,
+    /// Their cost.
+    pub cost: Cost,
+}
+
+impl Evaluation {
+    /// Traces one output of a plan; `None` if the model does not have it.
+    pub fn new(plan: &Plan, output: Output) -> Option<Evaluation> {
+        let program = trace(plan, output, &options(output)).ok()?.program;
+        Some(Evaluation { cost: symbolic::cost(&program), program })
+    }
+
+    /// Operations that lead to velocities.
+    pub fn velocity_operations(&self) -> usize {
+        use Quantity::{BiasMomentum, Inertia, Pivot, Velocity};
+        let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | BiasMomentum | Velocity);
+        self.program.counts_where(velocities).total()
+    }
+}

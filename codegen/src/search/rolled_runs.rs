@@ -1,0 +1,37 @@
+//! Which runs of links are laid out for rolled code.
+
+use super::evaluation::Evaluation;
+use super::LARGEST;
+use crate::options::{EliminationStrategy, Output, PlanOptions, RolledCode};
+use crate::plan::{is_single_but_for_rows, unbranched_paths, Plan};
+
+/// Chains from this length on are rolled without a search if their straight-line code is long: then it is far slower.
+const ALWAYS: usize = 24;
+
+/// Bytes of such code: more than a first-level cache has.
+const LONG: f64 = 49152.0;
+
+/// The length from which chains are rolled whose elimination is not searched for speed.
+const ALWAYS_OTHERWISE: usize = 16;
+
+/// Marks what may become rolled code: all that repeats, or what is long enough to gain by it for certain. The search of a chain
+/// adds to it.
+pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
+    let fastest = options.elimination == EliminationStrategy::Fastest;
+    let least = match (options.rolled, fastest) {
+        (RolledCode::Never, _) => return,
+        (RolledCode::Always, true) => 3,
+        (RolledCode::Always, false) => 1,
+        (RolledCode::Auto, true) => ALWAYS,
+        (RolledCode::Auto, false) => ALWAYS_OTHERWISE,
+    };
+    let mut long = unbranched_paths(plan, least);
+    if (options.rolled, fastest) == (RolledCode::Auto, true) && plan.nodes.len() <= LARGEST {
+        let bytes = |path: &[usize]| Evaluation::new(&plan.branch(path[0]).0, Output::Rates).map(|e| e.cost.bytes);
+        long.retain(|path| bytes(path).is_none_or(|bytes| bytes > LONG));
+    }
+    for i in long.concat() {
+        plan.nodes[i].rolled = true;
+        plan.nodes[i].elimination.before_joint = fastest && is_single_but_for_rows(plan, i);
+    }
+}

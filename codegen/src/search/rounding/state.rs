@@ -1,0 +1,104 @@
+//! States that rounding errors are measured in.
+
+use mbd_runtime::tree::Source;
+use mbd_runtime::{Interpreter, Scalar};
+
+use super::super::evaluation::options;
+use super::super::wide::Wide;
+use crate::model::{Gravity, JointKind};
+use crate::options::Output;
+use crate::plan::Plan;
+
+/// A random state. Momenta belong to the velocities once they are set.
+pub struct State {
+    q: Vec<f64>,
+    v: Vec<f64>,
+    /// Momenta.
+    pub p: Vec<f64>,
+    drive_q: Vec<f64>,
+    params: Vec<f64>,
+    seed: u64,
+}
+
+impl State {
+    /// The state of a seed: turns up to 3 rad, slides up to 0.6 m, velocities up to 1.5; no momenta yet.
+    pub fn new(plan: &Plan, seed: u64) -> State {
+        let d = plan.dims;
+        let (mut q, mut drive_q) = (random(seed, 0, d.nq, 3.0), random(seed, 1, d.drive_q, 3.0));
+        for slot in &plan.slots {
+            let (list, at) = match slot.at {
+                Some(Source::State { q: at, .. }) => (&mut q, at),
+                Some(Source::Drive { q: at, .. }) => (&mut drive_q, at),
+                None => continue,
+            };
+            let at = match plan.model.joints[slot.joint].kind {
+                JointKind::Spherical => at,
+                JointKind::Floating => at + 3,
+                JointKind::Prismatic { .. } => {
+                    list[at] *= 0.2;
+                    continue;
+                }
+                _ => continue,
+            };
+            let norm = list[at..at + 4].iter().map(|x| x * x).sum::<f64>();
+            list[at..at + 4].iter_mut().for_each(|x| *x /= Scalar::sqrt(norm));
+        }
+        State { q, v: random(seed, 2, d.nv, 1.5), p: Vec::new(), drive_q, params: plan.default_params(), seed }
+    }
+
+    /// One of the arrays that a program is called with.
+    pub fn input(&self, name: &str, len: usize) -> Vec<f64> {
+        match name {
+            "q" => self.q.clone(),
+            "v" => self.v.clone(),
+            "p" => self.p.clone(),
+            "self.drive_q" => self.drive_q.clone(),
+            "self.params" => self.params.clone(),
+            "self.drive_v" => random(self.seed, 3, len, 1.5),
+            "self.gravity" => random(self.seed, 4, len, 9.0),
+            _ => random(self.seed, 5, len, 3.0),
+        }
+    }
+
+    /// The results that programs should give, in double-double numbers.
+    pub fn exact(&self, plan: &Plan, output: Output, interpreter: &mut Interpreter<Wide>) -> Vec<Wide> {
+        let d = plan.dims;
+        let wide = |x: Vec<f64>| x.into_iter().map(Wide::constant).collect::<Vec<Wide>>();
+        let input = |name: &str, len: usize| wide(self.input(name, len));
+        let inputs = &mut interpreter.inputs;
+        if options(output).efforts {
+            inputs.tau = input("self.tau", d.nv);
+        }
+        inputs.drive_q = input("self.drive_q", d.drive_q);
+        inputs.drive_v = input("self.drive_v", d.drive_v);
+        inputs.drive_a = input("self.drive_a", d.drive_v);
+        let wrenches = input("self.wrenches", 6 * d.wrenches);
+        inputs.wrenches = wrenches.chunks_exact(6).map(|w| std::array::from_fn(|k| w[k])).collect();
+        let gravity = match plan.model.gravity {
+            Gravity::Input => self.input("self.gravity", 3),
+            Gravity::Constant(_) => plan.gravity(&self.params).to_vec(),
+        };
+        inputs.gravity = std::array::from_fn(|k| Wide::constant(gravity[k]));
+        let zeros = |n: usize| vec![Wide::zero(); n];
+        let (mut v, mut qd, mut pd) = (zeros(d.nv), zeros(d.nq), zeros(d.nv));
+        if output == Output::Accelerations {
+            interpreter.accelerations(&wide(self.q.clone()), &wide(self.v.clone()), &mut v);
+            return v;
+        }
+        interpreter.rates(&wide(self.q.clone()), &wide(self.p.clone()), &mut v, &mut qd, &mut pd);
+        [qd, pd].concat()
+    }
+}
+
+/// Numbers evenly from `[-size, size)`: splitmix64.
+fn random(seed: u64, stream: u64, n: usize, size: f64) -> Vec<f64> {
+    let mut state = (seed << 8 | stream).wrapping_mul(0xd1b5_4a32_d192_ed03);
+    let next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        let unit = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
+        size * (2.0 * unit - 1.0)
+    };
+    std::iter::repeat_with(next).take(n).collect()
+}
