@@ -18,6 +18,7 @@ use std::fmt::Write;
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{JointKind, Model};
 use mbd_codegen::plan::{Candidate, EliminationStrategy, Plan, PlanOptions};
+use mbd_codegen::symbolic::Program;
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::chains;
@@ -45,7 +46,7 @@ fn measure(plans: &[Plan], kinds: &[Kind], states: u64) -> Vec<[Spread; 3]> {
         let program = |(plan, &(_, arithmetic)): (&Plan, &Kind)| {
             trace(plan, group, &Options { arithmetic, ..Options::default() }).expect("no frames are named")
         };
-        let programs: Vec<OutputProgram> = plans.iter().zip(kinds).map(program).collect();
+        let programs: Vec<OutputProgram<Program>> = plans.iter().zip(kinds).map(program).collect();
         for seed in 0..states {
             let s = random_state(&plans[0], seed);
             let mut p = vec![0.0; plans[0].dims.nv];

@@ -15,9 +15,9 @@ use mbd_runtime::{Interpreter, Scalar};
 use super::forms::options;
 use super::Plan;
 use crate::model::{Gravity, JointKind};
-use crate::options::Output;
+use crate::output::{InputArray, Output};
 use crate::symbolic::Program;
-use crate::trace::{trace, InputArray};
+use crate::trace::trace;
 use crate::wide::Wide;
 
 /// States that errors are measured on: few for large trees, in which roundings average out.
@@ -237,10 +237,10 @@ impl State {
             "q" => self.q.clone(),
             "v" => self.v.clone(),
             "p" => self.p.clone(),
-            "self.drive_q" => self.drive_q.clone(),
-            "self.params" => self.params.clone(),
-            "self.drive_v" => random(self.seed, 3, len, 1.5),
-            "self.gravity" => random(self.seed, 4, len, 9.0),
+            "drive_q" => self.drive_q.clone(),
+            "params" => self.params.clone(),
+            "drive_v" => random(self.seed, 3, len, 1.5),
+            "gravity" => random(self.seed, 4, len, 9.0),
             _ => random(self.seed, 5, len, 3.0),
         }
     }
@@ -252,15 +252,15 @@ impl State {
         let input = |name: &str, len: usize| wide(self.input(name, len));
         let inputs = &mut interpreter.inputs;
         if options(group).efforts {
-            inputs.tau = input("self.tau", d.nv);
+            inputs.tau = input("tau", d.nv);
         }
-        inputs.drive_q = input("self.drive_q", d.drive_q);
-        inputs.drive_v = input("self.drive_v", d.drive_v);
-        inputs.drive_a = input("self.drive_a", d.drive_v);
-        let wrenches = input("self.wrenches", 6 * d.wrenches);
+        inputs.drive_q = input("drive_q", d.drive_q);
+        inputs.drive_v = input("drive_v", d.drive_v);
+        inputs.drive_a = input("drive_a", d.drive_v);
+        let wrenches = input("wrenches", 6 * d.wrenches);
         inputs.wrenches = wrenches.chunks_exact(6).map(|w| std::array::from_fn(|k| w[k])).collect();
         let gravity = match plan.model.gravity {
-            Gravity::Input => self.input("self.gravity", 3),
+            Gravity::Input => self.input("gravity", 3),
             Gravity::Constant(_) => plan.gravity(&self.params).to_vec(),
         };
         inputs.gravity = std::array::from_fn(|k| Wide::constant(gravity[k]));
@@ -278,7 +278,7 @@ impl State {
 /// Inputs of a program in their order, in some states.
 fn inputs(states: &[State; LANES], arrays: &[InputArray]) -> Vec<[f64; LANES]> {
     let lanes =
-        states.each_ref().map(|state| arrays.iter().flat_map(|a| state.input(&a.name, a.len)).collect::<Vec<f64>>());
+        states.each_ref().map(|state| arrays.iter().flat_map(|a| state.input(a.name, a.len())).collect::<Vec<f64>>());
     (0..lanes[0].len()).map(|k| std::array::from_fn(|lane| lanes[lane][k])).collect()
 }
 

@@ -14,7 +14,8 @@ use super::placement::{direction, placement};
 use super::shared::ancestors;
 use super::{Plan, PlanFrame, PoseStep, Rigid};
 use crate::model::{ConstraintKind, JointKind, LoopKind, Model, Mount, Value};
-use crate::options::{Options, Output};
+use crate::options::Options;
+use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
 
@@ -160,7 +161,7 @@ pub fn rest_idle(plan: &mut Plan) {
         return;
     }
     let graph = Graph::default();
-    let given = SymbolicInputs::new(&graph, plan, Output::PositionCorrection, &Options::default());
+    let given = SymbolicInputs::new(&graph, plan, Output::PositionCorrection.spec(), &Options::default());
     let tree: Tree<Expr> = plan.tree(&given.params);
     let mut w = Workspace::new(&tree);
     let [mut phi, mut pivots] = [plan.dims.rows, plan.dims.rows].map(|n| vec![Expr::Const(0.0); n]);

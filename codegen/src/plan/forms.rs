@@ -13,7 +13,8 @@ use mbd_runtime::tree::{Source, Unknown};
 
 use super::accuracy::{ErrorEstimator, LIMIT};
 use super::{NodeKind, Plan, PlanNode, PlanOptions, PoseStep};
-use crate::options::{Arithmetic, Options, Output, RolledCode};
+use crate::options::{Arithmetic, Options, RolledCode};
+use crate::output::Output;
 use crate::rolled;
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;

@@ -1,7 +1,8 @@
 //! How far out the mass matrix carries screws.
 
 use super::Plan;
-use crate::options::{Options, Output};
+use crate::options::Options;
+use crate::output::Output;
 use crate::trace::trace;
 
 /// Trees beyond this are not searched.
