@@ -38,11 +38,6 @@ impl Port {
         matches!(self.place, Place::Written | Place::Returned)
     }
 
-    /// Whether it is what the function returns.
-    pub fn returned(&self) -> bool {
-        self.place == Place::Returned
-    }
-
     fn mutable(&self) -> &'static str {
         if self.written() {
             "mut "
