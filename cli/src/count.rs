@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 
 use multibody::codegen::emit::quantity;
-use multibody::codegen::generate::{trace, OutputProgram};
+use multibody::codegen::generate::trace;
 use multibody::codegen::model::{Gravity, Model, Value};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
 use multibody::codegen::plan::Plan;
@@ -176,15 +176,15 @@ pub fn gravity(plan: &Plan) -> String {
 
 /// Counts of all outputs of the options.
 pub fn all(plan: &Plan, options: &Options) -> Outcome<Vec<OutputCounts>> {
-    options.outputs.iter().map(|&g| Ok(of_program(&trace(plan, g, options).map_err(generate::failure)?))).collect()
+    options.outputs.iter().map(|&g| of_output(plan, g, options)).collect()
 }
 
-fn of_program(group: &OutputProgram) -> OutputCounts {
-    let program = &group.program;
+fn of_output(plan: &Plan, group: Output, options: &Options) -> Outcome<OutputCounts> {
+    let program = trace(plan, group, options).map_err(generate::failure)?.program;
     let quantities: BTreeSet<_> = program.steps.iter().map(|(_, _, (_, what))| *what).collect();
-    let sweeps = quantities.into_iter().map(|q| (quantity(q).1, program.counts_where(|label| label.1 == q)));
+    let sweeps = quantities.into_iter().map(|q| (quantity(q), program.counts_where(|label| label.1 == q)));
     let sweeps = sweeps.filter(|(_, c)| *c != Counts::default()).collect();
-    OutputCounts { group: group.group, counts: program.counts(), sweeps }
+    Ok(OutputCounts { group, counts: program.counts(), sweeps })
 }
 
 /// The table of counts, with a row for each sweep of the outputs in `detailed`.

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use multibody::codegen::{self, Options};
+use multibody::codegen::{self, GenerateError, Options};
 
 use super::args::GenerateArgs;
 use super::output::write_file;
@@ -23,12 +23,17 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
 }
 
 /// What a sound model can still get wrong: frames of the options, freedoms without inertia.
-pub fn failure(message: String) -> Failure {
-    let help = match message.starts_with("no frame") {
-        true => "--frames takes names of bodies and of [[frame]] tables; leave it out for all",
-        false => "give the bodies behind that joint mass and inertia, or the joint an armature",
+pub fn failure(error: GenerateError) -> Failure {
+    let help = match error {
+        GenerateError::UnknownFrame { .. } => {
+            "--frames takes names of bodies and of [[frame]] tables; leave it out for all"
+        }
+        GenerateError::OutputNeedsConstraints { .. } | GenerateError::OutputLacksConstraints { .. } => {
+            "leave the output out; `mbd generate --help` says which models have it"
+        }
+        _ => "give the bodies behind that joint mass and inertia, or the joint an armature",
     };
-    Failure::new(message, help)
+    Failure::new(error.to_string(), help)
 }
 
 /// A path as the header of the code shows it: the same on every machine.

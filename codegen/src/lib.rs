@@ -1,16 +1,19 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
 pub mod check;
+pub mod code;
 pub mod diag;
 pub mod emit;
+pub mod error;
 pub mod generate;
 pub mod import;
 pub mod model;
 pub mod options;
+pub mod output;
 pub mod plan;
 pub mod rolled;
 pub mod search;
 pub mod symbolic;
 pub mod trace;
 
-pub use generate::{generate, Arithmetic, Generated, Options, Output, Precision, RolledCode};
+pub use generate::{generate, Arithmetic, GenerateError, Generated, Options, Output, Precision, RolledCode};

@@ -1,5 +1,7 @@
 //! What is to be generated, and how.
 
+use crate::output::{Output, Search};
+
 /// Number type of the generated code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
@@ -125,120 +127,6 @@ impl Default for PlanOptions {
     }
 }
 
-/// What generated code can compute.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Output {
-    /// `(q, p) → (q̇, ṗ)`; makes the type a `System`.
-    Rates,
-    /// `(q, p) → v`.
-    Velocities,
-    /// `(q, v) → p`.
-    Momenta,
-    /// `(q, p) →` kinetic and potential energy.
-    Energy,
-    /// `(q, v) → v̇`.
-    Accelerations,
-    /// `(q, v) →` the wrench that each joint transmits.
-    Reactions,
-    /// `q → M`.
-    MassMatrix,
-    /// `(q, v) →` placements and velocities of frames.
-    Frames,
-    /// `(q, v, v̇) → τ`.
-    InverseDynamics,
-    /// `(q, v) → h` with `M v̇ + h = τ`.
-    Bias,
-    /// `q →` Jacobians of frames.
-    Jacobians,
-    /// `(q, v) →` accelerations of frames at `v̇ = 0`.
-    BiasAccelerations,
-    /// `(q, p) →` velocities, momentum rates, and their derivatives with respect to coordinates and momenta; with the
-    /// rates, makes the type `Differentiable`.
-    Derivatives,
-    /// `(q, v) →` momenta, their rates, and derivatives of both at given velocities.
-    MomentumDerivatives,
-    /// `(q, p) →` derivatives of velocities and momentum rates with respect to the parameters.
-    ParameterDerivatives,
-    /// `q →` residuals of the constraints and the entries of `Φ`.
-    ConstraintResiduals,
-    /// `(q, p) →` velocities, momenta freed of multipliers, multipliers `σ`.
-    ProjectMomenta,
-    /// `q →` residuals of the constraints, Newton's step onto the closed positions, and its pivots.
-    PositionCorrection,
-    /// `(q, v) → λ`; with the rates and the three before it, makes the type `Constrained`.
-    Multipliers,
-}
-
-impl Output {
-    /// Those of every mechanism.
-    pub const ALL: [Output; 15] = [
-        Output::Rates,
-        Output::Velocities,
-        Output::Momenta,
-        Output::Energy,
-        Output::Accelerations,
-        Output::Reactions,
-        Output::MassMatrix,
-        Output::Frames,
-        Output::InverseDynamics,
-        Output::Bias,
-        Output::Jacobians,
-        Output::BiasAccelerations,
-        Output::Derivatives,
-        Output::MomentumDerivatives,
-        Output::ParameterDerivatives,
-    ];
-
-    /// Those that mechanisms with constraints have besides.
-    pub const CONSTRAINED: [Output; 4] =
-        [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
-
-    /// Both.
-    pub fn every() -> impl Iterator<Item = Output> + Clone {
-        Output::ALL.into_iter().chain(Output::CONSTRAINED)
-    }
-
-    /// Name of the generated function, and of the output in options.
-    pub fn name(self) -> &'static str {
-        match self {
-            Output::Rates => "rates",
-            Output::Velocities => "velocities",
-            Output::Momenta => "momenta",
-            Output::Energy => "energy",
-            Output::Accelerations => "accelerations",
-            Output::Reactions => "reactions",
-            Output::MassMatrix => "mass_matrix",
-            Output::Frames => "frames",
-            Output::InverseDynamics => "inverse_dynamics",
-            Output::Bias => "bias",
-            Output::Jacobians => "jacobians",
-            Output::BiasAccelerations => "bias_accelerations",
-            Output::Derivatives => "derivatives",
-            Output::MomentumDerivatives => "momentum_derivatives",
-            Output::ParameterDerivatives => "parameter_derivatives",
-            Output::ConstraintResiduals => "constraint_residuals",
-            Output::ProjectMomenta => "project_momenta",
-            Output::PositionCorrection => "position_correction",
-            Output::Multipliers => "multipliers",
-        }
-    }
-
-    /// Whether it has one result for each chosen frame.
-    pub fn of_frames(self) -> bool {
-        matches!(self, Output::Frames | Output::Jacobians | Output::BiasAccelerations)
-    }
-
-    /// Whether mechanisms with constraints lack it.
-    pub fn of_trees(self) -> bool {
-        self == Output::MomentumDerivatives
-    }
-
-    /// The group of a name.
-    pub fn from_name(name: &str) -> Option<Output> {
-        Output::every().find(|g| g.name() == name)
-    }
-}
-
 /// How code is generated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
@@ -250,7 +138,7 @@ pub struct Options {
     pub precision: Precision,
     /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
     pub efforts: bool,
-    /// Names of the frames of [`Output::Frames`], [`Output::Jacobians`] and [`Output::BiasAccelerations`]; empty means all.
+    /// Names of the frames for outputs that have a result for each frame; empty means all.
     pub frames: Vec<String>,
     /// How the structure is chosen.
     pub plan: PlanOptions,
@@ -265,28 +153,26 @@ pub struct Options {
 }
 
 impl Options {
-    /// What is computed unless something else is asked for; and, where there are constraints, [`Output::CONSTRAINED`].
-    pub const OUTPUTS: [Output; 3] = [Output::Rates, Output::Momenta, Output::Energy];
-
-    /// The options for a model with or without constraints: where the outputs are [`Options::OUTPUTS`] or all of them, one with
-    /// constraints also gets [`Output::CONSTRAINED`], and not what such models lack.
+    /// The options for a model with or without constraints: where the outputs are [`Output::DEFAULT`], or all of a model without constraints, a model with
+    /// constraints also gets the outputs that only such models have, and not those that they lack.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
-        let asked =
-            |groups: &[Output]| groups.len() == self.outputs.len() && groups.iter().all(|g| self.outputs.contains(g));
-        if constrained && (asked(&Options::OUTPUTS) || asked(&Output::ALL)) {
-            options.outputs.retain(|g| !g.of_trees());
-            options.outputs.extend(Output::CONSTRAINED);
+        let mut asked: Vec<Output> = self.outputs.clone();
+        asked.sort_unstable();
+        let unchosen = asked == Output::DEFAULT || Output::available(false).eq(asked);
+        if constrained && unchosen {
+            options.outputs.retain(|output| output.spec().available(true));
+            options.outputs.extend(Output::available(true).filter(|output| !output.spec().available(false)));
         }
         options
     }
 
-    /// [`Options::plan`] without the searches that no output asks for.
+    /// [`Options::plan`] without the searches that no output profits from.
     pub fn searches(&self) -> PlanOptions {
-        let asked = |groups: &[Output]| self.outputs.iter().any(|g| groups.contains(g));
+        let asked = |search| self.outputs.iter().any(|output| output.spec().search == search);
         PlanOptions {
-            accelerations: self.plan.accelerations && asked(&[Output::Accelerations, Output::Reactions]),
-            mass_matrix: self.plan.mass_matrix && asked(&[Output::MassMatrix]),
+            accelerations: self.plan.accelerations && asked(Search::Accelerations),
+            mass_matrix: self.plan.mass_matrix && asked(Search::MassMatrix),
             ..self.plan
         }
     }
@@ -296,7 +182,7 @@ impl Default for Options {
     fn default() -> Self {
         Options {
             type_name: "Model".to_string(),
-            outputs: Options::OUTPUTS.to_vec(),
+            outputs: Output::DEFAULT.to_vec(),
             precision: Precision::F64,
             efforts: true,
             frames: Vec::new(),

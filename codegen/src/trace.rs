@@ -1,4 +1,4 @@
-//! The sweeps run on symbols: from a plan to the program of each output group.
+//! The sweeps run on symbols: from a plan to the straight-line program of each output.
 
 mod directional;
 
@@ -8,69 +8,40 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use crate::model::Gravity;
-use crate::options::{Arithmetic, EliminationStrategy, Options, Output, Precision};
+use crate::error::GenerateError;
+use crate::model::{Gravity, Value};
+use crate::options::{Arithmetic, EliminationStrategy, Options, Precision};
+use crate::output::{Array, Availability, InputArray, Output, OutputProgram, Sizes, Spec, COORDINATE_RATES, FIELDS};
 use crate::plan::Plan;
-use crate::rolled::RolledProgram;
-use crate::symbolic::{passes, Counts, Expr, Graph, Program, Rewrite};
+use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
+use directional::Directional;
 
-/// One array of numbers that generated code is called with; its inputs are numbered through all arrays.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct InputArray {
-    /// Expression in the generated code: `q`, `p`, `self.tau`.
-    pub name: String,
-    /// Length; for wrenches, six times their number.
-    pub len: usize,
-    /// Whether it is an array of arrays of six.
-    pub sixes: bool,
-}
-
-/// Program of one output group.
-#[derive(Clone, Debug)]
-pub struct OutputProgram {
-    /// Which.
-    pub group: Output,
-    /// Input arrays, numbered through.
-    pub inputs: Vec<InputArray>,
-    /// The program; empty where the group is in loop form.
-    pub program: Program,
-    /// The group in loop form.
-    pub loops: Option<RolledProgram>,
-}
-
-impl OutputProgram {
-    /// A group in loop form.
-    pub fn rolled(loops: RolledProgram) -> OutputProgram {
-        OutputProgram {
-            group: loops.group,
-            inputs: loops.inputs.clone(),
-            program: Program::default(),
-            loops: Some(loops),
-        }
-    }
-
-    /// Operations that are executed.
-    pub fn counts(&self) -> Counts {
-        self.loops.as_ref().map_or_else(|| self.program.counts(), RolledProgram::counts)
-    }
-}
-
-/// Symbolic inputs of one function.
-pub(crate) struct Symbols<'g> {
+/// Arrays of symbols, their entries numbered through.
+struct Symbols<'g> {
     graph: &'g Graph,
     arrays: Vec<InputArray>,
     next: usize,
 }
 
-/// What a group is given, as symbols.
+impl<'g> Symbols<'g> {
+    fn array(&mut self, array: &Array, field: bool, sizes: &Sizes) -> Vec<Expr<'g>> {
+        let array = InputArray::new(array, field, sizes);
+        let first = self.next;
+        self.next += array.len();
+        self.arrays.push(array);
+        (first..self.next).map(|k| self.graph.input(k)).collect()
+    }
+}
+
+/// What a function is given, as symbols.
 pub(crate) struct SymbolicInputs<'g> {
     /// Input arrays, numbered through.
     pub arrays: Vec<InputArray>,
     /// Coordinates.
     pub q: Vec<Expr<'g>>,
-    /// Momenta or velocities, whichever the group takes.
+    /// Momenta or velocities, whichever the function takes.
     pub second: Vec<Expr<'g>>,
-    /// Accelerations, where the group takes them.
+    /// Accelerations, where the function takes them.
     pub third: Vec<Expr<'g>>,
     /// Joint forces.
     pub tau: Vec<Expr<'g>>,
@@ -85,43 +56,24 @@ pub(crate) struct SymbolicInputs<'g> {
 }
 
 impl<'g> SymbolicInputs<'g> {
-    /// Symbols for the inputs of a group.
-    pub fn new(graph: &'g Graph, plan: &Plan, group: Output, options: &Options) -> SymbolicInputs<'g> {
+    /// Symbols for the arguments of a function and for the fields of the generated type.
+    pub fn new(graph: &'g Graph, plan: &Plan, spec: &Spec, options: &Options) -> SymbolicInputs<'g> {
+        let sizes = &sizes(plan, options, 0);
         let mut symbols = Symbols { graph, arrays: Vec::new(), next: 0 };
-        let dims = plan.dims;
-        let q = symbols.array("q", dims.nq);
-        let second = match group {
-            Output::Rates
-            | Output::Velocities
-            | Output::Energy
-            | Output::Derivatives
-            | Output::ParameterDerivatives
-            | Output::ProjectMomenta => symbols.array("p", dims.nv),
-            Output::MassMatrix | Output::Jacobians | Output::ConstraintResiduals | Output::PositionCorrection => {
-                Vec::new()
-            }
-            _ => symbols.array("v", dims.nv),
-        };
-        let third = if group == Output::InverseDynamics { symbols.array("a", dims.nv) } else { Vec::new() };
-        let tau = if options.efforts { symbols.array("self.tau", dims.nv) } else { Vec::new() };
-        let drive_q = symbols.array("self.drive_q", dims.drive_q);
-        let drive_v = symbols.array("self.drive_v", dims.drive_v);
-        let drive_a = symbols.array("self.drive_a", dims.drive_v);
-        let flat = symbols.array("self.wrenches", 6 * dims.wrenches);
-        let wrenches = flat.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
-        let params = symbols.array("self.params", plan.model.params.len());
-        let gravity = match plan.model.gravity {
-            Gravity::Constant(g) => g.map(|v| match v {
-                crate::model::Value::Const(x) => Expr::Const(x),
-                crate::model::Value::Param(k) => params[k],
-            }),
-            Gravity::Input => {
-                let g = symbols.array("self.gravity", 3);
-                std::array::from_fn(|k| g[k])
-            }
-        };
+        let mut state =
+            spec.inputs.iter().map(|array| symbols.array(array, false, sizes)).collect::<Vec<_>>().into_iter();
+        let [q, second, third] = [0; 3].map(|_| state.next().unwrap_or_default());
+        let [tau, drive_q, drive_v, drive_a, wrenches, params, gravity] =
+            FIELDS.map(|field| symbols.array(&field.array, true, sizes));
+        let wrenches = wrenches.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
+        let gravity = gravity_of(plan, &params, || std::array::from_fn(|k| gravity[k]));
         let drive = [drive_q, drive_v, drive_a];
         SymbolicInputs { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
+    }
+
+    /// Number of the first entry of an array.
+    pub fn first_of(&self, name: &str) -> usize {
+        self.arrays.iter().take_while(|array| array.name != name).map(InputArray::len).sum()
     }
 
     /// As the sweeps take it.
@@ -131,36 +83,59 @@ impl<'g> SymbolicInputs<'g> {
     }
 }
 
-impl<'g> Symbols<'g> {
-    fn array(&mut self, name: &str, len: usize) -> Vec<Expr<'g>> {
-        self.arrays.push(InputArray { name: name.to_string(), len, sixes: name == "self.wrenches" });
-        self.next += len;
-        (self.next - len..self.next).map(|k| self.graph.input(k)).collect()
+/// Gravity in ground axes, where it is an input as `given`.
+fn gravity_of<S: Scalar>(plan: &Plan, params: &[S], given: impl FnOnce() -> [S; 3]) -> [S; 3] {
+    match plan.model.gravity {
+        Gravity::Constant(g) => g.map(|v| match v {
+            Value::Const(x) => S::constant(x),
+            Value::Param(k) => params[k],
+        }),
+        Gravity::Input => given(),
     }
 }
 
 /// Frames of the options, as indices into the plan's.
-pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, String> {
+///
+/// # Errors
+/// A name that is none of a frame or body.
+pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, GenerateError> {
     if options.frames.is_empty() {
         return Ok((0..plan.frames.len()).collect());
     }
     let find = |name: &String| {
-        plan.frames.iter().position(|f| f.name == *name).ok_or_else(|| format!("no frame or body is named `{name}`"))
+        let found = plan.frames.iter().position(|f| f.name == *name);
+        found.ok_or_else(|| GenerateError::UnknownFrame { name: name.clone() })
     };
     options.frames.iter().map(find).collect()
 }
 
-/// Whether a model has an output.
-fn has(plan: &Plan, group: Output) -> Result<(), String> {
-    let (name, constrained) = (group.name(), !plan.constraints.is_empty());
-    let model = &plan.model.name;
-    if Output::CONSTRAINED.contains(&group) && !constrained {
-        return Err(format!("`{name}` is an output of mechanisms with loops or couplings, and `{model}` has none"));
+/// Lengths of all arrays of a generated type.
+pub(crate) fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
+    let dims = plan.dims;
+    Sizes {
+        nq: dims.nq,
+        nv: dims.nv,
+        joints: plan.joint_nodes.len(),
+        frames,
+        rows: dims.rows,
+        entries: plan.entry_columns().len(),
+        params: plan.model.params.len(),
+        efforts: if options.efforts { dims.nv } else { 0 },
+        drive_q: dims.drive_q,
+        drive_v: dims.drive_v,
+        wrenches: dims.wrenches,
+        gravity: if plan.model.gravity == Gravity::Input { 3 } else { 0 },
     }
-    if group.of_trees() && constrained {
-        return Err(format!("`{name}` does not know the loops and couplings of `{model}`: use `derivatives`"));
+}
+
+/// Refuses an output that the model does not have.
+fn check_availability(plan: &Plan, output: Output) -> Result<(), GenerateError> {
+    let model = || plan.model.name.clone();
+    match output.spec().availability {
+        _ if output.spec().available(!plan.constraints.is_empty()) => Ok(()),
+        Availability::WithoutConstraints => Err(GenerateError::OutputLacksConstraints { output, model: model() }),
+        _ => Err(GenerateError::OutputNeedsConstraints { output, model: model() }),
     }
-    Ok(())
 }
 
 /// Part of a row's diagonal below which it counts as redundant.
@@ -180,188 +155,156 @@ pub(crate) fn rewrite(options: &Options) -> Rewrite {
     }
 }
 
-/// Runs the sweeps of one group on symbols.
+/// Runs the sweeps of one output on symbols.
 ///
 /// # Errors
-/// An unknown frame name in the options, or an output that the model does not have, as a message.
-pub fn trace(plan: &Plan, group: Output, options: &Options) -> Result<OutputProgram, String> {
-    has(plan, group)?;
-    let graph = Graph::default();
-    let given = SymbolicInputs::new(&graph, plan, group, options);
+/// An unknown frame name in the options, or an output that the model does not have.
+pub fn trace(plan: &Plan, output: Output, options: &Options) -> Result<OutputProgram<Program>, GenerateError> {
+    check_availability(plan, output)?;
+    let frames = chosen_frames(plan, options)?;
+    let (graph, spec, sizes) = (Graph::default(), output.spec(), sizes(plan, options, frames.len()));
+    let given = SymbolicInputs::new(&graph, plan, spec, options);
     let mut physical: Tree<Expr> = plan.tree(&given.params);
     physical.tolerance = Expr::Const(tolerance(options.precision));
     let tree = physical.regrouped();
-    let frames = chosen_frames(plan, options)?;
-    let state = [given.q.as_slice(), &given.second, &given.third];
-    let outputs = match group {
-        Output::Derivatives | Output::ParameterDerivatives if !plan.constraints.is_empty() => {
-            directional::derivatives(&graph, plan, group, &given, tree.tolerance)
-        }
-        Output::ParameterDerivatives => {
-            parameter_derivatives(&graph, plan, &tree, &given.q, &given.second, &given.params, &given.inputs())
-        }
-        _ => run(&graph, [&tree, &physical], group, state, &given.inputs(), &frames),
-    };
-    let program = passes::run(Program::new(&graph, &outputs), rewrite(options));
-    Ok(OutputProgram { group, inputs: given.arrays, program, loops: None })
+    let run = Run { graph: &graph, plan, tree: &tree, physical: &physical, given: &given, frames: &frames };
+    let mut results: Vec<Vec<Expr>> = spec.results.iter().map(|a| vec![Expr::zero(); a.len(&sizes)]).collect();
+    run.sweep(output, &mut results);
+    name_results(&graph, spec, &sizes, &results);
+    let program = passes::run(Program::new(&graph, &results.concat()), rewrite(options));
+    Ok(OutputProgram { spec, inputs: given.arrays, program })
 }
 
-fn run<'g>(
-    graph: &'g Graph,
-    [tree, physical]: [&Tree<Expr<'g>>; 2],
-    group: Output,
-    [q, second, third]: [&[Expr<'g>]; 3],
-    inputs: &Inputs<Expr<'g>>,
-    frames: &[usize],
-) -> Vec<Expr<'g>> {
-    let sweeps = Sweeps { tree, trace: graph };
-    let mut w = Workspace::new(tree);
-    let dims = tree.dims;
-    let zeros = |n: usize| vec![Expr::zero(); n];
-    let mut v = zeros(dims.nv);
-    match group {
-        Output::Rates => {
-            let (mut qd, mut pd) = (zeros(dims.nq), zeros(dims.nv));
-            sweeps.rates(q, second, inputs, &mut w, &mut v, &mut qd, &mut pd);
-            qd.extend(pd);
-            qd
+/// Results that the sweeps have not named are called after their array and their place in it.
+fn name_results(graph: &Graph, spec: &Spec, sizes: &Sizes, results: &[Vec<Expr>]) {
+    for (array, values) in spec.results.iter().zip(results) {
+        let lengths = array.lengths(sizes);
+        for (k, value) in values.iter().enumerate() {
+            let Expr::Node { id, neg: minus, .. } = *value else { continue };
+            let entry = match lengths[..] {
+                [_] => Entry::Number(k),
+                [.., n] => Entry::Pair(k / n, k % n),
+                [] => Entry::Axes(""),
+            };
+            let (_, (node, _)) = graph.get(id);
+            graph.set_name(id, Name { node, minus, letter: array.name, entry });
         }
-        Output::Velocities => {
-            sweeps.velocities(q, second, inputs, &mut w, &mut v);
-            v
-        }
-        Output::Momenta => {
-            sweeps.momenta(q, second, inputs, &mut w, &mut v);
-            v
-        }
-        Output::Energy => {
-            let (kinetic, potential) = sweeps.energy(q, second, inputs, &mut w, &mut v);
-            vec![kinetic, potential]
-        }
-        Output::Accelerations => {
-            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
-            sweeps.accelerations(q, second, inputs, &mut w, &mut v);
-            v
-        }
-        Output::Reactions => {
-            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
-            sweeps.accelerations(q, second, inputs, &mut w, &mut v);
-            let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
-            Sweeps { tree: physical, trace: graph }.reactions(q, second, &v, inputs, &mut w, &mut out);
-            out.concat()
-        }
-        Output::InverseDynamics => {
-            sweeps.inverse_dynamics(q, second, third, inputs, &mut w, &mut v);
-            v
-        }
-        Output::Bias => {
-            sweeps.bias(q, second, inputs, &mut w, &mut v);
-            v
-        }
-        Output::Jacobians => {
-            let mut out = zeros(6 * dims.nv * frames.len());
-            sweeps.jacobians(q, inputs, &mut w, frames.iter().map(|&k| &tree.frames[k]), &mut out);
-            out
-        }
-        Output::BiasAccelerations => {
-            let mut out = vec![[Expr::zero(); 6]; frames.len()];
-            let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut out);
-            sweeps.bias_accelerations(q, second, inputs, &mut w, pairs);
-            out.concat()
-        }
-        Output::MassMatrix => {
-            let mut m = zeros(dims.nv * dims.nv);
-            sweeps.mass_matrix(q, inputs, &mut w, &mut m);
-            m
-        }
-        Output::Frames => {
-            let mut states = vec![FrameState::ground(); frames.len()];
-            let pairs = frames.iter().map(|&k| &tree.frames[k]).zip(&mut states);
-            sweeps.frame_states(q, second, inputs, &mut w, pairs);
-            let motion = |m: Motion<Expr<'g>>| [m.lin, m.ang].concat();
-            let rotations = states.iter().flat_map(|s| s.rotation.concat()).collect::<Vec<_>>();
-            let positions = states.iter().flat_map(|s| s.position);
-            let velocities = states.iter().flat_map(|s| motion(s.velocity));
-            rotations.into_iter().chain(positions).chain(velocities).collect()
-        }
-        Output::Derivatives => {
-            let mut d = Derivatives::new(tree);
-            sweeps.derivatives(q, second, inputs, &mut w, &mut d);
-            [d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp].concat()
-        }
-        Output::MomentumDerivatives => {
-            let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
-            sweeps.momentum_derivatives(q, second, inputs, &mut w, &mut d, &mut out);
-            [out.p, out.pd, out.dp_dq, out.dp_dv, out.dpd_dq, out.dpd_dv].concat()
-        }
-        Output::ConstraintResiduals => {
-            let (mut phi, mut entries) = (zeros(dims.rows), zeros(tree.entry_columns().len()));
-            sweeps.constraint_residuals(q, inputs, &mut w, &mut phi, &mut entries);
-            [phi, entries].concat()
-        }
-        Output::ProjectMomenta => {
-            let (mut freed, mut sigma) = (zeros(dims.nv), zeros(dims.rows));
-            sweeps.project_momenta(q, second, inputs, &mut w, &mut v, &mut freed, &mut sigma);
-            [v, freed, sigma].concat()
-        }
-        Output::PositionCorrection => {
-            let (mut phi, mut pivots) = (zeros(dims.rows), zeros(dims.rows));
-            sweeps.position_correction(q, inputs, &mut w, &mut phi, &mut v, &mut pivots);
-            [phi, v, pivots].concat()
-        }
-        Output::Multipliers => {
-            let mut lambda = zeros(dims.rows);
-            let sweeps = Sweeps { tree: tree.for_accelerations(), trace: graph };
-            sweeps.multipliers(q, second, inputs, &mut w, &mut v, &mut lambda);
-            lambda
-        }
-        // Needs the plan: see `parameter_derivatives`.
-        Output::ParameterDerivatives => Vec::new(),
     }
 }
 
-/// `∂v/∂params` and `∂ṗ/∂params`, row by row: one dual sweep for each parameter.
-fn parameter_derivatives<'g>(
+/// One run of the sweeps on symbols.
+struct Run<'a, 'g> {
     graph: &'g Graph,
-    plan: &Plan,
-    tree: &Tree<Expr<'g>>,
-    q: &[Expr<'g>],
-    p: &[Expr<'g>],
-    params: &[Expr<'g>],
-    inputs: &Inputs<Expr<'g>>,
-) -> Vec<Expr<'g>> {
-    let mut d = Derivatives::new(tree);
-    Sweeps { tree, trace: graph }.derivatives(q, p, inputs, &mut Workspace::new(tree), &mut d);
-    let columns: Vec<[Vec<Expr>; 2]> = (0..params.len())
-        .map(|k| {
-            let one = |j: usize| if j == k { Expr::one() } else { Expr::zero() };
-            let varied: Vec<Dual<Expr>> = params.iter().enumerate().map(|(j, x)| Dual::new(*x, one(j))).collect();
-            let gravity = match plan.model.gravity {
-                Gravity::Constant(g) => g.map(|v| match v {
-                    crate::model::Value::Const(x) => Dual::constant(x),
-                    crate::model::Value::Param(k) => varied[k],
-                }),
-                Gravity::Input => inputs.gravity.map(|x| Dual::new(x, Expr::zero())),
-            };
-            let tree = plan.tree(&varied).regrouped();
-            let mut column = ParameterDerivatives::new(&tree);
-            column.compute(&Sweeps { tree: &tree, trace: graph }, gravity, q, inputs, &d);
-            [column.dv, column.dpd]
-        })
-        .collect();
-    let rows = (0..2).flat_map(|half| (0..p.len()).map(move |a| (half, a)));
-    rows.flat_map(|(half, a)| columns.iter().map(move |c| c[half][a])).collect()
+    plan: &'a Plan,
+    /// The mechanism in the groups of joints that are eliminated together.
+    tree: &'a Tree<Expr<'g>>,
+    /// The mechanism joint by joint.
+    physical: &'a Tree<Expr<'g>>,
+    given: &'a SymbolicInputs<'g>,
+    frames: &'a [usize],
+}
+
+impl<'g> Run<'_, 'g> {
+    /// Calls the sweep of an output, which writes the arrays of [`Spec::results`].
+    fn sweep(&self, output: Output, results: &mut [Vec<Expr<'g>>]) {
+        let (tree, trace, given) = (self.tree, self.graph, self.given);
+        let (q, second, third, u) = (&given.q, &given.second, &given.third, &given.inputs());
+        let sweeps = Sweeps { tree, trace };
+        // Where another elimination suits accelerations better.
+        let other = Sweeps { tree: tree.for_accelerations(), trace };
+        let w = &mut Workspace::new(tree);
+        let v = &mut vec![Expr::zero(); tree.dims.nv];
+        // Derivatives where there are constraints.
+        let constrained = !self.plan.constraints.is_empty();
+        let directional = Directional { graph: trace, plan: self.plan, given, tolerance: tree.tolerance };
+        match (output, results) {
+            (Output::Rates, [qd, pd]) => sweeps.rates(q, second, u, w, v, qd, pd),
+            (Output::Velocities, [v]) => sweeps.velocities(q, second, u, w, v),
+            (Output::Momenta, [p]) => sweeps.momenta(q, second, u, w, p),
+            (Output::Energy, [energy]) => (energy[0], energy[1]) = sweeps.energy(q, second, u, w, v),
+            (Output::Accelerations, [a]) => other.accelerations(q, second, u, w, a),
+            (Output::Reactions, [wrenches]) => {
+                other.accelerations(q, second, u, w, v);
+                let mut out = vec![[Expr::zero(); 6]; tree.joint_nodes.len()];
+                Sweeps { tree: self.physical, trace }.reactions(q, second, v, u, w, &mut out);
+                *wrenches = out.concat();
+            }
+            (Output::MassMatrix, [m]) => sweeps.mass_matrix(q, u, w, m),
+            (Output::Frames, [rotation, position, velocity]) => {
+                let mut states = vec![FrameState::ground(); self.frames.len()];
+                sweeps.frame_states(q, second, u, w, self.frames().zip(&mut states));
+                let motion = |m: Motion<Expr<'g>>| [m.lin, m.ang].concat();
+                *rotation = states.iter().flat_map(|s| s.rotation.concat()).collect();
+                *position = states.iter().flat_map(|s| s.position).collect();
+                *velocity = states.iter().flat_map(|s| motion(s.velocity)).collect();
+            }
+            (Output::InverseDynamics, [tau]) => sweeps.inverse_dynamics(q, second, third, u, w, tau),
+            (Output::Bias, [h]) => sweeps.bias(q, second, u, w, h),
+            (Output::Jacobians, [jacobian]) => sweeps.jacobians(q, u, w, self.frames(), jacobian),
+            (Output::BiasAccelerations, [bias]) => {
+                let mut out = vec![[Expr::zero(); 6]; self.frames.len()];
+                sweeps.bias_accelerations(q, second, u, w, self.frames().zip(&mut out));
+                *bias = out.concat();
+            }
+            (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) if constrained => {
+                [*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp] = directional.derivatives();
+            }
+            (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) => {
+                let mut d = Derivatives::new(tree);
+                sweeps.derivatives(q, second, u, w, &mut d);
+                (*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp) = (d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
+            }
+            (Output::MomentumDerivatives, [p, pd, dp_dq, dp_dv, dpd_dq, dpd_dv]) => {
+                let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
+                sweeps.momentum_derivatives(q, second, u, w, &mut d, &mut out);
+                (*p, *pd, *dp_dq, *dp_dv) = (out.p, out.pd, out.dp_dq, out.dp_dv);
+                (*dpd_dq, *dpd_dv) = (out.dpd_dq, out.dpd_dv);
+            }
+            (Output::ParameterDerivatives, [dv, dpd]) if constrained => {
+                [*dv, *dpd] = directional.parameter_derivatives()
+            }
+            (Output::ParameterDerivatives, [dv, dpd]) => [*dv, *dpd] = self.parameter_derivatives(),
+            (Output::ConstraintResiduals, [phi, entries]) => sweeps.constraint_residuals(q, u, w, phi, entries),
+            (Output::ProjectMomenta, [v, freed, sigma]) => sweeps.project_momenta(q, second, u, w, v, freed, sigma),
+            (Output::PositionCorrection, [phi, dq, pivots]) => sweeps.position_correction(q, u, w, phi, dq, pivots),
+            (Output::Multipliers, [lambda]) => other.multipliers(q, second, u, w, v, lambda),
+            _ => unreachable!("results are those of the table"),
+        }
+    }
+
+    /// The chosen frames.
+    fn frames(&self) -> impl Iterator<Item = &mbd_runtime::tree::TreeFrame<Expr<'g>>> + Clone {
+        self.frames.iter().map(|&k| &self.tree.frames[k])
+    }
+
+    /// `∂v/∂params` and `∂ṗ/∂params`, row by row: one dual sweep for each parameter.
+    fn parameter_derivatives(&self) -> [Vec<Expr<'g>>; 2] {
+        let (tree, trace, given, inputs) = (self.tree, self.graph, self.given, self.given.inputs());
+        let (q, params) = (&given.q, &given.params);
+        let mut d = Derivatives::new(tree);
+        Sweeps { tree, trace }.derivatives(q, &given.second, &inputs, &mut Workspace::new(tree), &mut d);
+        let columns: Vec<[Vec<Expr>; 2]> = (0..params.len())
+            .map(|k| {
+                let one = |j: usize| if j == k { Expr::one() } else { Expr::zero() };
+                let varied: Vec<Dual<Expr>> = params.iter().enumerate().map(|(j, x)| Dual::new(*x, one(j))).collect();
+                let gravity = gravity_of(self.plan, &varied, || inputs.gravity.map(|x| Dual::new(x, Expr::zero())));
+                let tree = self.plan.tree(&varied).regrouped();
+                let mut column = ParameterDerivatives::new(&tree);
+                column.compute(&Sweeps { tree: &tree, trace }, gravity, q, &inputs, &d);
+                [column.dv, column.dpd]
+            })
+            .collect();
+        let rows = |half: usize| (0..tree.dims.nv).flat_map(|a| columns.iter().map(move |c| c[half][a])).collect();
+        [rows(0), rows(1)]
+    }
 }
 
 /// Program of `q̇ = N(q) v`.
-pub(crate) fn coordinate_map(plan: &Plan) -> OutputProgram {
-    let graph = Graph::default();
-    let mut symbols = Symbols { graph: &graph, arrays: Vec::new(), next: 0 };
-    let q = symbols.array("q", plan.dims.nq);
-    let v = symbols.array("v", plan.dims.nv);
-    let params = symbols.array("self.params", plan.model.params.len());
-    let tree: Tree<Expr> = plan.tree(&params);
+pub(crate) fn coordinate_rates(plan: &Plan, options: &Options) -> OutputProgram<Program> {
+    let (graph, spec) = (Graph::default(), COORDINATE_RATES);
+    let given = SymbolicInputs::new(&graph, plan, spec, options);
+    let tree: Tree<Expr> = plan.tree(&given.params);
     let mut qd = vec![Expr::zero(); plan.dims.nq];
-    Sweeps { tree: &tree, trace: &graph }.coordinate_rates(&q, &v, &mut qd);
-    OutputProgram { group: Output::Rates, inputs: symbols.arrays, program: Program::new(&graph, &qd), loops: None }
+    Sweeps { tree: &tree, trace: &graph }.coordinate_rates(&given.q, &given.second, &mut qd);
+    OutputProgram { spec, inputs: given.arrays, program: Program::new(&graph, &qd) }
 }

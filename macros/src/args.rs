@@ -272,7 +272,7 @@ fn outputs(value: &[TokenTree]) -> Result<Vec<Output>, Message> {
     let mut chosen = Vec::new();
     for element in elements("outputs", value, "[rates, energy]")? {
         let written: String = element.iter().map(|t| t.to_string()).collect();
-        let names = || Output::every().map(Output::name);
+        let names = || Output::ALL.iter().map(|output| output.name());
         let Some(group) = Output::from_name(&written) else {
             let help = did_you_mean(&written, names(), || format!("the outputs are {}", list_all(names())));
             return Err(Message::new(place(&element), format!("unknown output {}", quote(&written)), help));

@@ -37,9 +37,9 @@ pub fn expand(input: TokenStream) -> TokenStream {
     args.options.runtime = RUNTIME.to_string();
     let generated = model.and_then(|m| match generate(&m, &args.options) {
         Ok(generated) => Some(generated.source),
-        Err(message) => {
+        Err(error) => {
             let place = text.as_ref().map_or(Span::call_site().into(), |t| t.place);
-            out.extend(Message::new(place, message, "").compile_error());
+            out.extend(Message::new(place, error.to_string(), "").compile_error());
             None
         }
     });
@@ -171,7 +171,7 @@ fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut
         errors.push(Message::new(text.place, message, help));
     }
     // Whoever names frames wants them.
-    if !args.frames.is_empty() && !args.options.outputs.iter().any(|g| g.of_frames()) {
+    if !args.frames.is_empty() && !args.options.outputs.iter().any(|output| output.spec().of_frames()) {
         args.options.outputs.push(Output::Frames);
     }
     let Some(model) = model else { return };

@@ -1,66 +1,60 @@
 //! What stands in for a type that could not be made, so that its uses add no errors of their own.
 
-use mbd_codegen::{Options, Precision};
+use mbd_codegen::output::{Array, Field, Output, Sizes, Spec, COORDINATE_RATES, FIELDS};
+use mbd_codegen::Options;
 
 /// So large that no index of a real state is out of bounds.
 const LENGTH: usize = 1000;
 
+/// A function that takes whatever it is given and returns zeros.
+fn function(spec: &Spec, nested: &dyn Fn(&Array, &str) -> String, number: &str, zero: &str) -> String {
+    let written = if spec.returned { &[] } else { spec.results };
+    let arguments = || spec.inputs.iter().chain(written).enumerate();
+    let types: String = arguments().map(|(k, _)| format!("A{k}, ")).collect();
+    let taken: String = arguments().map(|(k, array)| format!("_{}: A{k}, ", array.name)).collect();
+    let (returned, body) = match spec.results {
+        [array] if spec.returned => (format!("-> {}", nested(array, number)), nested(array, zero)),
+        _ => Default::default(),
+    };
+    format!("#[doc = \"\"] pub fn {}<{types}>(&self, {taken}) {returned} {{ {body} }}", spec.name)
+}
+
 /// A type with the functions of a generated one that take whatever they are given.
 pub fn source(options: &Options) -> String {
     let (name, rt) = (&options.type_name, &options.runtime);
-    let t = match options.precision {
-        Precision::F64 => "f64",
-        Precision::F32 => "f32",
-    };
+    let t = options.precision.name();
     let array = format!("[{t}; {LENGTH}]");
-    let fields =
-        ["tau", "drive_q", "drive_v", "drive_a", "params"].map(|f| (f, array.clone(), format!("[0.0; {LENGTH}]")));
-    let fields: Vec<(&str, String, String)> = fields
-        .into_iter()
-        .chain([
-            ("wrenches", format!("[[{t}; 6]; {LENGTH}]"), format!("[[0.0; 6]; {LENGTH}]")),
-            ("gravity", format!("[{t}; 3]"), "[0.0; 3]".to_string()),
-        ])
-        .collect();
-    let declared: String = fields.iter().map(|(f, ty, _)| format!("#[doc = \"\"] pub {f}: {ty},")).collect();
-    let values: String = fields.iter().map(|(f, _, value)| format!("{f}: {value},")).collect();
-    let lane_fields: String = fields
-        .iter()
-        .map(|(f, ty, _)| {
-            format!("#[doc = \"\"] pub {f}: {},", ty.replacen(&format!("{t};"), &format!("[{t}; LANES];"), 1))
-        })
-        .collect();
-    let lane_values: String =
-        fields.iter().map(|(f, _, value)| format!("{f}: {},", value.replacen("0.0;", "[0.0; LANES];", 1))).collect();
-    let functions: String = [
-        ("rates", "q p qd pd"),
-        ("coordinate_rates", "q v qd"),
-        ("velocities", "q p v"),
-        ("momenta", "q v p"),
-        ("accelerations", "q v a"),
-        ("reactions", "q v reactions"),
-        ("mass_matrix", "q m"),
-        ("frames", "q v rotation position velocity"),
-        ("inverse_dynamics", "q v a tau"),
-        ("bias", "q v h"),
-        ("jacobians", "q jacobian"),
-        ("bias_accelerations", "q v drift"),
-        ("derivatives", "q p v pd dv_dq dv_dp dpd_dq dpd_dp"),
-        ("momentum_derivatives", "q v p pd dp_dq dp_dv dpd_dq dpd_dv"),
-        ("parameter_derivatives", "q p dv_dparams dpd_dparams"),
-        ("constraint_residuals", "q residual jacobian"),
-        ("project_momenta", "q p v freed sigma"),
-        ("position_correction", "q residual dq pivots"),
-        ("multipliers", "q v lambda"),
-    ]
-    .into_iter()
-    .map(|(f, arguments)| {
-        let arguments: Vec<&str> = arguments.split(' ').collect();
-        let types: Vec<String> = (0..arguments.len()).map(|k| format!("A{k}")).collect();
-        let taken: Vec<String> = arguments.iter().zip(&types).map(|(a, ty)| format!("_{a}: {ty}")).collect();
-        format!("#[doc = \"\"] pub fn {f}<{}>(&self, {}) {{}}", types.join(", "), taken.join(", "))
-    })
-    .collect();
+    let sizes = Sizes {
+        nq: LENGTH,
+        nv: LENGTH,
+        rows: LENGTH,
+        entries: LENGTH,
+        params: LENGTH,
+        efforts: LENGTH,
+        drive_q: LENGTH,
+        drive_v: LENGTH,
+        wrenches: LENGTH,
+        gravity: 3,
+        joints: LENGTH,
+        frames: LENGTH,
+    };
+    let nested = |array: &Array, entry: &str| {
+        array.lengths(&sizes).iter().rev().fold(entry.to_string(), |inner, n| format!("[{inner}; {n}]"))
+    };
+    let declared = |number: &str| -> String {
+        let field = |f: &Field| format!("#[doc = \"\"] pub {}: {},", f.array.name, nested(&f.array, number));
+        FIELDS.iter().map(field).collect()
+    };
+    let values = |zero: &str| -> String {
+        FIELDS.iter().map(|f| format!("{}: {},", f.array.name, nested(&f.array, zero))).collect()
+    };
+    let functions = |number: &str, zero: &str| -> String {
+        let specs = Output::ALL.iter().map(|output| output.spec()).chain([COORDINATE_RATES]);
+        specs.map(|spec| function(spec, &nested, number, zero)).collect()
+    };
+    let (lane, lane_zero) = (format!("[{t}; LANES]"), "[0.0; LANES]");
+    let (lane_fields, lane_values, lane_functions) = (declared(&lane), values(lane_zero), functions(&lane, lane_zero));
+    let (declared, values, functions) = (declared(t), values("0.0"), functions(t, "0.0"));
     format!(
         "/// Stands in for a model with errors.
         #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +71,6 @@ pub fn source(options: &Options) -> String {
             #[doc = \"\"] pub const VELOCITIES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
             #[doc = \"\"] pub const fn new() -> Self {{ {name} {{ {values} }} }}
             {functions}
-            #[doc = \"\"] pub fn energy<A0, A1>(&self, _q: A0, _p: A1) -> [{t}; 2] {{ [0.0; 2] }}
             #[doc = \"\"] pub fn rates_batch<A0, A1, A2, A3, A4>(&self, _q: A0, _p: A1, _tau: A2, _qd: A3, _pd: A4) -> ::core::result::Result<(), {rt}::batch::Lengths> {{
                 ::core::result::Result::Ok(())
             }}
@@ -89,8 +82,7 @@ pub fn source(options: &Options) -> String {
         #[allow(clippy::all, clippy::pedantic, dead_code)]
         impl<const LANES: usize> {name}Lanes<LANES> {{
             #[doc = \"\"] pub fn new() -> Self {{ {name}Lanes {{ {lane_values} }} }}
-            {functions}
-            #[doc = \"\"] pub fn energy<A0, A1>(&self, _q: A0, _p: A1) -> [[{t}; LANES]; 2] {{ [[0.0; LANES]; 2] }}
+            {lane_functions}
         }}
         impl ::core::default::Default for {name} {{ fn default() -> Self {{ Self::new() }} }}
         impl {rt}::System for {name} {{

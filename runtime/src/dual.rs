@@ -79,6 +79,10 @@ impl<S: Scalar> Scalar for Dual<S> {
         Dual::new(re, -(re * re * self.du))
     }
 
+    fn node(self) -> Option<(u32, bool)> {
+        self.re.node()
+    }
+
     fn rank_tolerance() -> Self {
         Dual::new(S::rank_tolerance(), S::zero())
     }

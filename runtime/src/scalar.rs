@@ -30,6 +30,13 @@ pub trait Scalar:
         Self::constant(1e-10)
     }
 
+    /// The node of a graph of operations that a symbolic scalar stands for, and whether it stands for the negative. Numbers
+    /// have none. Only for [`Trace::name`](crate::sweep::Trace::name): a sweep that asked would not be the same on numbers.
+    #[inline]
+    fn node(self) -> Option<(u32, bool)> {
+        None
+    }
+
     /// Zero.
     fn zero() -> Self {
         Self::constant(0.0)

@@ -25,7 +25,7 @@ pub fn tree(k: u64) -> (Model, Options) {
     let options = Options {
         arithmetic: Arithmetic::Exact,
         type_name: "Tree".to_string(),
-        outputs: Output::ALL.to_vec(),
+        outputs: Output::available(false).collect(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
         efforts: rng.chance(0.8),
         plan: PlanOptions {

@@ -20,6 +20,7 @@ use mbd_codegen::model::{JointKind, Model};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::search::{self, Candidate, Chosen};
+use mbd_codegen::symbolic::Program;
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;
 use mbd_testing::chains;
@@ -48,7 +49,7 @@ fn measure(plans: &[Plan], kinds: &[Kind], states: u64) -> Vec<[Spread; 3]> {
         let program = |(plan, &(_, arithmetic)): (&Plan, &Kind)| {
             trace(plan, group, &Options { arithmetic, ..Options::default() }).expect("no frames are named")
         };
-        let programs: Vec<OutputProgram> = plans.iter().zip(kinds).map(program).collect();
+        let programs: Vec<OutputProgram<Program>> = plans.iter().zip(kinds).map(program).collect();
         for seed in 0..states {
             let s = random_state(&plans[0], seed);
             let mut p = vec![0.0; plans[0].dims.nv];

@@ -2,7 +2,7 @@
 //!
 //! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
 
-use mbd_codegen::generate::trace;
+use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::rolled::{looped, RolledProgram};
@@ -15,21 +15,21 @@ use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
 
 /// Inputs of a program in order.
-fn inputs(program: &RolledProgram, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
+fn inputs(program: &OutputProgram<RolledProgram>, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
     let mut all = Vec::new();
     for array in &program.inputs {
-        match array.name.as_str() {
+        match array.name {
             "q" => all.extend(&s.q),
             "p" => all.extend(p),
             "v" => all.extend(&s.v),
             "a" => all.extend(a),
-            "self.tau" => all.extend(&s.tau),
-            "self.drive_q" => all.extend(&s.drive[0]),
-            "self.drive_v" => all.extend(&s.drive[1]),
-            "self.drive_a" => all.extend(&s.drive[2]),
-            "self.params" => all.extend(&s.params),
-            "self.gravity" => all.extend(&s.gravity),
-            "self.wrenches" => assert_eq!(array.len, 0),
+            "tau" => all.extend(&s.tau),
+            "drive_q" => all.extend(&s.drive[0]),
+            "drive_v" => all.extend(&s.drive[1]),
+            "drive_a" => all.extend(&s.drive[2]),
+            "params" => all.extend(&s.params),
+            "gravity" => all.extend(&s.gravity),
+            "wrenches" => assert_eq!(array.len(), 0),
             other => panic!("no input is named {other}"),
         }
     }
@@ -51,10 +51,10 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     i.accelerations(&s.q, &s.v, &mut a);
     let mut nodes = 0;
     let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
-    for group in Output::every() {
+    for &group in Output::ALL {
         let Some(program) = looped(&plan, group, options) else { continue };
-        nodes = nodes.max(program.loops.iter().map(|l| l.nodes.len()).sum());
-        let results = program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
+        nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
+        let results = program.program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
         let expected = match group {
             Output::Rates => {
                 i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::output;
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
@@ -104,40 +105,11 @@ pub enum BaseArg {
     Planar,
 }
 
-const OUTPUTS_HELP: &str = "What to compute, with commas between, or `all`:
-  rates          (q, p) -> (q', p'); makes the type a `System` that integrators take
-  velocities     (q, p) -> v
-  momenta        (q, v) -> p
-  energy         (q, p) -> kinetic and potential energy
-  accelerations  (q, v) -> v'
-  reactions      (q, v) -> wrench transmitted by every joint
-  mass_matrix    q -> M
-  frames         (q, v) -> placements and velocities of bodies and frames
-  inverse_dynamics (q, v, v') -> tau
-  bias           (q, v) -> h, with M v' + h = tau
-  jacobians      q -> Jacobians of bodies and frames
-  bias_accelerations
-                 (q, v) -> accelerations of bodies and frames at v' = 0
-  derivatives    (q, p) -> v, p' and their derivatives with respect to q and p
-  momentum_derivatives
-                 (q, v) -> p, p' and their derivatives with respect to q and v
-  parameter_derivatives
-                 (q, p) -> derivatives of v and p' with respect to parameters
-Of models with loops or couplings (they get these beside the defaults):
-  constraint_residuals
-                 q -> residuals of the constraints, and their Jacobian
-  project_momenta
-                 (q, p) -> v, momenta freed of multipliers, multipliers sigma
-  position_correction
-                 q -> residuals, Newton's step onto closed positions, its pivots
-  multipliers    (q, v) -> forces of the constraints
-such models have no `momentum_derivatives`.";
-
 /// What code is generated.
 #[derive(Args)]
 pub struct CodeArgs {
     /// What to compute, with commas between, or `all`
-    #[arg(long, long_help = OUTPUTS_HELP, value_delimiter = ',', value_parser = outputs, value_name = "LIST", default_value = "rates,momenta,energy")]
+    #[arg(long, long_help = output::help(), value_delimiter = ',', value_parser = outputs, value_name = "LIST", default_value = "rates,momenta,energy")]
     pub outputs: Vec<OutputList>,
     /// Number type
     #[arg(long, value_enum, default_value_t = ScalarArg::F64)]
@@ -161,7 +133,7 @@ pub struct CodeArgs {
     /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Each change is told
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
     pub snap: f64,
-    /// Frames and bodies of the outputs `frames`, `jacobians`, `bias_accelerations`, with commas between [default: all]
+    /// Frames and bodies of outputs that have a result for each frame, with commas between [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
     /// Longer bodies are written in blocks of this many statements

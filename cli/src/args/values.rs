@@ -51,9 +51,9 @@ pub fn vector(text: &str) -> Result<[f64; 3], String> {
 /// An output by its name, or all of them.
 pub fn outputs(text: &str) -> Result<OutputList, String> {
     if text == "all" {
-        return Ok(OutputList(Output::ALL.to_vec()));
+        return Ok(OutputList(Output::available(false).collect()));
     }
-    let names = || Output::every().map(|g| g.name()).chain(["all"]);
+    let names = || Output::ALL.iter().map(|output| output.name()).chain(["all"]);
     let unknown = || words::did_you_mean(text, names(), || format!("outputs are {}", words::list(names())));
     Output::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
 }

@@ -5,7 +5,7 @@ mod program;
 
 use std::io::Write;
 
-use multibody::codegen::generate::{trace, OutputProgram};
+use multibody::codegen::generate::trace;
 use multibody::codegen::Options;
 
 use super::args::{ExplainArgs, Stage};
@@ -20,7 +20,7 @@ pub fn run(args: &ExplainArgs, out: &mut dyn Write) -> Outcome {
         return frames::print(&plan, out);
     }
     for &group in &options.outputs {
-        let program: OutputProgram = trace(&plan, group, &options).map_err(generate::failure)?;
+        let program = trace(&plan, group, &options).map_err(generate::failure)?;
         match args.after {
             Stage::Frames => {}
             Stage::Trace => program::created(&program, out)?,

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::io::Write;
 
 use multibody::codegen::emit::quantity;
-use multibody::codegen::generate::OutputProgram;
+use multibody::codegen::generate::{InputArray, OutputProgram};
 use multibody::codegen::plan::Plan;
-use multibody::codegen::symbolic::{Op, Operand, ProgramResult};
+use multibody::codegen::symbolic::{Op, Operand, Program, ProgramResult};
 
 use crate::Outcome;
 
 /// Operations the sweeps made and those that the output needs, by quantity. Sines and cosines count one each.
-pub fn created(group: &OutputProgram, out: &mut dyn Write) -> Outcome {
+pub fn created(group: &OutputProgram<Program>, out: &mut dyn Write) -> Outcome {
     let program = &group.program;
     let mut live: BTreeMap<_, usize> = BTreeMap::new();
     for (_, op, (_, what)) in &program.steps {
@@ -19,14 +19,14 @@ pub fn created(group: &OutputProgram, out: &mut dyn Write) -> Outcome {
             *live.entry(*what).or_default() += 1;
         }
     }
-    writeln!(out, "{}", group.group.name())?;
+    writeln!(out, "{}", group.spec.name)?;
     writeln!(out, "  {:<48}{:>8}{:>8}", "operations", "made", "needed")?;
     let (mut made_all, mut live_all) = (0, 0);
     for (what, made) in &program.created {
         let live = live.get(what).copied().unwrap_or(0);
         made_all += made;
         live_all += live;
-        let name = quantity(*what).1;
+        let name = quantity(*what);
         let gap = " ".repeat(48_usize.saturating_sub(name.chars().count()));
         writeln!(out, "  {name}{gap}{made:>8}{live:>8}")?;
     }
@@ -34,11 +34,10 @@ pub fn created(group: &OutputProgram, out: &mut dyn Write) -> Outcome {
 }
 
 /// The program, one operation a line.
-pub fn statements(plan: &Plan, group: &OutputProgram, out: &mut dyn Write) -> Outcome {
-    writeln!(out, "{}", group.group.name())?;
+pub fn statements(plan: &Plan, group: &OutputProgram<Program>, out: &mut dyn Write) -> Outcome {
+    writeln!(out, "{}", group.spec.name)?;
     let mut inputs = BTreeMap::new();
-    let mut places = group.inputs.iter().flat_map(|a| (0..a.len).map(move |k| place(&a.name, k, a.sixes)));
-    let places: Vec<String> = places.by_ref().collect();
+    let places: Vec<String> = group.inputs.iter().flat_map(|a| (0..a.len()).map(move |k| place(a, k))).collect();
     for (id, op, _) in &group.program.steps {
         if let Op::Input(k) = op {
             inputs.insert(*id, places[*k as usize].clone());
@@ -72,7 +71,7 @@ pub fn statements(plan: &Plan, group: &OutputProgram, out: &mut dyn Write) -> Ou
         };
         if last != Some(*label) {
             let body = label.0.map_or("ground", |k| plan.nodes[k].name.as_str());
-            writeln!(out, "  {body}: {}", quantity(label.1).1)?;
+            writeln!(out, "  {body}: {}", quantity(label.1))?;
             last = Some(*label);
         }
         writeln!(out, "    x{id} = {text}")?;
@@ -87,25 +86,24 @@ pub fn statements(plan: &Plan, group: &OutputProgram, out: &mut dyn Write) -> Ou
     Ok(writeln!(out)?)
 }
 
-fn place(array: &str, k: usize, sixes: bool) -> String {
-    let array = array.trim_start_matches("self.");
-    match sixes {
-        true => format!("{array}[{}][{}]", k / 6, k % 6),
-        false => format!("{array}[{k}]"),
+fn place(array: &InputArray, k: usize) -> String {
+    match array.dims[..] {
+        [_, n] => format!("{}[{}][{}]", array.name, k / n, k % n),
+        _ => format!("{}[{k}]", array.name),
     }
 }
 
 /// The order: parts, values alive at once, longest chain.
-pub fn schedule(group: &OutputProgram, chunk: usize, out: &mut dyn Write) -> Outcome {
+pub fn schedule(group: &OutputProgram<Program>, chunk: usize, out: &mut dyn Write) -> Outcome {
     let steps = &group.program.steps;
     let statements = steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
-    writeln!(out, "{}", group.group.name())?;
+    writeln!(out, "{}", group.spec.name)?;
     writeln!(out, "  order: that of the sweeps; every operation stands after its operands")?;
     let parts = statements.div_ceil(chunk).max(1);
     let parts = if parts == 1 { "one block".to_string() } else { format!("{parts} blocks of {chunk}") };
     writeln!(out, "  operations (sines and cosines one each): {statements}, in {parts}")?;
     let (most, at) = alive(group);
-    let place = steps.get(at).map_or("", |(_, _, (_, what))| quantity(*what).1);
+    let place = steps.get(at).map_or("", |(_, _, (_, what))| quantity(*what));
     writeln!(out, "  values alive at once, inputs left out: at most {most} (in: {place})")?;
     let depth = depth(group);
     let width = statements as f64 / depth.max(1) as f64;
@@ -117,7 +115,7 @@ pub fn schedule(group: &OutputProgram, chunk: usize, out: &mut dyn Write) -> Out
 }
 
 /// Largest number of values between their definition and their last use, and the step where it is reached.
-fn alive(group: &OutputProgram) -> (usize, usize) {
+fn alive(group: &OutputProgram<Program>) -> (usize, usize) {
     let steps = &group.program.steps;
     let mut last: BTreeMap<u32, usize> = BTreeMap::new();
     for (k, (_, op, _)) in steps.iter().enumerate() {
@@ -150,7 +148,7 @@ fn alive(group: &OutputProgram) -> (usize, usize) {
 }
 
 /// Length of the longest chain of operations.
-fn depth(group: &OutputProgram) -> usize {
+fn depth(group: &OutputProgram<Program>) -> usize {
     let mut depth: BTreeMap<u32, usize> = BTreeMap::new();
     for (id, op, _) in &group.program.steps {
         let below = op.operands().map(|o| if let Operand::Node(k) = o { depth[&k] } else { 0 }).max().unwrap_or(0);

@@ -2,30 +2,25 @@
 
 use std::fmt::Write;
 
-use super::layout::{fields, Function};
-use super::ports::{declared, dims, nested, Port};
+use super::fields::{default, type_definition, Field};
+use super::head::tuple;
+use super::signature::{nested, Port, Signature};
 use crate::options::{Options, Precision};
+use crate::output::Output;
 use crate::plan::Plan;
 
 /// A function that has been written.
 pub struct Kernel<'a> {
     /// Its number.
     pub id: usize,
-    /// Its name.
-    pub name: &'a str,
     /// Its signature.
-    pub signature: &'a Function,
+    pub signature: &'a Signature,
     /// What its kernel reads and writes.
     pub ports: Vec<Port>,
 }
 
 const ALLOWED: &str =
     "#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]";
-
-/// A tuple of any length.
-fn tuple(items: &[String]) -> String {
-    items.iter().fold("(".to_string(), |all, item| format!("{all}{item}, ")).trim_end().to_string() + ")"
-}
 
 /// Lanes of a batch: two vectors of 32 bytes, one of 64.
 fn width(options: &Options) -> usize {
@@ -39,13 +34,12 @@ fn width(options: &Options) -> usize {
 pub fn kernels(out: &mut String, options: &Options, kernels: &[Kernel]) {
     let (name, rt, t) = (&options.type_name, &options.runtime, options.precision.name());
     for kernel in kernels {
-        let access = |p: &Port| if p.mutable { "Write" } else { "Read" };
         let numbered = || kernel.ports.iter().enumerate();
         let generics: String =
-            numbered().map(|(k, p)| format!("P{k}: {rt}::kernel::{}<{t}> + ?Sized, ", access(p))).collect();
+            numbered().map(|(k, p)| format!("P{k}: {rt}::kernel::{}<{t}> + ?Sized, ", p.access())).collect();
         let types: Vec<String> =
-            numbered().map(|(k, p)| format!("&'a {}P{k}", if p.mutable { "mut " } else { "" })).collect();
-        let names: Vec<String> = kernel.ports.iter().map(|p| p.name.clone()).collect();
+            numbered().map(|(k, p)| p.reference(&format!("P{k}")).replacen('&', "&'a ", 1)).collect();
+        let names: Vec<String> = kernel.ports.iter().map(|p| p.name.to_string()).collect();
         let (types, pattern) = (tuple(&types), tuple(&names));
         let _ = writeln!(
             out,
@@ -58,82 +52,56 @@ impl<'a, {generics}const LANES: usize> {rt}::kernel::Kernel<{}, LANES, {types}> 
     }}
 }}",
             kernel.id,
-            kernel.name,
+            kernel.signature.name,
             names.join(", ")
         );
     }
 }
 
-/// The method that copies the inputs into all lanes.
-pub fn broadcast(out: &mut String, plan: &Plan, options: &Options) {
-    let name = &options.type_name;
-    let copies: Vec<String> = fields(plan, options)
-        .into_iter()
-        .map(|(field, ty, _, _)| match dims(&ty).len() {
-            1 => format!("{field}: self.{field}.map(|x| [x; LANES])"),
-            _ => format!("{field}: self.{field}.map(|row| row.map(|x| [x; LANES]))"),
-        })
-        .collect();
-    let _ = writeln!(
-        out,
-        "
-    /// The same for several states at once; the inputs are copied into every lane.
-    pub fn lanes<const LANES: usize>(&self) -> {name}Lanes<LANES> {{
-        {name}Lanes {{ {} }}
-    }}",
-        copies.join(", ")
-    );
-}
-
 /// The type with lanes.
-pub fn lanes_type(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
-    let (name, rt, t) = (&options.type_name, &options.runtime, options.precision.name());
+pub fn lanes_type(out: &mut String, options: &Options, fields: &[Field], kernels: &[Kernel]) {
+    let (name, t) = (&options.type_name, options.precision.name());
     let _ = writeln!(
         out,
         "
 /// `LANES` states of [`{name}`] at once, side by side in vector registers. In every array the last index is the lane:
-/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; {} or a multiple of it is quick.
-#[derive(Clone, Debug, PartialEq)]
-#[rustfmt::skip]
-pub struct {name}Lanes<const LANES: usize> {{",
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; {} or a multiple of it is quick.",
         width(options)
     );
     let lane = format!("[{t}; LANES]");
-    for (field, ty, _, doc) in fields(plan, options) {
-        let _ = writeln!(out, "    /// {doc}\n    pub {field}: {},", nested(&dims(&ty), &lane));
-    }
-    let _ = writeln!(out, "}}\n\n{ALLOWED}\nimpl<const LANES: usize> {name}Lanes<LANES> {{");
-    let _ = write!(out, "    /// All inputs zero, parameters at their defaults.\n    pub fn new() -> Self {{\n");
-    let _ = writeln!(out, "        {name}::new().lanes()\n    }}");
-    for kernel in kernels {
-        let returned = kernel.ports.iter().find(|p| p.returned);
-        let declarations: Vec<String> = declared(kernel.signature).iter().map(|p| p.lanes_declaration(t)).collect();
-        let returns = returned.map_or(String::new(), |p| format!(" -> {}", nested(&p.dims, &lane)));
-        let _ = writeln!(out, "\n{}", kernel.signature.doc);
-        let _ =
-            writeln!(out, "    #[inline]\n    pub fn {}(&self, {}){returns} {{", kernel.name, declarations.join(", "));
-        if let Some(port) = returned {
-            let _ = writeln!(out, "        let mut {} = {};", port.name, nested(&port.dims, "[0.0; LANES]"));
-        }
-        let arguments: Vec<String> = kernel.ports.iter().map(|p| p.argument.clone()).collect();
-        let call = format!("{rt}::kernel::call_lanes::<{name}, {}, LANES, {t}, _>", kernel.id);
-        let _ = writeln!(out, "        {call}({});", tuple(&arguments));
-        if let Some(port) = returned {
-            let _ = writeln!(out, "        {}", port.name);
-        }
-        let _ = writeln!(out, "    }}");
-    }
-    let _ = writeln!(out, "}}");
+    type_definition(out, &format!("{name}Lanes<const LANES: usize>"), fields, &lane);
     let _ = writeln!(
         out,
         "
-#[rustfmt::skip]
-impl<const LANES: usize> ::core::default::Default for {name}Lanes<LANES> {{
-    fn default() -> Self {{
-        Self::new()
-    }}
-}}"
+{ALLOWED}
+impl<const LANES: usize> {name}Lanes<LANES> {{
+    /// All inputs zero, parameters at their defaults.
+    pub fn new() -> Self {{
+        {name}::new().lanes()
+    }}"
     );
+    for kernel in kernels {
+        lanes_function(out, options, kernel, &lane);
+    }
+    let _ = writeln!(out, "}}");
+    default(out, "<const LANES: usize>", &format!("{name}Lanes<LANES>"));
+}
+
+/// One function of the type with lanes.
+fn lanes_function(out: &mut String, options: &Options, Kernel { id, signature, ports }: &Kernel, lane: &str) {
+    let (name, rt, t) = (&options.type_name, &options.runtime, options.precision.name());
+    let _ =
+        write!(out, "\n{}    #[inline]\n    pub fn {} {{\n", signature.documentation(), signature.declaration(lane));
+    if let Some(port) = &signature.returned {
+        let _ = writeln!(out, "        let mut {} = {};", port.name, nested(&port.dims, "[0.0; LANES]"));
+    }
+    let arguments: Vec<String> = ports.iter().map(Port::argument).collect();
+    let call = format!("{rt}::kernel::call_lanes::<{name}, {id}, LANES, {t}, _>");
+    let _ = writeln!(out, "        {call}({});", tuple(&arguments));
+    if let Some(port) = &signature.returned {
+        let _ = writeln!(out, "        {}", port.name);
+    }
+    let _ = writeln!(out, "    }}");
 }
 
 /// Columns as arguments: of joint forces only where they are inputs.
@@ -148,12 +116,12 @@ fn columns(plan: &Plan, options: &Options) -> (String, &'static str, usize) {
 /// Rates of any number of states.
 pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
     let (rt, t, width) = (&options.runtime, options.precision.name(), width(options));
-    let Some(kernel) = kernels.iter().find(|k| k.name == "rates") else { return };
+    let Some(kernel) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
     let (arguments, given, _) = columns(plan, options);
     // The columns are what the kernel calls by the same names; everything else is the same for all states.
-    let ports = kernel.ports.iter().map(|p| match p.name.as_str() {
-        "q" | "p" | "tau" | "qd" | "pd" => p.name.clone(),
-        _ => p.argument.clone(),
+    let ports = kernel.ports.iter().map(|p| match p.name {
+        "q" | "p" | "tau" | "qd" | "pd" => p.name.to_string(),
+        _ => p.argument(),
     });
     let ports = tuple(&ports.collect::<Vec<_>>());
     let of_tau = if given == "tau" { "Joint forces are a column each; the" } else { "The" };

@@ -1,78 +1,103 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
+mod angles;
+mod constants;
+mod fields;
+mod head;
+mod header;
 mod lanes;
-mod layout;
 pub(crate) mod names;
-mod ports;
+mod numbers;
 mod rolled;
-mod statements;
+mod signature;
+mod straight;
 mod traits;
 
 use std::fmt::Write;
 
-use crate::options::{Options, Output};
+use crate::code::Code;
+use crate::options::Options;
+use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::trace::OutputProgram;
-use statements::{Body, Head};
+use head::Head;
+use signature::Signature;
 
-pub use layout::joint_word;
-pub use names::{identifier, quantity};
+pub use names::{identifier, joint_word, quantity};
 
-/// Writes one implementation of a trait.
-type Writer = fn(&mut String, &Plan, &Options);
+/// What the source is made from.
+pub struct Input<'a> {
+    /// The mechanism.
+    pub plan: &'a Plan,
+    /// How code is generated.
+    pub options: &'a Options,
+    /// Chosen frames, as indices into the plan's.
+    pub frames: &'a [usize],
+    /// Lengths of all arrays.
+    pub sizes: Sizes,
+}
 
-/// Source of one type with a function for each group, and of its `System` where the rates are among them.
-pub fn source(plan: &Plan, options: &Options, groups: &[OutputProgram], map: &OutputProgram) -> String {
+/// Source of one type with a function for each program, and of the runtime's traits that they make possible.
+pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates: &OutputProgram<Code>) -> String {
+    let Input { plan, options, .. } = *input;
     let mut out = String::new();
-    let has = |x: Output| groups.iter().any(|g| g.group == x);
-    let rates = has(Output::Rates);
-    let traits: [(bool, Writer); 5] = [
-        (has(Output::Momenta), traits::conjugate),
-        (has(Output::Energy), traits::energetic),
-        (has(Output::Accelerations), traits::accelerated),
-        (has(Output::Derivatives), traits::differentiable),
-        (Output::CONSTRAINED.into_iter().all(has), traits::constrained),
-    ];
-    layout::header(&mut out, plan, options, groups);
-    layout::type_definition(&mut out, plan, options, groups);
-    let name = &options.type_name;
+    let rates = options.outputs.contains(&Output::Rates);
+    let fields = fields::fields(plan, &input.sizes);
+    header::header(&mut out, plan, options, programs);
+    let outputs: Vec<&str> = programs.iter().map(|p| p.spec.name).collect();
     let _ = writeln!(
         out,
-        "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]\n#[rustfmt::skip]\nimpl {name} {{"
+        "/// Dynamics of `{}` in canonical form: {}. Set the fields between calls.",
+        plan.model.name,
+        outputs.join(", ")
     );
-    layout::constants(&mut out, plan, options);
-    layout::constructor(&mut out, plan, options);
-    let map_signature = rates.then(|| (map, "coordinate_rates", layout::coordinate_rates_signature(plan, options)));
-    let groups = groups.iter().map(|g| (g, g.group.name(), layout::signature(plan, options, g.group)));
-    let functions: Vec<_> = groups.chain(map_signature).collect();
-    let mut kernels = Vec::new();
-    for (id, (group, name, signature)) in functions.iter().enumerate() {
-        let _ = writeln!(out, "\n{}", signature.doc);
-        if let Some(counts) = layout::count_line(&group.counts()) {
-            let _ = writeln!(out, "    /// {counts}");
-        }
-        let ports = ports::ports(group, signature);
-        let head = Head { options, name, id, function: signature, ports: &ports };
-        match &group.loops {
-            Some(program) => rolled::RolledWriter::new(plan, program, head).write(&mut out),
-            None => Body::new(plan, group, head).write(&mut out),
-        }
-        kernels.push(lanes::Kernel { id, name, signature, ports });
+    fields::type_definition(&mut out, &options.type_name, &fields, options.precision.name());
+    let _ = writeln!(
+        out,
+        "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {} {{",
+        options.type_name
+    );
+    constants::constants(&mut out, plan, options, input.frames);
+    fields::constructor(&mut out, options, &fields);
+    let functions: Vec<_> = programs.iter().chain(rates.then_some(coordinate_rates)).collect();
+    let signatures: Vec<Signature> = functions.iter().map(|p| Signature::new(p.spec, &input.sizes)).collect();
+    let kernels = functions.iter().zip(&signatures).enumerate().map(|(id, (program, signature))| {
+        let ports = signature.ports(&program.inputs, &program.program.used_inputs());
+        lanes::Kernel { id, signature, ports }
+    });
+    let kernels: Vec<lanes::Kernel> = kernels.collect();
+    for (program, kernel) in functions.iter().zip(&kernels) {
+        function(&mut out, plan, options, program, kernel);
     }
-    lanes::broadcast(&mut out, plan, options);
+    fields::broadcast(&mut out, options, &fields);
     if rates {
         lanes::batch(&mut out, plan, options, &kernels);
     }
     let _ = writeln!(out, "}}");
     lanes::kernels(&mut out, options, &kernels);
-    lanes::lanes_type(&mut out, plan, options, &kernels);
-    layout::default(&mut out, options);
+    lanes::lanes_type(&mut out, options, &fields, &kernels);
+    fields::default(&mut out, "", &options.type_name);
+    traits::traits(&mut out, plan, options);
     if rates {
-        traits::system(&mut out, plan, options);
-        for (_, write) in traits.iter().filter(|(wanted, _)| *wanted) {
-            write(&mut out, plan, options);
-        }
         lanes::batch_trait(&mut out, plan, options);
     }
     out
+}
+
+/// One function and its kernel.
+fn function(
+    out: &mut String,
+    plan: &Plan,
+    options: &Options,
+    program: &OutputProgram<Code>,
+    lanes::Kernel { id, signature, ports }: &lanes::Kernel,
+) {
+    let _ = write!(out, "\n{}", signature.documentation());
+    if let Some(counts) = head::count_line(&program.program.counts()) {
+        let _ = writeln!(out, "    /// {counts}");
+    }
+    let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
+    match &program.program {
+        Code::Rolled(program) => rolled::RolledWriter::new(plan, program, head).write(out),
+        Code::Straight(program) => straight::Straight::new(plan, program, head).write(out),
+    }
 }

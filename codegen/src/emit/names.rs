@@ -1,6 +1,12 @@
-//! Names of values: body and quantity.
+//! Names of values: body, quantity and component.
+
+use std::collections::{BTreeMap, BTreeSet};
 
 use mbd_runtime::sweep::Quantity;
+
+use crate::model::JointKind;
+use crate::plan::Plan;
+use crate::symbolic::{Entry, Label, Name, Op, Program};
 
 /// A name as a snake-case identifier: what is not a letter or digit becomes `_`.
 pub fn identifier(name: &str) -> String {
@@ -17,26 +23,110 @@ pub fn constant(name: &str) -> String {
     identifier(name).to_ascii_uppercase()
 }
 
-/// Short name of a quantity and what to say of it in a comment.
-pub fn quantity(q: Quantity) -> (&'static str, &'static str) {
+/// What a comment says of a quantity.
+pub fn quantity(q: Quantity) -> &'static str {
     match q {
-        Quantity::Pose => ("pose", "sine and cosine, rotation"),
-        Quantity::Inertia => ("inertia", "inertia carried to the parent, M* (4.48)"),
-        Quantity::Pivot => ("pivot", "U, Mj, k and the reduced inertia M' (4.44)"),
-        Quantity::BiasMomentum => ("rest", "momentum remainder D, D' (4.45, 4.49)"),
-        Quantity::Velocity => ("vel", "velocity and joint rate (4.40)"),
-        Quantity::Rate => ("rate", "coordinate rates"),
-        Quantity::Acceleration => ("acc", "acceleration"),
-        Quantity::Momentum => ("mom", "momentum"),
-        Quantity::MomentumRate => ("pdot", "momentum rate (4.36)"),
-        Quantity::Load => ("load", "gravity and wrenches"),
-        Quantity::Energy => ("energy", "energy"),
-        Quantity::MassMatrix => ("mass", "mass matrix by composite inertias"),
-        Quantity::Placement => ("place", "placement"),
-        Quantity::Reaction => ("react", "reaction wrench (4.66)"),
-        Quantity::Effort => ("effort", "joint force"),
-        Quantity::Jacobian => ("jac", "Jacobian"),
-        Quantity::Derivative => ("deriv", "derivatives of the rates"),
-        Quantity::Constraint => ("loop", "loops and couplings"),
+        Quantity::Pose => "sine and cosine, rotation",
+        Quantity::Inertia => "inertia carried to the parent, M* (4.48)",
+        Quantity::Pivot => "U, Mj, k and the reduced inertia M' (4.44)",
+        Quantity::BiasMomentum => "bias momentum D, D' (4.45, 4.49)",
+        Quantity::Velocity => "velocity and joint rate (4.40)",
+        Quantity::Rate => "coordinate rates",
+        Quantity::Acceleration => "acceleration",
+        Quantity::Momentum => "momentum",
+        Quantity::MomentumRate => "momentum rate (4.36)",
+        Quantity::Load => "gravity and wrenches",
+        Quantity::Energy => "energy",
+        Quantity::MassMatrix => "mass matrix by composite inertias",
+        Quantity::Placement => "placement",
+        Quantity::Reaction => "reaction wrench (4.66)",
+        Quantity::Effort => "joint force",
+        Quantity::Jacobian => "Jacobian",
+        Quantity::Derivative => "derivatives of the rates",
+        Quantity::Constraint => "loops and couplings",
+    }
+}
+
+/// A joint's kind, as models name it.
+pub fn joint_word(kind: &JointKind) -> &'static str {
+    match kind {
+        JointKind::Revolute { .. } => "pin",
+        JointKind::Prismatic { .. } => "slider",
+        JointKind::Cylindrical { .. } => "cylindrical",
+        JointKind::Helical { .. } => "helical",
+        JointKind::Universal { .. } => "universal",
+        JointKind::Planar { .. } => "planar",
+        JointKind::Spherical => "spherical",
+        JointKind::Floating => "floating",
+        JointKind::Fixed => "fixed",
+    }
+}
+
+/// The comment above values of one body and quantity.
+pub fn heading(plan: &Plan, (node, what): Label) -> String {
+    format!("{}: {}", node.map_or("ground", |i| plan.nodes[i].name.as_str()), quantity(what))
+}
+
+/// What stands behind the body: `m_xx`, `v`.
+fn component(Name { minus, letter, entry, .. }: &Name) -> String {
+    let minus = if *minus { "minus_" } else { "" };
+    match entry {
+        Entry::Axes("") => format!("{minus}{letter}"),
+        Entry::Axes(axes) => format!("{minus}{letter}_{axes}"),
+        Entry::Number(k) => format!("{minus}{letter}_{k}"),
+        Entry::Pair(i, k) => format!("{minus}{letter}_{i}_{k}"),
+    }
+}
+
+/// Names of the values of one function.
+#[derive(Default)]
+pub struct Names {
+    taken: BTreeSet<String>,
+    /// Number that comes next after a name.
+    next: BTreeMap<String, usize>,
+}
+
+impl Names {
+    /// Names of a program's values, all different. A value that the sweeps have named is called after its body, its letter
+    /// and its component, `link5_m_xx`, further ones of that name `link5_m_xx_2`; sums and products on the way to such
+    /// values are numbered, `link5_t0`. `body` is the name of a body, `input` that of an input.
+    pub fn of(
+        mut self,
+        program: &Program,
+        body: impl Fn(Option<usize>) -> String,
+        mut input: impl FnMut(usize) -> String,
+    ) -> BTreeMap<u32, String> {
+        let mut names = BTreeMap::new();
+        for (id, op, (node, _)) in &program.steps {
+            let name = match (*op, program.name(*id)) {
+                (Op::Input(k), _) => self.unique(input(k as usize)),
+                (Op::Sin(_), _) => self.unique(format!("{}_sin", body(*node))),
+                (Op::Cos(_), _) => self.unique(format!("{}_cos", body(*node))),
+                (_, Some(name)) => self.unique(format!("{}_{}", body(name.node), component(&name))),
+                (_, None) => self.numbered(format!("{}_t", body(*node)), 0),
+            };
+            names.insert(*id, name);
+        }
+        names
+    }
+
+    /// The name, with a number from 2 on where it is taken.
+    fn unique(&mut self, name: String) -> String {
+        match self.taken.insert(name.clone()) {
+            true => name,
+            false => self.numbered(name + "_", 2),
+        }
+    }
+
+    /// The name with the first number from `first` on that is free.
+    fn numbered(&mut self, name: String, first: usize) -> String {
+        let number = self.next.entry(name.clone()).or_insert(first);
+        loop {
+            let next = format!("{name}{number}");
+            *number += 1;
+            if self.taken.insert(next.clone()) {
+                return next;
+            }
+        }
     }
 }

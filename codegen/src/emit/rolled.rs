@@ -1,11 +1,13 @@
-//! Programs in loop form: numbers between blocks in `kept`, what a run keeps from pass to pass in one row for each turn, its
+//! Rolled programs: numbers between blocks in `kept`, what a run keeps from pass to pass in one row for each turn, its
 //! constants in a table. Every block is a loop over lanes, as in straight-line code.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::names::{identifier, quantity};
-use super::statements::{input, Head};
+use super::angles::pairs;
+use super::head::{locate, Head};
+use super::names::{heading, identifier, Names};
+use super::numbers::{minus, signed};
 use crate::options::Precision;
 use crate::plan::Plan;
 use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
@@ -14,7 +16,7 @@ use crate::symbolic::{Op, ProgramResult};
 /// Bytes that the rows of eight lanes may take on the stack; beyond, lanes are computed one after the other.
 const ROWS: usize = 1 << 19;
 
-/// Writes the function of a group in loop form.
+/// Writes the function of a rolled program.
 pub struct RolledWriter<'a> {
     plan: &'a Plan,
     program: &'a RolledProgram,
@@ -24,7 +26,7 @@ pub struct RolledWriter<'a> {
 }
 
 impl<'a> RolledWriter<'a> {
-    /// Of one group.
+    /// Of one program.
     pub fn new(plan: &'a Plan, program: &'a RolledProgram, head: Head<'a>) -> Self {
         let bytes = match head.options.precision {
             Precision::F64 => 64,
@@ -45,7 +47,7 @@ impl<'a> RolledWriter<'a> {
 
     /// Function, kernel and tables.
     pub fn write(&self, out: &mut String) {
-        let (name, rt) = (self.head.name, &self.head.options.runtime);
+        let (name, rt) = (self.head.signature.name, &self.head.options.runtime);
         self.head.write(out, usize::MAX);
         if self.one_by_one {
             let ports: String = self.head.ports.iter().map(|p| format!(", {}", p.name)).collect();
@@ -86,14 +88,14 @@ impl<'a> RolledWriter<'a> {
         let (name, turns) = (self.table_name(k), run.table.len());
         let _ = writeln!(out, "    const {name}: &'static [[{t}; {columns}]; {turns}] = &[");
         for row in &run.table {
-            let numbers: Vec<String> = row.iter().map(|x| self.head.constant(*x)).collect();
+            let numbers: Vec<String> = row.iter().map(|x| signed(*x, self.head.options.precision)).collect();
             let _ = writeln!(out, "        [{}],", numbers.join(", "));
         }
         let _ = writeln!(out, "    ];");
     }
 
     fn table_name(&self, run: usize) -> String {
-        format!("{}_TABLE{run}", self.head.name.to_ascii_uppercase())
+        format!("{}_TABLE{run}", self.head.signature.name.to_ascii_uppercase())
     }
 
     /// The row of the table, if it is read.
@@ -105,15 +107,18 @@ impl<'a> RolledWriter<'a> {
 
     fn repeated(&self, out: &mut String, block: &Block, repeat: &Repeat) {
         for (k, (start, _)) in repeat.carried.iter().enumerate() {
-            let minus = |neg: bool| if neg { "-" } else { "" };
             let start = match *start {
                 Start::Const(x) => {
-                    let _ = writeln!(out, "            let mut carried{k} = [{}; LANES];", self.head.constant(x));
+                    let _ = writeln!(
+                        out,
+                        "            let mut carried{k} = [{}; LANES];",
+                        signed(x, self.head.options.precision)
+                    );
                     continue;
                 }
                 Start::Kept(slot, neg) => format!("{}kept[{slot}][l]", minus(neg)),
                 Start::Given(k, neg) => {
-                    format!("{}{}", minus(neg), input(&self.program.inputs, k, "", self.lane()))
+                    format!("{}{}", minus(neg), self.head.input(k, "", self.lane()))
                 }
             };
             let _ = writeln!(out, "            let mut carried{k} = [0.0; LANES];");
@@ -141,7 +146,7 @@ impl<'a> RolledWriter<'a> {
     fn sines(&self, out: &mut String, block: &Block, repeat: &Repeat) {
         let (run, turns) = (repeat.run, self.program.loops[repeat.run].table.len());
         let names = self.names(block);
-        let angles = pairs(block);
+        let angles = pairs(&block.program);
         for k in 0..angles.len() {
             let _ = writeln!(out, "            let mut angles{k} = {};", self.head.rows(turns));
         }
@@ -157,14 +162,13 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "                    angles{k}[k][l] = {};", names[angle]);
         }
         let _ = writeln!(out, "                }}\n            }}");
-        let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
         for k in 0..angles.len() {
-            let call = format!("{rt}::trig::pairs_{number}::<{}, LANES, {turns}>", self.head.arithmetic());
-            let _ = writeln!(out, "            let (sines{k}, cosines{k}) = {call}(&angles{k});");
+            let call = self.head.sines_and_cosines(&format!("angles{k}"), turns);
+            let _ = writeln!(out, "            let (sines{k}, cosines{k}) = {call};");
         }
         let _ = writeln!(out, "            for k in 0..{turns} {{");
-        for (output, target) in block.program.outputs.iter().zip(&block.outputs) {
-            let (ProgramResult::Node(id, _), Target::Row(row)) = (output, target) else { continue };
+        for (result, target) in block.program.outputs.iter().zip(&block.outputs) {
+            let (ProgramResult::Node(id, _), Target::Row(row)) = (result, target) else { continue };
             let part = |(k, pair): (usize, &[Option<u32>; 2])| {
                 let name = ["sines", "cosines"].into_iter().zip(pair).find(|(_, node)| **node == Some(*id));
                 name.map(|(name, _)| format!("{name}{k}"))
@@ -185,28 +189,25 @@ impl<'a> RolledWriter<'a> {
         }
         let _ = writeln!(out, "{indent}for l in 0..LANES {{");
         let mut last = None;
-        let mut late = pairs(block);
+        let mut late = pairs(&block.program);
         for (id, op, label) in &block.program.steps {
             let text = match op {
                 Op::Sin(a) | Op::Cos(a) => {
                     // The first of a pair to be met stands for both.
                     let Some(pair) = late.remove(a) else { continue };
-                    let [s, c] = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
-                    let (rt, number) = (&self.head.options.runtime, self.head.options.precision.name());
-                    let arithmetic = self.head.arithmetic();
-                    format!("let ({s}, {c}) = {rt}::trig::pair_{number}::<{arithmetic}>({});", names[a])
+                    let pair = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
+                    self.head.sine_and_cosine(pair, &names[a])
                 }
                 op => format!("let {} = {};", names[id], self.value(block, op, &names)),
             };
             if block.repeat.is_none() && last != Some(*label) && !matches!(op, Op::Input(_)) {
-                let body = label.0.map_or("ground", |i| self.plan.nodes[i].name.as_str());
-                let _ = writeln!(out, "{indent}    // {body}: {}", quantity(label.1).1);
+                let _ = writeln!(out, "{indent}    // {}", heading(self.plan, *label));
                 last = Some(*label);
             }
             let _ = writeln!(out, "{indent}    {text}");
         }
-        for (k, output) in block.program.outputs.iter().enumerate() {
-            let _ = writeln!(out, "{indent}    results[{k}][l] = {};", self.head.value(output, &names));
+        for (k, result) in block.program.outputs.iter().enumerate() {
+            let _ = writeln!(out, "{indent}    results[{k}][l] = {};", self.head.value(result, &names));
         }
         let _ = writeln!(out, "{indent}}}");
         let places = self.head.places();
@@ -226,55 +227,39 @@ impl<'a> RolledWriter<'a> {
         }
     }
 
-    /// Names after body and quantity; in loops, after the place of the link in its turn.
+    /// Names of a block's values; in loops, after the place of the link in its turn.
     fn names(&self, block: &Block) -> BTreeMap<u32, String> {
-        let mut next: BTreeMap<(String, &str), usize> = BTreeMap::new();
-        let mut names = BTreeMap::new();
-        for (id, op, (node, what)) in &block.program.steps {
-            let short = match op {
-                Op::Input(_) => "in",
-                Op::Sin(_) => "sin",
-                Op::Cos(_) => "cos",
-                _ => quantity(*what).0,
-            };
-            let body = match (node, &block.repeat) {
-                (None, _) => "ground".to_string(),
-                (Some(i), None) => identifier(&self.plan.nodes[*i].name),
-                (Some(0), Some(_)) => "inner".to_string(),
-                (Some(_), Some(r)) if self.program.loops[r.run].period == 1 => "link".to_string(),
-                (Some(i), Some(_)) => format!("link{i}"),
-            };
-            let number = next.entry((body.clone(), short)).or_default();
-            names.insert(*id, format!("{body}_{short}{number}"));
-            *number += 1;
-        }
-        names
+        let body = |node: Option<usize>| match (node, &block.repeat) {
+            (None, _) => "ground".to_string(),
+            (Some(i), None) => identifier(&self.plan.nodes[i].name),
+            (Some(0), Some(_)) => "inner".to_string(),
+            (Some(_), Some(r)) if self.program.loops[r.run].period == 1 => "link".to_string(),
+            (Some(i), Some(_)) => format!("link{i}"),
+        };
+        let input = |k: usize| match block.inputs[k] {
+            Place::Given(k) | Place::GivenOfTurn { first: k, .. } => {
+                let (array, k) = locate(self.head.inputs, k);
+                format!("{}_{k}", array.name)
+            }
+            Place::Kept(slot) => format!("kept_{slot}"),
+            Place::Column(column) => format!("table_{column}"),
+            Place::Row(row) => format!("row_{row}"),
+            Place::Carried(k) => format!("carried_{k}"),
+        };
+        Names::default().of(&block.program, body, input)
     }
 
     fn value(&self, block: &Block, op: &Op, names: &BTreeMap<u32, String>) -> String {
         let Op::Input(k) = op else { return self.head.expression(op, names) };
         match block.inputs[*k as usize] {
-            Place::Given(k) => input(&self.program.inputs, k, "", self.lane()),
-            Place::GivenOfTurn { first, stride } => input(&self.program.inputs, first, &of_turn(stride), self.lane()),
+            Place::Given(k) => self.head.input(k, "", self.lane()),
+            Place::GivenOfTurn { first, stride } => self.head.input(first, &of_turn(stride), self.lane()),
             Place::Kept(slot) => format!("kept[{slot}][l]"),
             Place::Column(column) => format!("table[{column}]"),
             Place::Row(row) => format!("row[{row}][l]"),
             Place::Carried(k) => format!("carried{k}[l]"),
         }
     }
-}
-
-/// Angles with the nodes of their sines and cosines.
-fn pairs(block: &Block) -> BTreeMap<u32, [Option<u32>; 2]> {
-    let mut pairs: BTreeMap<u32, [Option<u32>; 2]> = BTreeMap::new();
-    for (id, op, _) in &block.program.steps {
-        match op {
-            Op::Sin(a) => pairs.entry(*a).or_default()[0] = Some(*id),
-            Op::Cos(a) => pairs.entry(*a).or_default()[1] = Some(*id),
-            _ => {}
-        }
-    }
-    pairs
 }
 
 /// What is added to a number at turn 0 to have that of turn `k`.

@@ -4,195 +4,168 @@ use std::fmt::Write as _;
 
 use mbd_runtime::tree::Source;
 
-use super::layout::neutral;
+use super::fields::neutral;
 use crate::model::JointKind;
 use crate::options::Options;
+use crate::output::Output;
 use crate::plan::Plan;
 
-/// `impl System`.
-pub fn system(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let groups: Vec<String> = plan
-        .slots
-        .iter()
-        .filter_map(|s| {
+/// Types of the arguments, and what implementations are written to.
+struct Writer<'a> {
+    out: &'a mut String,
+    options: &'a Options,
+    /// The number.
+    t: &'static str,
+    /// Coordinates.
+    q: String,
+    /// Velocities and momenta.
+    v: String,
+}
+
+/// An item of an implementation.
+fn alias(name: &str, ty: &str) -> String {
+    format!("    type {name} = {ty};\n")
+}
+
+fn method(signature: &str, body: &str) -> String {
+    format!("\n    #[inline]\n    fn {signature} {{\n        {body}\n    }}\n")
+}
+
+impl Writer<'_> {
+    fn implement(&mut self, name: &str, items: &[String]) {
+        let (rt, ty) = (&self.options.runtime, &self.options.type_name);
+        let _ = writeln!(self.out, "\n#[rustfmt::skip]\nimpl {rt}::{name} for {ty} {{\n{}}}", items.concat());
+    }
+}
+
+/// All that the outputs make possible; nothing without the rates.
+pub fn traits(out: &mut String, plan: &Plan, options: &Options) {
+    let t = options.precision.name();
+    let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[{t}; {n}]"));
+    let mut writer = Writer { out, options, t, q, v };
+    let has = |output| options.outputs.contains(&output);
+    let of_constraints =
+        [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
+    if !has(Output::Rates) {
+        return;
+    }
+    writer.system(plan);
+    if has(Output::Momenta) {
+        writer.conjugate();
+    }
+    if has(Output::Energy) {
+        writer.energetic();
+    }
+    if has(Output::Accelerations) {
+        writer.accelerated();
+    }
+    if has(Output::Derivatives) {
+        writer.differentiable(plan.dims.nv);
+    }
+    if of_constraints.into_iter().all(has) {
+        writer.constrained(plan.dims.rows, plan.entry_columns().len());
+    }
+}
+
+impl Writer<'_> {
+    fn system(&mut self, plan: &Plan) {
+        let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
+        let joints = plan.slots.iter().filter_map(|s| {
             let Some(Source::State { q, v }) = s.at else { return None };
-            let kind = match plan.model.joints[s.joint].kind {
+            let group = match plan.model.joints[s.joint].kind {
                 JointKind::Spherical => "SO3",
                 JointKind::Floating => "SE3",
                 JointKind::Planar { .. } => "SE2",
                 _ => return None,
             };
-            Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{kind}, {q}, {v})"))
-        })
-        .collect();
-    let neutral = neutral(plan, false);
-    let groups = groups.join(", ");
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::System for {name} {{
-    type Scalar = {t};
-    type Coordinates = [{t}; {nq}];
-    type Momenta = [{t}; {nv}];
+            Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{group}, {q}, {v})"))
+        });
+        let joints = joints.collect::<Vec<_>>().join(", ");
+        let items = [
+            alias("Scalar", t),
+            alias("Coordinates", q),
+            alias("Momenta", v),
+            method(&format!("neutral(&self) -> {q}"), &neutral(plan, false)),
+            method(&format!("zero_momenta(&self) -> {v}"), &format!("[0.0; {}]", plan.dims.nv)),
+            method(&format!("lie_joints(&self) -> &[{rt}::system::LieJoint]"), &format!("const {{ &[{joints}] }}")),
+            method(
+                &format!("rates_at(&mut self, _t: {t}, q: &{q}, p: &{v}, qd: &mut {q}, pd: &mut {v})"),
+                "Self::rates(self, q, p, qd, pd);",
+            ),
+            method(
+                &format!("coordinate_rates(&self, q: &{q}, v: &{v}, qd: &mut {q})"),
+                "Self::coordinate_rates(self, q, v, qd);",
+            ),
+        ];
+        self.implement("System", &items);
+    }
 
-    fn neutral(&self) -> [{t}; {nq}] {{
-        {neutral}
-    }}
+    fn energetic(&mut self) {
+        let Writer { t, q, v, .. } = &*self;
+        let signature = format!("energies(&mut self, q: &{q}, p: &{v}) -> ({t}, {t})");
+        let body = "let [kinetic, potential] = Self::energy(self, q, p);\n        (kinetic, potential)";
+        let items = [method(&signature, body)];
+        self.implement("Energetic", &items);
+    }
 
-    fn zero_momenta(&self) -> [{t}; {nv}] {{
-        [0.0; {nv}]
-    }}
+    fn conjugate(&mut self) {
+        let Writer { q, v, .. } = &*self;
+        let signature = format!("conjugate_momenta(&mut self, q: &{q}, v: &{v}, p: &mut {v})");
+        let items = [method(&signature, "Self::momenta(self, q, v, p);")];
+        self.implement("Conjugate", &items);
+    }
 
-    #[inline]
-    fn lie_joints(&self) -> &[{rt}::system::LieJoint] {{
-        const {{ &[{groups}] }}
-    }}
+    fn accelerated(&mut self) {
+        let Writer { q, v, .. } = &*self;
+        let signature = format!("generalized_accelerations(&mut self, q: &{q}, v: &{v}, a: &mut {v})");
+        let items = [method(&signature, "Self::accelerations(self, q, v, a);")];
+        self.implement("Accelerated", &items);
+    }
 
-    #[inline]
-    fn rates_at(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
-        Self::rates(self, q, p, qd, pd);
-    }}
+    fn differentiable(&mut self, nv: usize) {
+        let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
+        let square = format!("[{v}; {nv}]");
+        let arguments = format!("_t: {t}, q: &{q}, p: &{v}, v: &mut {v}, pd: &mut {v}, d: {rt}::Blocks<'_, {square}>");
+        let items = [
+            alias("Square", &square),
+            method(&format!("square(&self) -> {square}"), &format!("[[0.0; {nv}]; {nv}]")),
+            method(
+                &format!("rate_derivatives(&mut self, {arguments})"),
+                "Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);",
+            ),
+        ];
+        self.implement("Differentiable", &items);
+    }
 
-    #[inline]
-    fn coordinate_rates(&self, q: &[{t}; {nq}], v: &[{t}; {nv}], qd: &mut [{t}; {nq}]) {{
-        Self::coordinate_rates(self, q, v, qd);
-    }}
-}}
-"
-    );
-}
-
-/// `impl Energetic`.
-pub fn energetic(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Energetic for {name} {{
-    #[inline]
-    fn energies(&mut self, q: &[{t}; {nq}], p: &[{t}; {nv}]) -> ({t}, {t}) {{
-        let [kinetic, potential] = Self::energy(self, q, p);
-        (kinetic, potential)
-    }}
-}}
-"
-    );
-}
-
-/// `impl Conjugate`.
-pub fn conjugate(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Conjugate for {name} {{
-    #[inline]
-    fn conjugate_momenta(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], p: &mut [{t}; {nv}]) {{
-        Self::momenta(self, q, v, p);
-    }}
-}}
-"
-    );
-}
-
-/// `impl Accelerated`.
-pub fn accelerated(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Accelerated for {name} {{
-    #[inline]
-    fn generalized_accelerations(&mut self, q: &[{t}; {nq}], v: &[{t}; {nv}], a: &mut [{t}; {nv}]) {{
-        Self::accelerations(self, q, v, a);
-    }}
-}}
-"
-    );
-}
-
-/// `impl Differentiable`.
-pub fn differentiable(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt, nv) = (options.precision.name(), &options.type_name, &options.runtime, plan.dims.nv);
-    let nq = plan.dims.nq;
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Differentiable for {name} {{
-    type Square = [[{t}; {nv}]; {nv}];
-
-    fn square(&self) -> [[{t}; {nv}]; {nv}] {{
-        [[0.0; {nv}]; {nv}]
-    }}
-
-    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], d: {rt}::Blocks<'_, [[{t}; {nv}]; {nv}]>) {{
-        Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
-    }}
-}}
-"
-    );
-}
-
-/// `impl Constrained`.
-pub fn constrained(out: &mut String, plan: &Plan, options: &Options) {
-    let (t, name, rt) = (options.precision.name(), &options.type_name, &options.runtime);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
-    let (rows, entries) = (plan.dims.rows, plan.entry_columns().len());
-    let _ = write!(
-        out,
-        "
-#[rustfmt::skip]
-impl {rt}::Constrained for {name} {{
-    type Rows = [{t}; {rows}];
-    type Entries = [{t}; {entries}];
-
-    fn zero_rows(&self) -> [{t}; {rows}] {{
-        [0.0; {rows}]
-    }}
-
-    fn zero_entries(&self) -> [{t}; {entries}] {{
-        [0.0; {entries}]
-    }}
-
-    fn rows(&self) -> &[{rt}::system::Row] {{
-        const {{ &Self::CONSTRAINT_ROWS }}
-    }}
-
-    fn entry_columns(&self) -> &[usize] {{
-        const {{ &Self::ENTRY_COLUMNS }}
-    }}
-
-    #[inline]
-    fn constraint_residuals(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], jacobian: &mut [{t}; {entries}]) {{
-        Self::constraint_residuals(self, q, residual, jacobian);
-    }}
-
-    #[inline]
-    fn project_momenta(&mut self, _t: {t}, q: &[{t}; {nq}], p: &mut [{t}; {nv}], v: &mut [{t}; {nv}], sigma: &mut [{t}; {rows}]) {{
-        let augmented = *p;
-        Self::project_momenta(self, q, &augmented, v, p, sigma);
-    }}
-
-    #[inline]
-    fn position_correction(&mut self, q: &[{t}; {nq}], residual: &mut [{t}; {rows}], dq: &mut [{t}; {nv}], pivots: &mut [{t}; {rows}]) {{
-        Self::position_correction(self, q, residual, dq, pivots);
-    }}
-
-    #[inline]
-    fn multipliers(&mut self, _t: {t}, q: &[{t}; {nq}], v: &[{t}; {nv}], lambda: &mut [{t}; {rows}]) {{
-        Self::multipliers(self, q, v, lambda);
-    }}
-}}
-"
-    );
+    fn constrained(&mut self, rows: usize, entries: usize) {
+        let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
+        let [row, entry] = [rows, entries].map(|n| format!("[{t}; {n}]"));
+        let items = [
+            alias("Rows", &row),
+            alias("Entries", &entry),
+            method(&format!("zero_rows(&self) -> {row}"), &format!("[0.0; {rows}]")),
+            method(&format!("zero_entries(&self) -> {entry}"), &format!("[0.0; {entries}]")),
+            method(&format!("rows(&self) -> &[{rt}::system::Row]"), "const { &Self::CONSTRAINT_ROWS }"),
+            method("entry_columns(&self) -> &[usize]", "const { &Self::ENTRY_COLUMNS }"),
+            method(
+                &format!("constraint_residuals(&mut self, q: &{q}, residual: &mut {row}, jacobian: &mut {entry})"),
+                "Self::constraint_residuals(self, q, residual, jacobian);",
+            ),
+            method(
+                &format!("project_momenta(&mut self, _t: {t}, q: &{q}, p: &mut {v}, v: &mut {v}, sigma: &mut {row})"),
+                "let augmented = *p;\n        Self::project_momenta(self, q, &augmented, v, p, sigma);",
+            ),
+            method(
+                &format!(
+                    "position_correction(&mut self, q: &{q}, residual: &mut {row}, dq: &mut {v}, pivots: &mut {row})"
+                ),
+                "Self::position_correction(self, q, residual, dq, pivots);",
+            ),
+            method(
+                &format!("multipliers(&mut self, _t: {t}, q: &{q}, v: &{v}, lambda: &mut {row})"),
+                "Self::multipliers(self, q, v, lambda);",
+            ),
+        ];
+        self.implement("Constrained", &items);
+    }
 }

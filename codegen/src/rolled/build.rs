@@ -11,16 +11,17 @@ use super::partition::{assemble, output, partition, Body, Requests};
 use super::runs::{find, Run};
 use super::stage::{passes, solves, PassState, SweepDirection};
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
-use crate::options::{Options, Output};
+use crate::options::Options;
+use crate::output::{Dim, InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
-use crate::trace::{rewrite, tolerance, SymbolicInputs};
+use crate::trace::{rewrite, sizes, tolerance, SymbolicInputs};
 
 /// Builds the loop form; `None` where no run is long enough.
-pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<RolledProgram> {
+pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<OutputProgram<RolledProgram>> {
     let ways = passes(group, !plan.constraints.is_empty())?;
     let graph = Graph::default();
-    let given = SymbolicInputs::new(&graph, plan, group, options);
+    let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
     let mut tree: Tree<Expr> = plan.tree(&given.params);
     tree.tolerance = Expr::Const(tolerance(options.precision));
     let tree = tree.regrouped();
@@ -40,17 +41,21 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     let graphs: Vec<Graph> = runs.iter().map(|_| Graph::default()).collect();
     let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, &tree, options.efforts));
     let mut links: Vec<Link> = links.collect();
-    let next_input = given.arrays.iter().map(|a| a.len).sum();
+    let next_input = given.arrays.iter().map(InputArray::len).sum();
     let stage = PassState::new(group, &graph, tree, false);
     let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
     for (pass, way) in ways.iter().enumerate() {
         line.pass(pass, *way, &mut links);
     }
     let results = line.stage.finish(&line.given);
-    let own: Vec<Vec<(Expr, Target)>> =
-        links.iter_mut().zip(&starts).map(|(link, start)| results_of_turn(plan, group, link, *start)).collect();
-    let mut build = Build { group, line: &line, graphs: &graphs, links: &links, starts: &starts, own, ways, results };
-    Some(build.program(options))
+    let own: Vec<Vec<(Expr, Target)>> = links
+        .iter_mut()
+        .zip(&starts)
+        .map(|(link, start)| results_of_turn(plan, group, options, link, *start))
+        .collect();
+    let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, ways, results };
+    let program = build.program(options);
+    Some(OutputProgram { spec: group.spec(), inputs: line.given.arrays, program })
 }
 
 /// Whether loops can carry the constraints where they matter: joints to the ground, whose rows are constants of the last body, so
@@ -78,31 +83,32 @@ fn steady(tree: &Tree<Expr>, run: &Run) -> bool {
     })
 }
 
-/// Results of one turn and where they go.
+/// Results of one turn and where they go: entries of the arrays that have one for each coordinate or velocity.
 fn results_of_turn<'g>(
     plan: &Plan,
     group: Output,
+    options: &Options,
     link: &mut Link<'g>,
     start: (usize, usize),
 ) -> Vec<(Expr<'g>, Target)> {
-    let (nq, nv) = link.size;
-    let coordinates = (start.0, nq);
-    let velocities = (start.1, nv);
-    let lists = match group {
-        Output::Rates => vec![coordinates, (plan.dims.nq + start.1, nv)],
-        Output::Energy => Vec::new(),
-        Output::ProjectMomenta => vec![velocities, (plan.dims.nv + start.1, nv)],
-        Output::PositionCorrection => vec![(plan.dims.rows + start.1, nv)],
-        _ => vec![velocities],
-    };
-    let targets = lists
-        .into_iter()
-        .flat_map(|(first, n)| (0..n).map(move |k| Target::ResultOfTurn { first: first + k, stride: n }));
+    let sizes = sizes(plan, options, 0);
+    let mut offset = 0;
+    let mut targets = Vec::new();
+    for array in group.spec().results {
+        let turn = match array.dims {
+            [Dim::Nq] => Some((start.0, link.size.0)),
+            [Dim::Nv] => Some((start.1, link.size.1)),
+            _ => None,
+        };
+        if let Some((first, n)) = turn {
+            targets.extend((0..n).map(|k| Target::ResultOfTurn { first: offset + first + k, stride: n }));
+        }
+        offset += array.len(&sizes);
+    }
     link.finish().into_iter().zip(targets).collect()
 }
 
 struct Build<'b, 'm, 'g> {
-    group: Output,
     line: &'b MainLine<'m, 'b>,
     graphs: &'g [Graph],
     links: &'b [Link<'g>],
@@ -183,13 +189,12 @@ impl<'m> Build<'_, 'm, '_> {
         let mut loops = Vec::new();
         let mut bodies: Vec<BTreeMap<Option<usize>, Body>> = Vec::new();
         for (k, run) in self.line.runs.iter().enumerate() {
-            let inputs = &self.line.given.arrays;
-            let array = |name: &str| inputs.iter().take_while(|a| a.name != name).map(|a| a.len).sum::<usize>();
+            let given = &self.line.given;
             let (q, v) = self.starts[k];
             let wanted = Requests {
                 results: self.own[k].clone(),
                 carried: &live.carried[k],
-                first: [q, inputs[0].len + v, array("a") + v, array("self.tau") + v],
+                first: [q, given.q.len() + v, given.first_of("a") + v, given.first_of("tau") + v],
             };
             let code = partition(&self.graphs[k], &self.links[k], run, &live.links[k], &wanted);
             loops.push(Loop { nodes: run.nodes.clone(), period: run.period, table: code.table, row: code.row });
@@ -216,12 +221,11 @@ impl<'m> Build<'_, 'm, '_> {
                 }
             }
         }
-        let inputs = self.line.given.arrays.clone();
         for block in &mut blocks {
             let program = std::mem::take(&mut block.program);
             block.program = passes::run(program, rewrite(options));
         }
-        RolledProgram { group: self.group, inputs, results: self.results.len(), loops, blocks, kept }
+        RolledProgram { results: self.results.len(), loops, blocks, kept }
     }
 
     /// Live nodes of the main line between loops.
@@ -323,7 +327,7 @@ impl<'m> Build<'_, 'm, '_> {
                 outputs.push((ProgramResult::Node(*id, false), Target::Kept(*slot)));
             }
         }
-        let given = self.line.given.arrays.iter().map(|a| a.len).sum();
+        let given: usize = self.line.given.arrays.iter().map(InputArray::len).sum();
         let place = |id: u32| match self.line.graph.get(id).0 {
             Op::Input(k) if (k as usize) < given => Place::Given(k as usize),
             _ => Place::Kept(slots[&id]),

@@ -1,7 +1,8 @@
 //! What a loop form costs to run, in the terms of [`symbolic::cost`](crate::symbolic::cost()).
 
 use super::{rolled, Block, Place, RolledProgram, Target};
-use crate::options::{Options, Output};
+use crate::options::Options;
+use crate::output::Output;
 use crate::plan::Plan;
 use crate::symbolic::machine::{latency, SINE, WIDTH};
 use crate::symbolic::{Cost, Operand, ProgramResult, BYTES};
@@ -9,7 +10,7 @@ use crate::symbolic::{Cost, Operand, ProgramResult, BYTES};
 /// Cost of a group in loop form; `None` where it has none. Turns follow each other as fast as what they carry allows.
 /// Sines and cosines are left out, as everywhere.
 pub fn cost(plan: &Plan, group: Output, options: &Options) -> Option<Cost> {
-    rolled(plan, group, options).map(|program| of_program(&program))
+    rolled(plan, group, options).map(|rolled| of_program(&rolled.program))
 }
 
 fn of_program(program: &RolledProgram) -> Cost {

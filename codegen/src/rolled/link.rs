@@ -9,7 +9,7 @@ use mbd_runtime::Scalar;
 
 use super::runs::{map_node, Run, Slot};
 use super::stage::{PassState, SweepDirection};
-use crate::options::Output;
+use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
 
@@ -81,7 +81,7 @@ impl<'g> Link<'g> {
             arrays: Vec::new(),
             q: symbols(&LinkInput::Q, nq),
             second: symbols(&LinkInput::Second, nv),
-            third: symbols(&LinkInput::Third, if group == Output::InverseDynamics { nv } else { 0 }),
+            third: symbols(&LinkInput::Third, if group.spec().inputs.len() > 2 { nv } else { 0 }),
             tau: symbols(&LinkInput::Tau, if efforts { nv } else { 0 }),
             // What the dummy is driven by; nothing reads it.
             drive: [vec![zero; 3], vec![zero; 3], vec![zero; 3]],

@@ -16,10 +16,10 @@ mod stage;
 
 use std::collections::BTreeSet;
 
-use crate::options::{Options, Output, RolledCode};
+use crate::options::{Options, RolledCode};
+use crate::output::{Output, OutputProgram};
 use crate::plan::Plan;
 use crate::symbolic::{Counts, Program, ProgramResult};
-use crate::trace::InputArray;
 
 pub use cost::cost;
 pub use runs::{find, Run};
@@ -124,10 +124,6 @@ pub struct Loop {
 /// An output group in loop form.
 #[derive(Clone, Debug)]
 pub struct RolledProgram {
-    /// Which.
-    pub group: Output,
-    /// Input arrays, numbered through.
-    pub inputs: Vec<InputArray>,
     /// Number of results.
     pub results: usize,
     /// Runs.
@@ -186,7 +182,7 @@ impl RolledProgram {
 }
 
 /// The loop form of a group; `None` where there is none, or straight-line code is better.
-pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<RolledProgram> {
+pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<RolledProgram>> {
     let least = match options.plan.rolled {
         RolledCode::Never => return None,
         RolledCode::Auto => LEAST,

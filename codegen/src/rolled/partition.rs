@@ -89,8 +89,9 @@ pub fn assemble(
             fetch(*id, &mut steps);
         }
     }
-    let mut program =
-        Program { steps, outputs: results.iter().map(|(o, _)| *o).collect(), created: BTreeMap::default() };
+    let names = own.iter().filter_map(|&id| graph.name_of(id).map(|name| (id, name))).collect();
+    let outputs = results.iter().map(|(o, _)| *o).collect();
+    let mut program = Program { steps, outputs, names, created: BTreeMap::default() };
     program.turn_negated_differences();
     (program, inputs, results.iter().map(|(_, t)| *t).collect())
 }

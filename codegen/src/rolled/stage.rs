@@ -7,7 +7,7 @@ use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
-use crate::options::Output;
+use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
 

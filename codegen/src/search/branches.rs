@@ -4,7 +4,8 @@
 use super::chain::{Candidate, ChainSearch};
 use super::objective::Objective;
 use super::{cycles, frames, LARGEST};
-use crate::options::{EliminationStrategy, Output, PlanOptions, RolledCode};
+use crate::options::{EliminationStrategy, PlanOptions, RolledCode};
+use crate::output::Output;
 use crate::plan::{parallel_runs, tip_chains, touches_rolled, ChainElimination, Plan};
 
 /// Eliminations of a chain that are tried for the accelerations, beside their neighbours.

@@ -2,7 +2,8 @@
 
 use mbd_runtime::sweep::Quantity;
 
-use crate::options::{Arithmetic, Options, Output};
+use crate::options::{Arithmetic, Options};
+use crate::output::Output;
 use crate::plan::Plan;
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;

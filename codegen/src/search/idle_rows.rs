@@ -5,7 +5,8 @@ use mbd_runtime::sweep::Sweeps;
 use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
 
-use crate::options::{Options, Output};
+use crate::options::Options;
+use crate::output::Output;
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
@@ -16,7 +17,7 @@ pub fn close(plan: &mut Plan) {
         return;
     }
     let graph = Graph::default();
-    let given = SymbolicInputs::new(&graph, plan, Output::PositionCorrection, &Options::default());
+    let given = SymbolicInputs::new(&graph, plan, Output::PositionCorrection.spec(), &Options::default());
     let tree: Tree<Expr> = plan.tree(&given.params);
     let mut w = Workspace::new(&tree);
     let [mut phi, mut pivots] = [plan.dims.rows, plan.dims.rows].map(|n| vec![Expr::Const(0.0); n]);

@@ -2,7 +2,8 @@
 
 use super::evaluation::Evaluation;
 use super::rounding::{ErrorEstimator, LIMIT};
-use crate::options::{EliminationStrategy, Output};
+use crate::options::EliminationStrategy;
+use crate::output::Output;
 use crate::plan::Plan;
 use crate::symbolic::Cost;
 

@@ -2,7 +2,8 @@
 
 use super::evaluation::Evaluation;
 use super::LARGEST;
-use crate::options::{EliminationStrategy, Output, PlanOptions, RolledCode};
+use crate::options::{EliminationStrategy, PlanOptions, RolledCode};
+use crate::output::Output;
 use crate::plan::{is_single_but_for_rows, unbranched_paths, Plan};
 
 /// Chains from this length on are rolled without a search if their straight-line code is long: then it is far slower.

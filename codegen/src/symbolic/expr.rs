@@ -86,10 +86,35 @@ impl Op {
 /// Where a node came from: tree node (`None`: ground) and quantity.
 pub type Label = (Option<usize>, Quantity);
 
+/// What a value is called: an entry of something of a body that has a letter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Name {
+    /// Tree node (`None`: ground).
+    pub node: Option<usize>,
+    /// Whether the value is the negative of what is named.
+    pub minus: bool,
+    /// The letter, in ASCII.
+    pub letter: &'static str,
+    /// Which entry.
+    pub entry: Entry,
+}
+
+/// An entry of a vector or matrix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Entry {
+    /// By the names of axes; empty for something of one entry.
+    Axes(&'static str),
+    /// By its number.
+    Number(usize),
+    /// By row and column.
+    Pair(usize, usize),
+}
+
 #[derive(Debug, Default)]
 struct Inner {
     ops: Vec<Op>,
     labels: Vec<Label>,
+    names: Vec<Option<Name>>,
     // Looked up, never iterated: order is that of `ops`.
     memo: HashMap<Op, u32>,
 }
@@ -110,6 +135,12 @@ impl Default for Graph {
 impl Trace for Graph {
     fn at(&self, node: Option<usize>, what: Quantity) {
         self.label.set((node, what));
+    }
+
+    fn name<S: Scalar>(&self, value: S, letter: &'static str, entry: &'static str) {
+        if let Some((id, minus)) = value.node() {
+            self.set_name(id, Name { node: self.label.get().0, minus, letter, entry: Entry::Axes(entry) });
+        }
     }
 }
 
@@ -133,6 +164,16 @@ impl Graph {
     pub fn get(&self, id: u32) -> (Op, Label) {
         let inner = self.inner.borrow();
         (inner.ops[id as usize], inner.labels[id as usize])
+    }
+
+    /// Names a node; its first name stays.
+    pub fn set_name(&self, id: u32, name: Name) {
+        self.inner.borrow_mut().names[id as usize].get_or_insert(name);
+    }
+
+    /// Name of a node.
+    pub fn name_of(&self, id: u32) -> Option<Name> {
+        self.inner.borrow().names[id as usize]
     }
 
     /// An operand of this graph as an expression.
@@ -161,6 +202,7 @@ impl Graph {
         if id == next {
             inner.ops.push(op);
             inner.labels.push(self.label.get());
+            inner.names.push(None);
         }
         Expr::Node { graph: self, id, neg }
     }
@@ -302,6 +344,13 @@ impl Scalar for Expr<'_> {
         let (s, neg) = self.unary(|x| trig(x).0, Op::Sin);
         let (c, _) = self.unary(|x| trig(x).1, Op::Cos);
         (if neg { -s } else { s }, c)
+    }
+
+    fn node(self) -> Option<(u32, bool)> {
+        match self {
+            Expr::Const(_) => None,
+            Expr::Node { id, neg, .. } => Some((id, neg)),
+        }
     }
 
     fn sqrt(self) -> Self {

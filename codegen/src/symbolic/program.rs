@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mbd_runtime::sweep::Quantity;
 
-use super::{Expr, Graph, Label, Op, Operand};
+use super::{Expr, Graph, Label, Name, Op, Operand};
 
 /// A signed result: a constant or a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +70,8 @@ pub struct Program {
     pub steps: Vec<(u32, Op, Label)>,
     /// Results, in the order they were asked for.
     pub outputs: Vec<ProgramResult>,
+    /// Names of nodes, in the order of their ids.
+    pub names: Vec<(u32, Name)>,
     /// Operations the sweeps made, live or not, inputs left out.
     pub created: BTreeMap<Quantity, usize>,
 }
@@ -100,13 +102,15 @@ impl Program {
             let (op, label) = graph.get(id);
             (id, op, label)
         });
+        let names = (0..live.len() as u32).filter(|&id| live[id as usize]);
+        let names = names.filter_map(|id| graph.name_of(id).map(|name| (id, name))).collect();
         let mut created = BTreeMap::new();
         for (op, (_, what)) in (0..live.len() as u32).map(|id| graph.get(id)) {
             if !matches!(op, Op::Input(_)) {
                 *created.entry(what).or_default() += 1;
             }
         }
-        let mut program = Program { steps: steps.collect(), outputs, created };
+        let mut program = Program { steps: steps.collect(), outputs, names, created };
         program.turn_negated_differences();
         program
     }
@@ -114,6 +118,11 @@ impl Program {
     /// One more than the largest node id.
     pub fn width(&self) -> usize {
         self.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
+    }
+
+    /// Name of a node.
+    pub fn name(&self, id: u32) -> Option<Name> {
+        self.names.binary_search_by_key(&id, |(id, _)| *id).ok().map(|k| self.names[k].1)
     }
 
     /// Operations that are executed.
@@ -159,6 +168,9 @@ impl Program {
             } else {
                 signs.remove(id);
             }
+        }
+        for (_, name) in self.names.iter_mut().filter(|(id, _)| signs.get(id) == Some(&true)) {
+            name.minus = !name.minus;
         }
         for output in &mut self.outputs {
             if let ProgramResult::Node(id, neg) = output {

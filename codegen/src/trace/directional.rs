@@ -5,9 +5,7 @@ use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use super::SymbolicInputs;
-use crate::model::{Gravity, Value};
-use crate::options::Output;
+use super::{gravity_of, SymbolicInputs};
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
 
@@ -26,27 +24,37 @@ fn unit<'g>(n: usize, k: usize) -> Vec<Expr<'g>> {
     (0..n).map(|j| if j == k { Expr::one() } else { Expr::zero() }).collect()
 }
 
+/// Velocities and momentum rates.
+type Rates<S> = [Vec<S>; 2];
+
 /// The rates along directions.
-struct Rates<'a, 'g> {
-    graph: &'g Graph,
-    plan: &'a Plan,
-    given: &'a SymbolicInputs<'g>,
-    tolerance: Expr<'g>,
+pub(super) struct Directional<'a, 'g> {
+    pub graph: &'g Graph,
+    pub plan: &'a Plan,
+    pub given: &'a SymbolicInputs<'g>,
+    pub tolerance: Expr<'g>,
 }
 
-impl<'g> Rates<'_, 'g> {
+/// Derivatives along a direction.
+fn slopes(rates: Rates<Dual<Expr<'_>>>) -> Rates<Expr<'_>> {
+    rates.map(|x| x.into_iter().map(|x| x.du).collect())
+}
+
+/// Derivatives of velocities and of momentum rates, row by row, from those along all directions.
+fn rows<'g>(columns: &[Rates<Expr<'g>>]) -> [Vec<Expr<'g>>; 2] {
+    [0, 1].map(|half| {
+        let n = columns.first().map_or(0, |column| column[half].len());
+        (0..n).flat_map(|a| columns.iter().map(move |column| column[half][a])).collect()
+    })
+}
+
+impl<'g> Directional<'_, 'g> {
     /// Velocities and momentum rates where coordinates, momenta and parameters change.
-    fn along(&self, q: &[Dual<Expr<'g>>], p: &[Dual<Expr<'g>>], params: &[Dual<Expr<'g>>]) -> [Vec<Dual<Expr<'g>>>; 2] {
+    fn along(&self, q: &[Dual<Expr<'g>>], p: &[Dual<Expr<'g>>], params: &[Dual<Expr<'g>>]) -> Rates<Dual<Expr<'g>>> {
         let (given, zero) = (self.given, Dual::zero());
         let mut tree = self.plan.tree(params).regrouped();
         tree.tolerance = Dual::new(self.tolerance, Expr::zero());
-        let gravity = match self.plan.model.gravity {
-            Gravity::Constant(g) => g.map(|v| match v {
-                Value::Const(x) => Dual::constant(x),
-                Value::Param(k) => params[k],
-            }),
-            Gravity::Input => given.gravity.map(|x| Dual::new(x, Expr::zero())),
-        };
+        let gravity = gravity_of(self.plan, params, || given.gravity.map(|x| Dual::new(x, Expr::zero())));
         let [drive_q, drive_v, drive_a] = given.drive.each_ref().map(|x| fixed(x));
         let wrenches: Vec<[Dual<Expr>; 6]> =
             given.wrenches.iter().map(|w| w.map(|x| Dual::new(x, Expr::zero()))).collect();
@@ -59,39 +67,30 @@ impl<'g> Rates<'_, 'g> {
         sweeps.rates(q, p, &inputs, &mut Workspace::new(&tree), &mut v, &mut qd, &mut pd);
         [v, pd]
     }
-}
-
-/// Results of [`Output::Derivatives`] or [`Output::ParameterDerivatives`].
-pub(super) fn derivatives<'g>(
-    graph: &'g Graph,
-    plan: &Plan,
-    group: Output,
-    given: &SymbolicInputs<'g>,
-    tolerance: Expr<'g>,
-) -> Vec<Expr<'g>> {
-    let (nv, np) = (plan.dims.nv, given.params.len());
-    let rates = Rates { graph, plan, given, tolerance };
-    let (q, p, params) = (fixed(&given.q), fixed(&given.second), fixed(&given.params));
-    let du = |pair: [Vec<Dual<Expr<'g>>>; 2]| pair.map(|x| x.into_iter().map(|x| x.du).collect::<Vec<Expr>>());
-    // Row by row, of a block whose columns are given.
-    let block = |columns: &[[Vec<Expr<'g>>; 2]], half: usize| {
-        (0..nv).flat_map(|a| columns.iter().map(move |c| c[half][a])).collect::<Vec<Expr>>()
-    };
-    if group == Output::ParameterDerivatives {
-        let column = |k| du(rates.along(&q, &p, &moving(&given.params, &unit(np, k))));
-        let columns: Vec<_> = (0..np).map(column).collect();
-        return [block(&columns, 0), block(&columns, 1)].concat();
+    /// Results of [`Output::Derivatives`](crate::output::Output).
+    pub fn derivatives(&self) -> [Vec<Expr<'g>>; 6] {
+        let (plan, given, nv) = (self.plan, self.given, self.plan.dims.nv);
+        let (q, p, params) = (fixed(&given.q), fixed(&given.second), fixed(&given.params));
+        let tree = plan.tree(&given.params);
+        let sweeps = Sweeps { tree: &tree, trace: self.graph };
+        let by_q = |k: usize| {
+            let mut direction = vec![Expr::zero(); plan.dims.nq];
+            sweeps.coordinate_rates(&given.q, &unit(nv, k), &mut direction);
+            slopes(self.along(&moving(&given.q, &direction), &p, &params))
+        };
+        let by_q: Vec<_> = (0..nv).map(by_q).collect();
+        let by_p = |k: usize| slopes(self.along(&q, &moving(&given.second, &unit(nv, k)), &params));
+        let by_p: Vec<_> = (0..nv).map(by_p).collect();
+        let [v, pd] = self.along(&q, &p, &params).map(|x| x.into_iter().map(|x| x.re).collect());
+        let ([dv_dq, dpd_dq], [dv_dp, dpd_dp]) = (rows(&by_q), rows(&by_p));
+        [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]
     }
-    let tree = plan.tree(&given.params);
-    let sweeps = Sweeps { tree: &tree, trace: graph };
-    let by_q = |k: usize| {
-        let mut way = vec![Expr::zero(); plan.dims.nq];
-        sweeps.coordinate_rates(&given.q, &unit(nv, k), &mut way);
-        du(rates.along(&moving(&given.q, &way), &p, &params))
-    };
-    let by_q: Vec<_> = (0..nv).map(by_q).collect();
-    let by_p: Vec<_> = (0..nv).map(|k| du(rates.along(&q, &moving(&given.second, &unit(nv, k)), &params))).collect();
-    let value = |pair: [Vec<Dual<Expr<'g>>>; 2]| pair.map(|x| x.into_iter().map(|x| x.re).collect::<Vec<Expr>>());
-    let [v, pd] = value(rates.along(&q, &p, &params));
-    [v, pd, block(&by_q, 0), block(&by_p, 0), block(&by_q, 1), block(&by_p, 1)].concat()
+
+    /// Results of [`Output::ParameterDerivatives`](crate::output::Output).
+    pub fn parameter_derivatives(&self) -> [Vec<Expr<'g>>; 2] {
+        let (given, n) = (self.given, self.given.params.len());
+        let (q, p) = (fixed(&given.q), fixed(&given.second));
+        let column = |k| slopes(self.along(&q, &p, &moving(&given.params, &unit(n, k))));
+        rows(&(0..n).map(column).collect::<Vec<_>>())
+    }
 }

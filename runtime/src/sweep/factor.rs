@@ -1,7 +1,7 @@
 //! Articulated inertia, leaves to base: every freedom is eliminated by itself, a multi-freedom joint one column after
 //! the other, which is the `LDLᵀ` of its `Mj`.
 
-use super::{Quantity, Sweeps, Trace};
+use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
 use crate::tree::{Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses, RowState};
@@ -74,8 +74,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
         let mut m = f.m[i]; // M*_i (4.48)
+        self.trace.at(Some(i), Quantity::Inertia);
+        name::inertia(self.trace, "m", &m);
         if node.elimination.before_joint {
-            self.trace.at(Some(i), Quantity::Inertia);
             m = self.leaving(poses, i).rev().fold(m, |m, step| step.inertia(&m));
             for g in node.elimination.open_before(0) {
                 let column = f.columns[g * n + i];
@@ -93,6 +94,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.solve_unknown(g, Some(i), node.elimination.open_after(k + 1), &mut m, f);
         }
         f.m[i] = m; // M'_i (4.44)
+        name::inertia(self.trace, "mp", &m);
         let ng = self.tree.unknowns.len();
         for (&h, &g) in node.elimination.ends.iter().flat_map(|h| node.elimination.screws.iter().map(move |g| (h, g))) {
             let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
@@ -126,6 +128,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let e = node.kind.axis(k);
         let armature = node.passive[k].armature;
         let u = column(&e, m); // U = M* E
+        name::force(self.trace, "u", &u);
         for h in node.elimination.open_after(0) {
             f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
         }
@@ -148,6 +151,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             return;
         }
         let pivot = reduce(&e, u, armature, m);
+        name::force(self.trace, "k", &pivot.k);
+        self.trace.name(pivot.rho, "rho", "");
         for h in node.elimination.open_after(0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));

@@ -1,6 +1,6 @@
 //! Motions from velocities, and placements.
 
-use super::{Quantity, Sweeps, Trace};
+use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Mat3, Motion, Vec3};
 use crate::tree::{Source, TreeFrame};
 use crate::workspace::Workspace;
@@ -42,6 +42,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         w.velocity.hat[i] = hat;
         w.velocity.omega[i] = omega;
+        name::motion(self.trace, "hat", &hat);
+        name::motion(self.trace, "omega", &omega);
     }
 
     /// Poses of all nodes in the ground.

@@ -1,6 +1,6 @@
 //! Gravity by first moments, external wrenches, springs.
 
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::{name, Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, dot3, Force};
 use crate::tree::{TreeWrench, WrenchAxes};
 use crate::workspace::Workspace;
@@ -32,6 +32,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Load);
         let g = self.tree.nodes[i].parent.map_or(u.gravity, |p| w.loads.gravity[p]);
         w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
+        name::vector(self.trace, "g", &w.loads.gravity[i]);
     }
 
     /// First moment and mass of every subtree: `s_i = m c + Σ (R s_c + m_c r)`.
@@ -54,6 +55,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub fn moment_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let mass = w.loads.mass[i];
+        name::vector(self.trace, "s", &w.loads.moment[i]);
         let out = self.steps(&w.poses, i).rev().fold(w.loads.moment[i], |s, step| step.moment(mass, s));
         match self.tree.nodes[i].parent {
             Some(p) => {

@@ -22,6 +22,7 @@ mod kinematics;
 mod loads;
 mod matrix;
 mod momentum;
+mod name;
 mod newton;
 mod rates;
 mod solve;
@@ -81,6 +82,10 @@ pub enum Quantity {
 pub trait Trace {
     /// The next operations belong to this node (`None`: the ground) and quantity.
     fn at(&self, _node: Option<usize>, _what: Quantity) {}
+    /// A value of the node where the sweep stands is an entry of something that has a letter: `m` and `xx`; the entry may be
+    /// empty.
+    #[inline]
+    fn name<S: Scalar>(&self, _value: S, _letter: &'static str, _entry: &'static str) {}
 }
 
 impl Trace for () {}

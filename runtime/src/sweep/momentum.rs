@@ -1,6 +1,6 @@
 //! Momenta from velocities, and kinetic energy.
 
-use super::{Quantity, Sweeps, Trace};
+use super::{name, Quantity, Sweeps, Trace};
 use crate::tree::{Source, Unknown};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -28,6 +28,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Momentum);
         let total = w.force[i];
+        name::force(self.trace, "p", &total);
         if let Source::State { v, .. } = node.source {
             for (k, passive) in node.passive.iter().enumerate() {
                 let along = node.kind.axis(k).dot(&total) + passive.armature * w.velocity.rate[w.first[i] + k];

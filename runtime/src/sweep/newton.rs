@@ -4,7 +4,7 @@
 //! No linear velocity is formed: an origin `r` away accelerates by `B r` more, `B = α× + ω×ω×`, and the entries of `B` are
 //! what the bodies' own wrenches are made of.
 
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::{name, Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, Axis, ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
@@ -67,6 +67,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         late.into_iter().for_each(|k| m.carry(&steps[k]));
         (w.newton.spin[i], w.newton.alpha[i], w.newton.accel[i]) = (m.spin, m.alpha, m.accel);
+        name::vector(self.trace, "spin", &m.spin);
+        name::vector(self.trace, "alpha", &m.alpha);
+        name::vector(self.trace, "accel", &m.accel);
     }
 
     /// Motion of a node after [`Sweeps::newton_node`], or of the ground.
@@ -82,6 +85,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Load);
         let motion = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
         let needed = motion.wrench(self.inertia(&w.poses, i));
+        name::force(self.trace, "f", &needed);
         w.force[i] = match self.tree.wrenches.is_empty() {
             true => needed,
             false => needed.minus(&w.loads.own[i]),

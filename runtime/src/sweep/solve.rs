@@ -4,7 +4,7 @@
 //! level the right-hand side is `p` and nothing else; on the acceleration level it is the joint force, and every body
 //! starts with the wrench it needs for a reference motion (`acceleration.rs`).
 
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::{name, Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
 use crate::tree::{Freedom, Source, Unknown};
 use crate::workspace::{Factor, Poses, Solution, Workspace};
@@ -34,6 +34,17 @@ impl<'a, S: Scalar> Load<'a, S> {
     /// Acceleration level: joint forces `p`, prescribed accelerations, `D` of every body, and what the constraints lack.
     pub fn accelerations(p: &'a [S], drive: &'a [S], seeds: &'a [Force<S>], rows: &'a [S]) -> Self {
         Load { p, drive, seeds: Some(seeds), rows, what: Quantity::Acceleration }
+    }
+}
+
+impl<S> Load<'_, S> {
+    /// Letters of `Ω̂`, `Ω` and the rates, or of what takes their place.
+    fn letters(&self) -> [&'static str; 3] {
+        match self.what {
+            Quantity::Velocity => ["hat", "omega", "v"],
+            Quantity::Acceleration => ["hatd", "omegad", "a"],
+            _ => ["hatx", "omegax", "dq"],
+        }
     }
 }
 
@@ -80,6 +91,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::BiasMomentum);
+        name::force(self.trace, "d", &sol.d[i]);
         let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
         for (k, &g) in node.elimination.solve_before.iter().enumerate() {
             let e = self.shared_remainder(g, f, load, sol, node.elimination.open_before(k + 1));
@@ -93,6 +105,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
+        name::force(self.trace, "dp", &d);
         if let Some(parent) = node.parent {
             let carried = self.entering(poses, i).rev().fold(d, |d, step| step.force(&d));
             sol.d[parent] = sol.d[parent].plus(&carried);
@@ -130,6 +143,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Source::State { v, .. } => {
                 let p = load.p[v + k];
                 let e = (p - axis.dot(d)) * pivot.rho;
+                self.trace.name(e, "e", "");
                 reduce(&axis, d, &pivot.u, e, p - pivot.armature * e);
                 e
             }
@@ -194,6 +208,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let outer = node.parent.map_or(Motion::zero(), |p| sol.omega[p]);
         let hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
         sol.hat[i] = hat; // Ω̂_i
+        let [hat_letter, letter, rate_letter] = load.letters();
+        name::motion(self.trace, hat_letter, &hat);
         for (k, &g) in node.elimination.solve_after.iter().enumerate().rev() {
             self.shared_motion(g, f, &hat, node.elimination.open_after(k + 1), sol);
         }
@@ -214,6 +230,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                         let total = sol.e[freedom] - row.dot(&omega);
                         let total = node.elimination.open_after(0).fold(total, open);
                         sol.rate[freedom] = total - omega.get(z); // (4.40)
+                        self.trace.name(sol.rate[freedom], rate_letter, "");
                         *omega.get_mut(z) = total;
                         continue;
                     }
@@ -222,13 +239,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
             };
             sol.rate[freedom] = rate;
+            self.trace.name(rate, rate_letter, "");
             axis.add_to(&mut omega, rate);
         }
         for (k, &g) in node.elimination.solve_before.iter().enumerate().rev() {
             self.shared_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
         }
-        sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m));
-        // Ω_i
+        sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m)); // Ω_i
+        name::motion(self.trace, letter, &sol.omega[i]);
     }
 
     fn shared_motion(

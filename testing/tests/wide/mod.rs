@@ -7,27 +7,28 @@ use mbd_codegen::generate::OutputProgram;
 use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
 pub use mbd_codegen::search::Wide;
+use mbd_codegen::symbolic::Program;
 use mbd_runtime::Scalar;
 use mbd_testing::state::State;
 
 /// Inputs of a program in their order.
-pub fn inputs(group: &OutputProgram, s: &State, p: &[f64]) -> Vec<f64> {
+pub fn inputs(group: &OutputProgram<Program>, s: &State, p: &[f64]) -> Vec<f64> {
     let array = |name: &str| -> Vec<f64> {
         match name {
             "q" => s.q.clone(),
             "p" => p.to_vec(),
             "v" | "a" => s.v.clone(),
-            "self.tau" => s.tau.clone(),
-            "self.drive_q" => s.drive[0].clone(),
-            "self.drive_v" => s.drive[1].clone(),
-            "self.drive_a" => s.drive[2].clone(),
-            "self.wrenches" => s.wrenches.concat(),
-            "self.params" => s.params.clone(),
-            "self.gravity" => s.gravity.to_vec(),
+            "tau" => s.tau.clone(),
+            "drive_q" => s.drive[0].clone(),
+            "drive_v" => s.drive[1].clone(),
+            "drive_a" => s.drive[2].clone(),
+            "wrenches" => s.wrenches.concat(),
+            "params" => s.params.clone(),
+            "gravity" => s.gravity.to_vec(),
             other => panic!("unknown input {other}"),
         }
     };
-    group.inputs.iter().flat_map(|a| array(&a.name)).collect()
+    group.inputs.iter().flat_map(|a| array(a.name)).collect()
 }
 
 /// The models of the project and how they hang on the ground.

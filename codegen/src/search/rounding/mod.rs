@@ -18,10 +18,10 @@ use self::lanes::{run, LANES};
 use self::state::State;
 use super::evaluation::options;
 use super::wide::Wide;
-use crate::options::Output;
+use crate::output::{InputArray, Output};
 use crate::plan::Plan;
 use crate::symbolic::Program;
-use crate::trace::{trace, InputArray};
+use crate::trace::trace;
 
 /// States that errors are measured on: few for large trees, in which roundings average out.
 const STATES: RangeInclusive<usize> = 64..=256;
@@ -149,6 +149,6 @@ fn error(results: &[[f64; LANES]], lane: usize, exact: &[Wide]) -> Option<f64> {
 /// Inputs of a program in their order, in some states.
 fn inputs(states: &[State; LANES], arrays: &[InputArray]) -> Vec<[f64; LANES]> {
     let lanes =
-        states.each_ref().map(|state| arrays.iter().flat_map(|a| state.input(&a.name, a.len)).collect::<Vec<f64>>());
+        states.each_ref().map(|state| arrays.iter().flat_map(|a| state.input(a.name, a.len())).collect::<Vec<f64>>());
     (0..lanes[0].len()).map(|k| std::array::from_fn(|lane| lanes[lane][k])).collect()
 }

@@ -6,7 +6,7 @@ use mbd_runtime::{Interpreter, Scalar};
 use super::super::evaluation::options;
 use super::super::wide::Wide;
 use crate::model::{Gravity, JointKind};
-use crate::options::Output;
+use crate::output::Output;
 use crate::plan::Plan;
 
 /// A random state. Momenta belong to the velocities once they are set.
@@ -52,10 +52,10 @@ impl State {
             "q" => self.q.clone(),
             "v" => self.v.clone(),
             "p" => self.p.clone(),
-            "self.drive_q" => self.drive_q.clone(),
-            "self.params" => self.params.clone(),
-            "self.drive_v" => random(self.seed, 3, len, 1.5),
-            "self.gravity" => random(self.seed, 4, len, 9.0),
+            "drive_q" => self.drive_q.clone(),
+            "params" => self.params.clone(),
+            "drive_v" => random(self.seed, 3, len, 1.5),
+            "gravity" => random(self.seed, 4, len, 9.0),
             _ => random(self.seed, 5, len, 3.0),
         }
     }
@@ -67,15 +67,15 @@ impl State {
         let input = |name: &str, len: usize| wide(self.input(name, len));
         let inputs = &mut interpreter.inputs;
         if options(output).efforts {
-            inputs.tau = input("self.tau", d.nv);
+            inputs.tau = input("tau", d.nv);
         }
-        inputs.drive_q = input("self.drive_q", d.drive_q);
-        inputs.drive_v = input("self.drive_v", d.drive_v);
-        inputs.drive_a = input("self.drive_a", d.drive_v);
-        let wrenches = input("self.wrenches", 6 * d.wrenches);
+        inputs.drive_q = input("drive_q", d.drive_q);
+        inputs.drive_v = input("drive_v", d.drive_v);
+        inputs.drive_a = input("drive_a", d.drive_v);
+        let wrenches = input("wrenches", 6 * d.wrenches);
         inputs.wrenches = wrenches.chunks_exact(6).map(|w| std::array::from_fn(|k| w[k])).collect();
         let gravity = match plan.model.gravity {
-            Gravity::Input => self.input("self.gravity", 3),
+            Gravity::Input => self.input("gravity", 3),
             Gravity::Constant(_) => plan.gravity(&self.params).to_vec(),
         };
         inputs.gravity = std::array::from_fn(|k| Wide::constant(gravity[k]));

@@ -3,18 +3,22 @@
 use mbd_runtime::sweep::Trace;
 use mbd_runtime::Scalar;
 
-use crate::symbolic::{Expr, Graph, Label, Op, Operand, Program, ProgramResult};
+use crate::symbolic::{Expr, Graph, Label, Name, Op, Operand, Program, ProgramResult};
 
 /// A program that is being rebuilt in a new graph: the new expression of every node so far.
 pub struct Rebuilt<'g> {
     /// The new graph.
     pub graph: &'g Graph,
     values: Vec<Option<Expr<'g>>>,
+    /// Names of the old program's nodes.
+    names: Vec<Option<Name>>,
 }
 
 impl<'g> Rebuilt<'g> {
     pub fn new(graph: &'g Graph, program: &Program) -> Self {
-        Rebuilt { graph, values: vec![None; program.width()] }
+        let mut names = vec![None; program.width()];
+        program.names.iter().for_each(|(id, name)| names[*id as usize] = Some(*name));
+        Rebuilt { graph, values: vec![None; names.len()], names }
     }
 
     /// The new expression of an operand.
@@ -25,8 +29,12 @@ impl<'g> Rebuilt<'g> {
         }
     }
 
-    /// Sets the new expression of a node.
+    /// Says what has become of a node, which hands on its name.
     pub fn set(&mut self, id: u32, value: Expr<'g>) {
+        // Nodes that a pass adds have no names.
+        if let (Some(Some(name)), Expr::Node { id, neg, .. }) = (self.names.get(id as usize), value) {
+            self.graph.set_name(id, Name { minus: name.minus != neg, ..*name });
+        }
         self.values[id as usize] = Some(value);
     }
 

@@ -59,7 +59,10 @@ fn renumber(program: &Program, order: &[u32]) -> Program {
         ProgramResult::Node(k, neg) => ProgramResult::Node(id(k), neg),
         constant => constant,
     };
+    let mut names: Vec<_> = program.names.iter().map(|(k, name)| (id(*k), *name)).collect();
+    names.sort_unstable_by_key(|(id, _)| *id);
     Program {
+        names,
         steps: order.iter().enumerate().map(step).collect(),
         outputs: program.outputs.iter().map(output).collect(),
         created: program.created.clone(),

@@ -1,0 +1,77 @@
+//! The program of an output, rolled where that is better.
+
+use std::collections::BTreeSet;
+
+use crate::error::GenerateError;
+use crate::options::{Options, Precision};
+use crate::output::{Output, OutputProgram};
+use crate::plan::Plan;
+use crate::rolled::{rolled, RolledProgram};
+use crate::symbolic::{Counts, Op, Operand, Program, ProgramResult};
+use crate::trace::trace;
+
+/// What computes an output.
+#[derive(Clone, Debug)]
+pub enum Code {
+    /// One operation after the other.
+    Straight(Program),
+    /// Loops over like links.
+    Rolled(RolledProgram),
+}
+
+impl Code {
+    /// Operations that are executed.
+    pub fn counts(&self) -> Counts {
+        match self {
+            Code::Straight(program) => program.counts(),
+            Code::Rolled(program) => program.counts(),
+        }
+    }
+
+    /// Numbers of the inputs that are read.
+    pub fn used_inputs(&self) -> BTreeSet<usize> {
+        match self {
+            Code::Straight(program) => {
+                let input = |op: &Op| if let Op::Input(k) = op { Some(*k as usize) } else { None };
+                program.steps.iter().filter_map(|(_, op, _)| input(op)).collect()
+            }
+            Code::Rolled(program) => program.used_inputs(),
+        }
+    }
+}
+
+/// The program of an output.
+///
+/// # Errors
+/// See [`GenerateError`].
+pub fn compile(plan: &Plan, output: Output, options: &Options) -> Result<OutputProgram<Code>, GenerateError> {
+    let program = match rolled(plan, output, options) {
+        Some(program) => program.map(Code::Rolled),
+        None => trace(plan, output, options)?.map(Code::Straight),
+    };
+    finite(plan, output, &program.program, options.precision)?;
+    Ok(program)
+}
+
+/// Refuses infinities, which no literal can state, and with them models that divide by zero whatever the state is.
+fn finite(plan: &Plan, output: Output, code: &Code, precision: Precision) -> Result<(), GenerateError> {
+    let fits = |x: f64| match precision {
+        Precision::F64 => x.is_finite(),
+        Precision::F32 => (x as f32).is_finite(),
+    };
+    let program = match code {
+        Code::Rolled(program) if program.all_constants(fits) => return Ok(()),
+        Code::Rolled(_) => return Err(GenerateError::InfiniteNumber { output, body: None }),
+        Code::Straight(program) => program,
+    };
+    for (_, op, (node, _)) in &program.steps {
+        if op.operands().any(|o| matches!(o, Operand::Const(bits) if !fits(f64::from_bits(bits)))) {
+            let body = node.map_or("ground", |i| plan.nodes[i].name.as_str());
+            return Err(GenerateError::InfiniteNumber { output, body: Some(body.to_string()) });
+        }
+    }
+    match program.outputs.iter().any(|r| matches!(r, ProgramResult::Const(x) if !fits(*x))) {
+        true => Err(GenerateError::InfiniteResult { output }),
+        false => Ok(()),
+    }
+}

@@ -1,0 +1,71 @@
+//! Sines and cosines of a straight-line body.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use crate::symbolic::{Op, Operand, Program, ProgramResult};
+
+/// Angles with the nodes of their sines and cosines.
+pub type Pairs = BTreeMap<u32, [Option<u32>; 2]>;
+
+/// Angles of a program with the nodes of their sines and cosines.
+pub fn pairs(program: &Program) -> Pairs {
+    let mut pairs = Pairs::new();
+    for (id, op, _) in &program.steps {
+        match op {
+            Op::Sin(a) => pairs.entry(*a).or_default()[0] = Some(*id),
+            Op::Cos(a) => pairs.entry(*a).or_default()[1] = Some(*id),
+            _ => {}
+        }
+    }
+    pairs
+}
+
+/// Nodes among the operands.
+pub fn nodes(op: &Op) -> impl Iterator<Item = u32> {
+    op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None })
+}
+
+/// What is computed before the sines and cosines, and what after them.
+#[derive(Default)]
+pub struct Angles {
+    /// Angles that follow from inputs by sums and products.
+    pub early: Pairs,
+    /// The others.
+    pub late: Pairs,
+    /// Nodes that early angles need.
+    pub before: BTreeSet<u32>,
+    /// Nodes that the rest needs.
+    pub after: BTreeSet<u32>,
+}
+
+impl Angles {
+    /// Of a program.
+    pub fn new(program: &Program) -> Angles {
+        // Nodes that do not follow from inputs by sums and products.
+        let mut involved = BTreeSet::new();
+        for (id, op, _) in &program.steps {
+            let functions = matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_));
+            if functions || nodes(op).any(|k| involved.contains(&k)) {
+                involved.insert(*id);
+            }
+        }
+        let mut angles = Angles::default();
+        (angles.late, angles.early) = pairs(program).into_iter().partition(|(a, _)| involved.contains(a));
+        angles.before.extend(angles.early.keys());
+        for result in &program.outputs {
+            if let ProgramResult::Node(id, _) = result {
+                angles.after.insert(*id);
+            }
+        }
+        for (id, op, _) in program.steps.iter().rev() {
+            if angles.before.contains(id) {
+                angles.before.extend(nodes(op));
+            }
+            let early = matches!(op, Op::Sin(a) | Op::Cos(a) if angles.early.contains_key(a));
+            if angles.after.contains(id) && !early {
+                angles.after.extend(nodes(op));
+            }
+        }
+        angles
+    }
+}

@@ -1,0 +1,108 @@
+//! The generated type: its fields, its constructor, the same with lanes.
+
+use std::fmt::Write;
+
+use mbd_runtime::tree::Source;
+
+use super::signature::nested;
+use crate::model::JointKind;
+use crate::options::Options;
+use crate::output::{Sizes, FIELDS};
+use crate::plan::Plan;
+
+/// One field of the type.
+pub struct Field {
+    /// Its name.
+    pub name: &'static str,
+    /// Lengths, the outermost first.
+    pub dims: Vec<usize>,
+    /// What the constructor puts there.
+    value: String,
+    doc: &'static str,
+}
+
+/// Fields that are there.
+pub fn fields(plan: &Plan, sizes: &Sizes) -> Vec<Field> {
+    let present = FIELDS.into_iter().filter(|field| field.array.len(sizes) > 0);
+    let field = present.map(|field| {
+        let (name, dims) = (field.array.name, field.array.lengths(sizes));
+        let value = match name {
+            "drive_q" => neutral(plan, true),
+            "params" => format!("{:?}", plan.default_params()),
+            "gravity" => "[0.0, 0.0, -9.81]".to_string(),
+            _ => nested(&dims, "0.0"),
+        };
+        Field { name, dims, value, doc: field.doc }
+    });
+    field.collect()
+}
+
+/// The neutral configuration as an array literal, of the state or of the drives.
+pub fn neutral(plan: &Plan, drives: bool) -> String {
+    let parts = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })) == drives && s.at.is_some());
+    let numbers: Vec<&str> = parts
+        .flat_map(|s| {
+            let kind = plan.model.joints[s.joint].kind;
+            let unit = matches!(kind, JointKind::Spherical | JointKind::Floating);
+            let n = kind.nq();
+            (0..n).map(move |k| if unit && k + 1 == n { "1.0" } else { "0.0" })
+        })
+        .collect();
+    format!("[{}]", numbers.join(", "))
+}
+
+/// The type with its fields; entries are of a type.
+pub fn type_definition(out: &mut String, ty: &str, fields: &[Field], entry: &str) {
+    let _ = writeln!(out, "#[derive(Clone, Debug, PartialEq)]\n#[rustfmt::skip]\npub struct {ty} {{");
+    for Field { name, dims, doc, .. } in fields {
+        let _ = writeln!(out, "    /// {doc}\n    pub {name}: {},", nested(dims, entry));
+    }
+    let _ = writeln!(out, "}}");
+}
+
+/// The constructor.
+pub fn constructor(out: &mut String, options: &Options, fields: &[Field]) {
+    let values: Vec<String> = fields.iter().map(|field| format!("{}: {}", field.name, field.value)).collect();
+    let _ = writeln!(
+        out,
+        "
+    /// All inputs zero, parameters at their defaults.
+    pub const fn new() -> Self {{
+        {} {{ {} }}
+    }}",
+        options.type_name,
+        values.join(", ")
+    );
+}
+
+/// The method that copies the fields into all lanes.
+pub fn broadcast(out: &mut String, options: &Options, fields: &[Field]) {
+    let name = &options.type_name;
+    let copy = |Field { name, dims, .. }: &Field| match dims.len() {
+        1 => format!("{name}: self.{name}.map(|x| [x; LANES])"),
+        _ => format!("{name}: self.{name}.map(|row| row.map(|x| [x; LANES]))"),
+    };
+    let _ = writeln!(
+        out,
+        "
+    /// The same for several states at once; the inputs are copied into every lane.
+    pub fn lanes<const LANES: usize>(&self) -> {name}Lanes<LANES> {{
+        {name}Lanes {{ {} }}
+    }}",
+        fields.iter().map(copy).collect::<Vec<_>>().join(", ")
+    );
+}
+
+/// `impl Default`, of a type with generic parameters or without.
+pub fn default(out: &mut String, generics: &str, ty: &str) {
+    let _ = writeln!(
+        out,
+        "
+#[rustfmt::skip]
+impl{generics} ::core::default::Default for {ty} {{
+    fn default() -> Self {{
+        Self::new()
+    }}
+}}"
+    );
+}

@@ -1,0 +1,168 @@
+//! What every function begins with, and what every body is written with.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+
+use super::numbers::{literal, minus, signed};
+use super::signature::{nested, Port, Signature};
+use crate::options::{Arithmetic, Options};
+use crate::output::InputArray;
+use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
+
+/// Statements up to which a function is inlined: small kernels melt into the caller's loop.
+const INLINED: usize = 300;
+
+/// A function and its kernel before their bodies are written.
+pub struct Head<'a> {
+    /// How code is generated.
+    pub options: &'a Options,
+    /// Number of the kernel.
+    pub id: usize,
+    /// The function.
+    pub signature: &'a Signature,
+    /// What the kernel reads and writes.
+    pub ports: &'a [Port],
+    /// Arrays that the inputs of the program stand in.
+    pub inputs: &'a [InputArray],
+}
+
+impl Head<'_> {
+    /// Whether the kernel computes what the target computes best; otherwise the same everywhere.
+    fn chooses(&self) -> bool {
+        self.options.arithmetic == Arithmetic::Fast
+    }
+
+    /// Arithmetic of sines and cosines.
+    pub fn arithmetic(&self) -> String {
+        match self.chooses() {
+            true => "A".to_string(),
+            false => format!("{}::kernel::Plain", self.options.runtime),
+        }
+    }
+
+    /// Writes the function, and the first line of its kernel.
+    pub fn write(&self, out: &mut String, statements: usize) {
+        let (rt, id, name) = (&self.options.runtime, self.id, self.signature.name);
+        if statements <= INLINED {
+            let _ = writeln!(out, "    #[inline]");
+        }
+        let _ = writeln!(out, "    pub fn {} {{", self.signature.declaration(self.options.precision.name()));
+        let arguments: Vec<String> = self.ports.iter().map(Port::argument).collect();
+        let call = match self.chooses() {
+            true => format!("{rt}::kernel::call::<Self, {id}, _>({})", tuple(&arguments)),
+            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
+        };
+        match &self.signature.returned {
+            Some(Port { name, dims, .. }) => {
+                let _ = writeln!(out, "        let mut {name} = {};", nested(dims, "0.0"));
+                let _ = writeln!(out, "        {call};\n        {name}\n    }}");
+            }
+            None => {
+                let _ = writeln!(out, "        {call};\n    }}");
+            }
+        }
+        let parameters = self.parameters();
+        let _ = writeln!(out, "\n    #[inline(always)]");
+        let _ = writeln!(out, "    fn {name}_kernel<A: {rt}::kernel::Arithmetic, const LANES: usize>({parameters}) {{");
+    }
+
+    /// Parameters of the kernel.
+    pub fn parameters(&self) -> String {
+        let (rt, number) = (&self.options.runtime, self.options.precision.name());
+        self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
+    }
+
+    /// A kernel's own array.
+    pub fn rows(&self, n: usize) -> String {
+        format!("{}::kernel::Rows([[0.0; LANES]; {n}])", self.options.runtime)
+    }
+
+    /// Places of the results in order: port and number in it.
+    pub fn places(&self) -> Vec<(&str, usize)> {
+        let places = self.ports.iter().filter(|p| p.written());
+        places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (p.name, k))).collect()
+    }
+
+    /// An input as the kernel reads it, in lane `lane`; the number may be a term to be added.
+    pub fn input(&self, k: usize, more: &str, lane: &str) -> String {
+        let (array, k) = locate(self.inputs, k);
+        format!("{}.get({k}{more}, {lane})", array.name)
+    }
+
+    /// `let` of a sine and a cosine of one angle.
+    pub fn sine_and_cosine(&self, [sine, cosine]: [&str; 2], angle: &str) -> String {
+        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
+        format!("let ({sine}, {cosine}) = {rt}::trig::pair_{number}::<{arithmetic}>({angle});")
+    }
+
+    /// Sines and cosines of `n` angles in every lane.
+    pub fn sines_and_cosines(&self, angles: &str, n: usize) -> String {
+        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
+        format!("{rt}::trig::pairs_{number}::<{arithmetic}, LANES, {n}>(&{angles})")
+    }
+
+    /// Right-hand side of an operation; inputs, sines and cosines are written by the caller.
+    pub fn expression(&self, op: &Op, names: &BTreeMap<u32, String>) -> String {
+        let text = |o: &Operand| match o {
+            Operand::Const(bits) => literal(f64::from_bits(*bits), self.options.precision),
+            Operand::Node(id) => names[id].clone(),
+        };
+        match op {
+            Op::Add(a, b) => format!("{} + {}", text(a), text(b)),
+            Op::Sub(a, b) => format!("{} - {}", text(a), text(b)),
+            Op::Mul(a, b) => format!("{} * {}", text(a), text(b)),
+            Op::Div(a, b) => format!("{} / {}", text(a), text(b)),
+            Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
+                let (a, b, c) = (text(a), text(b), text(c));
+                let number = self.options.precision.name();
+                format!("A::fma_{number}({}{a}, {b}, {}{c})", minus(*minus_product), minus(*minus_addend))
+            }
+            Op::ReciprocalAbove(FlooredReciprocal { value, floor, minus_value, minus_floor }) => {
+                let (value, floor) = (text(value), text(floor));
+                let (rt, v, f) = (&self.options.runtime, minus(*minus_value), minus(*minus_floor));
+                format!("{rt}::Scalar::reciprocal_above({v}{value}, {f}{floor})")
+            }
+            Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, names[a]),
+            Op::Input(_) | Op::Sin(_) | Op::Cos(_) => unreachable!("written by the caller"),
+        }
+    }
+
+    /// A result of a program as it is written.
+    pub fn value(&self, result: &ProgramResult, names: &BTreeMap<u32, String>) -> String {
+        match result {
+            ProgramResult::Const(x) => signed(*x, self.options.precision),
+            ProgramResult::Node(id, neg) => format!("{}{}", minus(*neg), names[id]),
+        }
+    }
+}
+
+/// The array that an input stands in, and its number there.
+pub fn locate(inputs: &[InputArray], mut k: usize) -> (&InputArray, usize) {
+    for array in inputs {
+        if k < array.len() {
+            return (array, k);
+        }
+        k -= array.len();
+    }
+    unreachable!("inputs are numbered through their arrays")
+}
+
+/// A tuple of any length.
+pub fn tuple(items: &[String]) -> String {
+    items.iter().fold("(".to_string(), |all, item| format!("{all}{item}, ")).trim_end().to_string() + ")"
+}
+
+/// `operations: additions, multiplications, divisions`, and what is counted apart.
+pub fn count_line(c: &crate::symbolic::Counts) -> Option<String> {
+    (c.total() + c.sincos + c.roots > 0).then(|| {
+        format!(
+            "{} operations: {} additions, {} multiplications, {} divisions; apart: {} square roots, {} sine-cosine pairs.",
+            c.total(),
+            c.additions,
+            c.multiplications,
+            c.divisions,
+            c.roots,
+            c.sincos
+        )
+    })
+}

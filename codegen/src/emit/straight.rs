@@ -1,0 +1,193 @@
+//! Straight-line bodies: one statement for each operation, in a loop over lanes.
+//!
+//! One text serves one state and many: the compiler drops a loop of one turn, and makes vector instructions of a longer
+//! one. For that the body has no calls that it cannot inline: angles come first, and their sines and cosines are computed
+//! together, before the loop. No function is split: compile time grows in proportion to the number of statements, and parts
+//! would hand their values over in memory.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
+
+use super::angles::{nodes, Angles, Pairs};
+use super::head::{locate, Head};
+use super::names::{heading, identifier, Names};
+use crate::plan::Plan;
+use crate::symbolic::{Label, Op, Program, ProgramResult};
+
+/// A program with names for its values and places for its results.
+pub struct Straight<'a> {
+    plan: &'a Plan,
+    head: Head<'a>,
+    program: &'a Program,
+    names: BTreeMap<u32, String>,
+    angles: Angles,
+}
+
+/// A `let`.
+struct Statement {
+    text: String,
+    /// Nodes that it gives values to, and those that it needs.
+    makes: Vec<u32>,
+    uses: Vec<u32>,
+    label: Label,
+    is_input: bool,
+}
+
+impl<'a> Straight<'a> {
+    /// Names every value after its body, quantity and component.
+    pub fn new(plan: &'a Plan, program: &'a Program, head: Head<'a>) -> Self {
+        let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
+        let body = |node: Option<usize>| node.map_or("ground", |i| bodies[i].as_str()).to_string();
+        let input = |k: usize| {
+            let (array, k) = locate(head.inputs, k);
+            format!("{}_{k}", array.name)
+        };
+        let names = Names::default().of(program, body, input);
+        Straight { plan, head, program, names, angles: Angles::new(program) }
+    }
+
+    /// Writes the function and its kernel.
+    pub fn write(&self, out: &mut String) {
+        let statements = self.program.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
+        self.head.write(out, statements);
+        self.write_sines(out);
+        self.write_given(out);
+        let n = self.program.outputs.len();
+        if n > 0 {
+            let _ = writeln!(out, "        let mut results = {};", self.head.rows(n));
+        }
+        let _ = writeln!(out, "        for l in 0..LANES {{");
+        self.write_steps(out, &self.angles.after, true);
+        self.write_results(out);
+        let _ = writeln!(out, "    }}");
+    }
+
+    /// Sines and cosines of all angles that are known from the start.
+    fn write_sines(&self, out: &mut String) {
+        let n = self.angles.early.len();
+        if n == 0 {
+            return;
+        }
+        let _ = writeln!(out, "        let mut angles = {};\n        for l in 0..LANES {{", self.head.rows(n));
+        self.write_steps(out, &self.angles.before, false);
+        for (k, angle) in self.angles.early.keys().enumerate() {
+            let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
+        }
+        let _ = writeln!(out, "        }}");
+        let _ = writeln!(out, "        let (sines, cosines) = {};", self.head.sines_and_cosines("angles", n));
+    }
+
+    /// Those of the program's steps that are in a set, in order. Many are written in blocks that hand on what is needed
+    /// behind them: each `let` is a scope inside the one before it, and debug information of thousands of them is deeper
+    /// than the compiler's stack.
+    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
+        let mut late = self.angles.late.clone();
+        // Only the loop over lanes has its inputs copied.
+        let given = match lanes {
+            true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
+            false => BTreeMap::new(),
+        };
+        let steps = self.program.steps.iter().filter(|(id, _, _)| set.contains(id));
+        let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, &given, &mut late)).collect();
+        let chunk = self.head.options.chunk;
+        if statements.len() <= chunk {
+            return self.write_statements(out, &statements, lanes, "            ");
+        }
+        // What is used at last, and in which chunk.
+        let mut last: BTreeMap<u32, usize> = BTreeMap::new();
+        for (k, statement) in statements.iter().enumerate() {
+            last.extend(statement.uses.iter().map(|id| (*id, k / chunk)));
+        }
+        match lanes {
+            true => last.extend(self.program.outputs.iter().filter_map(|result| match result {
+                ProgramResult::Node(id, _) => Some((*id, usize::MAX)),
+                ProgramResult::Const(_) => None,
+            })),
+            false => last.extend(self.angles.early.keys().map(|id| (*id, usize::MAX))),
+        }
+        for (k, statements) in statements.chunks(chunk).enumerate() {
+            let made = statements.iter().flat_map(|s| &s.makes);
+            let kept = made.filter(|id| last.get(id).is_some_and(|use_| *use_ > k));
+            let kept: Vec<&str> = kept.map(|id| self.names[id].as_str()).collect();
+            let kept = match kept[..] {
+                [one] => one.to_string(),
+                _ => format!("({})", kept.join(", ")),
+            };
+            let _ = writeln!(out, "            let {kept} = {{");
+            self.write_statements(out, statements, lanes, "                ");
+            let _ = writeln!(out, "                {kept}\n            }};");
+        }
+    }
+
+    fn write_statements(&self, out: &mut String, statements: &[Statement], headings: bool, indent: &str) {
+        let mut last = None;
+        for statement in statements {
+            if headings && last != Some(statement.label) && !statement.is_input {
+                let _ = writeln!(out, "{indent}// {}", heading(self.plan, statement.label));
+                last = Some(statement.label);
+            }
+            let _ = writeln!(out, "{indent}{}", statement.text);
+        }
+    }
+
+    fn statement(
+        &self,
+        (id, op, label): &(u32, Op, Label),
+        given: &BTreeMap<u32, usize>,
+        late: &mut Pairs,
+    ) -> Option<Statement> {
+        let (name, is_input) = (&self.names[id], matches!(op, Op::Input(_)));
+        let own = |text: String, uses| Some(Statement { text, makes: vec![*id], uses, label: *label, is_input });
+        if let Some(k) = given.get(id) {
+            return own(format!("let {name} = given[{k}][l];"), Vec::new());
+        }
+        let (angle, row) = match op {
+            Op::Sin(a) => (a, "sines"),
+            Op::Cos(a) => (a, "cosines"),
+            Op::Input(k) => return own(format!("let {name} = {};", self.head.input(*k as usize, "", "l")), Vec::new()),
+            op => return own(format!("let {name} = {};", self.head.expression(op, &self.names)), nodes(op).collect()),
+        };
+        if let Some(k) = self.angles.early.keys().position(|a| a == angle) {
+            return own(format!("let {name} = {row}[{k}][l];"), Vec::new());
+        }
+        // The first of a pair to be met stands for both.
+        let pair = late.remove(angle)?;
+        let names = pair.map(|id| id.map_or("_", |id| self.names[&id].as_str()));
+        let text = self.head.sine_and_cosine(names, &self.names[angle]);
+        let makes = pair.into_iter().flatten().collect();
+        Some(Statement { text, makes, uses: vec![*angle], label: *label, is_input })
+    }
+
+    /// Inputs of the loop over lanes.
+    fn given(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.program.steps.iter().filter_map(|(id, op, _)| match op {
+            Op::Input(k) if self.angles.after.contains(id) => Some((*id, *k)),
+            _ => None,
+        })
+    }
+
+    /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
+    /// point to, and the compiler makes vector instructions of it without asking at run time what overlaps.
+    fn write_given(&self, out: &mut String) {
+        let n = self.given().count();
+        if n > 0 {
+            let _ = writeln!(out, "        let mut given = {};", self.head.rows(n));
+        }
+        for (to, (_, k)) in self.given().enumerate() {
+            let from = self.head.input(k as usize, "", "l");
+            let _ = writeln!(out, "        for l in 0..LANES {{ given[{to}][l] = {from}; }}");
+        }
+    }
+
+    /// Results are gathered in an array before they are handed over.
+    fn write_results(&self, out: &mut String) {
+        for (k, result) in self.program.outputs.iter().enumerate() {
+            let value = self.head.value(result, &self.names);
+            let _ = writeln!(out, "            results[{k}][l] = {value};");
+        }
+        let _ = writeln!(out, "        }}");
+        for (result, (name, k)) in self.head.places().into_iter().enumerate() {
+            let _ = writeln!(out, "        {name}.give({k}, &results[{result}]);");
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! What a sound model and options can still get wrong.
+
+use std::fmt;
+
+use crate::output::Output;
+
+/// Why no code could be generated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum GenerateError {
+    /// The options choose a frame that the model does not have.
+    UnknownFrame {
+        /// The name in the options.
+        name: String,
+    },
+    /// The output is one of models with constraints, and the model has none.
+    OutputNeedsConstraints {
+        /// The output.
+        output: Output,
+        /// Name of the model.
+        model: String,
+    },
+    /// The output is one of models without constraints, and the model has some.
+    OutputLacksConstraints {
+        /// The output.
+        output: Output,
+        /// Name of the model.
+        model: String,
+    },
+    /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where parameters
+    /// are involved.
+    InfiniteNumber {
+        /// The output whose code contains it.
+        output: Output,
+        /// The body whose operation it belongs to; `None` where the code does not say so.
+        body: Option<String>,
+    },
+    /// A result is infinite whatever the state is.
+    InfiniteResult {
+        /// The output.
+        output: Output,
+    },
+}
+
+impl fmt::Display for GenerateError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let question = "is there a freedom without inertia?";
+        match self {
+            GenerateError::UnknownFrame { name } => write!(f, "no frame or body is named `{name}`"),
+            GenerateError::OutputNeedsConstraints { output, model } => {
+                let name = output.name();
+                write!(f, "`{name}` is an output of mechanisms with loops or couplings, and `{model}` has none")
+            }
+            GenerateError::OutputLacksConstraints { output, model } => {
+                let name = output.name();
+                write!(f, "`{name}` does not know the loops and couplings of `{model}`: use `derivatives`")
+            }
+            GenerateError::InfiniteNumber { output, body: Some(body) } => {
+                write!(f, "`{}` contains an infinite number at body `{body}`: {question}", output.name())
+            }
+            GenerateError::InfiniteNumber { output, body: None } => {
+                write!(f, "`{}` contains an infinite number: {question}", output.name())
+            }
+            GenerateError::InfiniteResult { output } => {
+                write!(f, "`{}` has a result that is always infinite: {question}", output.name())
+            }
+        }
+    }
+}
+
+impl std::error::Error for GenerateError {}

@@ -1,0 +1,226 @@
+//! What is known of an output: the arrays that its function takes and gives, and what it asks of the model and of the search.
+
+/// A dimension of an array. A model gives it a number: [`Sizes`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Dim {
+    /// Number of coordinates.
+    Nq,
+    /// Number of velocities, momenta, joint forces.
+    Nv,
+    /// Number of joints with reactions.
+    Joints,
+    /// Number of chosen frames.
+    Frames,
+    /// Number of rows of the constraints.
+    Rows,
+    /// Number of entries of the constraints' Jacobian that can be other than zero.
+    Entries,
+    /// Number of run-time parameters.
+    Params,
+    /// Number of joint forces that are inputs.
+    Efforts,
+    /// Number of prescribed positions.
+    DriveQ,
+    /// Number of prescribed rates.
+    DriveV,
+    /// Number of external wrenches.
+    Wrenches,
+    /// Three where gravity is an input.
+    Gravity,
+    /// The same for every model.
+    Const(usize),
+}
+
+impl Dim {
+    /// As documentation writes it: `NV`, `6`.
+    pub fn text(self) -> String {
+        let word = match self {
+            Dim::Nq => "NQ",
+            Dim::Nv => "NV",
+            Dim::Joints => "JOINTS",
+            Dim::Frames => "FRAMES",
+            Dim::Rows => "ROWS",
+            Dim::Entries => "ENTRIES",
+            Dim::Params => "PARAMS",
+            Dim::Efforts => "EFFORTS",
+            Dim::DriveQ => "DRIVE_Q",
+            Dim::DriveV => "DRIVE_V",
+            Dim::Wrenches => "WRENCHES",
+            Dim::Gravity => "GRAVITY",
+            Dim::Const(n) => return n.to_string(),
+        };
+        word.to_string()
+    }
+}
+
+/// The numbers behind [`Dim`] for one model and the frames that were chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// [`Dim::Nq`].
+    pub nq: usize,
+    /// [`Dim::Nv`].
+    pub nv: usize,
+    /// [`Dim::Joints`].
+    pub joints: usize,
+    /// [`Dim::Frames`].
+    pub frames: usize,
+    /// [`Dim::Rows`].
+    pub rows: usize,
+    /// [`Dim::Entries`].
+    pub entries: usize,
+    /// [`Dim::Params`].
+    pub params: usize,
+    /// [`Dim::Efforts`].
+    pub efforts: usize,
+    /// [`Dim::DriveQ`].
+    pub drive_q: usize,
+    /// [`Dim::DriveV`].
+    pub drive_v: usize,
+    /// [`Dim::Wrenches`].
+    pub wrenches: usize,
+    /// [`Dim::Gravity`].
+    pub gravity: usize,
+}
+
+impl Sizes {
+    /// The number of a dimension.
+    pub fn of(&self, dim: Dim) -> usize {
+        match dim {
+            Dim::Nq => self.nq,
+            Dim::Nv => self.nv,
+            Dim::Joints => self.joints,
+            Dim::Frames => self.frames,
+            Dim::Rows => self.rows,
+            Dim::Entries => self.entries,
+            Dim::Params => self.params,
+            Dim::Efforts => self.efforts,
+            Dim::DriveQ => self.drive_q,
+            Dim::DriveV => self.drive_v,
+            Dim::Wrenches => self.wrenches,
+            Dim::Gravity => self.gravity,
+            Dim::Const(n) => n,
+        }
+    }
+}
+
+/// An argument of a generated function, an array: its name and its lengths, the outermost first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// Its name in the generated code.
+    pub name: &'static str,
+    /// Its lengths.
+    pub dims: &'static [Dim],
+}
+
+impl Array {
+    pub(super) const fn new(name: &'static str, dims: &'static [Dim]) -> Array {
+        Array { name, dims }
+    }
+
+    /// Lengths for one model.
+    pub fn lengths(&self, sizes: &Sizes) -> Vec<usize> {
+        self.dims.iter().map(|dim| sizes.of(*dim)).collect()
+    }
+
+    /// Number of its entries for one model.
+    pub fn len(&self, sizes: &Sizes) -> usize {
+        self.lengths(sizes).iter().product()
+    }
+}
+
+/// What is given to every function beside its arguments: a field of the generated type, which is there where it has entries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The array.
+    pub array: Array,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+impl Field {
+    pub(super) const fn new(name: &'static str, dims: &'static [Dim], doc: &'static str) -> Field {
+        Field { array: Array::new(name, dims), doc }
+    }
+}
+
+/// Which models have an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Availability {
+    /// Every model.
+    Every,
+    /// Models with constraints: loops or couplings.
+    WithConstraints,
+    /// Models without constraints.
+    WithoutConstraints,
+}
+
+/// The search for eliminations that an output profits from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Search {
+    /// That of every model, which makes the rates cheap.
+    Rates,
+    /// The one for accelerations.
+    Accelerations,
+    /// The one for the mass matrix.
+    MassMatrix,
+}
+
+/// Everything that is known of an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Spec {
+    /// Name of the generated function, and of the output in options.
+    pub name: &'static str,
+    /// What the function computes: a line that stands for itself, then details.
+    pub(super) doc: &'static str,
+    /// What the function is given: the coordinates, then momenta or velocities, then accelerations.
+    pub inputs: &'static [Array],
+    /// What the function gives, in order.
+    pub results: &'static [Array],
+    /// Whether the one result is returned; otherwise results are written to arguments.
+    pub returned: bool,
+    /// Which models have it.
+    pub availability: Availability,
+    /// Which search it profits from.
+    pub search: Search,
+}
+
+impl Spec {
+    /// An output of every model that writes its results.
+    pub(super) const fn new(name: &'static str, inputs: &'static [Array], results: &'static [Array]) -> Spec {
+        let (availability, search) = (Availability::Every, Search::Rates);
+        Spec { name, doc: "", inputs, results, returned: false, availability, search }
+    }
+
+    pub(super) const fn returned(self) -> Spec {
+        Spec { returned: true, ..self }
+    }
+
+    pub(super) const fn only(self, availability: Availability) -> Spec {
+        Spec { availability, ..self }
+    }
+
+    pub(super) const fn searched(self, search: Search) -> Spec {
+        Spec { search, ..self }
+    }
+
+    /// Lines of the documentation; the first stands for itself.
+    pub fn doc(&self) -> impl Iterator<Item = &'static str> {
+        self.doc.trim_end().lines().map(str::trim)
+    }
+
+    /// Whether it has one result for each chosen frame.
+    pub fn of_frames(&self) -> bool {
+        self.results.iter().any(|array| array.dims.contains(&Dim::Frames))
+    }
+
+    /// Whether a model with (or without) constraints has it.
+    pub fn available(&self, constrained: bool) -> bool {
+        match self.availability {
+            Availability::Every => true,
+            Availability::WithConstraints => constrained,
+            Availability::WithoutConstraints => !constrained,
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! The table in words: help of the command, documentation of the macro.
+
+use std::fmt::Write;
+
+use super::{Availability, Output, Spec};
+
+/// Names with commas between.
+fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.collect::<Vec<_>>().join(", ")
+}
+
+impl Spec {
+    /// What goes in and what comes out: `(q, p) -> qd, pd`.
+    pub fn arrow(&self) -> String {
+        let [inputs, results] = [self.inputs, self.results].map(|arrays| names(arrays.iter().map(|array| array.name)));
+        format!("({inputs}) -> {results}")
+    }
+}
+
+/// Help of an option that lists outputs.
+pub fn help() -> String {
+    let mut out = "What to compute, with commas between, or `all`:".to_string();
+    let rows = |out: &mut String, constrained: bool| {
+        let with = |spec: &&Spec| (spec.availability == Availability::WithConstraints) == constrained;
+        for spec in Output::ALL.iter().map(|output| output.spec()).filter(with) {
+            let _ = write!(out, "\n  {} {}", spec.name, spec.arrow());
+            spec.doc().take(1).for_each(|line| {
+                let _ = write!(out, "\n      {line}");
+            });
+        }
+    };
+    rows(&mut out, false);
+    let _ = write!(out, "\nOf models with loops or couplings (they get these beside the defaults):");
+    rows(&mut out, true);
+    let lacking = Output::available(false).filter(|output| !output.spec().available(true)).map(Output::name);
+    let lacking: Vec<String> = lacking.map(|name| format!("`{name}`")).collect();
+    let _ = write!(out, "\nSuch models have no {}.", lacking.join(", "));
+    out
+}
+
+/// The table as Markdown, for documentation.
+pub fn table() -> String {
+    let mut out = "| output | arguments | results | meaning |\n| --- | --- | --- | --- |\n".to_string();
+    for spec in Output::ALL.iter().map(|output| output.spec()) {
+        let results = spec.results.iter().map(|array| {
+            let dims: String = array.dims.iter().map(|dim| format!("[{}]", dim.text())).collect();
+            format!("`{}{dims}`", array.name)
+        });
+        let only = match spec.availability {
+            Availability::Every => "",
+            Availability::WithConstraints => " Only with loops or couplings.",
+            Availability::WithoutConstraints => " Not with loops or couplings.",
+        };
+        let inputs = names(spec.inputs.iter().map(|array| array.name));
+        let (results, doc) = (results.collect::<Vec<_>>().join(", "), spec.doc().collect::<Vec<_>>().join(" "));
+        let _ = writeln!(out, "| `{}` | `{inputs}` | {results} | {doc}{only} |", spec.name);
+    }
+    out
+}
