@@ -6,8 +6,8 @@ use std::path::PathBuf;
 
 use multibody::codegen::model::{JointKind, Value};
 use multibody::codegen::plan::{Plan, PlanOptions};
+use multibody::runtime::catalogue;
 use multibody::runtime::constrained::Stabilisation;
-use multibody::runtime::integrate::catalogue;
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};

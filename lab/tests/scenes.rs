@@ -296,7 +296,7 @@ mod generated {
 /// Where the mass matrix is badly conditioned, rounding keeps iterations from going on to the last digits: no reason to fail.
 #[test]
 fn implicit_steps_converge_on_chains() {
-    use multibody::runtime::integrate::catalogue::{any, entries, Start};
+    use multibody::runtime::catalogue::{any, entries, Start};
     use multibody::runtime::integrate::Step;
     for name in ["chain10", "chain10_friction"] {
         let scene = scenes::by_name(name).expect("a scene");

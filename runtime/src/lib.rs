@@ -13,8 +13,12 @@ extern crate std;
 #[cfg(feature = "alloc")]
 mod acceleration_form;
 pub mod batch;
+#[cfg(feature = "alloc")]
+pub mod catalogue;
+mod constant;
 pub mod constrained;
 mod dual;
+mod error;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;

@@ -1,6 +1,6 @@
 //! The numbers a sweep may be run with.
 
-use crate::integrate::Constant;
+use crate::constant::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A field with sine, cosine, square root and a guarded reciprocal, and nothing else: no comparison and no way out to

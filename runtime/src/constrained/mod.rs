@@ -33,8 +33,6 @@ mod boundary;
 mod close;
 #[cfg(feature = "alloc")]
 mod dense;
-mod ends;
-mod error;
 mod hold;
 mod index_two;
 #[cfg(feature = "alloc")]
@@ -44,16 +42,16 @@ mod rows;
 mod split;
 mod steady;
 
+pub use crate::error::ConstraintError;
 pub use boundary::{PostStep, WithPostStep};
 #[cfg(feature = "alloc")]
 pub use close::{close, complete, Closed, Closing};
-pub use error::ConstraintError;
 pub use hold::{Effort, Hold, Stabilisation};
-pub use index_two::RadauIndex2;
+pub use index_two::{RadauIndex2, RadauIndex2Scheme};
 #[cfg(feature = "alloc")]
-pub use minimal::{CoordinatePartition, Repartition, Switch};
-pub use rattle::Rattle;
-pub use split::{OpenAndClosed, Unconstrained};
+pub use minimal::{CoordinatePartition, Switch, Repartition};
+pub use rattle::{Rattle, RattleScheme};
+pub use split::{Unconstrained, OpenAndClosed};
 pub use steady::Steady;
 
 #[cfg(doc)]

@@ -92,7 +92,7 @@ fn orders() {
     check("euler", 1, 200, Euler::new);
     check("semi-implicit", 1, 200, SemiImplicitEuler::new);
     check("rk4", 4, 25, Rk4::new);
-    check("rk4 doubled", 4, 15, |y| StepDoubling::new(y, Rk4::new(y)));
+    check("rk4 doubled", 4, 15, |y| StepDoubling::over(y, Rk4::new(y)));
     check("tsit5", 5, 20, Tsit5::new);
     check("dop853", 8, 5, Dop853::new);
     check("abm4", 4, 100, Abm4::new);
