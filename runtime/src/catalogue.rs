@@ -7,7 +7,7 @@ use crate::integrate::StepDoubling;
 use crate::integrate::{Ab4, Ab6, Abm4, Abm6, Abm8, VariableAdams};
 use crate::integrate::{BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
 use crate::integrate::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
-use crate::integrate::{Limits, EnergyProjection, Solver, Statistics, Step, StepError, Stepper};
+use crate::integrate::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::system::{Differentiable, Energetic, Real, System};
 
 /// What there is to know of a method before it is made.

@@ -49,9 +49,9 @@ pub use close::{close, complete, Closed, Closing};
 pub use hold::{Effort, Hold, Stabilisation};
 pub use index_two::{RadauIndex2, RadauIndex2Scheme};
 #[cfg(feature = "alloc")]
-pub use minimal::{CoordinatePartition, Switch, Repartition};
+pub use minimal::{CoordinatePartition, Repartition, Switch};
 pub use rattle::{Rattle, RattleScheme};
-pub use split::{Unconstrained, OpenAndClosed};
+pub use split::{OpenAndClosed, Unconstrained};
 pub use steady::Steady;
 
 #[cfg(doc)]

@@ -59,7 +59,9 @@ pub use events::{Direction, Events, Outcome, Watch};
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
 pub use fixed::FixedIterations;
-pub use formulas::{formula, BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5};
+pub use formulas::{
+    formula, BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
+};
 pub use integrator::{Attempt, FromSystem, Integrator, Scheme};
 pub use newton::{FixedPoint, Iteration, Newton};
 pub use projection::EnergyProjection;
