@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
-use multibody::runtime::constrained::{PostStep, ConstraintError, Effort, Hold, Stabilisation};
 use multibody::runtime::catalogue::{self, Drive, Start};
+use multibody::runtime::constrained::{ConstraintError, Effort, Hold, PostStep, Stabilisation};
 use multibody::runtime::integrate::{EnergyProjection, Statistics, Step, StepError};
 use multibody::runtime::interp::RankLoss;
 use multibody::runtime::{Constrained, Interpreter};

@@ -3,8 +3,8 @@
 use allocation_counter::measure;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::integrate::{
-    Ab6, Abm8, Direction, Events, Gauss12FixedPoint, ImplicitMidpoint, Outcome, EnergyProjection, Radau5, Rk4, Rodas5P, Solver,
-    Step, StepError, Stepper, Tolerances, Tsit5, VariableAdams, Verner9, Watch,
+    Ab6, Abm8, Direction, EnergyProjection, Events, Gauss12FixedPoint, ImplicitMidpoint, Outcome, Radau5, Rk4, Rodas5P,
+    Solver, Step, StepError, Stepper, Tolerances, Tsit5, VariableAdams, Verner9, Watch,
 };
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::Interpreter;
