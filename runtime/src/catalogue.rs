@@ -120,7 +120,7 @@ where
 
 /// A table of methods, and the function that makes one of them at time zero.
 macro_rules! catalogue {
-    ($(#[$doc:meta])* $list:ident, $make:ident, $bounded:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
+    ($(#[$doc:meta])* $list:ident, $make:ident, $with_post_step:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
      { $($name:literal $title:literal $adaptive:literal $method:expr;)* }) => {
         $(#[$doc])*
         pub static $list: &[Entry] = &[
@@ -144,7 +144,7 @@ macro_rules! catalogue {
         }
 
         /// The same with work at the end of every step, see [`constrained`](crate::constrained).
-        pub fn $bounded<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, boundary: B) -> Made<'a, Y>
+        pub fn $with_post_step<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, post_step: B) -> Made<'a, Y>
         where
             Y: $bound + 'a,
             Y::Scalar: Real,
@@ -154,7 +154,7 @@ macro_rules! catalogue {
             match name {
                 $($name => {
                     let method = $method;
-                    let method = WithPostStep::new($system, method, boundary);
+                    let method = WithPostStep::new($system, method, post_step);
                     boxed($system, method, start)
                 })*
                 _ => None,
@@ -176,7 +176,7 @@ macro_rules! sums {
 
 catalogue! {
     /// Methods that need the rates only.
-    EXPLICIT, explicit, explicit_bounded, System, false, |system, c| {
+    EXPLICIT, explicit, explicit_with_post_step, System, false, |system, c| {
         "euler" "Euler" false sums!(Euler, system, c);
         "semi-implicit-euler" "semi-implicit Euler" false sums!(SemiImplicitEuler, system, c);
         "midpoint" "explicit midpoint, order 2" false sums!(Midpoint, system, c);
@@ -199,7 +199,7 @@ catalogue! {
 
 catalogue! {
     /// Methods that need derivatives of the rates.
-    IMPLICIT, implicit, implicit_bounded, Differentiable, true, |system, c| {
+    IMPLICIT, implicit, implicit_with_post_step, Differentiable, true, |system, c| {
         "backward-euler" "backward Euler" false sums!(BackwardEuler, system, c);
         "implicit-midpoint" "implicit midpoint, order 2" false sums!(ImplicitMidpoint, system, c);
         "gauss4" "Gauss-Legendre, order 4" false sums!(Gauss4, system, c);

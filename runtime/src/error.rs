@@ -1,17 +1,20 @@
 //! What can go wrong in a step, and with constraints.
 
+use crate::system::{Part, System};
+
 /// A step that must not be used.
 ///
 /// Times are those of the start of the step, in s. An adaptive driver keeps the last accepted state; a step function
 /// leaves `q` and `p` as they were.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum StepError {
     /// A rate or a component of the new state is infinite or not a number: the motion diverges, or the mechanism is
     /// singular there.
     NotFinite {
         /// Time, s.
         time: f64,
-        /// Index into `v`, then on into `p`.
+        /// Index of the component: into the velocities, and from `nv` on into the momenta.
         index: usize,
     },
     /// The state that was given has a quaternion that is not of unit length.
@@ -89,11 +92,25 @@ impl StepError {
     }
 }
 
-impl core::fmt::Display for StepError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+/// Names of the parts of a system, for messages.
+type Names<'a> = &'a dyn Fn(Part) -> Option<&'a str>;
+
+impl StepError {
+    /// The error, shown with the names that a system gives to its parts.
+    pub fn named<Y: System>(self, system: &Y) -> Named<'_, Self, Y> {
+        Named { error: self, system }
+    }
+
+    /// The message for a system with `nv` velocities.
+    fn describe(&self, f: &mut core::fmt::Formatter<'_>, nv: usize, names: Names<'_>) -> core::fmt::Result {
         match self {
             StepError::NotFinite { time, index } => {
-                write!(f, "component {index} of the state's change is not finite in the step from t = {time} s: reduce the step, or look for a singular configuration")
+                write!(f, "component {index} of the state's change")?;
+                let part = Part::Velocity(if *index < nv { *index } else { index - nv });
+                if let Some(name) = names(part) {
+                    write!(f, " ({})", Label { part, name: Some(name) })?;
+                }
+                write!(f, " is not finite in the step from t = {time} s: reduce the step, or look for a singular configuration")
             }
             StepError::Quaternion { time, index, norm } => {
                 write!(f, "the quaternion at q[{index}] has norm {norm} at t = {time} s: give one of unit length")
@@ -111,8 +128,17 @@ impl core::fmt::Display for StepError {
             StepError::Singular { time, step, column } => {
                 write!(f, "the matrix of the implicit step of {step:e} s from t = {time} s is singular in column {column}: change the step")
             }
-            StepError::Constraint { time, error } => write!(f, "in the step from t = {time} s: {error}"),
+            StepError::Constraint { time, error } => {
+                write!(f, "in the step from t = {time} s: ")?;
+                error.describe(f, names)
+            }
         }
+    }
+}
+
+impl core::fmt::Display for StepError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.describe(f, usize::MAX, &|_| None)
     }
 }
 
@@ -120,8 +146,10 @@ impl core::error::Error for StepError {}
 
 /// Constraints that do not hold, or cannot.
 ///
-/// Constraints are named by [`Row::constraint`](crate::system::Row): their place among the loops and couplings of the description.
+/// Constraints are numbered as in [`Row::constraint`](crate::system::Row): by their place among the loops and couplings of the
+/// description.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ConstraintError {
     /// No positions were found that close the constraints.
     NotClosed {
@@ -158,7 +186,7 @@ pub enum ConstraintError {
     },
     /// A residual, or a correction, is not a number or infinite.
     NotFinite {
-        /// Index of the row; of the velocity where it is a correction.
+        /// Index of the row, of the velocity or of the coordinate, whichever is not finite.
         index: usize,
     },
     /// The iteration for the multipliers of a step did not converge.
@@ -170,20 +198,32 @@ pub enum ConstraintError {
     },
 }
 
-impl core::fmt::Display for ConstraintError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl ConstraintError {
+    /// The error, shown with the names that a system gives to its parts.
+    pub fn named<Y: System>(self, system: &Y) -> Named<'_, Self, Y> {
+        Named { error: self, system }
+    }
+
+    fn describe(&self, f: &mut core::fmt::Formatter<'_>, names: Names<'_>) -> core::fmt::Result {
+        let label = |constraint: &usize| {
+            let part = Part::Constraint(*constraint);
+            Label { part, name: names(part) }
+        };
         match self {
             ConstraintError::NotClosed { constraint, residual, rank, rows, iterations } => write!(
                 f,
-                "constraint {constraint} stays open by {residual:.3e} after {iterations} iterations ({rank} of {rows} rows are independent there): start nearer to a closed position, hold fewer coordinates, or check the lengths"
+                "{} stays open by {residual:.3e} after {iterations} iterations ({rank} of {rows} rows are independent there): start nearer to a closed position, hold fewer coordinates, or check the lengths",
+                label(constraint)
             ),
             ConstraintError::Incompatible { constraint, residual, rank, rows } => write!(
                 f,
-                "no velocities meet constraint {constraint}, which is off by {residual:.3e} ({rank} of {rows} rows are independent of what is held): hold fewer velocities, or leave a singular position"
+                "no velocities meet {}, which is off by {residual:.3e} ({rank} of {rows} rows are independent of what is held): hold fewer velocities, or leave a singular position",
+                label(constraint)
             ),
             ConstraintError::RankLoss { constraint, rank, before } => write!(
                 f,
-                "{rank} of {before} rows are left independent at constraint {constraint}: the position is singular, go through it by method 1 or move the start"
+                "{rank} of {before} rows are left independent at {}: the position is singular, go through it by method 1 or move the start",
+                label(constraint)
             ),
             ConstraintError::NotFinite { index } => {
                 write!(f, "constraint residual or correction {index} is not finite: reduce the step, or check the start")
@@ -196,4 +236,49 @@ impl core::fmt::Display for ConstraintError {
     }
 }
 
+impl core::fmt::Display for ConstraintError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.describe(f, &|_| None)
+    }
+}
+
 impl core::error::Error for ConstraintError {}
+
+/// A part of a mechanism by its name, or by its number where it has none.
+pub(crate) struct Label<'a> {
+    pub part: Part,
+    pub name: Option<&'a str>,
+}
+
+impl core::fmt::Display for Label<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let (kind, index) = match self.part {
+            Part::Velocity(k) => ("velocity", k),
+            Part::Constraint(k) => ("constraint", k),
+        };
+        match self.name {
+            Some(name) => write!(f, "{kind} `{name}`"),
+            None => write!(f, "{kind} {index}"),
+        }
+    }
+}
+
+/// An error that is shown with the names a system gives to its velocities and constraints ([`System::part_name`]).
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'a, E, Y> {
+    error: E,
+    system: &'a Y,
+}
+
+impl<Y: System> core::fmt::Display for Named<'_, StepError, Y> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let nv = self.system.zero_momenta().as_ref().len();
+        self.error.describe(f, nv, &|part| self.system.part_name(part))
+    }
+}
+
+impl<Y: System> core::fmt::Display for Named<'_, ConstraintError, Y> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.error.describe(f, &|part| self.system.part_name(part))
+    }
+}

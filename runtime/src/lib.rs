@@ -42,7 +42,8 @@ pub mod workspace;
 #[cfg(feature = "alloc")]
 pub use acceleration_form::AccelerationForm;
 pub use dual::Dual;
+pub use error::{ConstraintError, Named, StepError};
 #[cfg(feature = "alloc")]
-pub use interp::{Interpreter, RankLoss};
+pub use interp::{Interpreter, MassMatrixError};
 pub use scalar::Scalar;
-pub use system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic, Real, System};
+pub use system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Real, StateDerivatives, System};

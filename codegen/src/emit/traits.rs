@@ -28,6 +28,10 @@ pub fn system(out: &mut String, plan: &Plan, options: &Options) {
         })
         .collect();
     let neutral = neutral(plan, false);
+    let constraints = match plan.constraint_names() {
+        none if none.is_empty() => "{ let _ = k; None }".to_string(),
+        names => format!("const {{ &{names:?} }}.get(k).copied()"),
+    };
     let groups = groups.join(", ");
     let _ = write!(
         out,
@@ -54,6 +58,13 @@ impl {rt}::System for {name} {{
     #[inline]
     fn rates_at(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], qd: &mut [{t}; {nq}], pd: &mut [{t}; {nv}]) {{
         Self::rates(self, q, p, qd, pd);
+    }}
+
+    fn part_name(&self, part: {rt}::system::Part) -> Option<&str> {{
+        match part {{
+            {rt}::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            {rt}::system::Part::Constraint(k) => {constraints},
+        }}
     }}
 
     #[inline]
@@ -135,8 +146,8 @@ impl {rt}::Differentiable for {name} {{
         [[0.0; {nv}]; {nv}]
     }}
 
-    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], v: &mut [{t}; {nv}], pd: &mut [{t}; {nv}], d: {rt}::Blocks<'_, [[{t}; {nv}]; {nv}]>) {{
-        Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
+    fn rate_derivatives(&mut self, _t: {t}, q: &[{t}; {nq}], p: &[{t}; {nv}], out: &mut {rt}::StateDerivatives<[{t}; {nv}], [[{t}; {nv}]; {nv}]>) {{
+        Self::derivatives(self, q, p, &mut out.v, &mut out.pd, &mut out.dv_dq, &mut out.dv_dp, &mut out.dpd_dq, &mut out.dpd_dp);
     }}
 }}
 "

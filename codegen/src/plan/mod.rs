@@ -286,6 +286,11 @@ impl Plan {
         })
     }
 
+    /// Names of the loops and couplings, in the order of the description.
+    pub fn constraint_names(&self) -> Vec<String> {
+        self.model.constraints.iter().map(|c| c.name.clone()).collect()
+    }
+
     fn state_names(&self, parts: impl Fn(&JointKind) -> &'static [&'static str]) -> Vec<String> {
         let free = self.slots.iter().filter(|s| matches!(s.at, Some(Source::State { .. })));
         free.flat_map(|slot| {

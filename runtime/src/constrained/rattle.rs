@@ -1,7 +1,7 @@
 //! RATTLE for any Hamiltonian.
 
+use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
-use super::split::Unconstrained;
 use super::ConstraintError;
 use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, StepError};
 use crate::system::Real;

@@ -5,7 +5,7 @@ extern crate std;
 use std::println;
 use std::vec::Vec;
 
-use super::linear::{Lu, Matrix};
+use super::linear::{times, Lu};
 use super::scenes::{chain, gravity, three, Oscillator, Scene};
 use super::*;
 use crate::system::{Differentiable, System};
@@ -52,7 +52,7 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
         field.load(&scene.i, 0.0, &scene.q, &scene.p).unwrap();
         let zero = Point::zero(&scene.i);
         let (mut at, mut along, mut rate, mut known) = (zero.clone(), zero.clone(), zero.clone(), zero.clone());
-        let mut jacobian = Matrix::zero(&scene.i);
+        let mut jacobian = scene.i.zero_derivatives();
         for k in 0..20 {
             // The first about the state itself.
             fill(&mut at, if k == 0 { 0.0 } else { 0.7 }, &mut random);
@@ -78,7 +78,7 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
             let mut numeric = derivative(h / 2.0, &mut field, &mut scene.i);
             numeric.scale(4.0 / 3.0);
             numeric.add(-1.0 / 3.0, &derivative(h, &mut field, &mut scene.i));
-            jacobian.times(&along, &mut known);
+            times::<I>(&jacobian, &along, &mut known);
             let size = numeric.parts().into_iter().flatten().fold(size, |m, x| m.max(x.abs()));
             for (a, b) in known.parts().into_iter().flatten().zip(numeric.parts().into_iter().flatten()) {
                 assert!((a - b).abs() < 1e-8 * size, "{}, state {k}: {a} {b}", scene.name);
@@ -89,8 +89,8 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
 
 fn solve_and_check<const C: usize>(w: [f64; C], scene: &Scene<f64>) {
     let mut random = random(3);
-    let mut jacobian = Matrix::zero(&scene.i);
-    for row in jacobian.blocks.iter_mut().flatten().flat_map(|b| b.iter_mut()) {
+    let mut jacobian = scene.i.zero_derivatives();
+    for row in jacobian.blocks_mut().into_iter().flatten().flat_map(|b| b.iter_mut()) {
         row.iter_mut().for_each(|x| *x = random());
     }
     let mut lu = Lu::<I, C>::new(&scene.i);
@@ -99,7 +99,7 @@ fn solve_and_check<const C: usize>(w: [f64; C], scene: &Scene<f64>) {
     let (mut x, mut product) = (points(), points());
     x.iter_mut().for_each(|x| fill(x, 1.0, &mut random));
     for (product, x) in product.iter_mut().zip(&x) {
-        jacobian.times(x, product);
+        times::<I>(&jacobian, x, product);
     }
     // b = x - w J x.
     let mut b = x.clone();
@@ -123,12 +123,12 @@ fn linear_equations_are_solved() {
         solve_and_check([3.7], &scene);
         solve_and_check([3.7, -5.1], &scene);
         let mut lu = Lu::<I, 1>::new(&scene.i);
-        let mut one = Matrix::zero(&scene.i);
-        for (k, row) in one.blocks[0][0].iter_mut().enumerate() {
+        let mut one = scene.i.zero_derivatives();
+        for (k, row) in one.dv_dq.iter_mut().enumerate() {
             row[k] = 1.0;
         }
         assert_eq!(lu.factor([1.0], &one), Err(0));
-        one.blocks[1][1][0][0] = f64::NAN;
+        one.dpd_dp[0][0] = f64::NAN;
         assert_eq!(lu.factor([0.5], &one), Err(scene.i.tree().dims.nv));
     }
 }

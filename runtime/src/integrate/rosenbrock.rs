@@ -2,7 +2,7 @@
 
 use super::chart::Point;
 use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
-use super::linear::{Lu, Matrix};
+use super::linear::{Jacobian, Lu};
 use super::stepper::norm;
 use super::{tableau, StepError};
 use crate::system::{Differentiable, Real};
@@ -20,7 +20,7 @@ pub struct Rosenbrock<Y: Differentiable, const S: usize> {
     tableau: &'static tableau::Rosenbrock<S>,
     a: [[Y::Scalar; S]; S],
     coupling: [[Y::Scalar; S]; S],
-    jacobian: Matrix<Y>,
+    jacobian: Jacobian<Y>,
     lu: Lu<Y, 1>,
     /// Step that the matrix is factored for; zero: none.
     factored: Y::Scalar,
@@ -55,7 +55,7 @@ where
             tableau,
             a: tableau.a.map(|row| row.map(|x| x.get())),
             coupling: tableau.coupling.map(|row| row.map(|x| x.get())),
-            jacobian: Matrix::zero(system),
+            jacobian: system.zero_derivatives(),
             lu: Lu::new(system),
             factored: Y::Scalar::zero(),
             first: point(),

@@ -1,7 +1,7 @@
 //! Radau IIA on the equations with multipliers.
 
+use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
-use super::split::Unconstrained;
 use super::ConstraintError;
 use crate::integrate::tableau::RADAU5;
 use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, StepError};
@@ -14,7 +14,7 @@ const ITERATIONS: u32 = 100;
 /// The three-stage Radau IIA method on the equations of index 2, steps of given size: `q̇`, `ṗ − Φᵀλ` of the open system with
 /// `Φ v = b` at every stage, and so at the end of the step, which is the last one. Order 5 in the state, 3 in the multipliers (E.
 /// Hairer, C. Lubich, M. Roche, *The Numerical Solution of Differential-Algebraic Systems by Runge-Kutta Methods*, 1989, table
-/// 2.3). Positions drift with the method's error; [`Hold`](super::Hold) brings them back.
+/// 2.3). Positions drift with the method's error; [`Projection`](super::Projection) brings them back.
 ///
 /// Stages are solved for by inserting, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
 /// projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
