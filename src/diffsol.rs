@@ -34,8 +34,7 @@ use ::diffsol::{
 };
 
 use crate::runtime::integrate::Statistics;
-use crate::runtime::system::Blocks;
-use crate::runtime::Differentiable;
+use crate::runtime::{Differentiable, StateDerivatives};
 
 /// A method.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -208,14 +207,14 @@ where
         }
         let made = method.get_statistics();
         let equation = self.equation.borrow();
-        Ok(Statistics {
-            steps,
-            rejections: (made.number_of_error_test_failures + made.number_of_nonlinear_solver_fails) as u64,
-            evaluations: equation.evaluations,
-            jacobians: equation.jacobians,
-            factorisations: made.number_of_linear_solver_setups as u64,
-            iterations: made.number_of_nonlinear_solver_iterations as u64,
-        })
+        let mut statistics = Statistics::default();
+        statistics.steps = steps;
+        statistics.rejections = (made.number_of_error_test_failures + made.number_of_nonlinear_solver_fails) as u64;
+        statistics.evaluations = equation.evaluations;
+        statistics.jacobians = equation.jacobians;
+        statistics.factorisations = made.number_of_linear_solver_setups as u64;
+        statistics.iterations = made.number_of_nonlinear_solver_iterations as u64;
+        Ok(statistics)
     }
 }
 
@@ -233,7 +232,7 @@ struct Equation<'s, Y: Differentiable<Scalar = f64>> {
     at: (f64, Vec<f64>),
     rate: Vec<f64>,
     shifted: Vec<f64>,
-    blocks: [Y::Square; 4],
+    derivatives: StateDerivatives<Y::Momenta, Y::Square>,
     evaluations: u64,
     jacobians: u64,
 }
@@ -252,7 +251,7 @@ impl<'s, Y: Differentiable<Scalar = f64>> Equation<'s, Y> {
             at: (f64::NAN, vec![f64::NAN; n]),
             rate: vec![0.0; n],
             shifted: vec![0.0; n],
-            blocks: std::array::from_fn(|_| system.square()),
+            derivatives: system.zero_derivatives(),
             evaluations: 0,
             jacobians: 0,
             system,
@@ -303,16 +302,12 @@ impl<'s, Y: Differentiable<Scalar = f64>> Equation<'s, Y> {
     fn exact(&mut self, new: bool, t: f64, y: &[f64], along: &[f64], out: &mut [f64]) {
         if new {
             self.take(y);
-            let (mut v, mut pd) = (self.p.clone(), self.p.clone());
-            let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &mut self.blocks;
-            let blocks = Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp };
-            self.system.rate_derivatives(t, &self.q, &self.p, &mut v, &mut pd, blocks);
+            self.system.rate_derivatives(t, &self.q, &self.p, &mut self.derivatives);
         }
         let n = self.p.as_ref().len();
         let (dq, dp) = along.split_at(n);
         let times = |row: &Y::Momenta, x: &[f64]| row.as_ref().iter().zip(x).map(|(a, x)| a * x).sum::<f64>();
-        let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &self.blocks;
-        for (half, (by_q, by_p)) in out.chunks_mut(n).zip([(dv_dq, dv_dp), (dpd_dq, dpd_dp)]) {
+        for (half, [by_q, by_p]) in out.chunks_mut(n).zip(self.derivatives.blocks()) {
             for (out, (by_q, by_p)) in half.iter_mut().zip(by_q.as_ref().iter().zip(by_p.as_ref())) {
                 *out = times(by_q, dq) + times(by_p, dp);
             }

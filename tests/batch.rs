@@ -1,6 +1,6 @@
 //! Many states in one call: the numbers are those of single states, bit for bit, for any number of states.
 
-use multibody::runtime::batch::{Lengths, RatesBatch};
+use multibody::runtime::batch::{BatchError, RatesBatch};
 use multibody::runtime::kernel::{Kernel, Plain};
 
 multibody::mbd_model! { path = "models/ur5.urdf", name = Ur5, outputs = [rates, energy] }
@@ -109,7 +109,7 @@ fn lengths_are_checked() {
     let (mut qd, mut pd) = ([7.0; 6].map(|x| vec![x; 10]), [7.0; 6].map(|x| vec![x; 10]));
     pd[3].pop();
     let result = arm.rates_batch(slices(&q), slices(&p), slices(&tau), slices_mut(&mut qd), slices_mut(&mut pd));
-    assert_eq!(result, Err(Lengths { expected: 10, found: 9 }));
+    assert_eq!(result, Err(BatchError::Lengths { expected: 10, found: 9 }));
     assert_eq!(result.unwrap_err().to_string(), "a column has 9 numbers, the first has 10");
     assert!(qd.iter().chain(&pd).flatten().all(|x| *x == 7.0), "nothing is written");
 }

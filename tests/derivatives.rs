@@ -2,7 +2,7 @@
 
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::search;
-use multibody::runtime::{Blocks, Differentiable, Interpreter};
+use multibody::runtime::{Differentiable, Interpreter};
 
 multibody::mbd_model! {
     path = "models/double_pendulum.toml",
@@ -19,8 +19,7 @@ fn midpoint<M: Differentiable<Scalar = f64>>(
 ) -> Vec<f64> {
     let n = p.as_ref().len();
     let (q0, p0) = (q.clone(), p.clone());
-    let [mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp] = [m.square(), m.square(), m.square(), m.square()];
-    let (mut v, mut pd) = (m.zero_momenta(), m.zero_momenta());
+    let mut d = m.zero_derivatives();
     let mut residuals = Vec::new();
     for _ in 0..6 {
         let (mut q_mid, mut p_mid) = (q.clone(), p.clone());
@@ -28,13 +27,12 @@ fn midpoint<M: Differentiable<Scalar = f64>>(
             q_mid.as_mut()[k] = 0.5 * (q0.as_ref()[k] + q.as_ref()[k]);
             p_mid.as_mut()[k] = 0.5 * (p0.as_ref()[k] + p.as_ref()[k]);
         }
-        let blocks = Blocks { dv_dq: &mut dv_dq, dv_dp: &mut dv_dp, dpd_dq: &mut dpd_dq, dpd_dp: &mut dpd_dp };
-        m.rate_derivatives(0.0, &q_mid, &p_mid, &mut v, &mut pd, blocks);
-        let mut step: Vec<f64> = (0..n).map(|k| q.as_ref()[k] - q0.as_ref()[k] - h * v.as_ref()[k]).collect();
-        step.extend((0..n).map(|k| p.as_ref()[k] - p0.as_ref()[k] - h * pd.as_ref()[k]));
+        m.rate_derivatives(0.0, &q_mid, &p_mid, &mut d);
+        let mut step: Vec<f64> = (0..n).map(|k| q.as_ref()[k] - q0.as_ref()[k] - h * d.v.as_ref()[k]).collect();
+        step.extend((0..n).map(|k| p.as_ref()[k] - p0.as_ref()[k] - h * d.pd.as_ref()[k]));
         residuals.push(step.iter().fold(0.0_f64, |m, x| m.max(x.abs())));
         let entry = |a: usize, b: usize| {
-            let block = [[&dv_dq, &dv_dp], [&dpd_dq, &dpd_dp]][a / n][b / n];
+            let block = d.blocks()[a / n][b / n];
             f64::from(u8::from(a == b)) - 0.5 * h * block.as_ref()[a % n].as_ref()[b % n]
         };
         solve((0..2 * n).map(|a| (0..2 * n).map(|b| entry(a, b)).collect()).collect(), &mut step);

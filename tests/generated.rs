@@ -99,14 +99,14 @@ struct Given<const NQ: usize, const NV: usize> {
 
 macro_rules! input {
     (wrenches, $system:ident, $interpreter:ident, $random:ident) => {
-        for (ours, theirs) in $system.wrenches.iter_mut().zip(&mut $interpreter.inputs.wrenches) {
+        for (ours, theirs) in $system.wrenches.iter_mut().zip(&mut $interpreter.wrenches) {
             $random.fill(ours, 5.0);
             *theirs = *ours;
         }
     };
     ($list:ident, $system:ident, $interpreter:ident, $random:ident) => {
         $random.fill(&mut $system.$list, 3.0);
-        $interpreter.inputs.$list.copy_from_slice(&$system.$list);
+        $interpreter.$list.copy_from_slice(&$system.$list);
     };
 }
 

@@ -108,7 +108,7 @@ macro_rules! compare {
                 numbers(seed, &mut q);
                 numbers(seed + 50, &mut v);
                 numbers(seed + 90, &mut made.tau);
-                interpreter.inputs.tau.copy_from_slice(&made.tau);
+                interpreter.tau.copy_from_slice(&made.tau);
                 for k in made.quaternions() {
                     let norm = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
                     q[k..k + 4].iter_mut().for_each(|x| *x /= norm);

@@ -6,7 +6,7 @@ use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search;
-use multibody::runtime::constrained::{close, complete, Closing, Effort, Hold, Stabilisation};
+use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
 use multibody::runtime::integrate::{catalogue, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
@@ -163,9 +163,10 @@ fn they_keep_their_loops_and_their_energy() {
         let tolerance = 1e-9;
         let start =
             catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(tolerance)), compensated: false };
-        let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
-        let mut driver =
-            catalogue::explicit_bounded("verner9", &mut system, &start, hold).expect("it is there").expect("a start");
+        let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
+        let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
+            .expect("it is there")
+            .expect("a start");
         let energy = |system: &mut Interpreter<f64>, q: &[f64], p: &[f64]| system.energy(q, p);
         let (kinetic, potential) = energy(&mut system, &q, &p);
         let (before, mut scale, mut worst, mut open, mut rate) =
@@ -211,9 +212,9 @@ fn a_parallelogram_passes_its_change_points() {
     let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = sum(system.energy(&q, &p));
     let start = catalogue::Start { q: &q.clone(), p: &p.clone(), step: Step::Fixed(0.002), compensated: false };
-    let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
+    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
     let mut driver =
-        catalogue::explicit_bounded("dop853", &mut system, &start, hold).expect("it is there").expect("a start");
+        catalogue::explicit_with_post_step("dop853", &mut system, &start, hold).expect("it is there").expect("a start");
     let (mut apart, mut lost, mut passed, mut above) = (0.0_f64, 0.0_f64, 0, true);
     while driver.time() < 2.0 {
         driver.advance(&mut system, 2.0).expect("a step");
@@ -246,9 +247,10 @@ fn a_change_point_takes_no_energy() {
         step: Step::Adaptive(Tolerances::new(1e-9)),
         compensated: false,
     };
-    let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
-    let mut driver =
-        catalogue::explicit_bounded("verner9", &mut system, &start, hold).expect("it is there").expect("a start");
+    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
+    let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
+        .expect("it is there")
+        .expect("a start");
     let (mut apart, mut lost) = (0.0_f64, 0.0_f64);
     while driver.time() < 4.5 {
         driver.advance(&mut system, 4.5).expect("a step");
@@ -293,9 +295,10 @@ fn the_bicycle_rides_as_published() {
     system.momenta(&q, &v, &mut p);
     system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     let start = catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(1e-11)), compensated: false };
-    let hold = Hold::new(&system, Stabilisation::default(), Effort::default());
-    let mut driver =
-        catalogue::explicit_bounded("verner9", &mut system, &start, hold).expect("it is there").expect("a start");
+    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
+    let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
+        .expect("it is there")
+        .expect("a start");
     let (mut q, mut p) = (q.clone(), p.clone());
     let h = 0.1;
     let lean = |q: &[f64]| 2.0 * (q[4] * q[5] + q[6] * q[3]);

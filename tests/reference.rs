@@ -106,9 +106,9 @@ fn check(name: &str) {
         layout.q_from(&numbers(&state["q"]), &mut q);
         layout.v_from(&q, &numbers(&state["v"]), &mut v);
         layout.v_from(&q, &numbers(&state["tau"]), &mut tau);
-        interpreter.inputs.tau.copy_from_slice(&tau);
+        interpreter.tau.copy_from_slice(&tau);
         if let Some(list) = state.get("wrenches").and_then(Value::as_array) {
-            for (to, from) in interpreter.inputs.wrenches.iter_mut().zip(list) {
+            for (to, from) in interpreter.wrenches.iter_mut().zip(list) {
                 to.copy_from_slice(&numbers(from));
             }
         }
@@ -167,7 +167,7 @@ fn set_drives(plan: &Plan, data: &Value, state: &Value, interpreter: &mut Interp
         if drive["kind"] == "planar" {
             position = vec![position[0], position[1], position[3].atan2(position[2])];
         }
-        let inputs = &mut interpreter.inputs;
+        let inputs = &mut interpreter;
         for (to, key) in [(&mut inputs.drive_v, "v"), (&mut inputs.drive_a, "a")] {
             let rates = numbers(&given[key]);
             to[v..v + rates.len()].copy_from_slice(&rates);

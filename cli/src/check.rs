@@ -55,7 +55,7 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
     let closed = match model.constraints.is_empty() {
         true => None,
         false => {
-            let mut interpreter = Interpreter::new(plan.tree(&params), plan.gravity(&params));
+            let mut interpreter = plan.interpreter(&params);
             let start = plan.start();
             let assembly = loops::assemble(path, &plan, &mut interpreter, &start)?;
             loops::tell(path, &plan, &assembly);

@@ -74,7 +74,7 @@ impl Assembly {
 /// # Errors
 /// Loops that do not close are told with their places in the file at `path`.
 pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
-    interpreter.check_rank(start).map_err(|e| source::rank_failure(plan, &e))?;
+    interpreter.check_rank(start).map_err(|e| source::rank_failure(&e))?;
     let held = plan.held();
     let mut q = start.to_vec();
     let closing = Closing { held: &held, ..Closing::default() };

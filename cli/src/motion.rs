@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
-use multibody::runtime::constrained::{ConstraintError, Effort, Hold, PostStep, Stabilisation};
-use multibody::runtime::integrate::catalogue::{self, Drive, Start};
+use multibody::runtime::catalogue::{self, Drive, Start};
+use multibody::runtime::constrained::{ConstraintError, Effort, PostStep, Projection, Stabilisation};
 use multibody::runtime::integrate::{EnergyProjection, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Interpreter};
 
@@ -147,9 +147,9 @@ impl Observer {
     }
 }
 
-/// [`Hold`], with what it met.
+/// [`Projection`], with what it met.
 struct Keeper {
-    hold: Hold<Timed>,
+    hold: Projection<Timed>,
     met: Rc<RefCell<Drift>>,
 }
 
@@ -181,8 +181,9 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         Gravity::Input => [0.0, 0.0, -9.81],
         Gravity::Constant(_) => plan.gravity(&params),
     };
-    let mut interpreter = Interpreter::new(plan.tree(&params), gravity);
-    interpreter.check_rank(&q).map_err(|e| source::rank_failure(plan, &e))?;
+    let mut interpreter = plan.interpreter(&params);
+    interpreter.gravity = gravity;
+    interpreter.check_rank(&q).map_err(|e| source::rank_failure(&e))?;
     let mut p = vec![0.0; plan.dims.nv];
     interpreter.momenta(&q, &v, &mut p);
     let (mut residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
@@ -206,12 +207,14 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let made = match bound {
         false => catalogue::any(settings.method, &mut system, &start),
         true => {
-            let keeper =
-                |system: &Timed| Keeper { hold: Hold::new(system, settings.hold, Effort::default()), met: met.clone() };
-            let boundary = keeper(&system);
-            catalogue::implicit_bounded(settings.method, &mut system, &start, boundary).or_else(|| {
-                let boundary = keeper(&system);
-                catalogue::explicit_bounded(settings.method, &mut system, &start, boundary)
+            let keeper = |system: &Timed| Keeper {
+                hold: Projection::new(system, settings.hold, Effort::default()),
+                met: met.clone(),
+            };
+            let post_step = keeper(&system);
+            catalogue::implicit_with_post_step(settings.method, &mut system, &start, post_step).or_else(|| {
+                let post_step = keeper(&system);
+                catalogue::explicit_with_post_step(settings.method, &mut system, &start, post_step)
             })
         }
     };

@@ -8,7 +8,7 @@ use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search::{self, Chosen};
-use multibody::runtime::interp::RankLoss;
+use multibody::runtime::interp::MassMatrixError;
 
 use super::args::ModelArgs;
 use super::output::note;
@@ -99,10 +99,6 @@ pub fn tell_notices(path: &Path, notices: &[String]) {
 }
 
 /// The failure of a model whose mass matrix is singular: the mechanism cannot be moved by its own laws.
-pub fn rank_failure(plan: &Plan, e: &RankLoss) -> Failure {
-    let name = plan.velocity_names().get(e.velocity).cloned().unwrap_or_default();
-    Failure::new(
-        format!("the mass matrix is singular: freedom `{name}` moves an inertia of {:e}", e.inertia),
-        "give the bodies behind this joint mass and inertia, or the joint an armature",
-    )
+pub fn rank_failure(e: &MassMatrixError) -> Failure {
+    Failure::new(e.to_string(), "give the bodies behind this joint mass and inertia, or the joint an armature")
 }

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use multibody::runtime::system::{LieJoint, Row};
-use multibody::runtime::{Blocks, Constrained, Differentiable, Energetic, Interpreter, System};
+use multibody::runtime::{Constrained, Differentiable, Energetic, Interpreter, StateDerivatives, System};
 
 /// Time that calls of one kind take.
 #[derive(Clone, Copy, Debug, Default)]
@@ -133,12 +133,10 @@ impl Differentiable for Timed {
         t: f64,
         q: &Vec<f64>,
         p: &Vec<f64>,
-        v: &mut Vec<f64>,
-        pd: &mut Vec<f64>,
-        blocks: Blocks<'_, Vec<Vec<f64>>>,
+        out: &mut StateDerivatives<Vec<f64>, Vec<Vec<f64>>>,
     ) {
         let Timed { inner, derivatives, .. } = self;
-        derivatives.time(|| inner.rate_derivatives(t, q, p, v, pd, blocks));
+        derivatives.time(|| inner.rate_derivatives(t, q, p, out));
     }
     fn depends_on_time(&self) -> bool {
         self.inner.depends_on_time()

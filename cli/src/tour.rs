@@ -57,7 +57,7 @@ pub fn run(out: &mut dyn Write) -> Outcome {
     )?;
     counts(&plan, out)?;
     let params = plan.default_params();
-    let mut interpreter = Interpreter::new(plan.tree(&params), plan.gravity(&params));
+    let mut interpreter = plan.interpreter(&params);
     let mut generated = Ur5::new();
     let states = states();
     let numbers = compare(&states, &mut generated, &mut interpreter)?;
@@ -126,7 +126,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
     for (k, s) in states.iter().enumerate() {
         let zero: Array = [0.0; Ur5::NV];
         generated.tau = s.tau;
-        interpreter.inputs.tau.copy_from_slice(&s.tau);
+        interpreter.tau.copy_from_slice(&s.tau);
         let (mut a, mut b, mut c, mut d, mut v) = (zero, zero, zero, zero, zero);
         Ur5::rates(generated, &s.q, &s.p, &mut a, &mut b);
         interpreter.rates(&s.q, &s.p, &mut v, &mut c, &mut d);
@@ -147,7 +147,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
         same(k, "mass_matrix", &m.concat(), &n)?;
     }
     generated.tau = [0.0; Ur5::NV];
-    interpreter.inputs.tau.fill(0.0);
+    interpreter.tau.fill(0.0);
     Ok(numbers)
 }
 

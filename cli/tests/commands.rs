@@ -206,7 +206,7 @@ fn simulates_by_any_method() {
         let pairs = rows.iter().flatten().zip(reference.iter().flatten());
         pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
     };
-    for method in multibody::runtime::integrate::catalogue::entries() {
+    for method in multibody::runtime::catalogue::entries() {
         let low = method.title.contains("order 2") || method.title.contains("Euler");
         let (rows, text) = run(&["--method", method.name, "--step", "0.002"]);
         println!("{}: {:.1e}", method.name, apart(&rows));

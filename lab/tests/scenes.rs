@@ -107,7 +107,7 @@ mod generated {
     };
     use mbd_lab::scenes::Dynamics;
     use multibody::codegen::search::Wide;
-    use multibody::runtime::{Blocks, Differentiable, Scalar};
+    use multibody::runtime::{Differentiable, Scalar};
 
     use super::*;
 
@@ -199,13 +199,11 @@ mod generated {
         for state in states {
             fill(q.as_mut(), &state[0]);
             fill(p.as_mut(), &state[2]);
-            let (mut v, mut pd) = (system.zero_momenta(), system.zero_momenta());
-            let [mut a, mut b, mut c, mut d] = [(); 4].map(|()| system.square());
-            let blocks = Blocks { dv_dq: &mut a, dv_dp: &mut b, dpd_dq: &mut c, dpd_dp: &mut d };
-            system.rate_derivatives(Y::Scalar::zero(), &q, &p, &mut v, &mut pd, blocks);
-            results.push(("v", doubles(v.as_ref())));
-            results.push(("pd", doubles(pd.as_ref())));
-            for (name, block) in [("dv/dq", &a), ("dv/dp", &b), ("dpd/dq", &c), ("dpd/dp", &d)] {
+            let mut d = system.zero_derivatives();
+            system.rate_derivatives(Y::Scalar::zero(), &q, &p, &mut d);
+            results.push(("v", doubles(d.v.as_ref())));
+            results.push(("pd", doubles(d.pd.as_ref())));
+            for (name, block) in ["dv/dq", "dv/dp", "dpd/dq", "dpd/dp"].iter().zip(d.blocks().into_iter().flatten()) {
                 results.push((name, block.as_ref().iter().flat_map(|row| doubles(row.as_ref())).collect()));
             }
         }
@@ -296,7 +294,7 @@ mod generated {
 /// Where the mass matrix is badly conditioned, rounding keeps iterations from going on to the last digits: no reason to fail.
 #[test]
 fn implicit_steps_converge_on_chains() {
-    use multibody::runtime::integrate::catalogue::{any, entries, Start};
+    use multibody::runtime::catalogue::{any, entries, Start};
     use multibody::runtime::integrate::Step;
     for name in ["chain10", "chain10_friction"] {
         let scene = scenes::by_name(name).expect("a scene");

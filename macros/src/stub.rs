@@ -71,7 +71,7 @@ pub fn source(options: &Options) -> String {
             #[doc = \"\"] pub const VELOCITIES: [&'static str; {LENGTH}] = [\"\"; {LENGTH}];
             #[doc = \"\"] pub const fn new() -> Self {{ {name} {{ {values} }} }}
             {functions}
-            #[doc = \"\"] pub fn rates_batch<A0, A1, A2, A3, A4>(&self, _q: A0, _p: A1, _tau: A2, _qd: A3, _pd: A4) -> ::core::result::Result<(), {rt}::batch::Lengths> {{
+            #[doc = \"\"] pub fn rates_batch<A0, A1, A2, A3, A4>(&self, _q: A0, _p: A1, _tau: A2, _qd: A3, _pd: A4) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
                 ::core::result::Result::Ok(())
             }}
             #[doc = \"\"] pub fn lanes<const LANES: usize>(&self) -> {name}Lanes<LANES> {{ {name}Lanes {{ {lane_values} }} }}
@@ -107,7 +107,7 @@ pub fn source(options: &Options) -> String {
         impl {rt}::Differentiable for {name} {{
             type Square = [{array}; {LENGTH}];
             fn square(&self) -> [{array}; {LENGTH}] {{ [[0.0; {LENGTH}]; {LENGTH}] }}
-            fn rate_derivatives(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _v: &mut {array}, _pd: &mut {array}, _d: {rt}::Blocks<'_, [{array}; {LENGTH}]>) {{}}
+            fn rate_derivatives(&mut self, _t: {t}, _q: &{array}, _p: &{array}, _out: &mut {rt}::StateDerivatives<{array}, [{array}; {LENGTH}]>) {{}}
         }}
         impl {rt}::Constrained for {name} {{
             type Rows = {array};

@@ -1,34 +1,39 @@
 //! Rates of many states: columns in, columns out.
 //!
-//! A column holds one coordinate of every state, `q[k][s]` that of coordinate `k` in state `s`: so neighbouring states
-//! are computed side by side in vector registers, and nothing is turned around on the way. Generated types have a method
+//! A column holds one coordinate of every state, `q[k][s]` is coordinate `k` of state `s`: so neighbouring states are computed
+//! side by side in vector registers, and nothing is transposed on the way. Generated types have a method
 //! `rates_batch`; with feature `rayon`, `rates_parallel` gives the states to several threads.
 
 use crate::Scalar;
 
-/// Columns of different lengths.
+/// What can be wrong with the columns of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lengths {
-    /// That of the first column.
-    pub expected: usize,
-    /// One that differs.
-    pub found: usize,
+#[non_exhaustive]
+pub enum BatchError {
+    /// Two columns differ in length.
+    Lengths {
+        /// Length of the first column.
+        expected: usize,
+        /// Length of a column that differs.
+        found: usize,
+    },
 }
 
-impl core::fmt::Display for Lengths {
+impl core::fmt::Display for BatchError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "a column has {} numbers, the first has {}", self.found, self.expected)
+        let BatchError::Lengths { expected, found } = self;
+        write!(f, "a column has {found} numbers, the first has {expected}")
     }
 }
 
-impl core::error::Error for Lengths {}
+impl core::error::Error for BatchError {}
 
 /// A system whose rates can be computed for many states in one call. `NT` is `NV`, or 0 without joint forces.
 pub trait RatesBatch<T, const NQ: usize, const NV: usize, const NT: usize> {
-    /// Rates of any number of states; the columns are those of `q` (rad, m), `p`, `tau` (N m, N), `q̇` and `ṗ`.
+    /// Computes the rates of any number of states; the columns are those of `q` (rad, m), `p`, `tau` (N m, N), `q̇` and `ṗ`.
     ///
     /// # Errors
-    /// Columns of different lengths; nothing is written then.
+    /// [`BatchError::Lengths`]; nothing is written then.
     fn rates_batch(
         &self,
         q: [&[T]; NQ],
@@ -36,20 +41,20 @@ pub trait RatesBatch<T, const NQ: usize, const NV: usize, const NT: usize> {
         tau: [&[T]; NT],
         qd: [&mut [T]; NQ],
         pd: [&mut [T]; NV],
-    ) -> Result<(), Lengths>;
+    ) -> Result<(), BatchError>;
 }
 
-/// Length of all columns.
-fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, Lengths> {
+/// The length that all columns have.
+fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, BatchError> {
     let mut lengths = lengths.into_iter();
     let expected = lengths.next().unwrap_or(0);
     match lengths.find(|n| *n != expected) {
-        Some(found) => Err(Lengths { expected, found }),
+        Some(found) => Err(BatchError::Lengths { expected, found }),
         None => Ok(expected),
     }
 }
 
-/// States `at..at + L` of some columns. Behind the last state stands the last one again: a state that exists.
+/// Reads states `at..at + L` of the columns. Places behind the last state take the last one again: a state that exists.
 #[inline(always)]
 fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usize, block: &mut [[T; L]; N]) {
     for (column, lanes) in columns.iter().zip(block) {
@@ -63,7 +68,7 @@ fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usiz
     }
 }
 
-/// The way back.
+/// Writes a block to states `at..at + L` of the columns; what lies behind the last state is dropped.
 #[inline(always)]
 fn store<T: Scalar, const L: usize, const N: usize>(block: &[[T; L]; N], at: usize, columns: &mut [&mut [T]; N]) {
     for (lanes, column) in block.iter().zip(columns) {
@@ -79,7 +84,7 @@ fn store<T: Scalar, const L: usize, const N: usize>(block: &[[T; L]; N], at: usi
 /// Cuts columns into blocks of `L` states and runs a kernel on each; for generated code.
 ///
 /// # Errors
-/// Columns of different lengths.
+/// [`BatchError::Lengths`].
 #[inline]
 pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT: usize>(
     q: [&[T]; NQ],
@@ -88,7 +93,7 @@ pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT
     mut qd: [&mut [T]; NQ],
     mut pd: [&mut [T]; NV],
     mut kernel: impl FnMut(&[[T; L]; NQ], &[[T; L]; NV], &[[T; L]; NT], &mut [[T; L]; NQ], &mut [[T; L]; NV]),
-) -> Result<(), Lengths> {
+) -> Result<(), BatchError> {
     let inputs = q.iter().chain(&p).chain(&tau).map(|c| c.len());
     let n = length(inputs.chain(qd.iter().chain(&pd).map(|c| c.len())))?;
     let zero = [T::zero(); L];
@@ -108,7 +113,7 @@ pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT
 /// [`RatesBatch::rates_batch`] on the threads of rayon's pool. Every state's numbers are those of one thread alone.
 ///
 /// # Errors
-/// Columns of different lengths; nothing is written then.
+/// [`BatchError::Lengths`]; nothing is written then.
 #[cfg(feature = "rayon")]
 pub fn rates_parallel<S, T, const NQ: usize, const NV: usize, const NT: usize>(
     system: &S,
@@ -117,7 +122,7 @@ pub fn rates_parallel<S, T, const NQ: usize, const NV: usize, const NT: usize>(
     tau: [&[T]; NT],
     qd: [&mut [T]; NQ],
     pd: [&mut [T]; NV],
-) -> Result<(), Lengths>
+) -> Result<(), BatchError>
 where
     S: RatesBatch<T, NQ, NV, NT> + Sync,
     T: Scalar + Send + Sync,

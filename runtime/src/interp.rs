@@ -3,6 +3,7 @@
 mod directions;
 
 use alloc::boxed::Box;
+use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -10,42 +11,26 @@ use directions::DualRun;
 
 use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
-use crate::system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic};
-use crate::system::{LieGroup, LieJoint, Real, Row, System};
+use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
+use crate::system::{LieGroup, LieJoint, Part, Real, Row, StateDerivatives, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-/// What is given beside the state; public, to be set between calls.
-#[derive(Clone, Debug)]
-pub struct InputValues<S> {
-    /// Joint forces, one for each velocity, N m or N.
-    pub tau: Vec<S>,
-    /// Prescribed positions.
-    pub drive_q: Vec<S>,
-    /// Prescribed rates.
-    pub drive_v: Vec<S>,
-    /// Prescribed accelerations; needed for accelerations and reactions only.
-    pub drive_a: Vec<S>,
-    /// External wrenches `[force; moment]`.
-    pub wrenches: Vec<[S; 6]>,
-    /// Gravity in ground axes, m/s².
-    pub gravity: [S; 3],
-}
-
-impl<S: Scalar> InputValues<S> {
-    /// As the sweeps take it.
-    pub fn view(&self) -> Inputs<'_, S> {
+/// The inputs of an interpreter as the sweeps take them: a macro, since it borrows the fields of the inputs alone.
+macro_rules! inputs {
+    ($of:expr) => {
         Inputs {
-            tau: &self.tau,
-            drive_q: &self.drive_q,
-            drive_v: &self.drive_v,
-            drive_a: &self.drive_a,
-            wrenches: &self.wrenches,
-            gravity: self.gravity,
+            tau: &$of.tau,
+            drive_q: &$of.drive_q,
+            drive_v: &$of.drive_v,
+            drive_a: &$of.drive_a,
+            wrenches: &$of.wrenches,
+            gravity: $of.gravity,
         }
-    }
+    };
 }
+use inputs;
 
 /// Runs the sweeps on numbers. Allocates when it is made, never afterwards, but for room for derivatives, which is made
 /// when it is first needed.
@@ -59,8 +44,20 @@ pub struct Interpreter<S> {
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
-    /// Inputs of the next call.
-    pub inputs: InputValues<S>,
+    /// Joint forces, `nv` numbers, N m or N.
+    pub tau: Vec<S>,
+    /// Prescribed positions, rad, m; unit quaternions.
+    pub drive_q: Vec<S>,
+    /// Prescribed rates, rad/s, m/s.
+    pub drive_v: Vec<S>,
+    /// Prescribed accelerations, rad/s², m/s²; needed for accelerations and reactions only.
+    pub drive_a: Vec<S>,
+    /// External wrenches `[force; moment]`, N and N m.
+    pub wrenches: Vec<[S; 6]>,
+    /// Gravity in ground axes, m/s².
+    pub gravity: [S; 3],
+    /// Names of the velocities and of the constraints, as far as they were given.
+    names: [Vec<String>; 2],
     v: Vec<S>,
     groups: Vec<LieJoint>,
     rows: Vec<Row>,
@@ -102,27 +99,37 @@ impl<S: Scalar> Interpreter<S> {
                 }
             }
         }
-        let inputs = InputValues {
+        Interpreter {
             tau: vec![o; dims.nv],
             drive_q,
             drive_v: vec![o; dims.drive_v],
             drive_a: vec![o; dims.drive_v],
             wrenches: vec![[o; 6]; dims.wrenches],
             gravity,
-        };
-        Interpreter {
+            names: [Vec::new(), Vec::new()],
             work: Workspace::new(&tree),
             v: vec![o; dims.nv],
             rows: tree.rows(),
             entry_columns: tree.entry_columns(),
             tree,
             physical,
-            inputs,
             groups,
             neutral,
             derivatives: None,
             dual: None,
         }
+    }
+
+    /// Takes the names of the velocities and of the constraints, in their order, for the messages of errors.
+    #[must_use]
+    pub fn with_names(mut self, velocities: Vec<String>, constraints: Vec<String>) -> Self {
+        self.names = [velocities, constraints];
+        self
+    }
+
+    /// The inputs of the next call, as the sweeps take them.
+    pub fn inputs(&self) -> Inputs<'_, S> {
+        inputs!(self)
     }
 
     /// The tree that is run.
@@ -133,31 +140,31 @@ impl<S: Scalar> Interpreter<S> {
     /// `(q, p) → (v, q̇, ṗ)`.
     pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.rates(q, p, &self.inputs.view(), &mut self.work, v, qd, pd);
+        sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
     }
 
     /// `(q, p) → v`.
     pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.velocities(q, p, &self.inputs.view(), &mut self.work, v);
+        sweeps.velocities(q, p, &inputs!(self), &mut self.work, v);
     }
 
     /// `(q, v) → p`.
     pub fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.momenta(q, v, &self.inputs.view(), &mut self.work, p);
+        sweeps.momenta(q, v, &inputs!(self), &mut self.work, p);
     }
 
     /// `(q, p) → (kinetic, potential)`, J.
     pub fn energy(&mut self, q: &[S], p: &[S]) -> (S, S) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.energy(q, p, &self.inputs.view(), &mut self.work, &mut self.v)
+        sweeps.energy(q, p, &inputs!(self), &mut self.work, &mut self.v)
     }
 
     /// `(q, v) → v̇`.
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
-        sweeps.accelerations(q, v, &self.inputs.view(), &mut self.work, a);
+        sweeps.accelerations(q, v, &inputs!(self), &mut self.work, a);
     }
 
     /// `(q, v) → (v̇, reaction wrenches)`: `[force; moment]` transmitted by every joint to its child, in the child's
@@ -165,20 +172,20 @@ impl<S: Scalar> Interpreter<S> {
     pub fn reactions(&mut self, q: &[S], v: &[S], a: &mut [S], wrenches: &mut [[S; 6]]) {
         self.accelerations(q, v, a);
         let sweeps = Sweeps { tree: &self.physical, trace: &() };
-        sweeps.reactions(q, v, a, &self.inputs.view(), &mut self.work, wrenches);
+        sweeps.reactions(q, v, a, &inputs!(self), &mut self.work, wrenches);
     }
 
     /// `(q, v, v̇) → τ = M v̇ + h`. The joint forces of the inputs are not read.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], tau: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.inverse_dynamics(q, v, a, &self.inputs.view(), &mut self.work, tau);
+        sweeps.inverse_dynamics(q, v, a, &inputs!(self), &mut self.work, tau);
     }
 
     /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`: products of velocities, prescribed accelerations and gravity, less
     /// springs, dampers and external wrenches.
     pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.bias(q, v, &self.inputs.view(), &mut self.work, h);
+        sweeps.bias(q, v, &inputs!(self), &mut self.work, h);
     }
 
     /// `q →` Jacobian of every frame of [`Tree::frames`], `6 × nv` each, row by row: `J v` is the frame's velocity
@@ -186,7 +193,7 @@ impl<S: Scalar> Interpreter<S> {
     /// the rotation of [`Interpreter::frames`] on both halves.
     pub fn jacobians(&mut self, q: &[S], out: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.jacobians(q, &self.inputs.view(), &mut self.work, self.tree.frames.iter(), out);
+        sweeps.jacobians(q, &inputs!(self), &mut self.work, self.tree.frames.iter(), out);
     }
 
     /// `(q, v) →` acceleration `[linear; angular]` of every frame of [`Tree::frames`] at `v̇ = 0`, in its own axes: that of
@@ -195,63 +202,74 @@ impl<S: Scalar> Interpreter<S> {
     pub fn bias_accelerations(&mut self, q: &[S], v: &[S], out: &mut [[S; 6]]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
-        sweeps.bias_accelerations(q, v, &self.inputs.view(), &mut self.work, frames);
+        sweeps.bias_accelerations(q, v, &inputs!(self), &mut self.work, frames);
     }
 
     /// `q → M`, `nv × nv`, row by row.
     pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.mass_matrix(q, &self.inputs.view(), &mut self.work, m);
+        sweeps.mass_matrix(q, &inputs!(self), &mut self.work, m);
     }
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
     pub fn momentum_derivatives(&mut self, q: &[S], v: &[S], d: &mut Derivatives<S>, out: &mut MomentumDerivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.momentum_derivatives(q, v, &self.inputs.view(), &mut self.work, d, out);
+        sweeps.momentum_derivatives(q, v, &inputs!(self), &mut self.work, d, out);
     }
 
     /// `v`, `ṗ` and their derivatives with respect to `q` and `p`. `d` is [`Derivatives::new`] of
     /// [`Interpreter::tree`].
     pub fn derivatives(&mut self, q: &[S], p: &[S], d: &mut Derivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.derivatives(q, p, &self.inputs.view(), &mut self.work, d);
+        sweeps.derivatives(q, p, &inputs!(self), &mut self.work, d);
     }
 
     /// `(q, v) →` pose and velocity of every frame of [`Tree::frames`].
     pub fn frames(&mut self, q: &[S], v: &[S], out: &mut [FrameState<S>]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
-        sweeps.frame_states(q, v, &self.inputs.view(), &mut self.work, frames);
+        sweeps.frame_states(q, v, &inputs!(self), &mut self.work, frames);
     }
 }
 
-/// A mass matrix without full rank: some freedom moves no inertia.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RankLoss {
-    /// Velocity index of the freedom.
-    pub velocity: usize,
-    /// Inertia it moves, all other freedoms outboard of it being free: zero, negative or not a number.
-    pub inertia: f64,
+/// What can be wrong with a mass matrix.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum MassMatrixError {
+    /// The matrix has no full rank: a freedom moves no inertia.
+    Singular {
+        /// Velocity index of the freedom.
+        velocity: usize,
+        /// Name of the freedom, where the interpreter knows it ([`Interpreter::with_names`]).
+        name: Option<String>,
+        /// Inertia it moves, all other freedoms outboard of it being free: zero, negative or not a number.
+        inertia: f64,
+    },
 }
 
-impl core::fmt::Display for RankLoss {
+impl core::fmt::Display for MassMatrixError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let RankLoss { velocity, inertia } = self;
-        write!(f, "the mass matrix is singular: velocity {velocity} moves an inertia of {inertia:e}")
+        let MassMatrixError::Singular { velocity, name, inertia } = self;
+        write!(f, "the mass matrix is singular: ")?;
+        match name {
+            Some(name) => write!(f, "freedom `{name}`")?,
+            None => write!(f, "velocity {velocity}")?,
+        }
+        write!(f, " moves an inertia of {inertia:e}")
     }
 }
 
-impl core::error::Error for RankLoss {}
+impl core::error::Error for MassMatrixError {}
 
 impl<S: Real> Interpreter<S> {
     /// Whether every freedom moves a positive inertia at the coordinates `q`. The sweeps themselves do not look: where
     /// this fails, velocities and accelerations are infinite or not numbers.
     ///
     /// # Errors
-    /// [`RankLoss`] for the first freedom, outboard first, without inertia.
-    pub fn check_rank(&mut self, q: &[S]) -> Result<(), RankLoss> {
+    /// [`MassMatrixError::Singular`] for the first freedom, outboard first, without inertia.
+    pub fn check_rank(&mut self, q: &[S]) -> Result<(), MassMatrixError> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.prepare(q, &self.inputs.view(), &mut self.work, false);
+        sweeps.prepare(q, &inputs!(self), &mut self.work, false);
         let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| {
             match (node.source, node.elimination.unknown) {
                 (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
@@ -267,19 +285,19 @@ impl<S: Real> Interpreter<S> {
             .zip(&self.work.factor.unknown_pivots)
             .filter_map(|(s, pivot)| Some((s.velocity()?, pivot.rho)));
         // A zero pivot spoils those inboard of it: it is the one to name.
-        let mut spoiled = None;
+        let mut found = None;
         for (velocity, rho) in own.chain(shared) {
-            let loss = RankLoss { velocity, inertia: 1.0 / rho.to_f64() };
-            if loss.inertia.is_nan() {
-                spoiled = spoiled.or(Some(loss));
+            let inertia = 1.0 / rho.to_f64();
+            if inertia.is_nan() {
+                found = found.or(Some((velocity, inertia)));
             } else if !(rho.is_finite() && rho > S::zero()) {
-                return Err(loss);
+                found = Some((velocity, inertia));
+                break;
             }
         }
-        if let Some(loss) = spoiled {
-            return Err(loss);
-        }
-        Ok(())
+        let Some((velocity, inertia)) = found else { return Ok(()) };
+        let name = self.names[0].get(velocity).cloned();
+        Err(MassMatrixError::Singular { velocity, name, inertia })
     }
 }
 
@@ -310,7 +328,16 @@ impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
 
     fn rates_at(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.rates(q, p, &self.inputs.view(), &mut self.work, &mut self.v, qd, pd);
+        sweeps.rates(q, p, &inputs!(self), &mut self.work, &mut self.v, qd, pd);
+    }
+
+    fn part_name(&self, part: Part) -> Option<&str> {
+        let [velocities, constraints] = &self.names;
+        let name = match part {
+            Part::Velocity(k) => velocities.get(k),
+            Part::Constraint(k) => constraints.get(k),
+        };
+        name.map(String::as_str)
     }
 
     fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {
@@ -358,23 +385,23 @@ impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
 
     fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.constraint_residuals(q, &self.inputs.view(), &mut self.work, residual, jacobian);
+        sweeps.constraint_residuals(q, &inputs!(self), &mut self.work, residual, jacobian);
     }
 
     fn project_momenta(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         self.v.copy_from_slice(p);
-        sweeps.project_momenta(q, &self.v, &self.inputs.view(), &mut self.work, v, p, sigma);
+        sweeps.project_momenta(q, &self.v, &inputs!(self), &mut self.work, v, p, sigma);
     }
 
     fn position_correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.position_correction(q, &self.inputs.view(), &mut self.work, residual, dq, pivots);
+        sweeps.position_correction(q, &inputs!(self), &mut self.work, residual, dq, pivots);
     }
 
     fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
-        sweeps.multipliers(q, v, &self.inputs.view(), &mut self.work, &mut self.v, lambda);
+        sweeps.multipliers(q, v, &inputs!(self), &mut self.work, &mut self.v, lambda);
     }
 }
 
@@ -386,27 +413,19 @@ impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
         vec![vec![S::zero(); nv]; nv]
     }
 
-    fn rate_derivatives(
-        &mut self,
-        _t: S,
-        q: &Vec<S>,
-        p: &Vec<S>,
-        v: &mut Vec<S>,
-        pd: &mut Vec<S>,
-        derivatives: Blocks<'_, Vec<Vec<S>>>,
-    ) {
+    fn rate_derivatives(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, out: &mut StateDerivatives<Vec<S>, Vec<Vec<S>>>) {
         if !self.tree.constraints.is_empty() {
             let mut run = self.dual.take().unwrap_or_else(|| Box::new(DualRun::new(&self.tree)));
-            run.derivatives(&self.inputs, q, p, v, pd, derivatives);
+            run.derivatives(&inputs!(self), q, p, out);
             self.dual = Some(run);
             return;
         }
         let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
         self.derivatives(q, p, &mut d);
-        v.copy_from_slice(&d.v);
-        pd.copy_from_slice(&d.pd);
-        let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = derivatives;
-        for (to, from) in [(dv_dq, &d.dv_dq), (dv_dp, &d.dv_dp), (dpd_dq, &d.dpd_dq), (dpd_dp, &d.dpd_dp)] {
+        out.v.copy_from_slice(&d.v);
+        out.pd.copy_from_slice(&d.pd);
+        let blocks = [&d.dv_dq, &d.dv_dp, &d.dpd_dq, &d.dpd_dp];
+        for (to, from) in out.blocks_mut().into_iter().flatten().zip(blocks) {
             for (row, from) in to.iter_mut().zip(from.chunks(p.len().max(1))) {
                 row.copy_from_slice(from);
             }

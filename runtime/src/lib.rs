@@ -14,8 +14,12 @@ extern crate std;
 #[cfg(feature = "alloc")]
 mod acceleration_form;
 pub mod batch;
+#[cfg(feature = "alloc")]
+pub mod catalogue;
+mod constant;
 pub mod constrained;
 mod dual;
+mod error;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;
@@ -39,7 +43,8 @@ pub mod workspace;
 #[cfg(feature = "alloc")]
 pub use acceleration_form::AccelerationForm;
 pub use dual::Dual;
+pub use error::{ConstraintError, Named, StepError};
 #[cfg(feature = "alloc")]
-pub use interp::{Interpreter, RankLoss};
+pub use interp::{Interpreter, MassMatrixError};
 pub use scalar::Scalar;
-pub use system::{Accelerated, Blocks, Conjugate, Constrained, Differentiable, Energetic, Real, System};
+pub use system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Real, StateDerivatives, System};

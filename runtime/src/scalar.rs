@@ -1,6 +1,6 @@
 //! The number types with which a sweep can be run.
 
-use crate::integrate::Constant;
+use crate::constant::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number type with the four operations, sine, cosine, square root and a guarded reciprocal. There is no comparison and no

@@ -4,9 +4,9 @@ use crate::Scalar;
 
 /// A scalar that can be compared, for code that watches results (integrators), never for sweeps.
 pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
-    /// Neither infinite nor NaN.
+    /// Whether it is neither infinite nor NaN.
     fn is_finite(self) -> bool;
-    /// As a double.
+    /// The nearest double.
     fn to_f64(self) -> f64;
     /// Distance of the next number after one.
     fn epsilon() -> f64;
@@ -14,11 +14,11 @@ pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
     fn from_index(index: usize) -> Self {
         Self::constant(index as f64)
     }
-    /// The other way.
+    /// The count that a number is: the inverse of [`Real::from_index`].
     fn index(self) -> usize {
         self.to_f64() as usize
     }
-    /// Without its sign.
+    /// Absolute value.
     fn abs(self) -> Self {
         if self < Self::zero() {
             -self
@@ -63,6 +63,11 @@ impl Real for f32 {
 ///
 /// `q` has `nq` coordinates (rad, m, unit quaternions x, y, z, w), `p` has `nv ≤ nq` momenta. Joint forces, prescribed
 /// motions, wrenches and parameters are fields of the implementing type, set between calls.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a mechanism with rates of its state",
+    label = "the trait `System` is not implemented",
+    note = "a generated type has it with `rates` among its outputs: `outputs = [rates, ..]` in `mbd_model!`, `--outputs rates` on the command line"
+)]
 pub trait System {
     /// Number type.
     type Scalar: Scalar + core::fmt::Debug;
@@ -90,8 +95,21 @@ pub trait System {
         qd: &mut Self::Coordinates,
         pd: &mut Self::Momenta,
     );
+    /// Name of a part, for messages; none where it is not known.
+    fn part_name(&self, _part: Part) -> Option<&str> {
+        None
+    }
     /// `q̇ = N(q) v`: coordinate rates of given velocities.
     fn coordinate_rates(&self, q: &Self::Coordinates, v: &Self::Momenta, qd: &mut Self::Coordinates);
+}
+
+/// A part of a mechanism that may have a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// A velocity, by its index into `v` and `p`.
+    Velocity(usize),
+    /// A constraint, by its index as in [`Row::constraint`].
+    Constraint(usize),
 }
 
 /// A joint whose state lies on a Lie group: where it stands, and of which kind it is.
@@ -154,18 +172,33 @@ impl LieJoint {
 }
 
 /// A [`System`] whose energy is known.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not give its energy",
+    label = "the trait `Energetic` is not implemented",
+    note = "a generated type has it with `energy` among its outputs: `outputs = [rates, energy, ..]`"
+)]
 pub trait Energetic: System {
     /// Kinetic and potential energy, J.
     fn energies(&mut self, q: &Self::Coordinates, p: &Self::Momenta) -> (Self::Scalar, Self::Scalar);
 }
 
 /// A mechanism that gives the momenta of given velocities.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not give the momenta of velocities",
+    label = "the trait `Conjugate` is not implemented",
+    note = "a generated type has it with `momenta` among its outputs: `outputs = [rates, momenta, ..]`"
+)]
 pub trait Conjugate: System {
     /// `(q, v) → p`.
     fn conjugate_momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
 }
 
 /// A mechanism that gives accelerations at given velocities.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not give its accelerations",
+    label = "the trait `Accelerated` is not implemented",
+    note = "a generated type has it with `accelerations` among its outputs: `outputs = [rates, accelerations, ..]`"
+)]
 pub trait Accelerated: System {
     /// `(q, v) → v̇`.
     fn generalized_accelerations(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
@@ -176,6 +209,11 @@ pub trait Accelerated: System {
 /// Columns with respect to `q` are derivatives along `q̇ = N(q) e_k`, the direction in which velocity `k` alone moves the
 /// coordinates: for angles and slides the partial derivatives, for joints with quaternions and planar joints those with
 /// respect to a small displacement in body axes. Joint forces add to `ṗ`: `∂ṗ/∂τ = 1`, `∂v/∂τ = 0`.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not give the derivatives of its rates",
+    label = "the trait `Differentiable` is not implemented",
+    note = "a generated type has it with `derivatives` among its outputs: `outputs = [rates, derivatives, ..]`; explicit methods and those by fixed-point iteration do without"
+)]
 pub trait Differentiable: System {
     /// Rows of an `nv × nv` matrix.
     type Square: Clone + core::fmt::Debug + AsRef<[Self::Momenta]> + AsMut<[Self::Momenta]>;
@@ -186,29 +224,48 @@ pub trait Differentiable: System {
     fn depends_on_time(&self) -> bool {
         false
     }
+    /// Zeros in the shape of the derivatives: room for [`Differentiable::rate_derivatives`].
+    fn zero_derivatives(&self) -> StateDerivatives<Self::Momenta, Self::Square> {
+        let (zero, square) = (|| self.zero_momenta(), || self.square());
+        StateDerivatives { v: zero(), pd: zero(), dv_dq: square(), dv_dp: square(), dpd_dq: square(), dpd_dp: square() }
+    }
     /// Velocities and momentum rates at time `t` (s), and their derivatives.
     fn rate_derivatives(
         &mut self,
         t: Self::Scalar,
         q: &Self::Coordinates,
         p: &Self::Momenta,
-        v: &mut Self::Momenta,
-        pd: &mut Self::Momenta,
-        derivatives: Blocks<'_, Self::Square>,
+        out: &mut StateDerivatives<Self::Momenta, Self::Square>,
     );
 }
 
-/// Where the derivatives go, `nv × nv` each.
-#[derive(Debug)]
-pub struct Blocks<'a, M> {
-    /// `∂v/∂q`.
-    pub dv_dq: &'a mut M,
-    /// `∂v/∂p`, the inverse of the mass matrix.
-    pub dv_dp: &'a mut M,
-    /// `∂ṗ/∂q`.
-    pub dpd_dq: &'a mut M,
-    /// `∂ṗ/∂p`.
-    pub dpd_dp: &'a mut M,
+/// Velocities `v` and momentum rates `ṗ` of a state, and their derivatives with respect to coordinates and momenta.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StateDerivatives<V, M> {
+    /// Velocities, `nv` numbers.
+    pub v: V,
+    /// Momentum rates, `nv` numbers.
+    pub pd: V,
+    /// `∂v/∂q`, `nv × nv`; columns as [`Differentiable`] says.
+    pub dv_dq: M,
+    /// `∂v/∂p`, `nv × nv`: the inverse of the mass matrix.
+    pub dv_dp: M,
+    /// `∂ṗ/∂q`, `nv × nv`.
+    pub dpd_dq: M,
+    /// `∂ṗ/∂p`, `nv × nv`.
+    pub dpd_dp: M,
+}
+
+impl<V, M> StateDerivatives<V, M> {
+    /// The four blocks: rows `v`, `ṗ`; columns `q`, `p`.
+    pub fn blocks(&self) -> [[&M; 2]; 2] {
+        [[&self.dv_dq, &self.dv_dp], [&self.dpd_dq, &self.dpd_dp]]
+    }
+
+    /// The four blocks, to be changed.
+    pub fn blocks_mut(&mut self) -> [[&mut M; 2]; 2] {
+        [[&mut self.dv_dq, &mut self.dv_dp], [&mut self.dpd_dq, &mut self.dpd_dp]]
+    }
 }
 
 /// One scalar constraint of a [`Constrained`] system: a row of `Φ v = b`.
@@ -233,6 +290,11 @@ pub struct Row {
 /// Constraints hold in the velocities of every evaluation, to round-off; redundant rows are recognised and left out. `Φ`
 /// is `rows × nv`, one column for each velocity, and the force of the constraints on the joints is `−Φᵀλ`. It is given by the
 /// entries that can be other than zero, row by row.
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not give its constraints",
+    label = "the trait `Constrained` is not implemented",
+    note = "a generated type of a mechanism with loops or couplings has it with the outputs `outputs = [rates, constraint_residuals, project_momenta, position_correction, multipliers]`"
+)]
 pub trait Constrained: System {
     /// One number for each row.
     type Rows: Clone + core::fmt::Debug + AsRef<[Self::Scalar]> + AsMut<[Self::Scalar]>;

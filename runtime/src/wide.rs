@@ -4,8 +4,8 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use twofloat::TwoFloat;
 
-use crate::integrate::constant::list;
-use crate::integrate::Constant;
+use crate::constant::list;
+use crate::constant::Constant;
 use crate::{Real, Scalar};
 
 /// A double-double number of about 106 bits.

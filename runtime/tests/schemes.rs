@@ -1,8 +1,8 @@
-//! Displacements one after the other, step doubling, compositions, the doubled phase space.
+//! Displacements one after the other, step doubling, the semi-implicit Euler method.
 
 use mbd_runtime::integrate::{
-    Chart, Composition, Doubled, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling,
-    Stepper, Symmetric, Tolerances,
+    Chart, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling, Stepper, Tolerances,
+    Verner9,
 };
 use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::System;
@@ -135,81 +135,7 @@ fn state(method: &mut impl Stepper<Swing>, time: f64, steps: u32) -> [f64; 4] {
 }
 
 fn reference(time: f64) -> [f64; 4] {
-    state(&mut Composition::new(&Swing, Doubled::new(&Swing, 2.0), Symmetric::KAHAN_LI_8), time, 400 * time as u32)
-}
-
-/// Conditions of order on the lengths: all sums of odd powers (*Geometric Numerical Integration*, V.3.2), the ones of mixed
-/// kind show in [`orders_of_compositions`].
-#[test]
-fn lengths() {
-    fn check<const S: usize>(lengths: Symmetric<S>) {
-        let steps: [f64; S] = lengths.steps();
-        assert!((0..S).all(|k| steps[k] == steps[S - 1 - k]));
-        for power in (1..lengths.order as i32).step_by(2) {
-            let sum: f64 = steps.iter().map(|x| x.powi(power)).sum();
-            let size: f64 = steps.iter().map(|x| x.abs().powi(power)).sum();
-            let expected = f64::from(u8::from(power == 1));
-            assert!((sum - expected).abs() < 4.0 * f64::from(power) * size * f64::EPSILON, "{S}: {power}: {sum}");
-        }
-    }
-    check(Symmetric::YOSHIDA_4);
-    check(Symmetric::SUZUKI_4);
-    check(Symmetric::YOSHIDA_6);
-    check(Symmetric::KAHAN_LI_6);
-    check(Symmetric::KAHAN_LI_8);
-}
-
-#[test]
-fn orders_of_compositions() {
-    let time = 4.0;
-    let exact = reference(time);
-    let order = |run: &dyn Fn(u32) -> [f64; 4], steps: u32| {
-        let [coarse, fine] = [steps, 2 * steps].map(|n| largest(&run(n), &exact));
-        println!("{steps} steps: error {coarse:.1e}, {fine:.1e}, order {:.2}", (coarse / fine).log2());
-        (coarse / fine).log2()
-    };
-    fn of<const S: usize>(lengths: Symmetric<S>) -> impl Fn(u32) -> [f64; 4] {
-        move |n| state(&mut Composition::new(&Swing, Doubled::new(&Swing, 2.0), lengths), 4.0, n)
-    }
-    assert!((order(&|n| state(&mut Doubled::new(&Swing, 2.0), time, n), 200) - 2.0).abs() < 0.1);
-    assert!((order(&of(Symmetric::YOSHIDA_4), 200) - 4.0).abs() < 0.2);
-    assert!((order(&of(Symmetric::SUZUKI_4), 100) - 4.0).abs() < 0.2);
-    assert!((order(&of(Symmetric::YOSHIDA_6), 100) - 6.0).abs() < 0.4);
-    assert!((order(&of(Symmetric::KAHAN_LI_6), 50) - 6.0).abs() < 0.4);
-    assert!((order(&of(Symmetric::KAHAN_LI_8), 20) - 8.0).abs() < 0.6);
-}
-
-/// A symmetric method, run backwards, comes back. From equal copies the doubled phase space does so only if they are kept.
-#[test]
-fn compositions_come_back() {
-    let mut method = Composition::new(&Swing, Doubled::new(&Swing, 2.0), Symmetric::SUZUKI_4);
-    let (mut q, mut p) = Swing::START;
-    for h in [[0.1; 50], [-0.1; 50]].concat() {
-        method.step(&mut Swing, 0.0, h, &mut q, &mut p).unwrap();
-    }
-    let (q0, p0) = Swing::START;
-    assert!(largest(&q, &q0).max(largest(&p, &p0)) < 1e-12, "{q:?} {p:?}");
-}
-
-#[test]
-fn copies_stay_near_each_other() {
-    let mut method = Doubled::new(&Swing, 10.0);
-    let (mut q, mut p) = Swing::START;
-    let energy = Swing::energy(&q, &p);
-    let mut gap = Point::zero(&Swing);
-    let (mut widest, mut drift) = (0.0_f64, 0.0_f64);
-    for k in 0..100_000 {
-        method.step(&mut Swing, f64::from(k) * 0.01, 0.01, &mut q, &mut p).unwrap();
-        method.gap(&mut gap);
-        widest = widest.max(largest(&gap.x, &[0.0; 2])).max(largest(&gap.p, &[0.0; 2]));
-        drift = drift.max((Swing::energy(&q, &p) - energy).abs());
-    }
-    println!("gap {widest:.1e}, energy {drift:.1e}");
-    // Of the size of the square of the step, over a thousand seconds.
-    assert!(widest > 0.0 && widest < 1e-3, "{widest:e}");
-    assert!(drift < 1e-3, "{drift:e}");
-    // Three evaluations a step, and the first one.
-    assert_eq!(method.statistics().evaluations, 300_001);
+    state(&mut Verner9::new(&Swing), time, 400 * time as u32)
 }
 
 /// Where the Hamiltonian is separable this is the symplectic method: for the oscillator `H = (p² + q²)/2` it keeps
@@ -278,9 +204,9 @@ fn step_doubling_meets_tolerances() {
         ([q[0], q[1], p[0], p[1]], [s.steps, s.rejections, s.evaluations])
     }
     for tolerance in [1e-5, 1e-8] {
-        let (state, counts) = run(StepDoubling::new(&Swing, Rk4::new(&Swing)), tolerance, time);
+        let (state, counts) = run(StepDoubling::over(&Swing, Rk4::new(&Swing)), tolerance, time);
         let (better, same) = run(StepDoubling::extrapolated(&Swing, Rk4::new(&Swing)), tolerance, time);
-        let (other, more) = run(StepDoubling::new(&Swing, Midpoint::new(&Swing)), tolerance, time);
+        let (other, more) = run(StepDoubling::over(&Swing, Midpoint::new(&Swing)), tolerance, time);
         let [a, b, c] = [&state, &better, &other].map(|s| largest(s, &exact) / tolerance);
         println!("{tolerance:e}: {a:.1} {counts:?}, extrapolated {b:.1} {same:?}, midpoint {c:.1} {more:?}");
         // Every step adds at most one tolerance; what the motion makes of them is of the size of one in two periods.
@@ -302,7 +228,7 @@ fn orders_of_step_doubling() {
     assert!(
         (order(&|n| state(&mut StepDoubling::extrapolated(&Swing, Euler::new(&Swing)), 4.0, n), 400) - 2.0).abs() < 0.2
     );
-    assert!((order(&|n| state(&mut StepDoubling::new(&Swing, Rk4::new(&Swing)), 4.0, n), 50) - 4.0).abs() < 0.2);
+    assert!((order(&|n| state(&mut StepDoubling::over(&Swing, Rk4::new(&Swing)), 4.0, n), 50) - 4.0).abs() < 0.2);
     assert!(
         (order(&|n| state(&mut StepDoubling::extrapolated(&Swing, Rk4::new(&Swing)), 4.0, n), 50) - 5.0).abs() < 0.4
     );

@@ -267,7 +267,7 @@ impl Rows<'_> {
         let q = &self.state.q;
         let nv = self.plan.dims.nv;
         let driven: Vec<f64> = self.rates(&mut i, q, &vec![0.0; nv]).concat().iter().map(|x| -x).collect();
-        i.inputs.drive_v.fill(0.0);
+        i.drive_v.fill(0.0);
         let mut phi = vec![vec![0.0; nv]; driven.len()];
         for k in 0..nv {
             for (row, x) in phi.iter_mut().zip(self.rates(&mut i, q, &unit_of(nv, k)).concat()) {
@@ -283,7 +283,7 @@ impl Rows<'_> {
         let (mut i, q) = self.moving(v);
         let constant = |v: &[f64]| v.iter().map(|x| Dual::new(*x, 0.0)).collect::<Vec<_>>();
         let gamma: Vec<f64> = self.rates(&mut i, &q, &constant(v)).concat().iter().map(|x| x.du).collect();
-        i.inputs.drive_v.fill(Dual::new(0.0, 0.0));
+        i.drive_v.fill(Dual::new(0.0, 0.0));
         let mut rows = vec![vec![0.0; nv]; gamma.len()];
         for k in 0..nv {
             let column = self.rates(&mut i, &q, &constant(&unit_of(nv, k))).concat();

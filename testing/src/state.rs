@@ -97,11 +97,11 @@ impl State {
         let all = |list: &[f64]| list.iter().map(|x| lift(*x, 0.0)).collect::<Vec<S>>();
         let mut i = Interpreter::new(plan.tree(&all(&self.params)), self.gravity.map(|x| lift(x, 0.0)));
         let both = |x: &[f64], dx: &[f64]| x.iter().zip(dx).map(|(x, dx)| lift(*x, *dx)).collect::<Vec<S>>();
-        i.inputs.tau = all(&self.tau);
-        i.inputs.drive_q = both(&self.drive[0], &drive_rates(plan, &self.drive[0], &self.drive[1]));
-        i.inputs.drive_v = both(&self.drive[1], &self.drive[2]);
-        i.inputs.drive_a = all(&self.drive[2]);
-        i.inputs.wrenches = self.wrenches.iter().map(|w| w.map(|x| lift(x, 0.0))).collect();
+        i.tau = all(&self.tau);
+        i.drive_q = both(&self.drive[0], &drive_rates(plan, &self.drive[0], &self.drive[1]));
+        i.drive_v = both(&self.drive[1], &self.drive[2]);
+        i.drive_a = all(&self.drive[2]);
+        i.wrenches = self.wrenches.iter().map(|w| w.map(|x| lift(x, 0.0))).collect();
         i
     }
 }
@@ -127,11 +127,12 @@ pub fn parameter<S: Scalar>(
         Gravity::Input => s.gravity.map(Dual::constant),
     };
     let mut varied = Interpreter::new(plan.tree(&varied), gravity);
-    varied.inputs = s.interpreter_of(plan, |x, _| Dual::constant(x)).inputs;
-    varied.inputs.gravity = gravity;
+    let given = s.interpreter_of(plan, |x, _| Dual::constant(x));
+    (varied.tau, varied.wrenches) = (given.tau, given.wrenches);
+    (varied.drive_q, varied.drive_v, varied.drive_a) = (given.drive_q, given.drive_v, given.drive_a);
     let mut column = ParameterDerivatives::new(varied.tree());
     let sweeps = Sweeps { tree: varied.tree(), trace: &() };
-    column.compute(&sweeps, gravity, q, &i.inputs.view(), at);
+    column.compute(&sweeps, gravity, q, &i.inputs(), at);
     (column, varied)
 }
 

@@ -142,9 +142,9 @@ impl Case {
         };
         let mut i = Interpreter::new(self.plan.tree(params), gravity);
         let fixed = |x: &[f64]| x.iter().map(|x| Dual::constant(*x)).collect::<Vec<Dual<f64>>>();
-        i.inputs.tau = fixed(&s.tau);
-        [i.inputs.drive_q, i.inputs.drive_v, i.inputs.drive_a] = s.drive.each_ref().map(|x| fixed(x));
-        i.inputs.wrenches = s.wrenches.iter().map(|w| w.map(Dual::constant)).collect();
+        i.tau = fixed(&s.tau);
+        [i.drive_q, i.drive_v, i.drive_a] = s.drive.each_ref().map(|x| fixed(x));
+        i.wrenches = s.wrenches.iter().map(|w| w.map(Dual::constant)).collect();
         let zeros = |n| vec![Dual::zero(); n];
         let (mut v, mut qd, mut pd) = (zeros(q.len()), zeros(q.len()), zeros(p.len()));
         v.truncate(p.len());

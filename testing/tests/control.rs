@@ -56,7 +56,7 @@ fn inverse_dynamics_is_the_change_of_momentum() {
         let mut p = vec![D::default(); nv];
         i.momenta(&q, &c.dual_v(), &mut p);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
-        c.i.inputs.tau.fill(0.0);
+        c.i.tau.fill(0.0);
         c.i.rates(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
         let other: Vec<f64> = p.iter().zip(&pd).map(|(p, pd)| p.du - pd).collect();
         c.near("tau", &tau, &other, largest(&pd))
@@ -131,7 +131,7 @@ fn jacobians_take_velocities_to_those_of_frames() {
         let (nv, n) = (c.plan.dims.nv, c.plan.frames.len());
         let mut jacobians = vec![0.0; 6 * nv * n];
         c.i.jacobians(&c.s.q, &mut jacobians);
-        c.i.inputs.drive_v.fill(0.0);
+        c.i.drive_v.fill(0.0);
         let mut frames = vec![FrameState::ground(); n];
         c.i.frames(&c.s.q, &c.s.v, &mut frames);
         let ours: Vec<f64> = match nv {

@@ -147,7 +147,7 @@ fn derivatives_at_given_velocities_are_those_of_dual_numbers() {
         let mut along = |dq: &[f64], dv: &[f64]| {
             let (mut p, mut pd) = (vec![zero; nv], vec![zero; nv]);
             let (q, v) = (dual(&c.s.q, dq), dual(&c.s.v, dv));
-            sweeps.momenta_and_rates(&q, &v, &i.inputs.view(), &mut w, &mut p, &mut pd);
+            sweeps.momenta_and_rates(&q, &v, &i.inputs(), &mut w, &mut p, &mut pd);
             [p, pd]
         };
         let du = |list: &[D]| list.iter().map(|x| x.du).collect::<Vec<f64>>();

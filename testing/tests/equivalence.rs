@@ -103,7 +103,7 @@ fn regrouped_trees_move_as_described_ones() {
         let sweeps = Sweeps { tree: &tree, trace: &() };
         let mut w = Workspace::new(&tree);
         let i = s.interpreter(&plan);
-        let u = i.inputs.view();
+        let u = i.inputs();
         let (nq, nv) = (plan.dims.nq, plan.dims.nv);
         let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
         let (mut a, mut m) = (vec![0.0; nv], vec![0.0; nv * nv]);

@@ -68,7 +68,7 @@ impl Scene {
     /// Without anything that takes energy out or puts it in.
     fn conservative(mut self) -> Scene {
         self.state.tau.fill(0.0);
-        self.i.inputs.tau.fill(Number::zero());
+        self.i.tau.fill(Number::zero());
         self
     }
 

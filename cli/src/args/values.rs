@@ -3,7 +3,7 @@
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use multibody::codegen::import::words;
 use multibody::codegen::Output;
-use multibody::runtime::integrate::catalogue;
+use multibody::runtime::catalogue;
 
 use super::{OutputList, DEFAULT_RUNTIME};
 

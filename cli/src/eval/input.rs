@@ -35,7 +35,7 @@ pub struct State {
 impl State {
     /// Sets the inputs of the interpreter.
     pub fn apply(&self, interpreter: &mut Interpreter<f64>) {
-        let inputs = &mut interpreter.inputs;
+        let inputs = interpreter;
         inputs.tau.copy_from_slice(&self.tau);
         if let Some(q) = &self.drive_q {
             inputs.drive_q.copy_from_slice(q);

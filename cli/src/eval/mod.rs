@@ -105,7 +105,7 @@ fn standard_input() -> Outcome<String> {
 fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) -> Result<String, (usize, Failure)> {
     // Parameters of the file, not the defaults of the model.
     let params = &inputs.params;
-    let mut interpreter = Interpreter::new(plan.tree(params), plan.gravity(params));
+    let mut interpreter = plan.interpreter(params);
     // What is not solved for exists without inertia; nothing else does.
     let unsolved = |w: &Quantity| {
         matches!(w, Quantity::Momenta | Quantity::MassMatrix | Quantity::Bias | Quantity::InverseDynamics)
@@ -115,7 +115,7 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
     for (k, state) in inputs.states.iter().enumerate() {
         state.apply(&mut interpreter);
         if needs_rank {
-            interpreter.check_rank(&state.q).map_err(|e| (k, source::rank_failure(plan, &e)))?;
+            interpreter.check_rank(&state.q).map_err(|e| (k, source::rank_failure(&e)))?;
         }
         for open in loops::violated(plan, &mut interpreter, &state.q, &state.v) {
             note(format_args!("states[{k}]: warning: {open}"));

@@ -133,7 +133,7 @@ pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
-    pub fn rates_batch(&self, {arguments}) -> ::core::result::Result<(), {rt}::batch::Lengths> {{
+    pub fn rates_batch(&self, {arguments}) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
         {rt}::batch::run::<{t}, {width}, {}, {}, _>(q, p, {given}, qd, pd, |q, p, tau, qd, pd| {{
             {rt}::kernel::call_lanes::<Self, {}, {width}, {t}, _>({ports});
         }})
@@ -153,7 +153,7 @@ pub fn batch_trait(out: &mut String, plan: &Plan, options: &Options) {
         "
 #[rustfmt::skip]
 impl {rt}::batch::RatesBatch<{t}, {nq}, {nv}, {nt}> for {name} {{
-    fn rates_batch(&self, q: [&[{t}]; {nq}], p: [&[{t}]; {nv}], tau: [&[{t}]; {nt}], qd: [&mut [{t}]; {nq}], pd: [&mut [{t}]; {nv}]) -> ::core::result::Result<(), {rt}::batch::Lengths> {{
+    fn rates_batch(&self, q: [&[{t}]; {nq}], p: [&[{t}]; {nv}], tau: [&[{t}]; {nt}], qd: [&mut [{t}]; {nq}], pd: [&mut [{t}]; {nv}]) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
         let _ = tau;
         Self::rates_batch(self, q, p, {given}qd, pd)
     }}

@@ -81,6 +81,11 @@ impl Writer<'_> {
             Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{group}, {q}, {v})"))
         });
         let joints = joints.collect::<Vec<_>>().join(", ");
+        let constraints = match plan.constraint_names() {
+            none if none.is_empty() => "{ let _ = k; None }".to_string(),
+            names => format!("const {{ &{names:?} }}.get(k).copied()"),
+        };
+        let part = format!("{rt}::system::Part");
         let items = [
             alias("Scalar", t),
             alias("Coordinates", q),
@@ -91,6 +96,13 @@ impl Writer<'_> {
             method(
                 &format!("rates_at(&mut self, _t: {t}, q: &{q}, p: &{v}, qd: &mut {q}, pd: &mut {v})"),
                 "Self::rates(self, q, p, qd, pd);",
+            ),
+            method(
+                &format!("part_name(&self, part: {part}) -> Option<&str>"),
+                &format!(
+                    "match part {{\n            {part}::Velocity(k) => Self::VELOCITIES.get(k).copied(),\n            \
+                     {part}::Constraint(k) => {constraints},\n        }}"
+                ),
             ),
             method(
                 &format!("coordinate_rates(&self, q: &{q}, v: &{v}, qd: &mut {q})"),
@@ -125,13 +137,14 @@ impl Writer<'_> {
     fn differentiable(&mut self, nv: usize) {
         let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
         let square = format!("[{v}; {nv}]");
-        let arguments = format!("_t: {t}, q: &{q}, p: &{v}, v: &mut {v}, pd: &mut {v}, d: {rt}::Blocks<'_, {square}>");
+        let arguments = format!("_t: {t}, q: &{q}, p: &{v}, out: &mut {rt}::StateDerivatives<{v}, {square}>");
         let items = [
             alias("Square", &square),
             method(&format!("square(&self) -> {square}"), &format!("[[0.0; {nv}]; {nv}]")),
             method(
                 &format!("rate_derivatives(&mut self, {arguments})"),
-                "Self::derivatives(self, q, p, v, pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);",
+                "let d = out;\n        Self::derivatives(\n            self, q, p, &mut d.v, &mut d.pd, &mut d.dv_dq, &mut d.dv_dp, &mut d.dpd_dq, \
+                 &mut d.dpd_dp,\n        );",
             ),
         ];
         self.implement("Differentiable", &items);

@@ -64,6 +64,7 @@ impl Plan {
     /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
     pub fn interpreter(&self, params: &[f64]) -> Interpreter<f64> {
         Interpreter::new(self.tree(params), self.gravity(params))
+            .with_names(self.velocity_names(), self.constraint_names())
     }
 
     /// Gravity of the model at given parameters; zero where it is an input, to be set with every call.

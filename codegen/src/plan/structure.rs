@@ -209,6 +209,11 @@ impl Plan {
         })
     }
 
+    /// Names of the loops and couplings, in the order of the description.
+    pub fn constraint_names(&self) -> Vec<String> {
+        self.model.constraints.iter().map(|c| c.name.clone()).collect()
+    }
+
     /// Names of the velocities (momenta, joint forces), in state order.
     pub fn velocity_names(&self) -> Vec<String> {
         self.state_names(|kind| match kind {

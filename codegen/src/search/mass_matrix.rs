@@ -1,8 +1,8 @@
 //! How far outward the mass matrix carries screws.
 
-use crate::plan::Plan;
 use crate::options::Options;
 use crate::output::Output;
+use crate::plan::Plan;
 use crate::trace::trace;
 
 /// Trees with more nodes than this are not searched.

@@ -12,6 +12,6 @@ pub mod passes;
 mod program;
 
 pub use cost::{cost, Cost, BYTES};
-pub use passes::Rewrite;
 pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, Name, Op, Operand};
+pub use passes::Rewrite;
 pub use program::{Counts, Program, ProgramResult};

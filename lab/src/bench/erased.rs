@@ -2,7 +2,9 @@
 
 use crate::scenes::{Dynamics, Scene};
 use multibody::runtime::system::LieJoint;
-use multibody::runtime::{Accelerated, Blocks, Conjugate, Differentiable, Energetic, Interpreter, Real, System};
+use multibody::runtime::{
+    Accelerated, Conjugate, Differentiable, Energetic, Interpreter, Real, StateDerivatives, System,
+};
 
 /// What a scene is asked for, on slices.
 trait Calls<S> {
@@ -61,23 +63,21 @@ impl<Y: Dynamics> Calls<Y::Scalar> for Held<Y> {
     }
 }
 
-/// The four blocks of derivatives, row by row.
-type Rows<'a, S> = [&'a mut [Vec<S>]; 4];
+/// Rates and their derivatives, in vectors.
+type Rows<S> = StateDerivatives<Vec<S>, Vec<Vec<S>>>;
 
-/// Rates of velocities and momenta and their derivatives, on slices.
-type Derivatives<S> = Box<dyn FnMut(S, &[S], &[S], &mut [S], &mut [S], Rows<'_, S>)>;
+/// Computes them at a time and a state.
+type Derivatives<S> = Box<dyn FnMut(S, &[S], &[S], &mut Rows<S>)>;
 
 fn derivatives<Y: Dynamics + Differentiable + 'static>(mut y: Y) -> Derivatives<Y::Scalar> {
-    let (mut q, mut p, mut v, mut pd) = (y.neutral(), y.zero_momenta(), y.zero_momenta(), y.zero_momenta());
-    let mut blocks = [y.square(), y.square(), y.square(), y.square()];
-    Box::new(move |t, q_, p_, v_, pd_, rows| {
+    let (mut q, mut p, mut d) = (y.neutral(), y.rest(), y.zero_derivatives());
+    Box::new(move |t, q_, p_, out| {
         q.as_mut().copy_from_slice(q_);
         p.as_mut().copy_from_slice(p_);
-        let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &mut blocks;
-        y.rate_derivatives(t, &q, &p, &mut v, &mut pd, Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp });
-        v_.copy_from_slice(v.as_ref());
-        pd_.copy_from_slice(pd.as_ref());
-        for (to, from) in rows.into_iter().zip(&blocks) {
+        y.rate_derivatives(t, &q, &p, &mut d);
+        out.v.copy_from_slice(d.v.as_ref());
+        out.pd.copy_from_slice(d.pd.as_ref());
+        for (to, from) in out.blocks_mut().into_iter().flatten().zip(d.blocks().into_iter().flatten()) {
             for (to, from) in to.iter_mut().zip(from.as_ref()) {
                 to.copy_from_slice(from.as_ref());
             }
@@ -163,21 +163,10 @@ impl<S: Real + 'static> Differentiable for Erased<S> {
         self.interpreter.square()
     }
 
-    fn rate_derivatives(
-        &mut self,
-        t: S,
-        q: &Vec<S>,
-        p: &Vec<S>,
-        v: &mut Vec<S>,
-        pd: &mut Vec<S>,
-        blocks: Blocks<'_, Vec<Vec<S>>>,
-    ) {
+    fn rate_derivatives(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, out: &mut Rows<S>) {
         match &mut self.derivatives {
-            None => self.interpreter.rate_derivatives(t, q, p, v, pd, blocks),
-            Some(derivatives) => {
-                let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = blocks;
-                derivatives(t, q, p, v, pd, [dv_dq, dv_dp, dpd_dq, dpd_dp]);
-            }
+            None => self.interpreter.rate_derivatives(t, q, p, out),
+            Some(derivatives) => derivatives(t, q, p, out),
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::scenes::Scene;
-use multibody::runtime::integrate::catalogue::{self, Start};
+use multibody::runtime::catalogue::{self, Start};
 use multibody::runtime::integrate::{EnergyProjection, Step};
 use multibody::runtime::{Energetic, System};
 use serde::Serialize;

@@ -17,7 +17,7 @@ use crate::scenes::{self, Scene};
 use crate::args::bench::{Bench, BenchArgs, Choice, LongArgs, WorkArgs};
 use mbd_cli::{note, write_file};
 use mbd_cli::{Failure, Outcome};
-use multibody::runtime::integrate::catalogue;
+use multibody::runtime::catalogue;
 use sample::Sample;
 use work::{Reference, Variant};
 

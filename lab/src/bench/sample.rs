@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use multibody::runtime::integrate::catalogue::{self, Drive, Made, Start};
+use multibody::runtime::catalogue::{self, Drive, Made, Start};
 use multibody::runtime::integrate::{Statistics, Step, StepError, Tolerances};
 use multibody::runtime::{Energetic, Real, Scalar, System};
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! What every scene says to every method.
 
 use crate::scenes::{self, Scene};
-use multibody::runtime::integrate::catalogue::{self, Start};
+use multibody::runtime::catalogue::{self, Start};
 use multibody::runtime::integrate::Step;
 use multibody::runtime::{Energetic, Interpreter, Real};
 use serde::Serialize;

@@ -178,7 +178,7 @@ pub fn ratios(measured: &[Measured]) -> String {
                 least(&|s: &&Series| s.name == name && (method.is_empty() || s.method.eq_ignore_ascii_case(method)))
             };
             let explicit = |s: &&Series| {
-                let entry = multibody::runtime::integrate::catalogue::entry(s.method);
+                let entry = multibody::runtime::catalogue::entry(s.method);
                 s.name == Variant::Hamilton.name() && entry.is_some_and(|e| !e.implicit)
             };
             let Some((best, name)) = least(&explicit) else { continue };

@@ -2,7 +2,7 @@
 
 use crate::generated::{visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable};
 use crate::scenes::{Dynamics, Expect, Scene};
-use multibody::runtime::integrate::catalogue::{self, Entry, Start};
+use multibody::runtime::catalogue::{self, Entry, Start};
 use multibody::runtime::wide::Wide;
 use multibody::runtime::{AccelerationForm, Differentiable, Energetic, Real};
 

@@ -1,60 +1,54 @@
 //! Motion of [`Constrained`] systems.
 //!
-//! | variant | momenta | positions | cost at the end of a step |
+//! | method | momenta | positions | cost at the end of a step |
 //! | --- | --- | --- | --- |
 //! | [`Stabilisation::None`] | `σ` adds up | drift | nothing |
 //! | [`Stabilisation::Momenta`] | re-zeroed | drift, by the method's error | one solve |
 //! | [`Stabilisation::Mass`] | re-zeroed | closed | one solve, and one for each iteration and the last look |
 //! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
 //! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
-//!
 //! | `CoordinatePartition` with `Repartition` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
 //! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
 //! | [`RadauIndex2`] | re-zeroed | drift | inside of the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
 //!
-//! The first five are wrapped around any method ([`WithPostStep`], [`Hold`]; by name `catalogue::explicit_bounded` and
-//! `implicit_bounded`); minimal coordinates are a [`System`](crate::System) of their own, and the last two are methods on a
+//! The first five are done by a [`Projection`] around any method ([`WithPostStep`]; by name `catalogue::explicit_with_post_step` and
+//! `implicit_with_post_step`). [`Projection::fixed_work`] is [`Stabilisation::Mass`] with a number of iterations that is fixed when it is
+//! compiled, for firmware. A `CoordinatePartition` is a [`System`](crate::System) of its own, and the last two are methods on a
 //! system with and without its constraints ([`OpenAndClosed`]).
 //!
-//! Methods that remember rates of the past go on with their `σ`, as their history must. [`Stabilisation::Mass`] is the choice
-//! where nothing speaks for another: what it costs is small, and of a mechanism that passes a singular position it loses least.
-//! There steps of given size step past; a tight error control sees the rates' round-off and may not get by.
+//! Methods that remember rates of past steps keep their multipliers `σ`, as their history requires. [`Stabilisation::Mass`] is the
+//! choice where nothing speaks for another: it costs little, and of a mechanism that passes a singular position it loses least.
+//! Fixed steps pass such a position; a tight error control sees the rates' round-off there and may not get by.
 //!
-//! [`Steady`] is the third of them with a number of iterations that is fixed when it is compiled, for firmware.
-//!
-//! States to begin with come from `close` and `complete`.
+//! Functions `close` and `complete` find states to begin with.
 
 #[cfg(feature = "alloc")]
 mod basic;
 #[cfg(feature = "alloc")]
 mod blocks;
-mod boundary;
 #[cfg(feature = "alloc")]
 mod close;
 #[cfg(feature = "alloc")]
-mod dense;
-mod ends;
-mod error;
-mod hold;
-mod index_two;
+mod coordinate_partition;
 #[cfg(feature = "alloc")]
-mod minimal;
+mod dense;
+mod open_and_closed;
+mod post_step;
+mod projection;
+mod radau;
 mod rattle;
 mod rows;
-mod split;
-mod steady;
 
-pub use boundary::{PostStep, WithPostStep};
+pub use crate::error::ConstraintError;
 #[cfg(feature = "alloc")]
 pub use close::{close, complete, Closed, Closing};
-pub use error::ConstraintError;
-pub use hold::{Effort, Hold, Stabilisation};
-pub use index_two::RadauIndex2;
 #[cfg(feature = "alloc")]
-pub use minimal::{CoordinatePartition, Repartition, Switch};
-pub use rattle::Rattle;
-pub use split::{OpenAndClosed, Unconstrained};
-pub use steady::Steady;
+pub use coordinate_partition::{CoordinatePartition, Repartition, Switch};
+pub use open_and_closed::{OpenAndClosed, Unconstrained};
+pub use post_step::{PostStep, WithPostStep};
+pub use projection::{Effort, FixedWork, Policy, Projection, Room, Stabilisation, ToTolerance};
+pub use radau::{RadauIndex2, RadauIndex2Scheme};
+pub use rattle::{Rattle, RattleScheme};
 
 #[cfg(doc)]
 use crate::Constrained;

@@ -1,10 +1,9 @@
 //! RATTLE for any Hamiltonian.
 
-use super::ends::Ends;
+use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
-use super::split::Unconstrained;
 use super::ConstraintError;
-use crate::integrate::{hermite, Chart, Field, Point, Statistics, StepError, Stepper};
+use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, StepError};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -21,16 +20,17 @@ const ITERATIONS: u32 = 100;
 /// `q̇`, `ṗ` are those of the open system, and all of it is solved by inserting: 3 evaluations, a correction of positions and two
 /// sweeps for its multipliers each time. Momenta are `M v` at both ends. Constraints and open system must not depend on time, and
 /// be holonomic for the energy's sake.
+pub type Rattle<Y> = Integrator<Y, RattleScheme<Y>>;
+
+/// The scheme of [`Rattle`].
 #[derive(Clone, Debug)]
-pub struct Rattle<Y: Unconstrained>
+pub struct RattleScheme<Y: Unconstrained>
 where
     Y::Scalar: Real,
 {
-    field: Field<Y>,
-    statistics: Statistics,
-    evaluations: u64,
     fixed: Option<u32>,
-    delta: Point<Y>,
+    /// Rate of the closed system at the start.
+    rate: Point<Y>,
     /// Half a step: momenta alone.
     half: Point<Y>,
     /// Rates at both ends with these.
@@ -45,23 +45,18 @@ where
     other: Y::Momenta,
     work: [Y::Momenta; 2],
     qd: Y::Coordinates,
-    ends: Ends<Y>,
 }
 
-impl<Y> Rattle<Y>
+impl<Y> FromSystem<Y> for RattleScheme<Y>
 where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// Room for one system.
-    pub fn new(system: &Y) -> Self {
+    fn new(system: &Y) -> Self {
         let (point, state) = (|| Point::zero(system), || (system.neutral(), system.zero_momenta()));
-        Rattle {
-            field: Field::new(system, false),
-            statistics: Statistics::default(),
-            evaluations: 0,
+        RattleScheme {
             fixed: None,
-            delta: point(),
+            rate: point(),
             half: point(),
             first: point(),
             second: point(),
@@ -73,72 +68,94 @@ where
             other: system.zero_momenta(),
             work: [system.zero_momenta(), system.zero_momenta()],
             qd: system.neutral(),
-            ends: Ends::new(system),
         }
     }
+}
 
-    /// Exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+impl<Y> Rattle<Y>
+where
+    Y: Unconstrained,
+    Y::Scalar: Real,
+{
+    /// The same method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
     #[must_use]
-    pub fn with_iterations(mut self, n: u32) -> Self {
-        self.fixed = Some(n);
-        self
+    pub fn with_iterations(self, n: u32) -> Self {
+        self.map(|scheme| RattleScheme { fixed: Some(n), ..scheme })
     }
 
     /// Multipliers of the first half of the last step: forces and moments of the constraints, N and N m.
     pub fn lambda(&self) -> &Y::Rows {
-        &self.lambda
+        &self.scheme().lambda
     }
+}
 
+impl<Y> RattleScheme<Y>
+where
+    Y: Unconstrained,
+    Y::Scalar: Real,
+{
     /// Rates of the open system: at the start with the momenta of half a step, or at the end.
-    fn open(&mut self, system: &mut Y, t: Y::Scalar, end: bool) {
+    fn open(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, end: bool) {
         let (q, p) = (&mut self.state.0, &mut self.state.1);
-        let (point, out) = if end { (&self.delta, &mut self.second) } else { (&self.half, &mut self.first) };
-        let chart = self.field.chart();
+        let (point, out) = if end { (&step.delta, &mut self.second) } else { (&self.half, &mut self.first) };
+        let chart = step.field.chart();
         chart.state(system, point, q, p);
         system.open_rates(t, q, p, &mut self.qd, &mut out.p);
         chart.rates(system, point, (q, p), &self.qd, out);
-        self.evaluations += 1;
+        step.statistics.evaluations += 1;
     }
 
     /// One iteration; how much it changed the end's positions, or they are off, relative to the largest.
-    fn iterate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<f64, ConstraintError> {
+    fn iterate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+    ) -> Result<f64, ConstraintError> {
         let half = Y::Scalar::constant(0.5) * h;
         // The force at the start, in the chart's axes.
         let [force, _] = &mut self.work;
         force.as_mut().fill(Y::Scalar::zero());
         add_forces(system, &self.entries, &self.lambda, force);
         Chart::forces(system, &self.start.0, &self.half, force);
-        self.open(system, t, false);
+        self.open(step, system, t, false);
         let forces = self.work[0].as_ref();
         for ((p, rate), force) in self.half.p.as_mut().iter_mut().zip(self.first.p.as_ref()).zip(forces) {
             *p = half * (*rate - *force);
         }
         // Once more at the new momenta: multipliers that worked on old ones would swing.
-        self.open(system, t, false);
-        self.delta.p.as_mut().copy_from_slice(self.half.p.as_ref());
-        self.open(system, t + h, true);
-        self.other.as_mut().copy_from_slice(self.delta.x.as_ref());
+        self.open(step, system, t, false);
+        step.delta.p.as_mut().copy_from_slice(self.half.p.as_ref());
+        self.open(step, system, t + h, true);
+        self.other.as_mut().copy_from_slice(step.delta.x.as_ref());
         let rates = self.first.x.as_ref().iter().zip(self.second.x.as_ref());
-        for (x, (first, second)) in self.delta.x.as_mut().iter_mut().zip(rates) {
+        for (x, (first, second)) in step.delta.x.as_mut().iter_mut().zip(rates) {
             *x = half * (*first + *second);
         }
-        let size = worst(self.start.0.as_ref()).1.to_f64().max(worst(self.delta.x.as_ref()).1.to_f64());
-        for (old, new) in self.other.as_mut().iter_mut().zip(self.delta.x.as_ref()) {
+        let size = worst(self.start.0.as_ref()).1.to_f64().max(worst(step.delta.x.as_ref()).1.to_f64());
+        for (old, new) in self.other.as_mut().iter_mut().zip(step.delta.x.as_ref()) {
             *old = *old - *new;
         }
         let change = worst(self.other.as_ref()).1.to_f64().abs();
-        let open = self.correct(system, t, h)?;
-        self.statistics.iterations += 1;
+        let open = self.correct(step, system, t, h)?;
+        step.statistics.iterations += 1;
         // Not a number is no small change.
         let change = if change.is_finite() { change.max(open) } else { f64::INFINITY };
         Ok(if change == 0.0 { 0.0 } else { change / size })
     }
 
     /// Multipliers that bring the end nearer to where it is closed, and how far off it is.
-    fn correct(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<f64, ConstraintError> {
+    fn correct(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+    ) -> Result<f64, ConstraintError> {
         let [dq, momenta] = &mut self.work;
         let [residual, sigma] = &mut self.rows;
-        self.field.chart().state(system, &self.delta, &mut self.state.0, &mut self.state.1);
+        step.field.chart().state(system, &step.delta, &mut self.state.0, &mut self.state.1);
         system.position_correction(&self.state.0, residual, dq, sigma);
         let (index, size) = worst(dq.as_ref());
         if !size.is_finite() {
@@ -154,11 +171,17 @@ where
         Ok(size.to_f64())
     }
 
-    fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), ConstraintError> {
+    fn solve(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+    ) -> Result<(), ConstraintError> {
         let mut last = f64::INFINITY;
         let epsilon = Y::Scalar::epsilon();
         for iteration in 1..=self.fixed.unwrap_or(ITERATIONS) {
-            let change = self.iterate(system, t, h)?;
+            let change = self.iterate(step, system, t, h)?;
             if self.fixed.is_some() {
                 continue;
             }
@@ -168,7 +191,7 @@ where
             // Round-off, or as near to it as it comes.
             if change <= 2.0 * epsilon || (iteration > 3 && change >= last && change <= 256.0 * epsilon) {
                 // Momenta lag by one.
-                return self.iterate(system, t, h).map(|_| ());
+                return self.iterate(step, system, t, h).map(|_| ());
             }
             last = change;
         }
@@ -179,7 +202,7 @@ where
     }
 }
 
-impl<Y> Stepper<Y> for Rattle<Y>
+impl<Y> Scheme<Y> for RattleScheme<Y>
 where
     Y: Unconstrained,
     Y::Scalar: Real,
@@ -188,78 +211,40 @@ where
         2
     }
 
-    fn error_order(&self) -> Option<u32> {
-        None
-    }
-
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        self.ends.forget();
-        self.field.load(system, t, q, p)
-    }
-
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         _scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
         let wrong = |error| StepError::Constraint { time: t.to_f64(), error };
-        self.ends.forget_end();
-        self.field.chart().base(system, &mut self.start.0, &mut self.start.1);
+        step.field.chart().base(system, &mut self.start.0, &mut self.start.1);
         system.constraint_residuals(&self.start.0, &mut self.rows[0], &mut self.entries);
         if !worst(self.lambda.as_ref()).1.is_finite() {
             self.lambda.as_mut().fill(Y::Scalar::zero());
         }
         // From the multipliers of the last step, which change little, and from rest.
         self.half.clear();
-        self.delta.clear();
-        self.solve(system, t, h).map_err(wrong)?;
-        self.open(system, t + h, true);
+        step.delta.clear();
+        self.solve(step, system, t, h).map_err(wrong)?;
+        self.open(step, system, t + h, true);
         let half = Y::Scalar::constant(0.5) * h;
-        for (p, rate) in self.delta.p.as_mut().iter_mut().zip(self.second.p.as_ref()) {
+        for (p, rate) in step.delta.p.as_mut().iter_mut().zip(self.second.p.as_ref()) {
             *p = *p + half * *rate;
         }
         // The second multipliers: the projection of momenta at the end.
         let ((q, p), new) = ((&mut self.state.0, &mut self.state.1), &mut self.other);
-        self.field.chart().state(system, &self.delta, q, p);
+        step.field.chart().state(system, &step.delta, q, p);
         new.as_mut().copy_from_slice(p.as_ref());
         let ([v, _], [sigma, _]) = (&mut self.work, &mut self.rows);
         system.project_momenta(t + h, q, new, v, sigma);
-        Chart::correct(system, (q, p), (q, new), &mut self.delta);
+        Chart::correct(system, (q, p), (q, new), &mut step.delta);
         Ok(0.0)
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
-    }
-
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        self.ends.start(&mut self.field, system, t)
-    }
-
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        self.ends.end(&mut self.field, system, t + h, &self.delta)
-    }
-
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        self.ends.forget();
-        self.statistics.steps += 1;
-        Ok(())
-    }
-
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.start_rate(system, t);
-        self.end_rate(system, t, h);
-        hermite(h, theta, &self.delta, self.ends.both(), out);
-    }
-
-    fn corrected(&mut self) {
-        self.ends.forget_end();
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics { evaluations: self.evaluations + self.field.evaluations(), ..self.statistics }
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.rate
     }
 }

@@ -11,9 +11,9 @@
 //! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
 //! the exponential: its inverse differential is a polynomial.
 
-use super::constant::Constant;
 use super::group::normalise;
 use super::StepError;
+use crate::constant::Constant;
 use crate::system::{LieJoint, Real, System};
 use crate::Scalar;
 
@@ -172,18 +172,6 @@ where
     /// About the neutral state. `compensated` sums of steps carry on what rounding takes from them.
     pub fn new(system: &Y, compensated: bool) -> Self {
         Chart { q: system.neutral(), p: system.zero_momenta(), carry: compensated.then(|| Point::zero(system)) }
-    }
-
-    /// About the state of another chart, what it carries on included if this one carries something on.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.q.as_mut().copy_from_slice(other.q.as_ref());
-        self.p.as_mut().copy_from_slice(other.p.as_ref());
-        if let Some(carry) = &mut self.carry {
-            match &other.carry {
-                Some(other) => carry.copy_from(other),
-                None => carry.clear(),
-            }
-        }
     }
 
     /// About another state.

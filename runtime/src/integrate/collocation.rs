@@ -13,12 +13,12 @@
 //! coordinates of a step are those about its start, not its middle, so a step back does not lead back exactly.
 
 use super::chart::{Chart, Point};
-use super::field::Field;
-use super::fixed::FixedIterations;
-use super::formulas::Formula;
+use super::integrator::{Attempt, FromSystem, Scheme};
 use super::newton::Iteration;
-use super::stepper::{hermite, norm, Statistics, Stepper};
-use super::{Constant, StepError};
+use super::stepper::{hermite, norm};
+use super::tableau::{self, Mode};
+use super::StepError;
+use crate::constant::Constant;
 use crate::system::{Real, System};
 use crate::Scalar;
 
@@ -41,11 +41,19 @@ enum Derivatives {
     New,
 }
 
+/// A method with `S` stages, by name.
+pub trait Formula<const S: usize> {
+    /// Its coefficients.
+    const TABLEAU: &'static tableau::Collocation<S>;
+    /// Its modes, real ones first; [`Newton`](super::Newton)'s iteration needs them.
+    const MODES: &'static [Mode<S>] = &[];
+    /// Weights `e` of the error estimate `μ (1 − h μ J)⁻¹ (h f(y) + Σ e_i z_i)`, of third order.
+    const ERROR: Option<[Constant; S]> = None;
+}
+
 /// Any collocation method; take one by its name, [`Radau5`](super::Radau5) for example.
 #[derive(Clone, Debug)]
 pub struct Collocation<Y: System, T, I, const S: usize> {
-    field: Field<Y>,
-    statistics: Statistics,
     iteration: I,
     a: [[Y::Scalar; S]; S],
     b: [Y::Scalar; S],
@@ -56,11 +64,7 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     z: [Point<Y>; S],
     f: [Point<Y>; S],
     r: [Point<Y>; S],
-    delta: Point<Y>,
     first: Point<Y>,
-    first_known: bool,
-    end: Point<Y>,
-    end_known: bool,
     /// What counts as solved.
     weight: Point<Y>,
     derivatives: Derivatives,
@@ -76,36 +80,19 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     formula: core::marker::PhantomData<T>,
 }
 
-impl<Y, T, I, const S: usize> Collocation<Y, T, I, S>
+impl<Y, T, I, const S: usize> FromSystem<Y> for Collocation<Y, T, I, S>
 where
     Y: System,
     Y::Scalar: Real,
     T: Formula<S>,
     I: Iteration<Y, S>,
 {
-    /// Room for one system.
-    pub fn new(system: &Y) -> Self {
-        Self::with_sums(system, false)
-    }
-
-    /// With compensated sums of steps, as [`Explicit::compensated`](super::Explicit::compensated).
-    pub fn compensated(system: &Y) -> Self {
-        Self::with_sums(system, true)
-    }
-
-    /// Exactly `n` iterations a step, for real time.
-    pub fn with_iterations(self, n: u32) -> FixedIterations<Self> {
-        FixedIterations::new(self, n)
-    }
-
-    fn with_sums(system: &Y, compensated: bool) -> Self {
+    fn new(system: &Y) -> Self {
         let tableau = T::TABLEAU;
         let point = || Point::zero(system);
         let points = || core::array::from_fn(|_| point());
         let c = tableau.c.map(|x| x.get());
         Collocation {
-            field: Field::new(system, compensated),
-            statistics: Statistics::default(),
             iteration: I::new(system, T::MODES),
             a: tableau.a.map(|row| row.map(|x| x.get())),
             b: tableau.b.map(|x| x.get()),
@@ -114,11 +101,7 @@ where
             z: points(),
             f: points(),
             r: points(),
-            delta: point(),
             first: point(),
-            first_known: false,
-            end: point(),
-            end_known: false,
             weight: point(),
             derivatives: Derivatives::None,
             factored: Y::Scalar::zero(),
@@ -130,41 +113,37 @@ where
             formula: core::marker::PhantomData,
         }
     }
+}
 
-    /// Rate at the start, with derivatives if they are due.
-    fn start(&mut self, system: &mut Y, t: Y::Scalar) {
+impl<Y, T, I, const S: usize> Collocation<Y, T, I, S>
+where
+    Y: System,
+    Y::Scalar: Real,
+    T: Formula<S>,
+    I: Iteration<Y, S>,
+{
+    /// Derivatives, and the rate at the start with them, if they are due.
+    fn linearise(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
         let due = match self.derivatives {
             Derivatives::None => true,
             Derivatives::Old => !self.keep,
             Derivatives::New => false,
         };
         if I::DERIVATIVES && due {
-            self.iteration.linearise(&mut self.field, system, t, &mut self.first);
+            self.iteration.linearise(&mut step.field, system, t, &mut self.first);
             (self.derivatives, self.factored) = (Derivatives::New, Y::Scalar::zero());
-            self.statistics.jacobians += 1;
-            self.first_known = true;
+            step.statistics.jacobians += 1;
+            step.start_known = true;
         }
     }
 
-    fn rate(&mut self, system: &mut Y, t: Y::Scalar) {
-        self.start(system, t);
-        if !self.first_known {
-            self.delta.clear();
-            self.field.rates(system, t, &self.delta, &mut self.first);
-            self.first_known = true;
-        }
-    }
-
-    fn factor(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+    fn factor(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         if I::DERIVATIVES && self.factored != h {
             self.factored = Y::Scalar::zero();
-            self.statistics.factorisations += 1;
+            step.statistics.factorisations += 1;
             if let Err(column) = self.iteration.factor(h) {
-                self.rate(system, t);
-                return Err(match self.first.not_finite() {
-                    Some(index) => StepError::NotFinite { time: t.to_f64(), index },
-                    None => StepError::Singular { time: t.to_f64(), step: h.to_f64(), column },
-                });
+                self.start_rate(step, system, t);
+                return Err(Attempt::singular(&self.first, t, h, column));
             }
             self.factored = h;
         }
@@ -172,8 +151,8 @@ where
     }
 
     /// Stages of the linearised equations.
-    fn linear(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
-        self.rate(system, t);
+    fn linear(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+        self.start_rate(step, system, t);
         for (z, c) in self.z.iter_mut().zip(&self.c) {
             z.copy_from(&self.first);
             z.scale(h * *c);
@@ -194,9 +173,9 @@ where
     }
 
     /// One iteration: rates of all stages, residuals, changes.
-    fn iterate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+    fn iterate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
         for ((z, f), c) in self.z.iter().zip(&mut self.f).zip(&self.c) {
-            self.field.rates(system, t + *c * h, z, f);
+            step.field.rates(system, t + *c * h, z, f);
         }
         for ((r, row), z) in self.r.iter_mut().zip(&self.a).zip(&self.z) {
             r.clear();
@@ -210,12 +189,12 @@ where
         for (z, r) in self.z.iter_mut().zip(&self.r) {
             z.add(Y::Scalar::one(), r);
         }
-        self.statistics.iterations += 1;
+        step.statistics.iterations += 1;
     }
 
     /// What counts as solved: part of the allowed errors, but not less than round-off.
-    fn weigh(&mut self, system: &Y, scale: Option<&Point<Y>>) {
-        self.field.chart().size(system, &mut self.weight);
+    fn weigh(&mut self, step: &Attempt<Y>, system: &Y, scale: Option<&Point<Y>>) {
+        step.field.chart().size(system, &mut self.weight);
         if let Some(z) = self.z.last() {
             for (w, z) in self.weight.parts_mut().into_iter().flatten().zip(z.parts().into_iter().flatten()) {
                 *w = *w + z.abs();
@@ -250,12 +229,13 @@ where
     /// Iterates until solved.
     fn converge(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<(), StepError> {
-        self.weigh(system, scale);
+        self.weigh(step, system, scale);
         // One good contraction says little about the next step's, and with insertion about the next iteration's.
         let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
         self.eta = libm::pow(self.eta, 0.8).max(least);
@@ -264,7 +244,7 @@ where
         self.keep = true;
         let limit = I::LIMITS[usize::from(scale.is_some())];
         for k in 1..=limit {
-            self.iterate(system, t, h);
+            self.iterate(step, system, t, h);
             let sum = self.r.iter().map(|r| norm(r, &self.weight)).fold(0.0, |sum, x| sum + x * x);
             change = libm::sqrt(sum / S as f64);
             if k > 1 {
@@ -305,12 +285,19 @@ where
     }
 
     /// Solves for the stages.
-    fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: Option<&Point<Y>>) -> Result<(), StepError> {
-        self.start(system, t);
-        self.factor(system, t, h)?;
+    fn solve(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<(), StepError> {
+        self.linearise(step, system, t);
+        self.factor(step, system, t, h)?;
         if self.past_h != Y::Scalar::zero() {
             self.extrapolate(h);
-            let result = self.converge(system, t, h, scale);
+            let result = self.converge(step, system, t, h, scale);
             if result.is_ok() {
                 return result;
             }
@@ -318,61 +305,82 @@ where
             if self.derivatives == Derivatives::Old {
                 self.derivatives = Derivatives::None;
             }
-            self.start(system, t);
-            self.factor(system, t, h)?;
+            self.linearise(step, system, t);
+            self.factor(step, system, t, h)?;
         }
-        self.linear(system, t, h);
-        self.converge(system, t, h, scale)
+        self.linear(step, system, t, h);
+        self.converge(step, system, t, h, scale)
     }
 
     /// Stages of the linearised equations, then `n` iterations.
     #[inline]
-    pub(super) fn solve_by(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, n: u32) -> Result<(), StepError> {
+    pub(super) fn solve_by(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        n: u32,
+    ) -> Result<(), StepError> {
         if self.derivatives == Derivatives::Old {
             self.derivatives = Derivatives::None;
         }
-        self.start(system, t);
-        self.factor(system, t, h)?;
-        self.linear(system, t, h);
+        self.linearise(step, system, t);
+        self.factor(step, system, t, h)?;
+        self.linear(step, system, t, h);
         for _ in 0..n {
-            self.iterate(system, t, h);
+            self.iterate(step, system, t, h);
         }
         Ok(())
     }
 
     /// Displacement and error of a step whose stages are known.
     #[inline]
-    pub(super) fn conclude(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: Option<&Point<Y>>) -> f64 {
+    pub(super) fn conclude(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> f64 {
         let error = match (T::ERROR, scale) {
             (Some(e), Some(scale)) => {
-                self.rate(system, t);
-                self.error(system, t, h, scale, e)
+                self.start_rate(step, system, t);
+                self.error(step, system, t, h, scale, e)
             }
             _ => 0.0,
         };
-        self.end_known = false;
-        self.finish(h);
+        self.displace(step, h);
         error
     }
 
     /// Displacement of the step from those of the stages.
-    fn finish(&mut self, h: Y::Scalar) {
-        self.delta.clear();
+    fn displace(&mut self, step: &mut Attempt<Y>, h: Y::Scalar) {
+        step.delta.clear();
         if I::DERIVATIVES {
             for (z, w) in self.z.iter().zip(&self.last) {
                 if *w != Y::Scalar::zero() {
-                    self.delta.add(*w, z);
+                    step.delta.add(*w, z);
                 }
             }
         } else {
             for (f, b) in self.f.iter().zip(&self.b) {
-                self.delta.add(*b, f);
+                step.delta.add(*b, f);
             }
-            self.delta.scale(h);
+            step.delta.scale(h);
         }
     }
 
-    fn error(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, scale: &Point<Y>, e: [Constant; S]) -> f64 {
+    fn error(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: &Point<Y>,
+        e: [Constant; S],
+    ) -> f64 {
         let [sum, estimate, ..] = &mut self.r[..] else { return 0.0 };
         sum.clear();
         for (z, e) in self.z.iter().zip(e) {
@@ -384,9 +392,9 @@ where
         let error = norm(estimate, scale);
         // The estimate is too large where the step is much longer than the fast motions; filtered once more it is not.
         if error > 1.0 {
-            self.field.rates(system, t, estimate, &mut self.end);
+            step.field.rates(system, t, estimate, &mut step.end);
             estimate.copy_from(sum);
-            estimate.add(h, &self.end);
+            estimate.add(h, &step.end);
             self.iteration.filter(estimate);
             return norm(estimate, scale);
         }
@@ -410,7 +418,7 @@ fn polynomial<N: Real, const S: usize>(c: &[N; S], theta: N) -> ([N; S], N) {
     (weights, origin)
 }
 
-impl<Y, T, I, const S: usize> Stepper<Y> for Collocation<Y, T, I, S>
+impl<Y, T, I, const S: usize> Scheme<Y> for Collocation<Y, T, I, S>
 where
     Y: System,
     Y::Scalar: Real,
@@ -425,86 +433,72 @@ where
         T::ERROR.map(|_| 3)
     }
 
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        (self.first_known, self.end_known) = (false, false);
+    fn begin(&mut self) {
         (self.derivatives, self.factored) = (Derivatives::None, Y::Scalar::zero());
         self.past_h = Y::Scalar::zero();
         (self.keep, self.eta) = (false, 1.0);
-        self.field.load(system, t, q, p)
     }
 
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.solve(system, t, h, scale)?;
-        Ok(self.conclude(system, t, h, scale))
+        self.solve(step, system, t, h, scale)?;
+        Ok(self.conclude(step, system, t, h, scale))
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.first
     }
 
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        self.rate(system, t);
-        &self.first
+    fn start_rate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
+        self.linearise(step, system, t);
+        step.start_rate(system, t, &mut self.first);
     }
 
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
-        }
-        &self.end
-    }
-
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
+    fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, h: Y::Scalar) -> bool {
         for (past, z) in self.past.iter_mut().zip(&self.z) {
             past.copy_from(z);
-            Chart::relative(system, &self.delta, past);
+            Chart::relative(system, &step.delta, past);
         }
         self.origin.clear();
-        Chart::relative(system, &self.delta, &mut self.origin);
+        Chart::relative(system, &step.delta, &mut self.origin);
         self.past_h = h;
-        if self.end_known {
-            self.first.copy_from(&self.end);
-            self.weight.copy_from(&self.delta);
-            Chart::follow(system, &self.delta, &mut self.weight, &mut self.first);
+        if step.end_known {
+            step.hand_on(system, &mut self.first, &mut self.weight);
         }
-        (self.first_known, self.end_known) = (self.end_known, false);
         if self.derivatives == Derivatives::New {
             self.derivatives = Derivatives::Old;
         }
-        self.statistics.steps += 1;
-        Ok(())
+        step.end_known
     }
 
     /// The collocation polynomial; of methods with less than three stages the cubic through both ends and their rates.
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        if S < 3 {
-            if !self.first_known {
-                out.clear();
-                self.field.rates(system, t, out, &mut self.first);
-                self.first_known = true;
-            }
-            self.end_rate(system, t, h);
-            return hermite(h, theta, &self.delta, [&self.first, &self.end], out);
-        }
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
         out.clear();
+        if S < 3 {
+            // Not with the derivatives: those of the next step may be old ones.
+            if !step.start_known {
+                step.field.rates(system, t, out, &mut self.first);
+                step.start_known = true;
+            }
+            step.end_rate(system, t, h);
+            return hermite(h, theta, &step.delta, [&self.first, &step.end], out);
+        }
         for (z, w) in self.z.iter().zip(polynomial(&self.c, theta).0) {
             out.add(w, z);
         }
-    }
-
-    fn corrected(&mut self) {
-        self.end_known = false;
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics { evaluations: self.field.evaluations(), ..self.statistics }
     }
 }

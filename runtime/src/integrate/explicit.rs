@@ -1,11 +1,11 @@
 //! Explicit Runge-Kutta methods.
 
-use super::chart::{Chart, Point};
-use super::constant::Constant;
-use super::field::Field;
-use super::stepper::{norm, Statistics, Stepper};
+use super::chart::Point;
+use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
+use super::stepper::{hermite, norm};
 use super::tableau::{self, Dense, Tableau};
 use super::StepError;
+use crate::constant::Constant;
 use crate::system::{Real, System};
 
 /// A method with `S` stages, and `X` more for dense output, by name.
@@ -29,7 +29,7 @@ macro_rules! methods {
             })*
         }
         $(#[doc = $doc]
-        pub type $name<Y> = Explicit<Y, method::$name, $stages, $extra>;)*
+        pub type $name<Y> = Integrator<Y, Explicit<Y, method::$name, $stages, $extra>>;)*
     };
 }
 
@@ -47,16 +47,11 @@ methods! {
 /// Any explicit Runge-Kutta method; take one by its name, [`Rk4`] for example.
 #[derive(Clone, Debug)]
 pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
-    field: Field<Y>,
-    statistics: Statistics,
+    /// Rates of the stages, the first one that at the start of the step.
     k: [Point<Y>; S],
-    delta: Point<Y>,
     /// A stage's displacement; an estimate of the error.
     stage: Point<Y>,
-    /// Rate at the end, if it is known.
-    end: Point<Y>,
-    end_known: bool,
-    first_known: bool,
+    /// Rates of the extra stages of dense output.
     extra: [Point<Y>; X],
     extra_known: bool,
     method: core::marker::PhantomData<T>,
@@ -116,40 +111,24 @@ impl<const S: usize> Weights<S> {
     }
 }
 
+impl<Y: System, T, const S: usize, const X: usize> FromSystem<Y> for Explicit<Y, T, S, X> {
+    fn new(system: &Y) -> Self {
+        Explicit {
+            k: core::array::from_fn(|_| Point::zero(system)),
+            stage: Point::zero(system),
+            extra: core::array::from_fn(|_| Point::zero(system)),
+            extra_known: false,
+            method: core::marker::PhantomData,
+        }
+    }
+}
+
 impl<Y, T, const S: usize, const X: usize> Explicit<Y, T, S, X>
 where
     Y: System,
     Y::Scalar: Real,
     T: Method<S, X>,
 {
-    /// Room for the stages of one system.
-    pub fn new(system: &Y) -> Self {
-        Self::with_sums(system, false)
-    }
-
-    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions. Of use where steps
-    /// are small against the precision, above all in `f32`.
-    pub fn compensated(system: &Y) -> Self {
-        Self::with_sums(system, true)
-    }
-
-    fn with_sums(system: &Y, compensated: bool) -> Self {
-        let point = || Point::zero(system);
-        Explicit {
-            field: Field::new(system, compensated),
-            statistics: Statistics::default(),
-            k: core::array::from_fn(|_| point()),
-            delta: point(),
-            stage: point(),
-            end: point(),
-            end_known: false,
-            first_known: false,
-            extra: core::array::from_fn(|_| point()),
-            extra_known: false,
-            method: core::marker::PhantomData,
-        }
-    }
-
     /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq. 10.17).
     fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
@@ -181,29 +160,30 @@ where
         k[..S - usize::from(T::TABLEAU.fsal)].iter().chain([end]).chain(extra)
     }
 
-    /// Extra stages of dense output.
-    fn extend(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, dense: &Dense) {
-        self.end_rate(system, t, h);
+    /// Extra stages of dense output, after the rate at the end is known.
+    fn extend(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, dense: &Dense) {
         for (i, (c, row)) in dense.c.iter().zip(dense.a).enumerate().take(X) {
             self.stage.clear();
             let (known, rest) = self.extra.split_at_mut(i);
-            let rates = Self::rates_of_rows(&self.k, &self.end, known);
+            let rates = Self::rates_of_rows(&self.k, &step.end, known);
             for (w, k) in row.iter().zip(rates) {
                 self.stage.add(w.get(), k);
             }
             self.stage.scale(h);
-            self.field.rates(system, t + c.get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+            step.field.rates(system, t + c.get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
         }
         self.extra_known = true;
     }
 }
 
-impl<Y, T, const S: usize, const X: usize> Stepper<Y> for Explicit<Y, T, S, X>
+impl<Y, T, const S: usize, const X: usize> Scheme<Y> for Explicit<Y, T, S, X>
 where
     Y: System,
     Y::Scalar: Real,
     T: Method<S, X>,
 {
+    const ENDS_WITH_RATE: bool = true;
+
     fn order(&self) -> u32 {
         T::TABLEAU.order
     }
@@ -212,98 +192,60 @@ where
         (!T::TABLEAU.error.is_empty()).then_some(T::TABLEAU.error_order)
     }
 
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        (self.first_known, self.end_known, self.extra_known) = (false, false, false);
-        self.field.load(system, t, q, p)
-    }
-
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start_rate(system, t);
+        self.start_rate(step, system, t);
         // The last stage of a pair whose last stage is the rate at the end only serves the estimate and the next step.
         let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
         for i in 1..stages {
             let (known, rest) = self.k.split_at_mut(i);
             self.stage.combine(h, T::WEIGHTS.a[i].list(), known);
-            self.field.rates(system, t + T::TABLEAU.c[i].get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+            step.field.rates(system, t + T::TABLEAU.c[i].get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
         }
-        self.delta.combine(h, T::WEIGHTS.b.list(), &self.k);
-        (self.end_known, self.extra_known) = (false, false);
+        step.delta.combine(h, T::WEIGHTS.b.list(), &self.k);
+        self.extra_known = false;
         if T::TABLEAU.fsal && stages == S {
-            self.end.copy_from(&self.k[S - 1]);
-            self.end_known = true;
+            step.end.copy_from(&self.k[S - 1]);
+            step.end_known = true;
         }
         Ok(scale.map_or(0.0, |scale| self.error(h, scale)))
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.k[0]
     }
 
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        if !self.first_known {
-            self.stage.clear();
-            self.field.rates(system, t, &self.stage, &mut self.k[0]);
-            self.first_known = true;
-        }
-        &self.k[0]
+    fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, _h: Y::Scalar) -> bool {
+        step.hand_on(system, &mut self.k[0], &mut self.stage);
+        true
     }
 
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
-            if T::TABLEAU.fsal {
-                // The stage that was left out, for dense output.
-                self.k[S - 1].copy_from(&self.end);
-            }
-        }
-        &self.end
-    }
-
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.end_rate(system, t, h);
-        self.field.advance(system, t, &self.delta)?;
-        self.k[0].copy_from(&self.end);
-        self.stage.copy_from(&self.delta);
-        Chart::follow(system, &self.delta, &mut self.stage, &mut self.k[0]);
-        (self.first_known, self.end_known, self.extra_known) = (true, false, false);
-        self.statistics.steps += 1;
-        Ok(())
-    }
-
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.end_rate(system, t, h);
-        super::stepper::hermite(h, theta, &self.delta, [&self.k[0], &self.end], out);
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
+        step.end_rate(system, t, h);
+        hermite(h, theta, &step.delta, [&self.k[0], &step.end], out);
         let Some(dense) = T::TABLEAU.dense else { return };
         if !self.extra_known {
-            self.extend(system, t, h, dense);
+            self.extend(step, system, t, h, dense);
         }
-        let rates = Self::rates_of_rows(&self.k, &self.end, &self.extra);
+        let rates = Self::rates_of_rows(&self.k, &step.end, &self.extra);
         for (i, (row, k)) in dense.bend.iter().zip(rates).enumerate() {
             if !row.is_empty() {
                 out.add(h * dense.weight(i, theta), k);
             }
         }
-    }
-
-    fn finish(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        (self.first_known, self.end_known, self.extra_known) = (false, false, false);
-        self.statistics.steps += 1;
-        Ok(())
-    }
-
-    fn corrected(&mut self) {
-        self.end_known = false;
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics { evaluations: self.field.evaluations(), ..self.statistics }
     }
 }

@@ -58,12 +58,6 @@ where
         self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref()
     }
 
-    /// Starts displacements where those of another field start, to the last bit.
-    pub fn join(&mut self, other: &Self) {
-        self.chart.copy_from(&other.chart);
-        self.stored = false;
-    }
-
     /// Gives the state that displacements start from.
     pub fn store(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         self.chart.base(system, &mut self.q, &mut self.p);

@@ -1,11 +1,9 @@
 //! Implicit methods at constant cost.
 
 use super::chart::Point;
-use super::collocation::Collocation;
-use super::field::Field;
-use super::formulas::Formula;
+use super::collocation::{Collocation, Formula};
+use super::integrator::{Attempt, Integrator, Scheme};
 use super::newton::Iteration;
-use super::stepper::{Statistics, Stepper};
 use super::StepError;
 use crate::system::{Real, System};
 
@@ -21,13 +19,18 @@ pub struct FixedIterations<C> {
     n: u32,
 }
 
-impl<C> FixedIterations<C> {
-    pub(super) fn new(method: C, n: u32) -> Self {
-        FixedIterations { method, n }
+impl<Y, T, I, const S: usize> Integrator<Y, Collocation<Y, T, I, S>>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// The same method with exactly `n` iterations a step, for real time.
+    pub fn with_iterations(self, n: u32) -> Integrator<Y, FixedIterations<Collocation<Y, T, I, S>>> {
+        self.map(|method| FixedIterations { method, n })
     }
 }
 
-impl<Y, T, I, const S: usize> Stepper<Y> for FixedIterations<Collocation<Y, T, I, S>>
+impl<Y, T, I, const S: usize> Scheme<Y> for FixedIterations<Collocation<Y, T, I, S>>
 where
     Y: System,
     Y::Scalar: Real,
@@ -42,46 +45,43 @@ where
         self.method.error_order()
     }
 
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        self.method.begin(system, t, q, p)
+    fn begin(&mut self) {
+        self.method.begin();
     }
 
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.method.solve_by(system, t, h, self.n)?;
-        Ok(self.method.conclude(system, t, h, scale))
+        self.method.solve_by(step, system, t, h, self.n)?;
+        Ok(self.method.conclude(step, system, t, h, scale))
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        self.method.parts()
+    fn start(&mut self) -> &mut Point<Y> {
+        self.method.start()
     }
 
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        self.method.start_rate(system, t)
+    fn start_rate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
+        self.method.start_rate(step, system, t);
     }
 
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        self.method.end_rate(system, t, h)
+    fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, h: Y::Scalar) -> bool {
+        self.method.accepted(step, system, h)
     }
 
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.method.accept(system, t, h)
-    }
-
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.method.interpolate(system, t, h, theta, out);
-    }
-
-    fn corrected(&mut self) {
-        self.method.corrected();
-    }
-
-    fn statistics(&self) -> Statistics {
-        self.method.statistics()
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
+        self.method.interpolate(step, system, t, h, theta, out);
     }
 }

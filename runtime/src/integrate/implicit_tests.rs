@@ -5,7 +5,7 @@ extern crate std;
 use std::println;
 use std::vec::Vec;
 
-use super::linear::{Lu, Matrix};
+use super::linear::{times, Lu};
 use super::scenes::{chain, gravity, three, Oscillator, Scene};
 use super::*;
 use crate::system::{Differentiable, System};
@@ -52,7 +52,7 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
         field.load(&scene.i, 0.0, &scene.q, &scene.p).unwrap();
         let zero = Point::zero(&scene.i);
         let (mut at, mut along, mut rate, mut known) = (zero.clone(), zero.clone(), zero.clone(), zero.clone());
-        let mut jacobian = Matrix::zero(&scene.i);
+        let mut jacobian = scene.i.zero_derivatives();
         for k in 0..20 {
             // The first about the state itself.
             fill(&mut at, if k == 0 { 0.0 } else { 0.7 }, &mut random);
@@ -78,7 +78,7 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
             let mut numeric = derivative(h / 2.0, &mut field, &mut scene.i);
             numeric.scale(4.0 / 3.0);
             numeric.add(-1.0 / 3.0, &derivative(h, &mut field, &mut scene.i));
-            jacobian.times(&along, &mut known);
+            times::<I>(&jacobian, &along, &mut known);
             let size = numeric.parts().into_iter().flatten().fold(size, |m, x| m.max(x.abs()));
             for (a, b) in known.parts().into_iter().flatten().zip(numeric.parts().into_iter().flatten()) {
                 assert!((a - b).abs() < 1e-8 * size, "{}, state {k}: {a} {b}", scene.name);
@@ -89,8 +89,8 @@ fn derivatives_in_the_chart_are_those_of_the_rates() {
 
 fn solve_and_check<const C: usize>(w: [f64; C], scene: &Scene<f64>) {
     let mut random = random(3);
-    let mut jacobian = Matrix::zero(&scene.i);
-    for row in jacobian.blocks.iter_mut().flatten().flat_map(|b| b.iter_mut()) {
+    let mut jacobian = scene.i.zero_derivatives();
+    for row in jacobian.blocks_mut().into_iter().flatten().flat_map(|b| b.iter_mut()) {
         row.iter_mut().for_each(|x| *x = random());
     }
     let mut lu = Lu::<I, C>::new(&scene.i);
@@ -99,7 +99,7 @@ fn solve_and_check<const C: usize>(w: [f64; C], scene: &Scene<f64>) {
     let (mut x, mut product) = (points(), points());
     x.iter_mut().for_each(|x| fill(x, 1.0, &mut random));
     for (product, x) in product.iter_mut().zip(&x) {
-        jacobian.times(x, product);
+        times::<I>(&jacobian, x, product);
     }
     // b = x - w J x.
     let mut b = x.clone();
@@ -123,12 +123,12 @@ fn linear_equations_are_solved() {
         solve_and_check([3.7], &scene);
         solve_and_check([3.7, -5.1], &scene);
         let mut lu = Lu::<I, 1>::new(&scene.i);
-        let mut one = Matrix::zero(&scene.i);
-        for (k, row) in one.blocks[0][0].iter_mut().enumerate() {
+        let mut one = scene.i.zero_derivatives();
+        for (k, row) in one.dv_dq.iter_mut().enumerate() {
             row[k] = 1.0;
         }
         assert_eq!(lu.factor([1.0], &one), Err(0));
-        one.blocks[1][1][0][0] = f64::NAN;
+        one.dpd_dp[0][0] = f64::NAN;
         assert_eq!(lu.factor([0.5], &one), Err(scene.i.tree().dims.nv));
     }
 }
@@ -157,7 +157,7 @@ fn orders_by_halving_the_step() {
     order("Rodas5P", 5.0, [0.02; 3], Rodas5P::new);
     // At order twelve the window between long steps and round-off is narrow, and single estimates on the third scene scatter
     // from 11.3 to 14 between 0.09 and 0.15 s: two terms of its error cancel on the way.
-    order("Gauss 12", 12.0, [0.11, 0.14, 0.13], Gauss12::new);
+    order("Gauss 12", 12.0, [0.11, 0.14, 0.13], Gauss12FixedPoint::new);
 }
 
 #[test]
@@ -213,7 +213,6 @@ fn stiff_springs_do_no_harm() {
         ("implicit midpoint", run(system, ImplicitMidpoint::new(&system))),
         ("Gauss 4", run(system, Gauss4::new(&system))),
         ("Gauss 6", run(system, Gauss6::new(&system))),
-        ("Gauss 12", run(system, Gauss12::new(&system))),
     ] {
         println!("{name}: {largest:.1e} {end:.1e}");
         assert!(largest < 1.0 + 1e-9 && end < 0.1, "{name}: {largest:e} {end:e}");
@@ -263,7 +262,7 @@ fn tolerances_are_met() {
 #[test]
 fn single_precision() {
     for (scene, exact) in three::<f32>().into_iter().zip(three::<f64>()) {
-        let exact = steps(&exact, Gauss12::new(&exact.i), 0.05, 4).0;
+        let exact = steps(&exact, Gauss12FixedPoint::new(&exact.i), 0.05, 4).0;
         let size = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         fn check<M: Stepper<Interpreter<f32>>>(
             name: &str,
@@ -284,8 +283,7 @@ fn single_precision() {
         let i = &scene.i;
         assert!(check("implicit midpoint", &scene, ImplicitMidpoint::new(i), Step::Fixed(1e-3), &exact) < 1e-4 * size);
         assert!(check("Gauss 4", &scene, Gauss4::new(i), fixed, &exact) < 2e-5 * size);
-        assert!(check("Gauss 12", &scene, Gauss12::compensated(i), Step::Fixed(0.05), &exact) < 2e-5 * size);
-        assert!(check("Gauss 12 inserted", &scene, Gauss12FixedPoint::compensated(i), fixed, &exact) < 2e-5 * size);
+        assert!(check("Gauss 12", &scene, Gauss12FixedPoint::compensated(i), Step::Fixed(0.05), &exact) < 2e-5 * size);
         assert!(check("Radau 5", &scene, Radau5::new(i), adaptive, &exact) < 1e-4 * size);
         assert!(check("Rodas5P", &scene, Rodas5P::new(i), adaptive, &exact) < 1e-4 * size);
     }
@@ -304,7 +302,7 @@ fn points_within_a_step() {
             }
             for theta in [0.0, 0.3, 0.8, 1.0] {
                 solver.dense(&mut i, theta, &mut q, &mut p);
-                let exact = steps(scene, Gauss12::new(&scene.i), h * (1.0 + theta) / 4.0, 4).0;
+                let exact = steps(scene, Gauss12FixedPoint::new(&scene.i), h * (1.0 + theta) / 4.0, 4).0;
                 let error = off(&[q.clone(), p.clone()].concat(), &exact);
                 println!("{name}, {}, {theta}: {error:.1e}", scene.name);
                 assert!(error < allowed, "{name}, {}, {theta}: {error:e}", scene.name);
@@ -312,7 +310,7 @@ fn points_within_a_step() {
         }
         check("implicit midpoint", &scene, ImplicitMidpoint::new, 1e-3, 1e-5);
         check("Gauss 4", &scene, Gauss4::new, 1e-2, 1e-5);
-        check("Gauss 12", &scene, Gauss12::new, 5e-2, 1e-6);
+        check("Gauss 12", &scene, Gauss12FixedPoint::new, 5e-2, 1e-6);
         check("Radau 5", &scene, Radau5::new, 1e-2, 1e-4);
         check("Rodas5P", &scene, Rodas5P::new, 1e-2, 1e-6);
     }
@@ -342,8 +340,7 @@ fn energy_stays_bounded() {
         ("implicit midpoint", run(&scene, ImplicitMidpoint::new(&scene.i), 0.02)),
         ("Gauss 4", run(&scene, Gauss4::new(&scene.i), 0.05)),
         ("Gauss 6", run(&scene, Gauss6::new(&scene.i), 0.1)),
-        ("Gauss 12", run(&scene, Gauss12::compensated(&scene.i), 0.2)),
-        ("Gauss 12 inserted", run(&scene, Gauss12FixedPoint::compensated(&scene.i), 0.2)),
+        ("Gauss 12", run(&scene, Gauss12FixedPoint::compensated(&scene.i), 0.2)),
     ] {
         println!("{name}: {early:.2e} {late:.2e}");
         assert!(late < 1.05 * early + 2e-13, "{name}: {early:e} {late:e}");
@@ -369,7 +366,7 @@ fn symmetric_methods_go_back_where_they_came_from() {
         check("implicit midpoint", &scene, ImplicitMidpoint::new(&scene.i), 0.02);
         check("Gauss 4", &scene, Gauss4::new(&scene.i), 0.02);
         check("Gauss 6", &scene, Gauss6::new(&scene.i), 0.02);
-        check("Gauss 12", &scene, Gauss12::new(&scene.i), 0.05);
+        check("Gauss 12", &scene, Gauss12FixedPoint::new(&scene.i), 0.05);
     }
 }
 
@@ -427,7 +424,7 @@ fn counts_of_fixed_iterations_are_constant() {
     assert_eq!(count(&scene, Gauss4::new(i).with_iterations(2)), of(1, 1, 4, 2));
     assert_eq!(count(&scene, Gauss6::new(i).with_iterations(3)), of(1, 1, 9, 3));
     assert_eq!(count(&scene, Radau5::new(i).with_iterations(3)), of(1, 1, 9, 3));
-    assert_eq!(count(&scene, Gauss12::new(i).with_iterations(2)), of(1, 1, 12, 2));
+    assert_eq!(count(&scene, Gauss12FixedPoint::new(i).with_iterations(2)), of(0, 0, 13, 2));
     assert_eq!(count(&scene, Gauss6FixedPoint::new(i).with_iterations(4)), of(0, 0, 13, 4));
     assert_eq!(count(&scene, Rodas5P::new(i)), of(1, 1, 7, 0));
 }

@@ -9,8 +9,8 @@
 
 use super::chart::Point;
 use super::field::Field;
-use super::linear::Matrix;
-use crate::system::{Blocks, Differentiable, LieJoint, Real};
+use super::linear::Jacobian;
+use crate::system::{Differentiable, LieJoint, Real};
 use crate::{Dual, Scalar};
 
 /// Coordinates and momenta of one joint, at most.
@@ -135,13 +135,13 @@ where
         t: Y::Scalar,
         point: &Point<Y>,
         rate: &mut Point<Y>,
-        jacobian: &mut Matrix<Y>,
+        jacobian: &mut Jacobian<Y>,
     ) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
         self.stored = false;
-        let [[dv_dq, dv_dp], [dpd_dq, dpd_dp]] = &mut jacobian.blocks;
-        let blocks = Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp };
-        system.rate_derivatives(t, &self.q, &self.p, &mut rate.x, &mut rate.p, blocks);
+        system.rate_derivatives(t, &self.q, &self.p, jacobian);
+        rate.x.as_mut().copy_from_slice(jacobian.v.as_ref());
+        rate.p.as_mut().copy_from_slice(jacobian.pd.as_ref());
         for group in system.lie_joints() {
             let joint = Joint::new(group, self.chart.held(), point.parts(), rate.parts());
             let (n, v) = (group.kind.sizes().1, group.v);
@@ -149,10 +149,10 @@ where
             rate.x.as_mut()[v..v + n].copy_from_slice(&xd[..n]);
             rate.p.as_mut()[v..v + n].copy_from_slice(&pd[..n]);
             let [inner, outer, direct] = joint.tables();
-            columns(jacobian, v, n, &inner);
-            rows(jacobian, v, n, &outer);
-            for (half, rows) in jacobian.blocks.iter_mut().enumerate() {
-                for (other, block) in rows.iter_mut().enumerate() {
+            columns::<Y>(jacobian, v, n, &inner);
+            rows::<Y>(jacobian, v, n, &outer);
+            for (half, rows) in jacobian.blocks_mut().into_iter().enumerate() {
+                for (other, block) in rows.into_iter().enumerate() {
                     for (i, row) in block.as_mut()[v..v + n].iter_mut().enumerate() {
                         for (j, x) in row.as_mut()[v..v + n].iter_mut().enumerate() {
                             *x = *x + direct[half * n + i][other * n + j];
@@ -165,8 +165,8 @@ where
 }
 
 /// `J ← J table` on the columns of a joint.
-fn columns<Y: Differentiable>(jacobian: &mut Matrix<Y>, v: usize, n: usize, table: &Table<Y::Scalar>) {
-    for [left, right] in &mut jacobian.blocks {
+fn columns<Y: Differentiable>(jacobian: &mut Jacobian<Y>, v: usize, n: usize, table: &Table<Y::Scalar>) {
+    for [left, right] in jacobian.blocks_mut() {
         for (left, right) in left.as_mut().iter_mut().zip(right.as_mut()) {
             let (left, right) = (&mut left.as_mut()[v..v + n], &mut right.as_mut()[v..v + n]);
             let mut old = [Y::Scalar::zero(); 2 * NV];
@@ -180,8 +180,8 @@ fn columns<Y: Differentiable>(jacobian: &mut Matrix<Y>, v: usize, n: usize, tabl
 }
 
 /// `J ← table J` on the rows of a joint.
-fn rows<Y: Differentiable>(jacobian: &mut Matrix<Y>, v: usize, n: usize, table: &Table<Y::Scalar>) {
-    let [[a, b], [c, d]] = &mut jacobian.blocks;
+fn rows<Y: Differentiable>(jacobian: &mut Jacobian<Y>, v: usize, n: usize, table: &Table<Y::Scalar>) {
+    let [[a, b], [c, d]] = jacobian.blocks_mut();
     for (top, bottom) in [(a, c), (b, d)] {
         for j in 0..top.as_ref().len() {
             let mut old = [Y::Scalar::zero(); 2 * NV];

@@ -4,7 +4,7 @@
 //! without a heap; a vector is a [`Point`]. Real and complex matrices share the code: an element is `[S; C]`, with `C` parts.
 
 use super::chart::Point;
-use crate::system::{Differentiable, Real};
+use crate::system::{Differentiable, Real, StateDerivatives, System};
 use crate::Scalar;
 
 /// A matrix of `2 nv` rows and columns; coordinates before momenta.
@@ -61,16 +61,19 @@ impl<Y: Differentiable> Matrix<Y> {
             }
         }
     }
+}
 
-    /// `out = self · vector`.
-    #[cfg(test)]
-    pub(super) fn times(&self, vector: &Point<Y>, out: &mut Point<Y>) {
-        for (rows, out) in self.blocks.iter().zip(out.parts_mut()) {
-            out.fill(Y::Scalar::zero());
-            for (block, x) in rows.iter().zip(vector.parts()) {
-                for (out, row) in out.iter_mut().zip(block.as_ref()) {
-                    *out = *out + dot(row.as_ref(), x);
-                }
+/// The derivatives of a system's rates, in the chart of a [`Field`](super::Field).
+pub(super) type Jacobian<Y> = StateDerivatives<<Y as System>::Momenta, <Y as Differentiable>::Square>;
+
+/// `out = J · vector`.
+#[cfg(test)]
+pub(super) fn times<Y: Differentiable>(jacobian: &Jacobian<Y>, vector: &Point<Y>, out: &mut Point<Y>) {
+    for (rows, out) in jacobian.blocks().into_iter().zip(out.parts_mut()) {
+        out.fill(Y::Scalar::zero());
+        for (block, x) in rows.into_iter().zip(vector.parts()) {
+            for (out, row) in out.iter_mut().zip(block.as_ref()) {
+                *out = *out + dot(row.as_ref(), x);
             }
         }
     }
@@ -168,9 +171,9 @@ where
     ///
     /// # Errors
     /// The first column without a pivot: all zero, or not numbers.
-    pub(super) fn factor(&mut self, w: [Y::Scalar; C], jacobian: &Matrix<Y>) -> Result<(), usize> {
+    pub(super) fn factor(&mut self, w: [Y::Scalar; C], jacobian: &Jacobian<Y>) -> Result<(), usize> {
         for (part, w) in self.parts.iter_mut().zip(w) {
-            for (to, from) in part.blocks.iter_mut().flatten().zip(jacobian.blocks.iter().flatten()) {
+            for (to, from) in part.blocks.iter_mut().flatten().zip(jacobian.blocks().into_iter().flatten()) {
                 for (to, from) in to.as_mut().iter_mut().zip(from.as_ref()) {
                     for (to, from) in to.as_mut().iter_mut().zip(from.as_ref()) {
                         *to = -(w * *from);
@@ -178,7 +181,7 @@ where
                 }
             }
         }
-        let n = 2 * jacobian.half();
+        let n = 2 * jacobian.v.as_ref().len();
         if let Some(real) = self.parts.first_mut() {
             for i in 0..n {
                 real.put(i, i, Y::Scalar::one() + real.get(i, i));

@@ -14,26 +14,19 @@
 //! | [`BackwardEuler`], [`ImplicitMidpoint`] | 1 | 1 real | `n` |
 //! | [`Gauss4`] | 1 | 1 complex | `2 n` |
 //! | [`Gauss6`], [`Radau5`] | 1 | 1 real, 1 complex | `3 n` |
-//! | [`Gauss12`] | 1 | 3 complex | `6 n` |
 //! | [`Gauss6FixedPoint`] | 0 | 0 | `1 + 3 n` |
 //! | [`Gauss12FixedPoint`] | 0 | 0 | `1 + 6 n` |
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
-//! This is so with [`Collocation::with_iterations`]. Otherwise `n` is at most 30 (60 by insertion) in a step of given size and 10
+//! This is so with `with_iterations`. Otherwise `n` is at most 30 (60 by insertion) in a step of given size and 10
 //! (20) in one by error control, all of it twice if the first try fails, and two evaluations more where an error is estimated; a
 //! step that has used it up is [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
 mod adams;
-#[cfg(feature = "alloc")]
-pub mod catalogue;
 pub mod chart;
 mod collocation;
-mod composition;
-pub(crate) mod constant;
 mod control;
-mod doubled;
 mod doubling;
-mod error;
 mod events;
 mod explicit;
 mod field;
@@ -42,6 +35,7 @@ mod formulas;
 mod group;
 #[cfg(test)]
 mod implicit_tests;
+mod integrator;
 mod jacobian;
 mod linear;
 mod newton;
@@ -54,27 +48,24 @@ mod solver;
 mod stepper;
 pub mod tableau;
 
-pub use adams::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton, VariableAdams};
+pub use crate::constant::{decimal, ratio, Constant};
+pub use crate::error::StepError;
+pub use adams::{Ab4, Ab6, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton, AdamsOfVariableOrder, VariableAdams};
 pub use chart::{Chart, Point};
-pub use collocation::Collocation;
-pub use composition::{Composition, Symmetric};
-pub use constant::{decimal, ratio, Constant};
+pub use collocation::{Collocation, Formula};
 pub use control::{Control, Limits, Step, Tolerance, Tolerances};
-pub use doubled::Doubled;
-pub use doubling::StepDoubling;
-pub use error::StepError;
+pub use doubling::{Doubling, StepDoubling};
 pub use events::{Direction, Events, Outcome, Watch};
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
 pub use fixed::FixedIterations;
 pub use formulas::{
-    formula, BackwardEuler, Formula, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint,
-    Radau5,
+    formula, BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
 };
+pub use integrator::{Attempt, FromSystem, Integrator, Scheme};
 pub use newton::{FixedPoint, Iteration, Newton};
 pub use projection::EnergyProjection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};
-pub use semi_implicit::SemiImplicitEuler;
+pub use semi_implicit::{SemiImplicit, SemiImplicitEuler};
 pub use solver::Solver;
-pub(crate) use stepper::hermite;
 pub use stepper::{norm, Statistics, Stepper};

@@ -2,7 +2,7 @@
 
 use super::chart::Point;
 use super::field::Field;
-use super::linear::{Lu, Matrix};
+use super::linear::{Jacobian, Lu};
 use super::tableau::Mode;
 use crate::system::{Differentiable, Real, System};
 
@@ -59,7 +59,7 @@ impl<Y: System, const S: usize> Iteration<Y, S> for FixedPoint {
 /// matrix of the size of the state for each. E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.8.
 #[derive(Clone, Debug)]
 pub struct Newton<Y: Differentiable, const S: usize, const R: usize, const C: usize> {
-    jacobian: Matrix<Y>,
+    jacobian: Jacobian<Y>,
     real: [Split<Y, S, 1>; R],
     pairs: [Split<Y, S, 2>; C],
     changes: [Point<Y>; S],
@@ -90,7 +90,7 @@ where
         }
     }
 
-    fn factor(&mut self, h: Y::Scalar, jacobian: &Matrix<Y>) -> Result<(), usize> {
+    fn factor(&mut self, h: Y::Scalar, jacobian: &Jacobian<Y>) -> Result<(), usize> {
         self.lu.factor(self.value.map(|value| h * value), jacobian)
     }
 
@@ -122,7 +122,7 @@ where
     fn new(system: &Y, modes: &'static [Mode<S>]) -> Self {
         assert!(modes.len() == R + C, "a method has as many modes as its iteration");
         Newton {
-            jacobian: Matrix::zero(system),
+            jacobian: system.zero_derivatives(),
             real: core::array::from_fn(|k| Split::new(system, &modes[k])),
             pairs: core::array::from_fn(|k| Split::new(system, &modes[R + k])),
             changes: core::array::from_fn(|_| Point::zero(system)),

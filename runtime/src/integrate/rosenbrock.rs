@@ -1,58 +1,46 @@
 //! Rosenbrock methods: linearly implicit, one matrix a step, no iteration.
 
 use super::chart::Point;
-use super::field::Field;
-use super::linear::{Lu, Matrix};
-use super::stepper::{norm, Statistics, Stepper};
+use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
+use super::linear::{Jacobian, Lu};
+use super::stepper::norm;
 use super::{tableau, StepError};
 use crate::system::{Differentiable, Real};
 use crate::Scalar;
 
 /// Rodas5P: order 5, eight stages, L-stable, error estimate, dense output of order 4. A step is one evaluation of the
 /// derivatives, one factorisation and seven evaluations of the rates, nine where [`Differentiable::depends_on_time`].
-pub type Rodas5P<Y> = Rosenbrock<Y, 8>;
+pub type Rodas5P<Y> = Integrator<Y, Rosenbrock<Y, 8>>;
 
 /// Any Rosenbrock method with `S` stages; take [`Rodas5P`].
 ///
 /// With exact derivatives in the chart it has its full order, joints with quaternions included.
 #[derive(Clone, Debug)]
 pub struct Rosenbrock<Y: Differentiable, const S: usize> {
-    field: Field<Y>,
-    statistics: Statistics,
     tableau: &'static tableau::Rosenbrock<S>,
     a: [[Y::Scalar; S]; S],
     coupling: [[Y::Scalar; S]; S],
-    jacobian: Matrix<Y>,
+    jacobian: Jacobian<Y>,
     lu: Lu<Y, 1>,
-    /// Whether the rate at the start and the derivatives are known, and for which step the matrix is factored; zero: none.
-    known: bool,
+    /// Step that the matrix is factored for; zero: none.
     factored: Y::Scalar,
     first: Point<Y>,
     /// Derivative of the rates with respect to time.
     by_time: Point<Y>,
     u: [Point<Y>; S],
-    delta: Point<Y>,
     stage: Point<Y>,
     work: [Point<Y>; 1],
-    end: Point<Y>,
-    end_known: bool,
     /// Part of a step by which the time is moved to find the derivative.
     shift: Y::Scalar,
 }
 
-impl<Y> Rosenbrock<Y, 8>
+impl<Y> FromSystem<Y> for Rosenbrock<Y, 8>
 where
     Y: Differentiable,
     Y::Scalar: Real,
 {
-    /// [`Rodas5P`]: room for one system.
-    pub fn new(system: &Y) -> Self {
-        Self::with(system, &tableau::RODAS5P, false)
-    }
-
-    /// With compensated sums of steps.
-    pub fn compensated(system: &Y) -> Self {
-        Self::with(system, &tableau::RODAS5P, true)
+    fn new(system: &Y) -> Self {
+        Self::with(system, &tableau::RODAS5P)
     }
 }
 
@@ -61,68 +49,48 @@ where
     Y: Differentiable,
     Y::Scalar: Real,
 {
-    fn with(system: &Y, tableau: &'static tableau::Rosenbrock<S>, compensated: bool) -> Self {
+    fn with(system: &Y, tableau: &'static tableau::Rosenbrock<S>) -> Self {
         let point = || Point::zero(system);
         Rosenbrock {
-            field: Field::new(system, compensated),
-            statistics: Statistics::default(),
             tableau,
             a: tableau.a.map(|row| row.map(|x| x.get())),
             coupling: tableau.coupling.map(|row| row.map(|x| x.get())),
-            jacobian: Matrix::zero(system),
+            jacobian: system.zero_derivatives(),
             lu: Lu::new(system),
-            known: false,
             factored: Y::Scalar::zero(),
             first: point(),
             by_time: point(),
             u: core::array::from_fn(|_| point()),
-            delta: point(),
             stage: point(),
             work: [point()],
-            end: point(),
-            end_known: false,
             shift: Y::Scalar::constant(libm::cbrt(Y::Scalar::epsilon())),
         }
     }
 
-    fn start(&mut self, system: &mut Y, t: Y::Scalar) {
-        if !self.known {
-            self.stage.clear();
-            self.field.linearise(system, t, &self.stage, &mut self.first, &mut self.jacobian);
-            self.statistics.jacobians += 1;
-            (self.known, self.factored) = (true, Y::Scalar::zero());
+    fn factor(&mut self, step: &mut Attempt<Y>, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if self.factored != h {
+            self.factored = Y::Scalar::zero();
+            step.statistics.factorisations += 1;
+            let gamma: Y::Scalar = self.tableau.gamma.get();
+            let factors = self.lu.factor([gamma * h], &self.jacobian);
+            factors.map_err(|column| Attempt::singular(&self.first, t, h, column))?;
+            self.factored = h;
         }
-    }
-
-    fn factor(&mut self, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        if self.factored == h {
-            return Ok(());
-        }
-        self.factored = Y::Scalar::zero();
-        self.statistics.factorisations += 1;
-        let gamma: Y::Scalar = self.tableau.gamma.get();
-        if let Err(column) = self.lu.factor([gamma * h], &self.jacobian) {
-            return Err(match self.first.not_finite() {
-                Some(index) => StepError::NotFinite { time: t.to_f64(), index },
-                None => StepError::Singular { time: t.to_f64(), step: h.to_f64(), column },
-            });
-        }
-        self.factored = h;
         Ok(())
     }
 
     /// Central difference; its error is about 1e-10 of the rates' change in a step.
-    fn differentiate_by_time(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+    fn differentiate_by_time(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
         let (after, before) = (t + h * self.shift, t - h * self.shift);
         self.stage.clear();
-        self.field.rates(system, after, &self.stage, &mut self.by_time);
-        self.field.rates(system, before, &self.stage, &mut self.end);
-        self.by_time.add(-Y::Scalar::one(), &self.end);
+        step.field.rates(system, after, &self.stage, &mut self.by_time);
+        step.field.rates(system, before, &self.stage, &mut step.end);
+        self.by_time.add(-Y::Scalar::one(), &step.end);
         self.by_time.scale(Y::Scalar::one() / (after - before));
     }
 }
 
-impl<Y, const S: usize> Stepper<Y> for Rosenbrock<Y, S>
+impl<Y, const S: usize> Scheme<Y> for Rosenbrock<Y, S>
 where
     Y: Differentiable,
     Y::Scalar: Real,
@@ -135,24 +103,19 @@ where
         Some(self.tableau.error_order)
     }
 
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        (self.known, self.end_known) = (false, false);
-        self.field.load(system, t, q, p)
-    }
-
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start(system, t);
-        self.end_known = false;
-        self.factor(t, h)?;
+        self.start_rate(step, system, t);
+        self.factor(step, t, h)?;
         let timed = system.depends_on_time();
         if timed {
-            self.differentiate_by_time(system, t, h);
+            self.differentiate_by_time(step, system, t, h);
         }
         let gamma: Y::Scalar = self.tableau.gamma.get();
         for i in 0..S {
@@ -166,7 +129,7 @@ where
                     self.stage.add(*a, u);
                 }
                 let c: Y::Scalar = self.tableau.c[i].get();
-                self.field.rates(system, t + c * h, &self.stage, work);
+                step.field.rates(system, t + c * h, &self.stage, work);
             }
             if timed {
                 let d: Y::Scalar = self.tableau.d[i].get();
@@ -183,37 +146,35 @@ where
             }
         }
         // The last stage's point is the embedded result, and its `u` leads from there to the new point.
-        self.delta.copy_from(&self.stage);
+        step.delta.copy_from(&self.stage);
         let Some(last) = self.u.last() else { return Ok(0.0) };
-        self.delta.add(Y::Scalar::one(), last);
+        step.delta.add(Y::Scalar::one(), last);
         Ok(scale.map_or(0.0, |scale| norm(last, scale)))
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.first
     }
 
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        self.start(system, t);
-        &self.first
-    }
-
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.field.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
+    /// With the derivatives, of which every step needs new ones.
+    fn start_rate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
+        if !step.start_known {
+            self.stage.clear();
+            step.field.linearise(system, t, &self.stage, &mut self.first, &mut self.jacobian);
+            step.statistics.jacobians += 1;
+            (step.start_known, self.factored) = (true, Y::Scalar::zero());
         }
-        &self.end
     }
 
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, _: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        (self.known, self.end_known) = (false, false);
-        self.statistics.steps += 1;
-        Ok(())
-    }
-
-    fn interpolate(&mut self, _: &mut Y, _: Y::Scalar, _: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        _: &mut Y,
+        _: Y::Scalar,
+        _: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
         // θ (y₁ + (1 − θ) (D₁ + θ (D₂ + θ D₃))), inside out.
         out.clear();
         for row in self.tableau.dense.iter().rev() {
@@ -223,11 +184,7 @@ where
             }
         }
         out.scale(Y::Scalar::one() - theta);
-        out.add(Y::Scalar::one(), &self.delta);
+        out.add(Y::Scalar::one(), &step.delta);
         out.scale(theta);
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics { evaluations: self.field.evaluations(), ..self.statistics }
     }
 }

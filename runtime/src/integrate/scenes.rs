@@ -6,7 +6,7 @@ use std::vec;
 use std::vec::Vec;
 
 use crate::spatial::{Axis, ElementaryTransform, RigidInertia};
-use crate::system::{Blocks, Differentiable, LieJoint, Real, System};
+use crate::system::{Differentiable, LieJoint, Real, StateDerivatives, System};
 use crate::tree::{Dims, Elimination, Kind, Node, Passive, Source, Tree};
 use crate::{Interpreter, Scalar};
 
@@ -188,14 +188,12 @@ impl Differentiable for Oscillator {
         t: f64,
         q: &[f64; 1],
         p: &[f64; 1],
-        v: &mut [f64; 1],
-        pd: &mut [f64; 1],
-        derivatives: Blocks<'_, [[f64; 1]; 1]>,
+        out: &mut StateDerivatives<[f64; 1], [[f64; 1]; 1]>,
     ) {
-        self.rates_at(t, q, p, v, pd);
-        *derivatives.dv_dq = [[0.0]];
-        *derivatives.dv_dp = [[1.0 / self.mass]];
-        *derivatives.dpd_dq = [[-self.stiffness]];
-        *derivatives.dpd_dp = [[-self.damping / self.mass]];
+        self.rates_at(t, q, p, &mut out.v, &mut out.pd);
+        out.dv_dq = [[0.0]];
+        out.dv_dp = [[1.0 / self.mass]];
+        out.dpd_dq = [[-self.stiffness]];
+        out.dpd_dp = [[-self.damping / self.mass]];
     }
 }

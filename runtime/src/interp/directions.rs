@@ -4,12 +4,23 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::InputValues;
-use crate::sweep::Sweeps;
-use crate::system::Blocks;
+use super::inputs;
+use crate::sweep::{Inputs, Sweeps};
+use crate::system::StateDerivatives;
 use crate::tree::Tree;
 use crate::workspace::Workspace;
 use crate::{Dual, Scalar};
+
+/// Inputs of the sweeps.
+#[derive(Clone, Debug)]
+struct InputValues<S> {
+    tau: Vec<S>,
+    drive_q: Vec<S>,
+    drive_v: Vec<S>,
+    drive_a: Vec<S>,
+    wrenches: Vec<[S; 6]>,
+    gravity: [S; 3],
+}
 
 /// Sweeps over numbers with derivatives.
 #[derive(Clone, Debug)]
@@ -40,27 +51,25 @@ impl<S: Scalar> DualRun<S> {
     /// One pass for each direction of the state.
     pub(super) fn derivatives(
         &mut self,
-        inputs: &InputValues<S>,
+        inputs: &Inputs<'_, S>,
         q: &[S],
         p: &[S],
-        v: &mut [S],
-        pd: &mut [S],
-        blocks: Blocks<'_, Vec<Vec<S>>>,
+        out: &mut StateDerivatives<Vec<S>, Vec<Vec<S>>>,
     ) {
         let of = |x: &S| Dual::new(*x, S::zero());
         let copy = |to: &mut [Dual<S>], from: &[S]| to.iter_mut().zip(from).for_each(|(to, from)| *to = of(from));
-        copy(&mut self.inputs.tau, &inputs.tau);
-        copy(&mut self.inputs.drive_q, &inputs.drive_q);
-        copy(&mut self.inputs.drive_v, &inputs.drive_v);
-        copy(&mut self.inputs.drive_a, &inputs.drive_a);
+        copy(&mut self.inputs.tau, inputs.tau);
+        copy(&mut self.inputs.drive_q, inputs.drive_q);
+        copy(&mut self.inputs.drive_v, inputs.drive_v);
+        copy(&mut self.inputs.drive_a, inputs.drive_a);
         copy(&mut self.inputs.gravity, &inputs.gravity);
-        for (to, from) in self.inputs.wrenches.iter_mut().zip(&inputs.wrenches) {
+        for (to, from) in self.inputs.wrenches.iter_mut().zip(inputs.wrenches) {
             copy(to, from);
         }
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let [dq, dp, dv, dqd, dpd] = &mut self.state;
         let unit = &mut self.unit;
-        let Blocks { dv_dq, dv_dp, dpd_dq, dpd_dp } = blocks;
+        let StateDerivatives { v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp } = out;
         for k in 0..p.len() {
             for (of_q, to_v, to_pd) in [(true, &mut *dv_dq, &mut *dpd_dq), (false, &mut *dv_dp, &mut *dpd_dp)] {
                 copy(dq, q);
@@ -73,7 +82,7 @@ impl<S: Scalar> DualRun<S> {
                 } else {
                     dp[k].du = S::one();
                 }
-                sweeps.rates(dq, dp, &self.inputs.view(), &mut self.work, dv, dqd, dpd);
+                sweeps.rates(dq, dp, &inputs!(self.inputs), &mut self.work, dv, dqd, dpd);
                 for (row, x) in to_v.iter_mut().zip(&*dv) {
                     row[k] = x.du;
                 }

@@ -1,7 +1,7 @@
 //! Stabilisation around every kind of method.
 
 use super::systems::*;
-use mbd_runtime::constrained::{ConstraintError, Effort, Hold, Stabilisation, WithPostStep};
+use mbd_runtime::constrained::{ConstraintError, Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{
     Abm4, Dop853, Euler, Gauss12FixedPoint, Rk4, Solver, Step, StepDoubling, StepError, Stepper,
 };
@@ -30,12 +30,12 @@ where
     Ok((q, p))
 }
 
-pub fn held<Y, M>(y: &Y, method: M, policy: Stabilisation) -> WithPostStep<Y, M, Hold<Y>>
+pub fn held<Y, M>(y: &Y, method: M, policy: Stabilisation) -> WithPostStep<Y, M, Projection<Y>>
 where
     Y: Constrained<Scalar = f64>,
     M: Stepper<Y>,
 {
-    WithPostStep::new(y, method, Hold::new(y, policy, Effort::default()))
+    WithPostStep::new(y, method, Projection::new(y, policy, Effort::default()))
 }
 
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
@@ -92,7 +92,7 @@ fn orders() {
     check("euler", 1, 200, Euler::new);
     check("semi-implicit", 1, 200, SemiImplicitEuler::new);
     check("rk4", 4, 25, Rk4::new);
-    check("rk4 doubled", 4, 15, |y| StepDoubling::new(y, Rk4::new(y)));
+    check("rk4 doubled", 4, 15, |y| StepDoubling::over(y, Rk4::new(y)));
     check("tsit5", 5, 20, Tsit5::new);
     check("dop853", 8, 5, Dop853::new);
     check("abm4", 4, 100, Abm4::new);
@@ -179,7 +179,7 @@ fn a_body_on_its_group() {
 #[test]
 fn long_drift() {
     let (mut y, start) = double();
-    let hold = Hold::new(&y, Stabilisation::Mass, Effort::fixed(2));
+    let hold = Projection::new(&y, Stabilisation::Mass, Effort { iterations: 2, tolerance: 0.0 });
     let method = Rk4::new(&y);
     let mut method = WithPostStep::new(&y, method, hold);
     let ((mut q, mut p), mut worst) = (start, 0.0_f64);
@@ -188,7 +188,7 @@ fn long_drift() {
         worst = worst.max(y.off(&q, &p).0);
     }
     assert!(worst < 1e-15, "{worst}");
-    assert_eq!(method.boundary.rank(), (Some(2), 0));
+    assert_eq!(method.post_step.rank(), (Some(2), 0));
 }
 
 /// A step far beyond what three iterations bring back is refused with its numbers, and the state is as it was.

@@ -4,11 +4,14 @@ mod projection;
 mod systems;
 
 use mbd_runtime::integrate::{
-    Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, Solver, Statistics, Step, Stepper, Tolerances, VariableAdams, Verner9,
+    Ab4, Ab6, Abm4, Abm6, Abm8, AdamsMoulton, Solver, Statistics, Step, Stepper, Tolerances, VariableAdams, Verner9,
 };
 use mbd_runtime::{Energetic, System};
 
 use systems::{apart, body, pendulum, top, turned, walk, walk_on, Top};
+
+/// The highest order there is.
+type Abm12<Y> = AdamsMoulton<Y, 12>;
 
 /// The order that halvings of the step show: over a time of 2 s with the first step, and in the first `K + 2` steps, whose
 /// error is of one order more, with the second one. Errors near round-off do not count.

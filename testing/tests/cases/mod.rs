@@ -70,10 +70,10 @@ impl Case {
 
     /// The same for given velocities of state and drives, without derivatives.
     pub fn bodies_at(&mut self, v: &[f64], drive: &[f64]) -> Vec<FrameState<f64>> {
-        self.i.inputs.drive_v.copy_from_slice(drive);
+        self.i.drive_v.copy_from_slice(drive);
         let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
         self.i.frames(&self.s.q, v, &mut frames);
-        self.i.inputs.drive_v.copy_from_slice(&self.s.drive[1]);
+        self.i.drive_v.copy_from_slice(&self.s.drive[1]);
         newton::body_frames(&self.plan).into_iter().map(|k| frames[k]).collect()
     }
 

@@ -65,7 +65,7 @@ impl State {
         let d = plan.dims;
         let wide = |x: Vec<f64>| x.into_iter().map(Wide::constant).collect::<Vec<Wide>>();
         let input = |name: &str, len: usize| wide(self.input(name, len));
-        let inputs = &mut interpreter.inputs;
+        let inputs = &mut *interpreter;
         if options(output).efforts {
             inputs.tau = input("tau", d.nv);
         }

@@ -1,7 +1,7 @@
 //! What the firmware and its host twin both run: generated dynamics in steps of 1 ms.
 #![no_std]
 
-use mbd_runtime::constrained::{WithPostStep, Steady};
+use mbd_runtime::constrained::{Projection, WithPostStep};
 use mbd_runtime::integrate::{Ab6, ImplicitMidpoint, Rk4, Stepper};
 use mbd_runtime::{Constrained, Differentiable, Energetic, Real, Scalar, System};
 
@@ -187,8 +187,8 @@ where
     for (q, start) in q.as_mut().iter_mut().zip(FOURBAR) {
         *q = Y::Scalar::constant(start);
     }
-    let hold = Steady::<_, 1>::new(system);
-    let method = WithPostStep::new(system, Rk4::new(system), hold);
+    let projection = Projection::fixed_work::<1>(system);
+    let method = WithPostStep::new(system, Rk4::new(system), projection);
     watched(system, method, LOOP, (q, p), watch)
 }
 

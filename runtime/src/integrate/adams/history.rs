@@ -45,6 +45,11 @@ where
         &self.rates[self.slot(j)]
     }
 
+    /// The newest rate.
+    pub fn newest(&mut self) -> &mut Point<Y> {
+        &mut self.rates[self.head]
+    }
+
     /// Age of rate `j`, s.
     pub fn age(&self, j: usize) -> Y::Scalar {
         self.ages[self.slot(j)]

@@ -7,5 +7,5 @@ mod start;
 mod variable;
 mod weights;
 
-pub use fixed::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton};
-pub use variable::VariableAdams;
+pub use fixed::{Ab4, Ab6, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton};
+pub use variable::{AdamsOfVariableOrder, VariableAdams};

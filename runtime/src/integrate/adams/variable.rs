@@ -1,10 +1,10 @@
 //! The Adams method with steps and orders of any size.
 
-use super::shared::{of_core, Core};
+use super::history::History;
 use super::weights::{Weights, NODES};
 use crate::integrate::chart::Point;
-use crate::integrate::field::Field;
-use crate::integrate::stepper::{norm, Statistics, Stepper};
+use crate::integrate::integrator::{Attempt, FromSystem, Integrator, Scheme};
+use crate::integrate::stepper::norm;
 use crate::integrate::StepError;
 use crate::system::{Real, System};
 use crate::Scalar;
@@ -33,9 +33,12 @@ const GROW: f64 = 2.0;
 /// the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every step from the
 /// places of the past rates, instead of their modified divided differences: the rates are rewritten by rotations
 /// ([`Chart::follow`](crate::integrate::Chart::follow)), which differences would not survive.
+pub type VariableAdams<Y> = Integrator<Y, AdamsOfVariableOrder<Y>>;
+
+/// The scheme of [`VariableAdams`].
 #[derive(Clone, Debug)]
-pub struct VariableAdams<Y: System> {
-    core: Core<Y, HIGHEST>,
+pub struct AdamsOfVariableOrder<Y: System> {
+    history: History<Y, HIGHEST>,
     /// Order of the predictor in the next attempt.
     order: usize,
     /// In the last one.
@@ -47,24 +50,14 @@ pub struct VariableAdams<Y: System> {
     work: Point<Y>,
 }
 
-impl<Y> VariableAdams<Y>
+impl<Y> FromSystem<Y> for AdamsOfVariableOrder<Y>
 where
     Y: System,
     Y::Scalar: Real,
 {
-    /// Room for the history of one system.
-    pub fn new(system: &Y) -> Self {
-        Self::with_sums(system, false)
-    }
-
-    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions.
-    pub fn compensated(system: &Y) -> Self {
-        Self::with_sums(system, true)
-    }
-
-    fn with_sums(system: &Y, compensated: bool) -> Self {
-        VariableAdams {
-            core: Core::new(system, compensated),
+    fn new(system: &Y) -> Self {
+        AdamsOfVariableOrder {
+            history: History::new(system),
             order: 1,
             used: 1,
             starting: true,
@@ -72,43 +65,51 @@ where
             work: Point::zero(system),
         }
     }
+}
 
+impl<Y> AdamsOfVariableOrder<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
     /// Weights at the order of the last attempt, up to `theta` of a step of `h`.
     fn weights(&self, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
         let mut places = [Y::Scalar::one(); NODES];
-        let count = (self.used + 1).min(self.core.history.len());
+        let count = (self.used + 1).min(self.history.len());
         for (j, place) in places[1..=count].iter_mut().enumerate() {
-            *place = -(self.core.history.age(j) / h);
+            *place = -(self.history.age(j) / h);
         }
         Weights::new(&places[..=count], self.used, theta)
     }
 
     /// Integral up to `theta` of the polynomial through the past rates and that at the end; to `work`.
-    fn polynomial(&mut self, h: Y::Scalar, theta: Y::Scalar) {
+    fn polynomial(&mut self, step: &Attempt<Y>, h: Y::Scalar, theta: Y::Scalar) {
         let weights = self.weights(h, theta).corrector;
-        self.core.history.combine(&weights[..=self.used], &self.core.end, &mut self.work);
+        self.history.combine(&weights[..=self.used], &step.end, &mut self.work);
         self.work.scale(h);
     }
 
     /// Errors of the last attempt at the orders around its own: by how much one rate more changes the integral.
-    fn estimate(&mut self, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
+    fn estimate(&mut self, step: &Attempt<Y>, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
         let k = self.used;
-        let known = [k > 1, true, k < self.core.history.len()];
+        let known = [k > 1, true, k < self.history.len()];
         for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
             self.errors[i] = f64::INFINITY;
             if known {
-                self.core.history.combine(&weights[..k + i], &self.core.end, &mut self.work);
+                self.history.combine(&weights[..k + i], &step.end, &mut self.work);
                 self.errors[i] = h.abs().to_f64() * norm(&self.work, scale) / SHARE;
             }
         }
     }
 }
 
-impl<Y> Stepper<Y> for VariableAdams<Y>
+impl<Y> Scheme<Y> for AdamsOfVariableOrder<Y>
 where
     Y: System,
     Y::Scalar: Real,
 {
+    const MULTISTEP: bool = true;
+
     /// The highest.
     fn order(&self) -> u32 {
         HIGHEST as u32 + 1
@@ -119,29 +120,30 @@ where
         Some(self.order as u32)
     }
 
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+    fn begin(&mut self) {
         (self.order, self.starting) = (1, true);
-        self.core.begin(system, t, q, p)
+        self.history.keep(0);
     }
 
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.core.attempt(system, t);
-        self.used = self.order.min(self.core.history.len());
+        self.start_rate(step, system, t);
+        self.used = self.order.min(self.history.len());
         let k = self.used;
         let weights = self.weights(h, Y::Scalar::one());
-        self.core.predict(h, &weights.predictor[..=k]);
-        self.core.correct(system, t, h, &weights.corrector[..=k]);
+        self.history.predict(step, h, &weights.predictor[..=k]);
+        self.history.correct(step, system, t, h, &weights.corrector[..=k]);
         let Some(scale) = scale else {
             self.order = (k + 1).min(HIGHEST);
             return Ok(0.0);
         };
-        self.estimate(&weights, h, scale);
+        self.estimate(step, &weights, h, scale);
         let [lower, error, _] = self.errors;
         // Not a number is too large as well.
         if error > 1.0 || error.is_nan() {
@@ -170,20 +172,34 @@ where
         Some(libm::exp(best).clamp(SHRINK, GROW))
     }
 
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        self.core.accept(system, t, h)
+    fn start(&mut self) -> &mut Point<Y> {
+        self.history.newest()
     }
 
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.core.end_rate(system, t, h);
-        self.polynomial(h, Y::Scalar::one());
-        out.copy_from(&self.core.delta);
+    fn start_rate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
+        self.history.start_rate(step, system, t);
+    }
+
+    fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, h: Y::Scalar) -> bool {
+        self.history.accepted(step, system, h)
+    }
+
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
+        step.end_rate(system, t, h);
+        self.polynomial(step, h, Y::Scalar::one());
+        out.copy_from(&step.delta);
         // The step was made with the rate at the prediction: what that differs by is spread over the step.
         out.add(-Y::Scalar::one(), &self.work);
         out.scale(theta);
-        self.polynomial(h, theta);
+        self.polynomial(step, h, theta);
         out.add(Y::Scalar::one(), &self.work);
     }
-
-    of_core!();
 }

@@ -1,6 +1,6 @@
 //! Weights of Adams methods, from the places of the known rates.
 
-use crate::integrate::constant::{decimal, Constant};
+use crate::constant::{decimal, Constant};
 use crate::Scalar;
 
 /// Most nodes of a polynomial; [`QUADRATURE`] is exact to degree 15.

@@ -1,7 +1,7 @@
 //! Dormand and Prince 8(5, 3).
 
-use super::super::constant::{list, lower};
 use super::{Dense, Tableau};
+use crate::constant::{list, lower};
 
 /// Dormand and Prince of order 8, twelve stages, with two estimators of its error, of order 5 and 3.
 ///

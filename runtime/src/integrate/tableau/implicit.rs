@@ -2,7 +2,7 @@
 //!
 //! `scripts/collocation.py` computes them, to 36 digits.
 
-use super::super::constant::{list, Constant};
+use crate::constant::{list, Constant};
 
 /// A collocation method with `S` stages: rates `k_i = f(t + c_i h, y + h Σ_j a_ij k_j)`, the new point `y + h Σ_i b_i k_i`.
 ///

@@ -1,7 +1,7 @@
 //! Methods of low order with rational coefficients.
 
-use super::super::constant::{list, lower};
 use super::Tableau;
+use crate::constant::{list, lower};
 
 /// Euler's method.
 pub static EULER: Tableau<1> = Tableau {

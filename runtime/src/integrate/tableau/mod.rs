@@ -14,14 +14,12 @@ mod tests;
 pub use dop853::DOP853;
 pub use implicit::{Collocation, BACKWARD_EULER, GAUSS12, GAUSS4, GAUSS6, IMPLICIT_MIDPOINT, RADAU5};
 pub use low::{CASH_KARP, DORMAND_PRINCE, EULER, MIDPOINT, RK4, RKF45};
-pub use modes::{
-    Mode, BACKWARD_EULER_MODES, GAUSS12_MODES, GAUSS4_MODES, GAUSS6_MODES, IMPLICIT_MIDPOINT_MODES, RADAU5_MODES,
-};
+pub use modes::{Mode, BACKWARD_EULER_MODES, GAUSS4_MODES, GAUSS6_MODES, IMPLICIT_MIDPOINT_MODES, RADAU5_MODES};
 pub use rosenbrock::{Rosenbrock, RODAS5P};
 pub use tsit5::TSIT5;
 pub use verner9::VERNER9;
 
-use super::constant::Constant;
+use crate::constant::Constant;
 use crate::Scalar;
 
 /// An explicit Runge-Kutta method with `S` stages.

@@ -1,6 +1,6 @@
 //! Coefficients of Rosenbrock methods.
 
-use super::super::constant::{decimal, list, lower, Constant};
+use crate::constant::{decimal, list, lower, Constant};
 
 /// A Rosenbrock method with `S` stages, in the variables that need no product with the Jacobian `J`:
 ///

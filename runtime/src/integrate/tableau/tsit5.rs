@@ -1,7 +1,7 @@
 //! Tsitouras 5(4).
 
-use super::super::constant::{list, lower};
 use super::{Dense, Tableau};
+use crate::constant::{list, lower};
 
 /// Tsitouras 5(4), seven stages of which the last is the next first one; six evaluations a step.
 ///

@@ -1,7 +1,7 @@
 //! Verner 9(8).
 
-use super::super::constant::{list, lower};
 use super::{Dense, Tableau};
+use crate::constant::{list, lower};
 
 /// Verner's "most efficient" pair of order 9(8), sixteen stages.
 ///

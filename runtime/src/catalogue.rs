@@ -2,12 +2,12 @@
 
 use alloc::boxed::Box;
 
-use super::{Ab4, Ab6, Abm12, Abm4, Abm6, Abm8, VariableAdams};
-use super::{BackwardEuler, Gauss12, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
-use super::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
-use super::{Composition, Doubled, StepDoubling, Symmetric};
-use super::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::constrained::{PostStep, WithPostStep};
+use crate::integrate::StepDoubling;
+use crate::integrate::{Ab4, Ab6, Abm4, Abm6, Abm8, VariableAdams};
+use crate::integrate::{BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
+use crate::integrate::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
+use crate::integrate::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::system::{Differentiable, Energetic, Real, System};
 
 /// What there is to know of a method before it is made.
@@ -120,7 +120,7 @@ where
 
 /// A table of methods, and the function that makes one of them at time zero.
 macro_rules! catalogue {
-    ($(#[$doc:meta])* $list:ident, $make:ident, $bounded:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
+    ($(#[$doc:meta])* $list:ident, $make:ident, $with_post_step:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
      { $($name:literal $title:literal $adaptive:literal $method:expr;)* }) => {
         $(#[$doc])*
         pub static $list: &[Entry] = &[
@@ -143,8 +143,8 @@ macro_rules! catalogue {
             }
         }
 
-        /// The same with work at the end of every step: [`crate::constrained`].
-        pub fn $bounded<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, boundary: B) -> Made<'a, Y>
+        /// The same with work at the end of every step, see [`constrained`](crate::constrained).
+        pub fn $with_post_step<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, post_step: B) -> Made<'a, Y>
         where
             Y: $bound + 'a,
             Y::Scalar: Real,
@@ -154,7 +154,7 @@ macro_rules! catalogue {
             match name {
                 $($name => {
                     let method = $method;
-                    let method = WithPostStep::new($system, method, boundary);
+                    let method = WithPostStep::new($system, method, post_step);
                     boxed($system, method, start)
                 })*
                 _ => None,
@@ -176,7 +176,7 @@ macro_rules! sums {
 
 catalogue! {
     /// Methods that need the rates only.
-    EXPLICIT, explicit, explicit_bounded, System, false, |system, c| {
+    EXPLICIT, explicit, explicit_with_post_step, System, false, |system, c| {
         "euler" "Euler" false sums!(Euler, system, c);
         "semi-implicit-euler" "semi-implicit Euler" false sums!(SemiImplicitEuler, system, c);
         "midpoint" "explicit midpoint, order 2" false sums!(Midpoint, system, c);
@@ -192,28 +192,18 @@ catalogue! {
         "abm4" "Adams-Bashforth-Moulton, order 4" false sums!(Abm4, system, c);
         "abm6" "Adams-Bashforth-Moulton, order 6" false sums!(Abm6, system, c);
         "abm8" "Adams-Bashforth-Moulton, order 8" false sums!(Abm8, system, c);
-        "abm12" "Adams-Bashforth-Moulton, order 12" false sums!(Abm12, system, c);
         "adams" "Adams-Bashforth-Moulton, variable steps and orders" true sums!(VariableAdams, system, c);
         "gauss12" "Gauss-Legendre, order 12, by insertion" false sums!(Gauss12FixedPoint, system, c);
-        "doubled" "phase space doubled, order 2 (experiment)" false Doubled::new(system, BINDING);
-        "doubled-6" "phase space doubled, composed to order 6 (experiment)" false
-            Composition::new(system, Doubled::new(system, BINDING), Symmetric::KAHAN_LI_6);
     }
 }
 
-/// Binding of the two copies of the doubled phase space, 1/s.
-const BINDING: f64 = 20.0;
-
 catalogue! {
     /// Methods that need derivatives of the rates.
-    IMPLICIT, implicit, implicit_bounded, Differentiable, true, |system, c| {
+    IMPLICIT, implicit, implicit_with_post_step, Differentiable, true, |system, c| {
         "backward-euler" "backward Euler" false sums!(BackwardEuler, system, c);
         "implicit-midpoint" "implicit midpoint, order 2" false sums!(ImplicitMidpoint, system, c);
-        "implicit-midpoint-6" "implicit midpoint, composed to order 6" false
-            Composition::new(system, sums!(ImplicitMidpoint, system, c), Symmetric::KAHAN_LI_6);
         "gauss4" "Gauss-Legendre, order 4" false sums!(Gauss4, system, c);
         "gauss6" "Gauss-Legendre, order 6" false sums!(Gauss6, system, c);
-        "gauss12-newton" "Gauss-Legendre, order 12, by Newton" false sums!(Gauss12, system, c);
         "radau5" "Radau IIA, order 5" true sums!(Radau5, system, c);
         "rodas5p" "Rosenbrock Rodas5P, order 5" true sums!(Rodas5P, system, c);
     }

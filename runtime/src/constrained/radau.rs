@@ -1,11 +1,10 @@
 //! Radau IIA on the equations with multipliers.
 
-use super::ends::Ends;
+use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
-use super::split::Unconstrained;
 use super::ConstraintError;
 use crate::integrate::tableau::RADAU5;
-use crate::integrate::{hermite, Chart, Field, Point, Statistics, StepError, Stepper};
+use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, StepError};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -15,19 +14,21 @@ const ITERATIONS: u32 = 100;
 /// The three-stage Radau IIA method on the equations of index 2, steps of given size: `q̇`, `ṗ − Φᵀλ` of the open system with
 /// `Φ v = b` at every stage, and so at the end of the step, which is the last one. Order 5 in the state, 3 in the multipliers (E.
 /// Hairer, C. Lubich, M. Roche, *The Numerical Solution of Differential-Algebraic Systems by Runge-Kutta Methods*, 1989, table
-/// 2.3). Positions drift with the method's error; [`Hold`](super::Hold) brings them back.
+/// 2.3). Positions drift with the method's error; [`Projection`](super::Projection) brings them back.
 ///
 /// Stages are solved for by inserting, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
 /// projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
+pub type RadauIndex2<Y> = Integrator<Y, RadauIndex2Scheme<Y>>;
+
+/// The scheme of [`RadauIndex2`].
 #[derive(Clone, Debug)]
-pub struct RadauIndex2<Y: Unconstrained>
+pub struct RadauIndex2Scheme<Y: Unconstrained>
 where
     Y::Scalar: Real,
 {
-    field: Field<Y>,
-    statistics: Statistics,
-    evaluations: u64,
     fixed: Option<u32>,
+    /// Rate of the closed system at the start.
+    rate: Point<Y>,
     /// Weights of the method, and their inverse.
     a: [[Y::Scalar; 3]; 3],
     inverse: [[Y::Scalar; 3]; 3],
@@ -35,7 +36,6 @@ where
     z: [Point<Y>; 3],
     f: [Point<Y>; 3],
     new: Point<Y>,
-    delta: Point<Y>,
     lambda: [Y::Rows; 3],
     sigma: [Y::Rows; 3],
     entries: Y::Entries,
@@ -45,7 +45,6 @@ where
     qd: Y::Coordinates,
     work: Y::Momenta,
     size: (f64, f64),
-    ends: Ends<Y>,
 }
 
 /// By cofactors: the matrix of the method is far from singular.
@@ -58,27 +57,23 @@ fn inverse<S: Scalar>(a: &[[S; 3]; 3]) -> [[S; 3]; 3] {
     core::array::from_fn(|i| core::array::from_fn(|j| minor(j, i) / det))
 }
 
-impl<Y> RadauIndex2<Y>
+impl<Y> FromSystem<Y> for RadauIndex2Scheme<Y>
 where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// Room for one system.
-    pub fn new(system: &Y) -> Self {
+    fn new(system: &Y) -> Self {
         let point = || Point::zero(system);
         let a = RADAU5.a.map(|row| row.map(|x| x.get()));
-        RadauIndex2 {
-            field: Field::new(system, false),
-            statistics: Statistics::default(),
-            evaluations: 0,
+        RadauIndex2Scheme {
             fixed: None,
+            rate: point(),
             inverse: inverse(&a),
             a,
             c: RADAU5.c.map(|x| x.get()),
             z: core::array::from_fn(|_| point()),
             f: core::array::from_fn(|_| point()),
             new: point(),
-            delta: point(),
             lambda: core::array::from_fn(|_| system.zero_rows()),
             sigma: core::array::from_fn(|_| system.zero_rows()),
             entries: system.zero_entries(),
@@ -88,27 +83,37 @@ where
             qd: system.neutral(),
             work: system.zero_momenta(),
             size: (0.0, 0.0),
-            ends: Ends::new(system),
         }
     }
+}
 
-    /// Exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+impl<Y> RadauIndex2<Y>
+where
+    Y: Unconstrained,
+    Y::Scalar: Real,
+{
+    /// The same method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
     #[must_use]
-    pub fn with_iterations(mut self, n: u32) -> Self {
-        self.fixed = Some(n);
-        self
+    pub fn with_iterations(self, n: u32) -> Self {
+        self.map(|scheme| RadauIndex2Scheme { fixed: Some(n), ..scheme })
     }
 
     /// Multipliers at the end of the last step: forces and moments of the constraints, N and N m.
     pub fn lambda(&self) -> &Y::Rows {
-        &self.lambda[2]
+        &self.scheme().lambda[2]
     }
+}
 
+impl<Y> RadauIndex2Scheme<Y>
+where
+    Y: Unconstrained,
+    Y::Scalar: Real,
+{
     /// Rates of a stage, with the forces of its multipliers, and `σ` by which its momenta miss the constraints.
-    fn stage(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, i: usize) {
+    fn stage(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, i: usize) {
         let at = t + self.c[i] * h;
         let (z, f) = (&self.z[i], &mut self.f[i]);
-        let chart = self.field.chart();
+        let chart = step.field.chart();
         chart.state(system, z, &mut self.q, &mut self.p);
         system.constraint_residuals(&self.q, &mut self.residual, &mut self.entries);
         let force = &mut self.work;
@@ -120,7 +125,7 @@ where
         for (f, force) in f.p.as_mut().iter_mut().zip(force.as_ref()) {
             *f = *f - *force;
         }
-        self.evaluations += 1;
+        step.statistics.evaluations += 1;
     }
 
     /// Stages from rates; the largest change relative to the state.
@@ -142,14 +147,14 @@ where
     }
 
     /// One iteration; how much it changed.
-    fn iterate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> f64 {
+    fn iterate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> f64 {
         for i in 0..3 {
-            self.stage(system, t, h, i);
+            self.stage(step, system, t, h, i);
         }
         let change = self.insert(h);
         for i in 0..3 {
             let at = t + self.c[i] * h;
-            self.field.chart().state(system, &self.z[i], &mut self.q, &mut self.p);
+            step.field.chart().state(system, &self.z[i], &mut self.q, &mut self.p);
             system.project_momenta(at, &self.q, &mut self.p, &mut self.work, &mut self.sigma[i]);
         }
         // h Σ a_ij Φ_jᵀ δλ_j = Φ_iᵀ σ_i, with Φ_j for Φ_i.
@@ -160,15 +165,21 @@ where
                 }
             }
         }
-        self.statistics.iterations += 1;
+        step.statistics.iterations += 1;
         change
     }
 
-    fn solve(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), ConstraintError> {
+    fn solve(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+    ) -> Result<(), ConstraintError> {
         let epsilon = Y::Scalar::epsilon();
         let (mut last, mut best) = (f64::INFINITY, f64::INFINITY);
         for iteration in 1..=self.fixed.unwrap_or(ITERATIONS) {
-            let change = self.iterate(system, t, h);
+            let change = self.iterate(step, system, t, h);
             if self.fixed.is_some() {
                 continue;
             }
@@ -198,7 +209,7 @@ fn largest<S: Real>(least: f64, x: &[S]) -> f64 {
     }
 }
 
-impl<Y> Stepper<Y> for RadauIndex2<Y>
+impl<Y> Scheme<Y> for RadauIndex2Scheme<Y>
 where
     Y: Unconstrained,
     Y::Scalar: Real,
@@ -207,23 +218,14 @@ where
         RADAU5.order
     }
 
-    fn error_order(&self) -> Option<u32> {
-        None
-    }
-
-    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        self.ends.forget();
-        self.field.load(system, t, q, p)
-    }
-
     fn attempt(
         &mut self,
+        step: &mut Attempt<Y>,
         system: &mut Y,
         t: Y::Scalar,
         h: Y::Scalar,
         _scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.ends.forget_end();
         let [_, _, end] = &self.lambda;
         // Multipliers go on from the end of the last step.
         let usable = worst(end.as_ref()).1.is_finite();
@@ -234,44 +236,15 @@ where
         first.as_mut().copy_from_slice(end.as_ref());
         second.as_mut().copy_from_slice(end.as_ref());
         self.z.iter_mut().for_each(Point::clear);
-        self.field.chart().base(system, &mut self.q, &mut self.p);
+        step.field.chart().base(system, &mut self.q, &mut self.p);
         self.size = (largest(0.0, self.q.as_ref()), largest(0.0, self.p.as_ref()));
-        let result = self.solve(system, t, h);
+        let result = self.solve(step, system, t, h);
         result.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
-        self.delta.copy_from(&self.z[2]);
+        step.delta.copy_from(&self.z[2]);
         Ok(0.0)
     }
 
-    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (&mut self.field, &mut self.delta)
-    }
-
-    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
-        self.ends.start(&mut self.field, system, t)
-    }
-
-    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        self.ends.end(&mut self.field, system, t + h, &self.delta)
-    }
-
-    fn accept(&mut self, system: &mut Y, t: Y::Scalar, _h: Y::Scalar) -> Result<(), StepError> {
-        self.field.advance(system, t, &self.delta)?;
-        self.ends.forget();
-        self.statistics.steps += 1;
-        Ok(())
-    }
-
-    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
-        self.start_rate(system, t);
-        self.end_rate(system, t, h);
-        hermite(h, theta, &self.delta, self.ends.both(), out);
-    }
-
-    fn corrected(&mut self) {
-        self.ends.forget_end();
-    }
-
-    fn statistics(&self) -> Statistics {
-        Statistics { evaluations: self.evaluations + self.field.evaluations(), ..self.statistics }
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.rate
     }
 }

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::basic::Basic;
-use super::boundary::PostStep;
+use super::post_step::PostStep;
 use super::rows::{named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
@@ -379,7 +379,7 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    const TURNS: bool = true;
+    const RESTARTS: bool = true;
 
     fn close(
         &mut self,
@@ -401,7 +401,7 @@ where
         Ok(())
     }
 
-    fn turn(
+    fn restart(
         &mut self,
         system: &mut CoordinatePartition<Y>,
         t: Y::Scalar,

@@ -6,8 +6,8 @@ use crate::system::{Real, System};
 
 /// What is done to a state where a step ends.
 pub trait PostStep<Y: System> {
-    /// Whether [`PostStep::turn`] does anything.
-    const TURNS: bool = false;
+    /// Whether [`PostStep::restart`] does anything.
+    const RESTARTS: bool = false;
 
     /// Changes the state at the end of a step that is about to be accepted, or inside of it, by little or by what means nothing
     /// to the motion. With `remembers` the method holds on to rates of the past, and momenta must not jump.
@@ -28,7 +28,7 @@ pub trait PostStep<Y: System> {
     ///
     /// # Errors
     /// [`ConstraintError`].
-    fn turn(
+    fn restart(
         &mut self,
         _system: &mut Y,
         _t: Y::Scalar,
@@ -49,7 +49,7 @@ pub struct WithPostStep<Y: System, M, B> {
     /// The method.
     method: M,
     /// What is done at the ends.
-    pub boundary: B,
+    pub post_step: B,
     delta: Point<Y>,
     end: Point<Y>,
     end_known: bool,
@@ -65,11 +65,11 @@ where
     B: PostStep<Y>,
 {
     /// Around a method.
-    pub fn new(system: &Y, method: M, boundary: B) -> Self {
+    pub fn new(system: &Y, method: M, post_step: B) -> Self {
         let state = || (system.neutral(), system.zero_momenta());
         WithPostStep {
             method,
-            boundary,
+            post_step,
             delta: Point::zero(system),
             end: Point::zero(system),
             end_known: false,
@@ -83,19 +83,19 @@ where
         &self.method
     }
 
-    /// Changes a displacement that ends at time `t` as the boundary wants it: `other`, or that of the last attempt.
+    /// Changes a displacement that ends at time `t` as the post_step wants it: `other`, or that of the last attempt.
     fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
-        let WithPostStep { method, boundary, delta, old, new: (q, p), .. } = self;
+        let WithPostStep { method, post_step, delta, old, new: (q, p), .. } = self;
         let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
         method.parts().0.chart().state(system, point, &mut old.0, &mut old.1);
         q.as_mut().copy_from_slice(old.0.as_ref());
         p.as_mut().copy_from_slice(old.1.as_ref());
-        boundary.close(system, t, remembers, q, p)?;
+        post_step.close(system, t, remembers, q, p)?;
         Chart::correct(system, (&old.0, &old.1), (q, p), point);
         Ok(())
     }
 
-    /// The method takes the displacement as the boundary left it.
+    /// The method takes the displacement as the post_step left it.
     fn hand_over(&mut self) {
         let delta = self.method.parts().1;
         if delta.parts() != self.delta.parts() {
@@ -105,13 +105,13 @@ where
         self.end_known = false;
     }
 
-    /// What the boundary does before the next step.
-    fn turn(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        if B::TURNS {
+    /// What the post_step does before the next step.
+    fn restart(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if B::RESTARTS {
             let (q, p) = (&mut self.new.0, &mut self.new.1);
             self.method.parts().0.store(system, q, p);
-            let turned = self.boundary.turn(system, t + h, q, p);
-            if turned.map_err(|error| StepError::Constraint { time: t.to_f64(), error })? {
+            let restarted = self.post_step.restart(system, t + h, q, p);
+            if restarted.map_err(|error| StepError::Constraint { time: t.to_f64(), error })? {
                 self.method.begin(system, t + h, q, p)?;
             }
         }
@@ -186,16 +186,16 @@ where
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         self.hand_over();
         self.method.accept(system, t, h)?;
-        self.turn(system, t, h)
+        self.restart(system, t, h)
     }
 
     fn finish(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         self.hand_over();
         self.method.finish(system, t, h)?;
-        self.turn(system, t, h)
+        self.restart(system, t, h)
     }
 
-    /// That of the method, changed by the boundary; where it cannot be, that of the method.
+    /// That of the method, changed by the post_step; where it cannot be, that of the method.
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.method.interpolate(system, t, h, theta, out);
         // A displacement is changed at last, when nothing can fail any more.

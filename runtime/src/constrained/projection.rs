@@ -1,0 +1,328 @@
+//! Projection of states onto the constraints where steps end.
+
+#[cfg(feature = "alloc")]
+use super::basic::Basic;
+use super::post_step::PostStep;
+use super::rows::{add_forces, named, worst};
+use super::ConstraintError;
+use crate::integrate::Chart;
+use crate::system::{Constrained, Real};
+use crate::Scalar;
+
+/// What is done at the end of every step; see the module's table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stabilisation {
+    /// Nothing: multipliers `σ` add up in the momenta, positions drift.
+    None,
+    /// Momenta are freed of `σ` ([`Constrained::project_momenta`]); positions drift with the method's error.
+    Momenta,
+    /// After that positions are moved back, least in the metric of the mass matrix ([`Constrained::position_correction`]);
+    /// momenta stay.
+    #[default]
+    Mass,
+    /// The same with displacements of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
+    #[cfg(feature = "alloc")]
+    Gradient,
+    /// The same with displacements of dependent coordinates alone, which are chosen anew each time.
+    #[cfg(feature = "alloc")]
+    Partition,
+}
+
+/// When positions count as closed, and how many iterations that may take.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Largest number of iterations at the end of a step.
+    pub iterations: u32,
+    /// Residual, m and rad, below which positions are left alone.
+    pub tolerance: f64,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort { iterations: 3, tolerance: 1e-14 }
+    }
+}
+
+/// Projects the state onto the constraints where a step ends: the [`PostStep`] of any method. Momenta are freed of the
+/// multipliers first; then positions are moved and momenta stay, which disturbs the energy least.
+///
+/// Methods that remember rates of past steps keep their multipliers `σ`: they are taken off the momenta, and put back where the
+/// positions are then.
+///
+/// The policy `P` says how much work is done: [`ToTolerance`] iterates until the residuals are small, [`FixedWork`] always does
+/// the same, for a processor that counts its cycles. [`Stabilisation::Momenta`], [`Stabilisation::Mass`] and [`FixedWork`]
+/// allocate nothing.
+#[derive(Clone, Debug)]
+pub struct Projection<Y: Constrained, P = ToTolerance<Y>> {
+    room: Room<Y>,
+    policy: P,
+}
+
+/// Room for one projection.
+#[derive(Clone, Debug)]
+pub struct Room<Y: Constrained> {
+    /// Velocities; displacement of an iteration.
+    v: Y::Momenta,
+    sigma: Y::Rows,
+    residual: Y::Rows,
+    pivots: Y::Rows,
+    entries: Y::Entries,
+}
+
+impl<Y: Constrained> Room<Y> {
+    fn new(system: &Y) -> Self {
+        let rows = || system.zero_rows();
+        Room {
+            v: system.zero_momenta(),
+            sigma: rows(),
+            residual: rows(),
+            pivots: rows(),
+            entries: system.zero_entries(),
+        }
+    }
+}
+
+/// How much work a [`Projection`] does.
+pub trait Policy<Y: Constrained> {
+    /// Whether momenta are freed of their multipliers. `remembers` as in [`PostStep::close`].
+    fn frees_momenta(&self, remembers: bool) -> bool;
+
+    /// Moves positions back.
+    ///
+    /// # Errors
+    /// [`ConstraintError`].
+    fn move_positions(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        q: &mut Y::Coordinates,
+    ) -> Result<(), ConstraintError>;
+}
+
+/// Exactly `N` iterations with [`Stabilisation::Mass`], whatever the residuals are: nothing is compared with a tolerance, and
+/// numbers stay in the precision of the system. One projection of momenta and one solve for each iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct FixedWork<const N: usize>;
+
+impl<Y, const N: usize> Policy<Y> for FixedWork<N>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+{
+    #[inline]
+    fn frees_momenta(&self, _remembers: bool) -> bool {
+        true
+    }
+
+    #[inline]
+    fn move_positions(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        q: &mut Y::Coordinates,
+    ) -> Result<(), ConstraintError> {
+        for _ in 0..N {
+            system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
+            Chart::displace(system, &mut room.v, q);
+        }
+        finite(q.as_ref())
+    }
+}
+
+/// Iterations of a [`Stabilisation`] until the residuals are small ([`Effort`]).
+#[derive(Clone, Debug)]
+pub struct ToTolerance<Y: Constrained> {
+    stabilisation: Stabilisation,
+    effort: Effort,
+    /// The largest pivot of every row so far.
+    most: Y::Rows,
+    /// Largest residual before the last end of a step was corrected.
+    found: Y::Scalar,
+    rank: Option<usize>,
+    changes: u32,
+    #[cfg(feature = "alloc")]
+    basic: Option<Basic<Y::Scalar>>,
+}
+
+impl<Y> Projection<Y>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+{
+    /// Room for one system; iterates until the residuals are small.
+    pub fn new(system: &Y, stabilisation: Stabilisation, effort: Effort) -> Self {
+        let policy = ToTolerance {
+            stabilisation,
+            effort,
+            most: system.zero_rows(),
+            found: Y::Scalar::zero(),
+            rank: None,
+            changes: 0,
+            #[cfg(feature = "alloc")]
+            basic: match stabilisation {
+                Stabilisation::Gradient | Stabilisation::Partition => Some(Basic::new(system)),
+                _ => None,
+            },
+        };
+        Projection { room: Room::new(system), policy }
+    }
+
+    /// Room for one system; exactly `N` iterations at the end of every step.
+    pub fn fixed_work<const N: usize>(system: &Y) -> Projection<Y, FixedWork<N>> {
+        Projection { room: Room::new(system), policy: FixedWork }
+    }
+
+    /// The largest residual of the last state that was corrected, at the end of a step or inside of it, before anything was
+    /// done, m or rad.
+    pub fn drift(&self) -> Y::Scalar {
+        self.policy.found
+    }
+
+    /// Number of independent rows at the last correction of positions, and how often it has changed.
+    pub fn rank(&self) -> (Option<usize>, u32) {
+        (self.policy.rank, self.policy.changes)
+    }
+}
+
+impl<Y: Constrained, P> Projection<Y, P> {
+    /// Multipliers `σ` that the momenta of the last state had, one for each row, N s and N m s.
+    pub fn sigma(&self) -> &Y::Rows {
+        &self.room.sigma
+    }
+
+    /// Residuals that the last iteration found, one for each row, m and rad.
+    pub fn residual(&self) -> &Y::Rows {
+        &self.room.residual
+    }
+}
+
+impl<Y> ToTolerance<Y>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+{
+    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent rows.
+    fn correct(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates) -> usize {
+        #[cfg(feature = "alloc")]
+        if let Some(basic) = &mut self.basic {
+            system.constraint_residuals(q, &mut room.residual, &mut room.entries);
+            let (residual, entries, dq) = (room.residual.as_ref(), room.entries.as_ref(), room.v.as_mut());
+            return match self.stabilisation {
+                Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
+                _ => basic.dependent(entries, residual, dq),
+            };
+        }
+        system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
+        room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
+    }
+
+    /// Whether rows depend on one another much more than they used to. Positions are left alone there: several ways lead on from a
+    /// singular position, and at a distance `s` from it a correction by `φ/s` turns the way by `φ/s²`, which takes energy from
+    /// momenta that stay. Pivots go with `s²`. What is left open is put back when the position has been passed.
+    fn near_fork(&mut self, pivots: &Y::Rows) -> bool {
+        let part = Y::Scalar::constant(libm::cbrt(Y::Scalar::epsilon()));
+        let mut near = false;
+        for (most, pivot) in self.most.as_mut().iter_mut().zip(pivots.as_ref()) {
+            if *pivot > *most {
+                *most = *pivot;
+            }
+            near |= *pivot < part * *most;
+        }
+        near
+    }
+}
+
+impl<Y> Policy<Y> for ToTolerance<Y>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+{
+    fn frees_momenta(&self, remembers: bool) -> bool {
+        match self.stabilisation {
+            Stabilisation::None => false,
+            Stabilisation::Momenta => !remembers,
+            _ => true,
+        }
+    }
+
+    fn move_positions(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        q: &mut Y::Coordinates,
+    ) -> Result<(), ConstraintError> {
+        if self.stabilisation == Stabilisation::Momenta {
+            return Ok(());
+        }
+        let Effort { iterations, tolerance } = self.effort;
+        let flat = libm::sqrt(Y::Scalar::epsilon());
+        for k in 0..iterations {
+            let rank = self.correct(room, system, q);
+            let (at, size) = worst(room.residual.as_ref());
+            if k == 0 {
+                self.found = size;
+                self.changes += u32::from(self.rank.is_some_and(|before| before != rank));
+                self.rank = Some(rank);
+            }
+            if !size.is_finite() {
+                return Err(ConstraintError::NotFinite { index: at });
+            }
+            if size.to_f64() <= tolerance {
+                return Ok(());
+            }
+            finite(room.v.as_ref())?;
+            if self.stabilisation == Stabilisation::Mass && self.near_fork(&room.pivots) && size.to_f64() <= flat {
+                return Ok(());
+            }
+            Chart::displace(system, &mut room.v, q);
+        }
+        // All iterations are used up: round-off is left, or the step went too far.
+        system.constraint_residuals(q, &mut room.residual, &mut room.entries);
+        let (at, size) = worst(room.residual.as_ref());
+        let residual = size.to_f64();
+        if residual <= tolerance.max(flat) {
+            return Ok(());
+        }
+        let (constraint, rows, rank) = (named(system, at), system.rows().len(), self.rank.unwrap_or(0));
+        Err(ConstraintError::NotClosed { constraint, residual, rank, rows, iterations })
+    }
+}
+
+/// Whether all numbers are finite.
+fn finite<S: Real>(x: &[S]) -> Result<(), ConstraintError> {
+    let (index, size) = worst(x);
+    match size.is_finite() {
+        true => Ok(()),
+        false => Err(ConstraintError::NotFinite { index }),
+    }
+}
+
+impl<Y, P> PostStep<Y> for Projection<Y, P>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+    P: Policy<Y>,
+{
+    #[inline]
+    fn close(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        remembers: bool,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), ConstraintError> {
+        let Projection { room, policy } = self;
+        if !policy.frees_momenta(remembers) {
+            return Ok(());
+        }
+        system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);
+        finite(p.as_ref())?;
+        policy.move_positions(room, system, q)?;
+        if remembers {
+            system.constraint_residuals(q, &mut room.residual, &mut room.entries);
+            add_forces(system, &room.entries, &room.sigma, p);
+        }
+        Ok(())
+    }
+}

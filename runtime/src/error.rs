@@ -1,0 +1,284 @@
+//! What can go wrong in a step, and with constraints.
+
+use crate::system::{Part, System};
+
+/// A step that must not be used.
+///
+/// Times are those of the start of the step, in s. An adaptive driver keeps the last accepted state; a step function
+/// leaves `q` and `p` as they were.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum StepError {
+    /// A rate or a component of the new state is infinite or not a number: the motion diverges, or the mechanism is
+    /// singular there.
+    NotFinite {
+        /// Time, s.
+        time: f64,
+        /// Index of the component: into the velocities, and from `nv` on into the momenta.
+        index: usize,
+    },
+    /// The state that was given has a quaternion that is not of unit length.
+    Quaternion {
+        /// Time, s.
+        time: f64,
+        /// Index into `q` of its first component.
+        index: usize,
+        /// Its norm.
+        norm: f64,
+    },
+    /// The error stays above the tolerances down to steps that no longer change the time.
+    StepTooSmall {
+        /// Time, s.
+        time: f64,
+        /// Step at which it was given up, s.
+        step: f64,
+        /// Error of that step relative to the tolerances; not a number where the rates were not finite.
+        error: f64,
+    },
+    /// Steps are to be chosen by an error that the method does not estimate.
+    NoEstimate {
+        /// Time, s.
+        time: f64,
+    },
+    /// The limit of steps is used up.
+    TooManySteps {
+        /// Time that was reached, s.
+        time: f64,
+        /// Steps taken, rejected ones included.
+        steps: u64,
+    },
+    /// The equations of an implicit method were not solved.
+    NoConvergence {
+        /// Time, s.
+        time: f64,
+        /// Step, s.
+        step: f64,
+        /// Iterations made.
+        iterations: u32,
+        /// Last change of the stages relative to the tolerances of the iteration.
+        change: f64,
+    },
+    /// The matrix of an implicit method has no inverse.
+    Singular {
+        /// Time, s.
+        time: f64,
+        /// Step, s.
+        step: f64,
+        /// Column without a pivot.
+        column: usize,
+    },
+    /// The constraints do not hold at the end of the step.
+    Constraint {
+        /// Time, s.
+        time: f64,
+        /// What is wrong with them.
+        error: ConstraintError,
+    },
+}
+
+impl StepError {
+    /// Time at the start of the step that failed, s.
+    pub fn time(&self) -> f64 {
+        match *self {
+            StepError::NotFinite { time, .. }
+            | StepError::Quaternion { time, .. }
+            | StepError::StepTooSmall { time, .. }
+            | StepError::NoEstimate { time }
+            | StepError::TooManySteps { time, .. }
+            | StepError::NoConvergence { time, .. }
+            | StepError::Singular { time, .. }
+            | StepError::Constraint { time, .. } => time,
+        }
+    }
+}
+
+/// Names of the parts of a system, for messages.
+type Names<'a> = &'a dyn Fn(Part) -> Option<&'a str>;
+
+impl StepError {
+    /// The error, shown with the names that a system gives to its parts.
+    pub fn named<Y: System>(self, system: &Y) -> Named<'_, Self, Y> {
+        Named { error: self, system }
+    }
+
+    /// The message for a system with `nv` velocities.
+    fn describe(&self, f: &mut core::fmt::Formatter<'_>, nv: usize, names: Names<'_>) -> core::fmt::Result {
+        match self {
+            StepError::NotFinite { time, index } => {
+                write!(f, "component {index} of the state's change")?;
+                let part = Part::Velocity(if *index < nv { *index } else { index - nv });
+                if let Some(name) = names(part) {
+                    write!(f, " ({})", Label { part, name: Some(name) })?;
+                }
+                write!(f, " is not finite in the step from t = {time} s: reduce the step, or look for a singular configuration")
+            }
+            StepError::Quaternion { time, index, norm } => {
+                write!(f, "the quaternion at q[{index}] has norm {norm} at t = {time} s: give one of unit length")
+            }
+            StepError::StepTooSmall { time, step, error } => {
+                write!(f, "the step fell to {step:e} s at t = {time} s with {error:.1e} times the allowed error: loosen the tolerances, or take an implicit method")
+            }
+            StepError::NoEstimate { .. } => write!(f, "this method estimates no error: give it a fixed step"),
+            StepError::TooManySteps { time, steps } => {
+                write!(f, "{steps} steps were used up at t = {time} s: raise the limit, loosen the tolerances, or take an implicit method")
+            }
+            StepError::NoConvergence { time, step, iterations, change } => {
+                write!(f, "no convergence in {iterations} iterations of the step of {step:e} s from t = {time} s (last change {change:.1e}): reduce the step")
+            }
+            StepError::Singular { time, step, column } => {
+                write!(f, "the matrix of the implicit step of {step:e} s from t = {time} s is singular in column {column}: change the step")
+            }
+            StepError::Constraint { time, error } => {
+                write!(f, "in the step from t = {time} s: ")?;
+                error.describe(f, names)
+            }
+        }
+    }
+}
+
+impl core::fmt::Display for StepError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.describe(f, usize::MAX, &|_| None)
+    }
+}
+
+impl core::error::Error for StepError {}
+
+/// Constraints that do not hold, or cannot.
+///
+/// Constraints are numbered as in [`Row::constraint`](crate::system::Row): by their place among the loops and couplings of the
+/// description.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ConstraintError {
+    /// No positions were found that close the constraints.
+    NotClosed {
+        /// The constraint that is furthest from closing.
+        constraint: usize,
+        /// How far, m or rad.
+        residual: f64,
+        /// Number of rows that are independent of one another where the search ended, coordinates that are held left out.
+        rank: usize,
+        /// Number of rows.
+        rows: usize,
+        /// Iterations made.
+        iterations: u32,
+    },
+    /// No velocities were found that meet the constraints.
+    Incompatible {
+        /// The constraint whose row is furthest from being met.
+        constraint: usize,
+        /// By how much, m/s or rad/s.
+        residual: f64,
+        /// Number of rows that are independent of one another, velocities that are held left out.
+        rank: usize,
+        /// Number of rows.
+        rows: usize,
+    },
+    /// There are not as many independent rows as before: the mechanism has reached a singular configuration.
+    RankLoss {
+        /// A constraint with a row that depends on others now.
+        constraint: usize,
+        /// Number of rows that are independent of one another, of those coupled with it.
+        rank: usize,
+        /// Number that was independent before.
+        before: usize,
+    },
+    /// A residual, or a correction, is not a number or infinite.
+    NotFinite {
+        /// Index of the row, of the velocity or of the coordinate, whichever is not finite.
+        index: usize,
+    },
+    /// The iteration for the multipliers of a step did not converge.
+    NoConvergence {
+        /// Iterations made.
+        iterations: u32,
+        /// Last change relative to the state.
+        change: f64,
+    },
+}
+
+impl ConstraintError {
+    /// The error, shown with the names that a system gives to its parts.
+    pub fn named<Y: System>(self, system: &Y) -> Named<'_, Self, Y> {
+        Named { error: self, system }
+    }
+
+    fn describe(&self, f: &mut core::fmt::Formatter<'_>, names: Names<'_>) -> core::fmt::Result {
+        let label = |constraint: &usize| {
+            let part = Part::Constraint(*constraint);
+            Label { part, name: names(part) }
+        };
+        match self {
+            ConstraintError::NotClosed { constraint, residual, rank, rows, iterations } => write!(
+                f,
+                "{} stays open by {residual:.3e} after {iterations} iterations ({rank} of {rows} rows are independent there): start nearer to a closed position, hold fewer coordinates, or check the lengths",
+                label(constraint)
+            ),
+            ConstraintError::Incompatible { constraint, residual, rank, rows } => write!(
+                f,
+                "no velocities meet {}, which is off by {residual:.3e} ({rank} of {rows} rows are independent of what is held): hold fewer velocities, or leave a singular position",
+                label(constraint)
+            ),
+            ConstraintError::RankLoss { constraint, rank, before } => write!(
+                f,
+                "{rank} of {before} rows are left independent at {}: the position is singular, go through it by method 1 or move the start",
+                label(constraint)
+            ),
+            ConstraintError::NotFinite { index } => {
+                write!(f, "constraint residual or correction {index} is not finite: reduce the step, or check the start")
+            }
+            ConstraintError::NoConvergence { iterations, change } => write!(
+                f,
+                "the multipliers did not converge in {iterations} iterations (last change {change:.1e} of the state): reduce the step"
+            ),
+        }
+    }
+}
+
+impl core::fmt::Display for ConstraintError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.describe(f, &|_| None)
+    }
+}
+
+impl core::error::Error for ConstraintError {}
+
+/// A part of a mechanism by its name, or by its number where it has none.
+pub(crate) struct Label<'a> {
+    pub part: Part,
+    pub name: Option<&'a str>,
+}
+
+impl core::fmt::Display for Label<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let (kind, index) = match self.part {
+            Part::Velocity(k) => ("velocity", k),
+            Part::Constraint(k) => ("constraint", k),
+        };
+        match self.name {
+            Some(name) => write!(f, "{kind} `{name}`"),
+            None => write!(f, "{kind} {index}"),
+        }
+    }
+}
+
+/// An error that is shown with the names a system gives to its velocities and constraints ([`System::part_name`]).
+#[derive(Clone, Copy, Debug)]
+pub struct Named<'a, E, Y> {
+    error: E,
+    system: &'a Y,
+}
+
+impl<Y: System> core::fmt::Display for Named<'_, StepError, Y> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let nv = self.system.zero_momenta().as_ref().len();
+        self.error.describe(f, nv, &|part| self.system.part_name(part))
+    }
+}
+
+impl<Y: System> core::fmt::Display for Named<'_, ConstraintError, Y> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.error.describe(f, &|part| self.system.part_name(part))
+    }
+}

@@ -1,0 +1,312 @@
+//! The shell of all methods: the state, the rates at both ends of a step, the order of events. A [`Scheme`] adds its stages.
+
+use super::chart::{Chart, Point};
+use super::field::Field;
+use super::stepper::{hermite, Statistics, Stepper};
+use super::StepError;
+use crate::system::{Real, System};
+
+/// A step under way, as far as it is the same for every method.
+#[derive(Clone, Debug)]
+pub struct Attempt<Y: System> {
+    /// The equation; displacements start from the state in its chart.
+    pub field: Field<Y>,
+    /// Displacement from the start of the step to its end.
+    pub delta: Point<Y>,
+    /// Rate at the end of the step, in the coordinates of its start; scratch while [`Attempt::end_known`] is false.
+    pub end: Point<Y>,
+    /// Whether [`Scheme::start`] holds the rate at the start of this step.
+    pub start_known: bool,
+    /// Whether [`Attempt::end`] holds the rate at the end of this step.
+    pub end_known: bool,
+    /// Work done. Evaluations are those that the field does not count itself.
+    pub statistics: Statistics,
+}
+
+impl<Y> Attempt<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// Evaluates the rate at the start of the step into `rate`, unless that is known.
+    pub fn start_rate(&mut self, system: &mut Y, t: Y::Scalar, rate: &mut Point<Y>) {
+        if !self.start_known {
+            self.end.clear();
+            self.field.rates(system, t, &self.end, rate);
+            (self.start_known, self.end_known) = (true, false);
+        }
+    }
+
+    /// Rate at the end of the step, evaluated unless it is known.
+    pub fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        if !self.end_known {
+            self.field.rates(system, t + h, &self.delta, &mut self.end);
+            self.end_known = true;
+        }
+        &self.end
+    }
+
+    /// Turns the rate at the end of an accepted step into the rate at the start of the next one: `start`. Overwrites `work`.
+    pub fn hand_on(&self, system: &Y, start: &mut Point<Y>, work: &mut Point<Y>) {
+        start.copy_from(&self.end);
+        work.copy_from(&self.delta);
+        Chart::follow(system, &self.delta, work, start);
+    }
+
+    /// The error of an implicit step whose matrix has no pivot in a column: the rate at the start tells whose fault it is.
+    pub(super) fn singular(rate: &Point<Y>, t: Y::Scalar, h: Y::Scalar, column: usize) -> StepError {
+        match rate.not_finite() {
+            Some(index) => StepError::NotFinite { time: t.to_f64(), index },
+            None => StepError::Singular { time: t.to_f64(), step: h.to_f64(), column },
+        }
+    }
+}
+
+/// What a method adds to the [`Integrator`]: how the displacement of a step is found, and its error.
+pub trait Scheme<Y>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// Whether rates of past steps are used. The history goes on as long as states are those that the method gave.
+    const MULTISTEP: bool = false;
+    /// Whether the rate at the end of a step is always evaluated when the step is accepted, for the next one to start with.
+    const ENDS_WITH_RATE: bool = false;
+
+    /// Order of convergence.
+    fn order(&self) -> u32;
+
+    /// Order of the result whose error is estimated, if an error is estimated.
+    fn error_order(&self) -> Option<u32> {
+        None
+    }
+
+    /// Forgets past steps: the next one starts from a new state.
+    fn begin(&mut self) {}
+
+    /// Computes the displacement `step.delta` of a step of `h` s from time `t` (s), and its error as
+    /// [`Stepper::attempt`] says. The rate at the end is not known before; a scheme that finds it may say so.
+    ///
+    /// # Errors
+    /// As [`Stepper::attempt`].
+    fn attempt(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError>;
+
+    /// As [`Stepper::advise`].
+    fn advise(&mut self) -> Option<f64> {
+        None
+    }
+
+    /// The place of the rate at the start of the step.
+    fn start(&mut self) -> &mut Point<Y>;
+
+    /// Evaluates the rate at the start of the step, unless it is known.
+    fn start_rate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar) {
+        step.start_rate(system, t, self.start());
+    }
+
+    /// Prepares the next step: the state has moved by `step.delta`, in `h` s. Returns whether the rate there is known.
+    fn accepted(&mut self, _step: &mut Attempt<Y>, _system: &Y, _h: Y::Scalar) -> bool {
+        false
+    }
+
+    /// Displacement at `t + θ h` within the step; unless a scheme knows better, the cubic through both ends and their rates.
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
+        self.start_rate(step, system, t);
+        step.end_rate(system, t, h);
+        hermite(h, theta, &step.delta, [self.start(), &step.end], out);
+    }
+
+    /// Adds to the work of the shell that of a method within this one.
+    fn statistics(&self, own: Statistics) -> Statistics {
+        own
+    }
+}
+
+/// A [`Scheme`] that a system alone determines.
+pub trait FromSystem<Y: System> {
+    /// Room for one system.
+    fn new(system: &Y) -> Self;
+}
+
+/// A method of integration: a [`Scheme`] in the shell that all methods share. Take one by its name, [`Rk4`](super::Rk4) for
+/// example; a scheme of your own becomes one by [`Integrator::from_scheme`].
+#[derive(Clone, Debug)]
+pub struct Integrator<Y: System, S> {
+    step: Attempt<Y>,
+    scheme: S,
+}
+
+impl<Y, S> Integrator<Y, S>
+where
+    Y: System,
+    Y::Scalar: Real,
+{
+    /// A method made of a scheme, for one system; with `compensated` as [`Integrator::compensated`].
+    pub fn from_scheme(system: &Y, scheme: S, compensated: bool) -> Self {
+        let step = Attempt {
+            field: Field::new(system, compensated),
+            delta: Point::zero(system),
+            end: Point::zero(system),
+            start_known: false,
+            end_known: false,
+            statistics: Statistics::default(),
+        };
+        Integrator { step, scheme }
+    }
+
+    /// Room for one system.
+    pub fn new(system: &Y) -> Self
+    where
+        S: FromSystem<Y>,
+    {
+        Self::from_scheme(system, S::new(system), false)
+    }
+
+    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions. Of use where steps
+    /// are small against the precision, above all in `f32`.
+    pub fn compensated(system: &Y) -> Self
+    where
+        S: FromSystem<Y>,
+    {
+        Self::from_scheme(system, S::new(system), true)
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> &S {
+        &self.scheme
+    }
+
+    /// The same method with another scheme in place of its own.
+    pub(crate) fn map<T>(self, scheme: impl FnOnce(S) -> T) -> Integrator<Y, T> {
+        Integrator { step: self.step, scheme: scheme(self.scheme) }
+    }
+}
+
+impl<Y, S> Stepper<Y> for Integrator<Y, S>
+where
+    Y: System,
+    Y::Scalar: Real,
+    S: Scheme<Y>,
+{
+    fn order(&self) -> u32 {
+        self.scheme.order()
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        self.scheme.error_order()
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        (self.step.start_known, self.step.end_known) = (false, false);
+        self.scheme.begin();
+        self.step.field.load(system, t, q, p)
+    }
+
+    fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        if S::MULTISTEP && self.step.field.holds(q, p) {
+            return self.step.field.load(system, t, q, p);
+        }
+        self.begin(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        self.step.end_known = false;
+        self.scheme.attempt(&mut self.step, system, t, h, scale)
+    }
+
+    fn advise(&mut self) -> Option<f64> {
+        self.scheme.advise()
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (&mut self.step.field, &mut self.step.delta)
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        self.scheme.start_rate(&mut self.step, system, t);
+        self.scheme.start()
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        self.step.end_rate(system, t, h)
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if S::ENDS_WITH_RATE {
+            self.step.end_rate(system, t, h);
+        }
+        self.step.field.advance(system, t, &self.step.delta)?;
+        self.step.start_known = self.scheme.accepted(&mut self.step, system, h);
+        self.step.end_known = false;
+        self.step.statistics.steps += 1;
+        Ok(())
+    }
+
+    fn finish(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        if S::MULTISTEP {
+            return self.accept(system, t, h);
+        }
+        self.step.field.advance(system, t, &self.step.delta)?;
+        (self.step.start_known, self.step.end_known) = (false, false);
+        self.step.statistics.steps += 1;
+        Ok(())
+    }
+
+    fn corrected(&mut self) {
+        self.step.end_known = false;
+    }
+
+    fn remembers(&self) -> bool {
+        S::MULTISTEP
+    }
+
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        self.scheme.interpolate(&mut self.step, system, t, h, theta, out);
+    }
+
+    fn statistics(&self) -> Statistics {
+        let Attempt { field, statistics, .. } = &self.step;
+        let evaluations = statistics.evaluations + field.evaluations();
+        self.scheme.statistics(Statistics { evaluations, ..*statistics })
+    }
+
+    fn step(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), StepError> {
+        self.resume(system, t, q, p)?;
+        self.attempt(system, t, h, None)?;
+        if S::MULTISTEP {
+            self.accept(system, t, h)?;
+        } else {
+            self.step.field.advance(system, t, &self.step.delta)?;
+        }
+        self.step.field.store(system, q, p);
+        Ok(())
+    }
+}
