@@ -4043,7 +4043,7 @@ impl Chain100 {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
-    pub fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+    pub fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 100, 100, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
         })
@@ -4203,7 +4203,7 @@ impl ::multibody::runtime::Energetic for Chain100 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 100, 100, 100> for Chain100 {
-    fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::Lengths> {
+    fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)
     }

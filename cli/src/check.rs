@@ -9,7 +9,6 @@ use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::search;
 use multibody::runtime::tree::Source;
-use multibody::runtime::Interpreter;
 
 use super::args::CheckArgs;
 use super::{loops, source, stale, Failure, Outcome};
