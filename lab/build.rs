@@ -20,21 +20,28 @@ mod generated {
     use multibody::codegen::import::{load, ImportOptions};
     use multibody::codegen::model::Model;
     use multibody::codegen::options::PlanOptions;
-    use multibody::codegen::{generate, Group, Loops, Options, Precision};
+    use multibody::codegen::{generate, Options, Output, Precision, RolledCode};
 
     use super::scenes;
 
-    const SMOOTH: &[Group] = &[Group::Rates, Group::Momenta, Group::Energy, Group::Accelerations, Group::Derivatives];
+    const SMOOTH: &[Output] =
+        &[Output::Rates, Output::Momenta, Output::Energy, Output::Accelerations, Output::Derivatives];
     /// Of mechanisms with quaternions.
-    const SMOOTH_ON_GROUP: &[Group] =
-        &[Group::Rates, Group::Velocities, Group::Momenta, Group::Energy, Group::Accelerations, Group::Derivatives];
+    const SMOOTH_ON_GROUP: &[Output] = &[
+        Output::Rates,
+        Output::Velocities,
+        Output::Momenta,
+        Output::Energy,
+        Output::Accelerations,
+        Output::Derivatives,
+    ];
     /// Derivatives grow with the square of the number of joints.
-    const PLAIN: &[Group] = &[Group::Rates, Group::Momenta, Group::Energy, Group::Accelerations];
-    const PLAIN_ON_GROUP: &[Group] =
-        &[Group::Rates, Group::Velocities, Group::Momenta, Group::Energy, Group::Accelerations];
+    const PLAIN: &[Output] = &[Output::Rates, Output::Momenta, Output::Energy, Output::Accelerations];
+    const PLAIN_ON_GROUP: &[Output] =
+        &[Output::Rates, Output::Velocities, Output::Momenta, Output::Energy, Output::Accelerations];
 
     /// Scene, a further scene of the same model, outputs, whether in single precision too.
-    const SCENES: [(&str, Option<&str>, &[Group], bool); 11] = [
+    const SCENES: [(&str, Option<&str>, &[Output], bool); 11] = [
         ("double_pendulum", Some("double_pendulum_chaotic"), SMOOTH, true),
         ("ur5", None, SMOOTH, true),
         ("panda_arm", None, SMOOTH, true),
@@ -63,7 +70,7 @@ mod generated {
                 }
                 let scene = scenes::by_name(name).unwrap_or_else(|| panic!("no scene `{name}`"));
                 let path = module(&mut all, name, &scene.model, outputs, precision);
-                let list = if outputs.contains(&Group::Derivatives) { &mut smooth } else { &mut plain };
+                let list = if outputs.contains(&Output::Derivatives) { &mut smooth } else { &mut plain };
                 let also = also.map_or(String::new(), |also| format!(" | {also:?}"));
                 let _ = writeln!(list, "    {name:?}{also} => {path},");
             }
@@ -77,17 +84,17 @@ mod generated {
             let (name, text) = (format!("closed{links}"), scenes::experiments::closed(links, "pin", false));
             let (model, findings) = load(&format!("{name}.toml"), &text, &ImportOptions::default());
             let model = model.unwrap_or_else(|| panic!("{findings}"));
-            module(&mut all, &name, &model, &[Group::Rates], Precision::F64);
+            module(&mut all, &name, &model, &[Output::Rates], Precision::F64);
         }
         write_file(&directory().join("scenes.rs"), &all);
     }
 
     /// Writes the code of a model and a module for it; path of the type.
-    fn module(all: &mut String, name: &str, model: &Model, outputs: &[Group], precision: Precision) -> String {
+    fn module(all: &mut String, name: &str, model: &Model, outputs: &[Output], precision: Precision) -> String {
         let single = precision == Precision::F32;
         let module = format!("{name}{}", if single { "_f32" } else { "" });
         // Branches of ten links are short for loops, but straight-line code of them all has 2.4 MB.
-        let loops = if name.starts_with("tree") { Loops::Always } else { Loops::default() };
+        let loops = if name.starts_with("tree") { RolledCode::Always } else { RolledCode::default() };
         let default = Options::default();
         let options = Options {
             type_name: "Scene".to_string(),

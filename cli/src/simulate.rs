@@ -142,7 +142,7 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             "raise --every or lower --rows",
         ));
     }
-    Ok(Settings { method, step, time: args.time, every, project: args.project, hold: args.hold.stabilisation() })
+    Ok(Settings { method, step, time: args.time, every, project: args.project, hold: args.hold })
 }
 
 /// Title of the plot, and what is told first.

@@ -10,7 +10,7 @@ use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP
 use multibody::codegen::output;
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
-use values::{camel_case, finite, methods, outputs, positive, rust_path, snap, vector};
+use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, snap, vector, HOLD};
 
 pub use values::type_name;
 
@@ -464,8 +464,8 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
     /// How loops are kept closed
-    #[arg(long, value_enum, default_value_t = HoldArg::Mass)]
-    pub hold: HoldArg,
+    #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
+    pub hold: Stabilisation,
     /// Picture of the motion to write, an SVG: the mechanism at several instants, the last one darkest
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
@@ -478,34 +478,6 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
-}
-
-/// How loops are kept closed; see `multibody::runtime::constrained`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum HoldArg {
-    /// Not at all: multipliers add up in the momenta, positions drift
-    None,
-    /// Momenta are freed of multipliers after every step, positions drift by the error of the method
-    Settle,
-    /// Positions are put back after every step too, least in the metric of the mass matrix
-    Mass,
-    /// The same, by displacements of least norm
-    Gradient,
-    /// The same, by dependent coordinates alone
-    Partition,
-}
-
-impl HoldArg {
-    /// As the runtime takes it.
-    pub fn stabilisation(self) -> Stabilisation {
-        match self {
-            HoldArg::None => Stabilisation::None,
-            HoldArg::Settle => Stabilisation::Momenta,
-            HoldArg::Mass => Stabilisation::Mass,
-            HoldArg::Gradient => Stabilisation::Gradient,
-            HoldArg::Partition => Stabilisation::Partition,
-        }
-    }
 }
 
 /// `mbd explain`.

@@ -1,9 +1,10 @@
 //! Values of arguments, read and refused.
 
-use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use multibody::codegen::import::words;
 use multibody::codegen::Output;
 use multibody::runtime::catalogue;
+use multibody::runtime::constrained::Stabilisation;
 
 use super::{OutputList, DEFAULT_RUNTIME};
 
@@ -31,6 +32,34 @@ pub fn positive(text: &str) -> Result<f64, String> {
 pub fn methods() -> PossibleValuesParser {
     PossibleValuesParser::new(catalogue::entries().map(|e| PossibleValue::new(e.name).help(e.title)))
 }
+
+/// One of a few values, each with its word and what it means.
+pub fn one_of<T: Copy + Send + Sync + 'static>(
+    choices: impl IntoIterator<Item = (T, &'static str, &'static str)>,
+) -> impl TypedValueParser<Value = T> {
+    let choices: Vec<_> = choices.into_iter().collect();
+    let words = choices.iter().map(|&(_, word, meaning)| PossibleValue::new(word).help(meaning));
+    // The parser lets nothing pass that is not in the list.
+    PossibleValuesParser::new(words)
+        .map(move |given| choices.iter().find(|(_, word, _)| *word == given).expect("a word of the list").0)
+}
+
+/// How loops are kept closed.
+pub const HOLD: [(Stabilisation, &str, &str); 5] = [
+    (Stabilisation::None, "none", "Not at all: multipliers add up in the momenta, positions drift"),
+    (
+        Stabilisation::Momenta,
+        "momenta",
+        "Momenta are freed of multipliers after every step, positions drift by the error of the method",
+    ),
+    (
+        Stabilisation::Mass,
+        "mass",
+        "Positions are corrected after every step too, by the displacement that is least in the metric of the mass matrix",
+    ),
+    (Stabilisation::Gradient, "gradient", "The same, by displacements of least norm"),
+    (Stabilisation::Partition, "partition", "The same, by displacements of dependent coordinates alone"),
+];
 
 /// A small angle: beyond some degrees, snapping would change the mechanism.
 pub fn snap(text: &str) -> Result<f64, String> {
