@@ -1,4 +1,4 @@
-//! Generates the code of the scenes that run compiled (feature `generated`), the way a user's build script does.
+//! Generates the code of the scenes that run compiled (feature `generated`), as the build script of a user does.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
@@ -6,7 +6,7 @@ fn main() {
     generated::write();
 }
 
-// The scenes belong to the crate this script builds, so they are taken in as source.
+// The scenes belong to the crate that this script builds, so the script includes their source.
 #[cfg(feature = "generated")]
 #[allow(dead_code, unused_imports)]
 #[path = "src/scenes/mod.rs"]
@@ -26,7 +26,7 @@ mod generated {
 
     const SMOOTH: &[Output] =
         &[Output::Rates, Output::Momenta, Output::Energy, Output::Accelerations, Output::Derivatives];
-    /// Of mechanisms with quaternions.
+    /// Outputs for mechanisms with quaternions.
     const SMOOTH_ON_GROUP: &[Output] = &[
         Output::Rates,
         Output::Velocities,
@@ -40,7 +40,7 @@ mod generated {
     const PLAIN_ON_GROUP: &[Output] =
         &[Output::Rates, Output::Velocities, Output::Momenta, Output::Energy, Output::Accelerations];
 
-    /// Scene, a further scene of the same model, outputs, whether in single precision too.
+    /// Scene, another scene of the same model, outputs, and whether there is code in single precision too.
     const SCENES: [(&str, Option<&str>, &[Output], bool); 11] = [
         ("double_pendulum", Some("double_pendulum_chaotic"), SMOOTH, true),
         ("ur5", None, SMOOTH, true),
@@ -54,10 +54,10 @@ mod generated {
         ("tree150_friction", None, PLAIN, false),
         ("quadruped", None, PLAIN_ON_GROUP, false),
     ];
-    /// Numbers of links of closed chains, of which nothing but the rates is needed.
+    /// Numbers of links of closed chains, for which only the rates are generated.
     const CLOSED: [usize; 2] = [10, 100];
 
-    /// Writes one module for each type, and which types belong to which scenes.
+    /// Writes one module for each type, and the list of types and their scenes.
     pub fn write() {
         println!("cargo::rerun-if-changed=src/scenes");
         println!("cargo::rerun-if-changed=../models");
@@ -89,11 +89,11 @@ mod generated {
         write_file(&directory().join("scenes.rs"), &all);
     }
 
-    /// Writes the code of a model and a module for it; path of the type.
+    /// Writes the code of a model and a module for it. Returns the path of the type.
     fn module(all: &mut String, name: &str, model: &Model, outputs: &[Output], precision: Precision) -> String {
         let single = precision == Precision::F32;
         let module = format!("{name}{}", if single { "_f32" } else { "" });
-        // Branches of ten links are short for loops, but straight-line code of them all has 2.4 MB.
+        // Branches of ten links are short for rolled code, but straight-line code of all of them has 2.4 MB.
         let loops = if name.starts_with("tree") { RolledCode::Always } else { RolledCode::default() };
         let default = Options::default();
         let options = Options {

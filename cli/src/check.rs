@@ -40,7 +40,7 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     worst
 }
 
-/// Numbers of loops and of couplings, in words.
+/// The numbers of loops and of couplings as text.
 fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
     let loops = model.constraints.iter().filter(|c| matches!(c.kind, ConstraintKind::Loop { .. })).count();
     let count = |n: usize, what: &str| (n > 0).then(|| format!("{n} {what}{}", if n == 1 { "" } else { "s" }));
@@ -84,7 +84,7 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
         (mass * 1e9).round() / 1e9,
     );
     let follows = plan.slots.iter().filter(|s| s.at.is_none()).count();
-    // What is absent is not mentioned.
+    // Elements that the model does not have are not mentioned.
     let counted = [
         (follows, "joints that follow others"),
         (prescribed.count(), "prescribed joints"),

@@ -18,17 +18,17 @@ use super::generate;
 use super::rivals::{chain_of_pins, RIVALS};
 use super::{source, Outcome};
 
-/// Counts of one output.
+/// Operation counts of one output.
 pub struct OutputCounts {
-    /// Which.
+    /// The output.
     pub group: Output,
-    /// All of it.
+    /// Total count.
     pub counts: Counts,
-    /// By sweep.
+    /// Count of each sweep.
     pub sweeps: Vec<(&'static str, Counts)>,
 }
 
-/// One output in one arithmetic, on the processor that schedules are made for.
+/// Estimated speed of one output in one arithmetic, on the processor of the cost model.
 struct Speed {
     group: Output,
     arithmetic: Arithmetic,
@@ -38,7 +38,7 @@ struct Speed {
     throughput: f64,
 }
 
-/// Every output, exact and fast.
+/// Estimated speeds of every output in exact and in fast arithmetic.
 fn speeds(plan: &Plan, options: &Options) -> Outcome<Vec<Speed>> {
     let mut speeds = Vec::new();
     for &group in &options.outputs {
@@ -70,14 +70,14 @@ fn speed_table(speeds: &[Speed], out: &mut dyn Write) -> Outcome {
     Ok(())
 }
 
-/// What one part of the scene costs.
+/// Operations that one part of the model costs.
 struct Part {
     what: &'static str,
     operations: usize,
     present: bool,
 }
 
-/// Counts and prints.
+/// Runs `mbd count`.
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let Chosen { plan, candidates: tried } = source::chosen(&args.model, args.code.plan_options())?;
     let options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
@@ -157,13 +157,13 @@ fn candidates(plan: &Plan, tried: &[Candidate], options: &Options, all: bool, ou
     Ok(())
 }
 
-/// Candidates of a branch that are shown unasked.
+/// Number of candidates of a branch that are printed without `--candidates`.
 const SHOWN: usize = 4;
 
 const RIGHT_ANGLES: &str = "right angles taken as exact";
 const FORMS: &str = "elimination forms";
 
-/// Gravity as it is printed.
+/// Gravity as text.
 pub fn gravity(plan: &Plan) -> String {
     match plan.model.gravity {
         Gravity::Constant(g) => match g.map(Value::constant) {
@@ -210,7 +210,7 @@ pub fn table(counts: &[OutputCounts], detailed: &[Output], out: &mut dyn Write) 
     Ok(())
 }
 
-/// Published formulas beside the rates of a serial chain of pins; nothing for other mechanisms.
+/// Published formulas next to the count of the rates, for serial chains of revolute joints only.
 pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outcome {
     let rates = counts.iter().find(|c| c.group == Output::Rates);
     let (Some(n), Some(rates)) = (chain_of_pins(plan), rates) else { return Ok(()) };
@@ -226,7 +226,7 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
     Ok(())
 }
 
-/// Differences of one output with parts of the scene left out.
+/// Differences of the count of one output when parts of the model are left out.
 fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
     let total = |plan: &Plan, options: &Options| -> Outcome<usize> {
         Ok(trace(plan, group, options).map_err(generate::failure)?.program.counts().total())
@@ -236,7 +236,7 @@ fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
         change(&mut model);
         total(&search::plan(&model, options.searches()), options)
     };
-    // What the sweeps do; rewriting would blur the differences.
+    // The operations of the sweeps, because rewriting would hide the differences.
     let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
     let here = total(plan, options)?;
     let mut parts = Vec::new();

@@ -9,7 +9,7 @@ use super::args::GenerateArgs;
 use super::output::write_file;
 use super::{source, Failure, Outcome};
 
-/// Generates code and prints or writes it.
+/// Runs `mbd generate`: prints the code or writes it to a file.
 pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
     let model = source::model_of(&args.model)?;
@@ -22,7 +22,7 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
-/// What a sound model can still get wrong: frames of the options, freedoms without inertia.
+/// Errors that remain possible with a valid model: unknown frames in the options, degrees of freedom without inertia.
 pub fn failure(error: GenerateError) -> Failure {
     let help = match error {
         GenerateError::UnknownFrame { .. } => {
@@ -36,7 +36,7 @@ pub fn failure(error: GenerateError) -> Failure {
     Failure::new(error.to_string(), help)
 }
 
-/// A path as the header of the code shows it: the same on every machine.
+/// A path as it is written in the header of the code, the same on every machine.
 pub fn shown(path: &Path) -> String {
     let name = || path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let parts: Vec<String> = path.components().map(|c| c.as_os_str().to_string_lossy().into_owned()).collect();
@@ -44,6 +44,6 @@ pub fn shown(path: &Path) -> String {
         true => name(),
         false => parts.into_iter().filter(|p| p != "." && p != "..").collect::<Vec<_>>().join("/"),
     };
-    // It stands in a comment of one line.
+    // The path is in a comment of one line.
     shown.replace(char::is_control, "?")
 }

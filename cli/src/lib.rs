@@ -1,7 +1,7 @@
-//! The command `mbd`: every subcommand takes its arguments and a writer, and returns what went wrong.
+//! The command `mbd`: every subcommand takes its arguments and a writer, and returns an error if it fails.
 //!
-//! This library serves the executable and the project's own experiments; its interface may change in any release. Programs use
-//! `multibody`.
+//! This library serves the executable and the project's own experiments. Its interface may change in any release; programs should
+//! use `multibody`.
 
 mod args;
 mod check;
@@ -30,14 +30,14 @@ use args::{Arguments, Command};
 
 pub use output::{note, write_file};
 
-/// Why a command stopped.
+/// Reason why a command stopped.
 #[derive(Debug)]
 pub enum Failure {
-    /// What and where, and what to do about it.
+    /// What is wrong, where, and what to do about it.
     Message(String, String),
-    /// The findings are on standard error already.
+    /// The findings have already been written to standard error.
     Shown,
-    /// Nobody reads standard output any more.
+    /// The reader of standard output has closed it.
     Pipe,
 }
 
@@ -73,7 +73,7 @@ pub fn reported(command: impl FnOnce(&mut dyn Write) -> Outcome) -> ExitCode {
     match result {
         Ok(()) | Err(Failure::Pipe) => ExitCode::SUCCESS,
         Err(failure) => {
-            // What was said before comes before the reason why it ended.
+            // Results that were written before the failure are flushed before its message.
             let _ = out.flush();
             if let Failure::Message(what, help) = failure {
                 note(format_args!("error: {what}\n  help: {help}"));

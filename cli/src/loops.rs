@@ -1,4 +1,4 @@
-//! Loops and couplings of a model: closed from its start, and what is said about them.
+//! Closes the loops and couplings of a model from its start, and reports on them.
 
 use std::path::Path;
 
@@ -11,45 +11,45 @@ use multibody::runtime::{Constrained, Interpreter, System};
 use super::output::note;
 use super::{source, Failure, Outcome};
 
-/// Residual below which a loop is not named as open, m or rad.
+/// Residual below which a loop counts as closed, m or rad.
 const OPEN: f64 = 1e-9;
 
-/// A model whose loops are closed.
+/// The state of a model whose loops have been closed.
 pub struct Assembly {
     /// Coordinates.
     pub q: Vec<f64>,
-    /// How they were found.
+    /// Iterations, residual and rank of the closing.
     pub closed: Closed,
     /// Largest change of a coordinate from the start, m or rad.
     pub moved: f64,
     /// Every loop and coupling.
     pub bonds: Vec<Bond>,
-    /// Velocities that can be chosen.
+    /// Mobility: number of velocities that can be chosen.
     pub mobility: usize,
 }
 
-/// A loop or coupling: its rows there.
+/// A loop or coupling and its rows at the closed coordinates.
 pub struct Bond {
     /// Name.
     pub name: String,
     /// Number of rows.
     pub rows: usize,
-    /// Of these, how many do not follow from others.
+    /// Number of independent rows.
     pub rank: usize,
 }
 
 impl Assembly {
-    /// Number of rows of all.
+    /// Number of rows of all constraints.
     pub fn rows(&self) -> usize {
         self.bonds.iter().map(|b| b.rows).sum()
     }
 
-    /// Number of independent ones.
+    /// Number of independent rows of all constraints.
     pub fn rank(&self) -> usize {
         self.bonds.iter().map(|b| b.rank).sum()
     }
 
-    /// One line: what was done, and what it leaves.
+    /// A summary in one line: iterations, residual, rank and mobility.
     pub fn summary(&self) -> String {
         let Closed { iterations, residual, .. } = self.closed;
         let (rows, rank) = (self.rows(), self.rank());
@@ -69,10 +69,10 @@ impl Assembly {
     }
 }
 
-/// Closes the loops from coordinates, and looks how many rows are independent there.
+/// Closes the loops from given coordinates, and counts the independent rows there.
 ///
 /// # Errors
-/// Loops that do not close are told with their places in the file at `path`.
+/// Loops that do not close are reported with their lines in the file at `path`.
 pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, start: &[f64]) -> Outcome<Assembly> {
     interpreter.check_rank(start).map_err(|e| source::rank_failure(&e))?;
     let held = plan.held();
@@ -101,8 +101,9 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
     Ok(Assembly { q, closed, moved, bonds, mobility })
 }
 
-/// Velocities that the loops allow: those of `held` joints stay, the others follow; where that cannot be, or none are held, the
-/// nearest in the metric of the mass matrix. `stated`: they are not a default, and not to be replaced by others silently.
+/// Velocities that satisfy the constraints. Those of `held` joints stay and the others follow from them; where that is
+/// impossible, or no joint is held, the nearest velocities in the metric of the mass matrix. `stated` says that the velocities
+/// are given by the user, so that a change is reported.
 pub fn velocities(
     plan: &Plan,
     interpreter: &mut Interpreter<f64>,
@@ -128,7 +129,7 @@ pub fn velocities(
     Ok(v)
 }
 
-/// Tells which loops stay open, furthest first.
+/// Reports the loops that stay open, those with the largest residuals first.
 fn does_not_close(
     path: &Path,
     plan: &Plan,
@@ -172,7 +173,7 @@ fn does_not_close(
     Failure::Shown
 }
 
-/// What a constraint is called, and what it fails to do.
+/// Name of a constraint, and a description of how it is violated.
 fn word(model: &Model, k: usize) -> (&'static str, &'static str) {
     match model.constraints[k].kind {
         ConstraintKind::Loop { .. } => ("loop", "does not close"),
@@ -207,7 +208,7 @@ fn unit(model: &Model, k: usize, at: usize) -> &'static str {
     }
 }
 
-/// Rows that follow from others, loop by loop, and what moves: notes and warnings.
+/// Notes and warnings: redundant rows, loop by loop, and the mobility.
 pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
     let text = source::read(path).unwrap_or_default();
     for (k, bond) in assembly.bonds.iter().enumerate().filter(|(_, b)| b.rank < b.rows) {
@@ -232,7 +233,7 @@ pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
     }
 }
 
-/// File and line of a constraint's name; the file alone where it is not written as a table of its own.
+/// File and line of a constraint's name; the file alone where the constraint is not a table of its own.
 fn place(path: &Path, text: &str, model: &Model, k: usize) -> String {
     let table = match model.constraints[k].kind {
         ConstraintKind::Loop { .. } => "[[loop]]",
@@ -256,7 +257,7 @@ fn place(path: &Path, text: &str, model: &Model, k: usize) -> String {
     path.display().to_string()
 }
 
-/// Name of the constraint of an error, for its message.
+/// Name of the constraint of an error, for the message.
 pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
     let k = match *error {
         ConstraintError::NotClosed { constraint, .. }
@@ -268,7 +269,7 @@ pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
     Some(format!("{} `{}`", word(&plan.model, k).0, constraint.name))
 }
 
-/// Loops and couplings that a state does not meet by more than 1e-6, in words.
+/// Description of the loops and couplings that a state violates by more than 1e-6.
 pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> Vec<String> {
     const MOST: f64 = 1e-6;
     if plan.dims.rows == 0 {
@@ -285,7 +286,7 @@ pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &
     let columns = interpreter.entry_columns();
     for (row, residual) in interpreter.rows().iter().zip(&residual) {
         let own = row.first..row.first + row.len;
-        // Rates of the positions beside those that the row wants, which `allowed` has.
+        // Rates of the residuals, minus those that the row prescribes, which are the rates of `allowed`.
         let rate: f64 = own.map(|e| entries[e] * (v[columns[e]] - allowed[columns[e]])).sum();
         let [open, fast] = &mut worst[row.constraint];
         (*open, *fast) = (open.max(residual.abs()), fast.max(rate.abs()));

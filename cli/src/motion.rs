@@ -1,4 +1,4 @@
-//! A motion: steps through the interpreter, and what is recorded of them.
+//! A simulation with the interpreter, and the record of its motion.
 
 use std::cell::RefCell;
 use std::io::{IsTerminal, Write as _};
@@ -15,23 +15,23 @@ use multibody::runtime::{Constrained, Interpreter};
 use super::timed::Timed;
 use super::{loops, source, Failure, Outcome};
 
-/// How to simulate.
+/// Settings of a simulation.
 pub struct Settings<'a> {
-    /// Name in the catalogue.
+    /// Name of the method in the catalogue.
     pub method: &'a str,
-    /// Its steps.
+    /// Fixed steps, or tolerances of adaptive steps.
     pub step: Step,
     /// Length, s.
     pub time: f64,
-    /// Time from one row to the next, s; the last one is at the end.
+    /// Time from one row to the next, s; the last row is at the end.
     pub every: f64,
-    /// Whether steps are put back on the energy of the start.
+    /// Whether every step is projected onto the energy of the start.
     pub project: bool,
     /// How loops are kept closed.
     pub hold: Stabilisation,
 }
 
-/// What was recorded.
+/// Record of a simulation.
 #[derive(Default)]
 pub struct Record {
     /// Times, s.
@@ -44,31 +44,31 @@ pub struct Record {
     pub p: Vec<Vec<f64>>,
     /// Kinetic and potential energy, J.
     pub energy: Vec<(f64, f64)>,
-    /// Energy where steps end: the method's own error, without that of dense output.
+    /// Energy at the ends of steps, which has the error of the method without that of the dense output.
     pub ends: Ends,
-    /// Work done.
+    /// Evaluations, steps and rejections.
     pub statistics: Statistics,
-    /// Where the time went.
+    /// Computing times.
     pub spent: Spent,
-    /// What became of loops and couplings.
+    /// Residuals and ranks of loops and couplings.
     pub drift: Drift,
 }
 
 /// Loops and couplings at the ends of steps.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Drift {
-    /// Largest residual before it was put back, m or rad.
+    /// Largest residual before the position correction, m or rad.
     pub found: f64,
-    /// Largest residual that is left, m or rad.
+    /// Largest residual after the position correction, m or rad.
     pub left: f64,
-    /// Largest number of independent rows, and smallest.
+    /// Largest and smallest number of independent rows.
     pub ranks: Option<[usize; 2]>,
 }
 
 /// Energy at the ends of steps.
 #[derive(Default)]
 pub struct Ends {
-    /// Times, s: of the first step that ends at a row or behind it.
+    /// Times, s: for each row, the end of the first step that reaches it.
     pub t: Vec<f64>,
     /// Change of the energy since the start, J.
     pub change: Vec<f64>,
@@ -78,20 +78,20 @@ pub struct Ends {
     pub scale: f64,
 }
 
-/// Where the time went, s.
+/// Computing times, s.
 #[derive(Clone, Copy, Default)]
 pub struct Spent {
-    /// All of it.
+    /// Total.
     pub total: f64,
-    /// Rates, for steps.
+    /// Evaluations of the rates in steps.
     pub rates: f64,
-    /// Their derivatives.
+    /// Derivatives of the rates.
     pub derivatives: f64,
-    /// Keeping loops closed.
+    /// Projection and position correction.
     pub constraints: f64,
-    /// Dense output, energies, rows.
+    /// Dense output, energies and rows.
     pub output: f64,
-    /// Looking at the clock.
+    /// Reading the clock.
     pub clock: f64,
 }
 
@@ -111,7 +111,7 @@ impl Ends {
     }
 }
 
-/// What looks at states.
+/// Observer of the states of a simulation.
 struct Observer {
     interpreter: Interpreter<f64>,
     record: Record,
@@ -173,11 +173,11 @@ impl PostStep<Timed> for Keeper {
     }
 }
 
-/// Simulates from coordinates and velocities, and records.
+/// Simulates from given coordinates and velocities, and records the motion.
 pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
     let params = plan.default_params();
     let gravity = match plan.model.gravity {
-        // As the fields of generated code start.
+        // The default values of these fields in generated code.
         Gravity::Input => [0.0, 0.0, -9.81],
         Gravity::Constant(_) => plan.gravity(&params),
     };
@@ -189,7 +189,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let (mut residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     let bound = !residual.is_empty();
     if bound {
-        // Velocities that the loops allow, nearest in the metric of the mass matrix.
+        // The nearest velocities in the metric of the mass matrix that satisfy the constraints.
         let mut v = v.clone();
         interpreter.project_momenta(0.0, &q, &mut p, &mut v, &mut residual);
     }
@@ -236,7 +236,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     Ok(record)
 }
 
-/// Steps to the end.
+/// Makes all steps to the end.
 fn go(
     driver: &mut dyn Drive<Timed>,
     system: &mut Timed,
@@ -257,7 +257,7 @@ fn go(
         let clock = Instant::now();
         system.output = true;
         let ((start, h), end) = (driver.last_step(), driver.time());
-        // Within rounding of the end it is the end.
+        // A time that differs from the end by rounding only counts as the end.
         let near = end - 1e-9 * h;
         let kept = row <= rows && at(row) <= end.max(near);
         while row <= rows && at(row) < near {
@@ -279,7 +279,7 @@ fn go(
     Ok(())
 }
 
-/// A run that did not reach its end: what happened when, and what to do.
+/// The failure of a run that did not reach its end: what happened, when, and what to do.
 fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
     let names = plan.velocity_names();
     let what = match e {
@@ -315,7 +315,7 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
     Failure::new(what, help)
 }
 
-/// A line on a terminal that tells how far a long run is.
+/// A progress line on a terminal for long runs.
 struct Progress {
     time: f64,
     next: Instant,

@@ -1,4 +1,4 @@
-//! Writing: notes to standard error, files that appear whole or not at all.
+//! Writing: notes to standard error, and files that are written completely or not at all.
 
 use std::fmt::Arguments;
 use std::io::Write;
@@ -6,22 +6,22 @@ use std::path::{Path, PathBuf};
 
 use super::{Failure, Outcome};
 
-/// One note to standard error. Nobody listening is no reason to stop.
+/// Writes one note to standard error. A failure to write it is ignored.
 pub fn note(text: Arguments) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// Writes a file by way of a temporary one beside it, so that it is whole or as it was.
+/// Writes a file through a temporary file in the same directory, so that it is either complete or unchanged.
 pub fn write_file(path: &Path, content: &str) -> Outcome {
     write_files(&[(path, content)])
 }
 
-/// Writes files that belong together: none is replaced before all are written.
+/// Writes several files that belong together: none is replaced before all have been written.
 pub fn write_files(files: &[(&Path, &str)]) -> Outcome {
     let mut written: Vec<(PathBuf, PathBuf, &Path)> = Vec::new();
     let result = files.iter().try_for_each(|(path, content)| {
         writable(path)?;
-        // A link keeps being one; a pipe or terminal cannot be renamed onto.
+        // A link stays a link, and a pipe or terminal cannot be the target of a rename.
         let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
         if target.exists() && !target.is_file() {
             return std::fs::write(&target, content).map_err(|e| failure(path, &e));
@@ -40,7 +40,7 @@ pub fn write_files(files: &[(&Path, &str)]) -> Outcome {
     result
 }
 
-/// Looks whether a file could be written, before the work for it is done.
+/// Checks whether a file can be written, before its contents are computed.
 pub fn writable(path: &Path) -> Outcome {
     if path.is_dir() {
         return Err(Failure::new(format!("cannot write `{}`: it is a directory", path.display()), "name a file in it"));

@@ -3,36 +3,36 @@
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-/// One panel: lines over time, or over something else that begins at zero.
+/// One panel: lines over time, or over another quantity that starts at zero.
 pub struct Panel {
     /// Label of the vertical axis, with the unit.
     pub label: String,
     /// Times, s.
     pub t: Vec<f64>,
-    /// Name (empty: not in the legend) and values; what is not a number is left out.
+    /// Name (empty: not in the legend) and values; values that are not finite are left out.
     pub lines: Vec<(String, Vec<f64>)>,
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// The backend rounds to whole units: drawn so much larger than shown, lines are smooth.
+/// Factor by which the plot is drawn larger than it is shown. The backend rounds to whole units; the factor keeps lines smooth.
 pub const SCALE: u32 = 3;
 const WIDTH: u32 = 1100 * SCALE;
-/// Width of the legend.
+/// Width of the legend, pixels.
 const LEGEND: u32 = 210 * SCALE;
 const TITLE: u32 = 36 * SCALE;
-/// Points of one line; more make large files and no better picture.
+/// Largest number of points of one line; more points enlarge the file without a visible difference.
 const POINTS: usize = 600;
-/// Entries of a legend; more cannot be told apart.
+/// Largest number of entries of a legend; more colours cannot be distinguished.
 const ENTRIES: usize = 40;
 const ROW: u32 = 14 * SCALE;
 
-/// Panels below each other, all over the same time.
+/// Panels below each other over the same time.
 pub fn svg(title: &str, panels: &[Panel]) -> Result<String, String> {
     svg_over(title, "time [s]", panels)
 }
 
-/// Panels below each other, all over the same quantity, whose label is `x`.
+/// Panels below each other over the same quantity, whose label is `x`.
 pub fn svg_over(title: &str, x: &str, panels: &[Panel]) -> Result<String, String> {
     let heights: Vec<u32> = panels.iter().enumerate().map(|(k, p)| height(p, k + 1 == panels.len())).collect();
     let mut text = String::new();
@@ -45,7 +45,7 @@ pub fn svg_over(title: &str, x: &str, panels: &[Panel]) -> Result<String, String
     Ok(shrunk(&text))
 }
 
-/// The picture at the size it is shown; what is drawn keeps its units by the `viewBox`.
+/// Sets the size at which the picture is shown; the `viewBox` keeps the units of the drawing.
 pub fn shrunk(text: &str) -> String {
     let number = |key: &str| {
         let value = text.split(key).nth(1).and_then(|rest| rest.split('"').next());
@@ -81,7 +81,7 @@ fn draw(
     Ok(())
 }
 
-/// Colours far apart, in the order of the lines; the lightness alternates so that neighbours differ in print too.
+/// Colours in the order of the lines. They are far apart, and their lightness alternates, so that neighbours also differ in print.
 pub fn colour(k: usize) -> HSLColor {
     let hue = (0.61 + k as f64 * 0.381_966) % 1.0;
     HSLColor(hue, 0.75, [0.42, 0.3, 0.55][k % 3])
@@ -91,7 +91,7 @@ fn draw_chart(area: &Area, x: &str, panel: &Panel) -> Result<(), DrawingAreaErro
     let end = panel.t.last().copied().unwrap_or(1.0);
     let all = panel.lines.iter().flat_map(|l| &l.1).copied();
     let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-    // A constant still wants a range.
+    // A constant needs a range too.
     let pad = ((high - low) * 0.05).max(low.abs().max(high.abs()) * 1e-3).max(1e-18);
     let mut chart = ChartBuilder::on(area)
         .margin(8 * SCALE)
@@ -143,7 +143,7 @@ fn draw_legend(area: &Area, panel: &Panel) -> Result<(), DrawingAreaErrorKind<st
     Ok(())
 }
 
-/// A name that fits; the end tells more than the middle.
+/// A name shortened to fit: the middle is left out, because the end is more informative.
 fn shortened(name: &str) -> String {
     const LONGEST: usize = 28;
     let letters: Vec<char> = name.chars().map(|c| if c.is_control() { '?' } else { c }).collect();
@@ -154,12 +154,12 @@ fn shortened(name: &str) -> String {
     head.iter().chain(&['…']).chain(tail).collect()
 }
 
-/// Distance of about `n` marks on a range.
+/// Distance between marks, for about `n` marks on a range.
 fn tick(range: f64, n: u32) -> f64 {
     10.0_f64.powf((range / f64::from(n)).log10().floor())
 }
 
-/// A mark's number, with the digits that tell it from the next.
+/// The number at a mark, with enough digits to distinguish it from the next.
 fn number(x: f64, step: f64) -> String {
     let x = if x.abs() < 0.5 * step { 0.0 } else { x };
     let digits = (-step.log10().floor()).max(0.0) as usize;

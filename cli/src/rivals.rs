@@ -1,7 +1,7 @@
-//! Published operation counts of the forward dynamics of serial chains of pins.
+//! Published operation counts of the forward dynamics of serial chains of revolute joints.
 //!
 //! J. Naudet, *Forward Dynamics of Multibody Systems: A Recursive Hamiltonian Approach* (2005), table 4.1: additions and
-//! multiplications for a chain of `n ≥ 3` bodies with pin joints, given there as upper bounds.
+//! multiplications for a chain of `n ≥ 3` bodies with revolute joints, given there as upper bounds.
 
 use multibody::codegen::model::{JointKind, JointMotion};
 use multibody::codegen::plan::Plan;
@@ -14,7 +14,7 @@ pub struct Rival {
     b: usize,
 }
 
-/// The table, best first.
+/// The table, smallest counts first.
 pub const RIVALS: [Rival; 5] = [
     Rival { name: "Naudet et al., 2003 (Hamiltonian)", a: 363, b: 475 },
     Rival { name: "Rein, 1993", a: 411, b: 669 },
@@ -24,7 +24,7 @@ pub const RIVALS: [Rival; 5] = [
 ];
 
 impl Rival {
-    /// As it is printed.
+    /// The formula as text.
     pub fn formula(&self) -> String {
         format!("{}n - {}", self.a, self.b)
     }
@@ -35,7 +35,7 @@ impl Rival {
     }
 }
 
-/// Number of bodies if the formulas apply: a serial chain of at least three free pins on the ground.
+/// Number of bodies if the formulas apply: a serial chain of at least three free revolute joints on the ground.
 pub fn chain_of_pins(plan: &Plan) -> Option<usize> {
     let serial = plan.nodes.iter().enumerate().all(|(k, node)| node.parent == k.checked_sub(1));
     let pins = plan.model.joints.iter().all(|j| {

@@ -20,18 +20,18 @@ use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::{loops, picture, source, Failure, Outcome};
 
-/// Method and tolerance unless the user says otherwise. Of double and spherical pendulum, UR5 and Panda the error at the end
-/// was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
+/// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at the
+/// end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
 const METHOD: &str = "verner9";
 const TOLERANCE: f64 = 1e-9;
-/// Rows of the table unless the user says otherwise.
+/// Default number of rows of the table.
 const ROWS: u64 = 1000;
-/// More steps than anybody waits for.
+/// Limit of the number of steps.
 const MOST_STEPS: f64 = 1e10;
-/// More rows than a table is good for.
+/// Limit of the number of rows.
 const MOST_ROWS: f64 = 1e7;
 
-/// Simulates and writes.
+/// Runs `mbd simulate`.
 pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
     let mut model = source::model_of(&args.model)?;
@@ -119,7 +119,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
 
 /// Method, steps and rows of the arguments.
 fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
-    // A step that is given asks for what has always been there for it.
+    // With `--step`, the default method is the classical one.
     let fallback = if args.step.is_some() { "rk4" } else { METHOD };
     let method = args.method.as_deref().unwrap_or(fallback);
     let step = match args.step {
@@ -145,7 +145,7 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
     Ok(Settings { method, step, time: args.time, every, project: args.project, hold: args.hold })
 }
 
-/// Title of the plot, and what is told first.
+/// The title of the plot, which is also the first line of the report.
 pub fn title(plan: &Plan, settings: &Settings) -> String {
     let Settings { method, time, step, .. } = settings;
     let title = catalogue::entry(method).map_or("", |e| e.title);
@@ -159,7 +159,7 @@ pub fn title(plan: &Plan, settings: &Settings) -> String {
     format!("{}: {time} s of free motion by {method} ({title}), {steps}", plan.model.name)
 }
 
-/// What was done.
+/// Report of the work done.
 fn work(s: &Statistics) -> String {
     let mut text =
         format!("{} steps, {} more rejected, {} evaluations of the rates", s.steps, s.rejections, s.evaluations);
@@ -173,7 +173,7 @@ fn work(s: &Statistics) -> String {
     text
 }
 
-/// What became of the loops.
+/// Report of the loops.
 fn drift(settings: &Settings, drift: &Drift) -> String {
     let Drift { found, left, ranks } = drift;
     let kept = matches!(settings.hold, Stabilisation::Mass | Stabilisation::Gradient | Stabilisation::Partition);
@@ -187,7 +187,7 @@ fn drift(settings: &Settings, drift: &Drift) -> String {
     text
 }
 
-/// Where the time went.
+/// Report of the computing times.
 fn spent(time: f64, spent: &Spent) -> String {
     let Spent { total, rates, derivatives, constraints, output, clock } = *spent;
     let share = |x: f64| format!("{:.0} %", 100.0 * (x / total).clamp(0.0, 1.0));
@@ -210,7 +210,7 @@ fn spent(time: f64, spent: &Spent) -> String {
     )
 }
 
-/// Initial coordinates and velocities: those of the arguments, or those that the help states.
+/// Initial coordinates and velocities: those of the arguments, or the defaults that the help states.
 fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let list = |what: &str, given: &Option<Vec<f64>>, names: Vec<String>, default: Vec<f64>| match given {
         None => Ok(default),
@@ -237,7 +237,7 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     Ok((q, v))
 }
 
-/// The start that the help states: see `mbd simulate --help`.
+/// The default start; `mbd simulate --help` states it.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
     if !plan.model.constraints.is_empty() || !plan.model.starts.is_empty() {

@@ -1,4 +1,4 @@
-//! From a path to a checked model and its plan, findings told on the way.
+//! Reads a path into a checked model and its plan, and reports the findings.
 
 use std::io::Read;
 use std::path::Path;
@@ -14,10 +14,10 @@ use super::args::ModelArgs;
 use super::output::note;
 use super::{Failure, Outcome};
 
-/// No description of a mechanism is that long; a device file may be.
+/// Largest size of a file, bytes. No description of a mechanism is as long, but a device file may be endless.
 const LONGEST: u64 = 256 << 20;
 
-/// Text of a file.
+/// Reads the text of a file.
 pub fn read(path: &Path) -> Outcome<String> {
     let file = path.display();
     let mut bytes = Vec::new();
@@ -51,7 +51,7 @@ fn similar(path: &Path) -> String {
     words::did_you_mean(&wanted, names, || "check the path and that you may read it".to_string())
 }
 
-/// A checked model. Findings go to standard error, all of them.
+/// Reads and checks a model. All findings go to standard error.
 pub fn model(path: &Path, options: &ImportOptions) -> Outcome<Model> {
     let text = read(path)?;
     let (model, findings) = load(&path.to_string_lossy(), &text, options);
@@ -86,12 +86,12 @@ pub fn chosen(args: &ModelArgs, options: PlanOptions) -> Outcome<Chosen> {
     Ok(chosen)
 }
 
-/// The plan of a model, with its notices told.
+/// Plans a model and reports the notices.
 pub fn plan(args: &ModelArgs, options: PlanOptions) -> Outcome<Plan> {
     Ok(chosen(args, options)?.plan)
 }
 
-/// Notices of a plan.
+/// Reports the notices of a plan.
 pub fn tell_notices(path: &Path, notices: &[String]) {
     for notice in notices {
         note(format_args!("{}: notice: {notice}", path.display()));

@@ -1,4 +1,4 @@
-//! `mbd check --generated`: committed code against its models.
+//! `mbd check --generated`: compares committed code with its models.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -14,7 +14,7 @@ use super::generate::{self, shown};
 use super::output::{note, write_file};
 use super::{source, Failure, Outcome};
 
-/// `manifest.toml`: what the directory holds. Paths are relative to it.
+/// The contents of `manifest.toml`: the files of the directory. Paths are relative to it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Manifest {
@@ -23,7 +23,7 @@ struct Manifest {
     file: Vec<Entry>,
 }
 
-/// One generated file; options not given are those of `mbd generate`.
+/// One generated file. Options that are not given have the defaults of `mbd generate`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Entry {
@@ -48,7 +48,7 @@ struct Entry {
 
 const MANIFEST: &str = "manifest.toml";
 
-/// Compares every file of the manifest with what the generator makes now, and `mod.rs` with the list of them.
+/// Compares every file of the manifest with the generator's present output, and `mod.rs` with the list of files.
 pub fn run(directory: &Path, update: bool, out: &mut dyn Write) -> Outcome {
     let path = directory.join(MANIFEST);
     let manifest = read(&path)?;
@@ -93,7 +93,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
                     `base`, `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
 
-/// What a file should hold.
+/// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
     let wrong = |what: String| {
         Failure::new(format!("{}: `{}`: {what}", manifest.display(), entry.file), "correct the entry in the manifest")
@@ -155,7 +155,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
     Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
 }
 
-/// Module of a file, if it can be one.
+/// Module name of a file, if its name is a valid one.
 fn module(file: &str) -> Option<&str> {
     let name = file.strip_suffix(".rs")?;
     let word = name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
@@ -172,7 +172,7 @@ fn modules(manifest: &Manifest) -> String {
     text
 }
 
-/// First difference of a file from what it should hold, as it is shown after its name.
+/// The first difference between a file and the text that it should have, as it is shown after its name.
 fn difference(path: &Path, wanted: &str) -> Option<String> {
     let Ok(bytes) = std::fs::read(path) else { return Some(": error: the file is missing or cannot be read".into()) };
     if bytes == wanted.as_bytes() {
@@ -193,7 +193,7 @@ fn difference(path: &Path, wanted: &str) -> Option<String> {
     Some(": error: stale: line ends differ".into())
 }
 
-/// Number of Rust files that the manifest does not know, each told.
+/// Reports the Rust files that the manifest does not list, and returns their number.
 fn strays(directory: &Path, wanted: &[(String, String)]) -> Outcome<usize> {
     let known: BTreeSet<&str> = wanted.iter().map(|(f, _)| f.as_str()).collect();
     let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();

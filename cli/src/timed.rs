@@ -1,11 +1,11 @@
-//! A mechanism that knows how long its rates take.
+//! A mechanism that measures the time of its rates.
 
 use std::time::{Duration, Instant};
 
 use multibody::runtime::system::{LieJoint, Row};
 use multibody::runtime::{Constrained, Differentiable, Energetic, Interpreter, StateDerivatives, System};
 
-/// Time that calls of one kind take.
+/// Total time of calls of one kind.
 #[derive(Clone, Copy, Debug, Default)]
 struct Clocked {
     calls: u64,
@@ -22,22 +22,22 @@ impl Clocked {
     }
 }
 
-/// The interpreter, with the time its rates and their derivatives take.
+/// The interpreter, with the times of its rates and their derivatives.
 pub struct Timed {
     inner: Interpreter<f64>,
     /// Whether calls are for dense output rather than for steps.
     pub output: bool,
-    /// What reading the clock takes, s.
+    /// Time of reading the clock once, s.
     clock: f64,
-    /// For steps and for output.
+    /// Times in steps, and in output.
     rates: [Clocked; 2],
     derivatives: Clocked,
-    /// What keeps constraints at the ends of steps, and in output.
+    /// Times of projection and position correction, at the ends of steps and in output.
     constraints: [Clocked; 2],
 }
 
 impl Timed {
-    /// Around an interpreter.
+    /// Wraps an interpreter.
     pub fn new(inner: Interpreter<f64>) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
@@ -51,11 +51,11 @@ impl Timed {
         }
     }
 
-    /// Time taken in steps, s: by the rates, by their derivatives, by keeping constraints, and by looking at the clock around
-    /// them.
+    /// Times in steps, s: of the rates, of their derivatives, of projection and position correction, and of reading the
+    /// clock around them.
     pub fn seconds(&self) -> [f64; 4] {
         let kinds = [self.rates[0], self.derivatives, self.constraints[0]];
-        // Of the two readings about a call one lies within what is measured.
+        // Each measured call includes one of its two readings of the clock.
         let [rates, derivatives, constraints] = kinds.map(|k| (k.seconds - k.calls as f64 * self.clock).max(0.0));
         [rates, derivatives, constraints, 2.0 * self.clock * kinds.iter().map(|k| k.calls as f64).sum::<f64>()]
     }

@@ -1,4 +1,4 @@
-//! The tour: what `mbd` without arguments shows, on a robot that is compiled in.
+//! The tour that `mbd` shows without arguments, on a robot that is part of the program.
 
 use std::hint::black_box;
 use std::io::Write;
@@ -34,7 +34,7 @@ const STEPS: u64 = 10_000;
 
 type Array = [f64; Ur5::NV];
 
-/// A state and what is given with it.
+/// A state and its inputs.
 struct State {
     q: Array,
     v: Array,
@@ -94,7 +94,7 @@ fn counts(plan: &Plan, out: &mut dyn Write) -> Outcome {
     count::rivals(plan, &counts, out)
 }
 
-/// Numbers in (−1, 1), the same everywhere.
+/// Pseudo-random numbers in (−1, 1), the same on every machine.
 fn random(seed: &mut u64) -> f64 {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
@@ -108,11 +108,11 @@ fn states() -> Vec<State> {
     (0..STATES).map(|_| State { q: array(3.0), v: array(2.0), p: array(2.0), tau: array(50.0) }).collect()
 }
 
-/// Number of results that agree; the first that does not is an error.
+/// Number of results that agree; the first one that differs is an error.
 fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f64>) -> Outcome<usize> {
     let mut numbers = 0;
     let mut same = |state: usize, what: &str, a: &[f64], b: &[f64]| -> Outcome {
-        // The sign of a zero may differ: adding zero levels it.
+        // The signs of zeros may differ; adding zero makes them equal.
         let equal = a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a + 0.0).to_bits() == (b + 0.0).to_bits());
         numbers += a.len();
         match equal && a.iter().all(|x| x.is_finite()) {
@@ -151,7 +151,7 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
     Ok(numbers)
 }
 
-/// How the interpreter simulates what the generated code does.
+/// The interpreter's simulation of the same motion as the generated code's.
 fn settings() -> Settings<'static> {
     let step = Step::Fixed(TIME / STEPS as f64);
     Settings { method: "rk4", step, time: TIME, every: TIME / 1000.0, project: false, hold: Stabilisation::default() }
@@ -207,7 +207,7 @@ fn speed(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<f6
         other.rates(&s.q, &s.p, &mut a, &mut b);
         let size = qd.iter().chain(&pd).fold(1.0_f64, |m, x| m.max(x.abs()));
         let off = qd.iter().zip(&a).chain(pd.iter().zip(&b)).fold(0.0_f64, |m, (x, y)| m.max((x - y).abs()));
-        // Some hundred roundings, times the condition of the inertia (below 1e3 for this arm).
+        // Some hundred roundings times the condition number of the mass matrix (below 1e3 for this arm).
         if off.is_nan() || off > 1e-11 * size {
             return Err(Failure::new(
                 format!("fast and exact arithmetic differ by {off:e} where rates are {size:e}"),

@@ -1,30 +1,30 @@
-//! Generated code of scenes, by their names. `build.rs` says which scenes have it, and calls the macro `scenes`.
+//! Generated code of scenes, by name. `build.rs` lists the scenes that have it, and calls the macro `scenes`.
 
 use multibody::runtime::{Differentiable, System};
 
 use crate::scenes::Dynamics;
 
-/// What is done with the generated system of a scene.
+/// An operation on the generated system of a scene.
 pub trait Visit<S> {
-    /// What comes of it.
+    /// Its result.
     type Out;
-    /// Does it.
+    /// Runs the operation.
     fn visit<Y: Dynamics<Scalar = S> + 'static>(self, system: Y) -> Self::Out;
 }
 
-/// The same where derivatives are needed.
+/// An operation that needs derivatives.
 pub trait VisitDifferentiable<S> {
-    /// What comes of it.
+    /// Its result.
     type Out;
-    /// Does it.
+    /// Runs the operation.
     fn visit<Y: Dynamics<Scalar = S> + Differentiable + 'static>(self, system: Y) -> Self::Out;
 }
 
-/// One number type: its types with derivatives, then those without, each with the scenes it belongs to.
+/// The functions for one number type: its types with derivatives, then those without, each with its scenes.
 macro_rules! scenes {
     ($scalar:ty, $any:ident, $differentiable:ident,
      { $($($smooth:literal)|+ => $with:ty,)* }, { $($plain:literal => $without:ty,)* }) => {
-        /// Does something with the generated system of a scene; `None` where there is none.
+        /// Runs an operation on the generated system of a scene; `None` where there is none.
         pub fn $any<V: Visit<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
             match scene {
                 $($($smooth)|+ => Some(visitor.visit(<$with>::new())),)*
@@ -33,7 +33,7 @@ macro_rules! scenes {
             }
         }
 
-        /// The same for those with derivatives.
+        /// Runs an operation that needs derivatives; `None` where there is no such system.
         pub fn $differentiable<V: VisitDifferentiable<$scalar>>(scene: &str, visitor: V) -> Option<V::Out> {
             match scene {
                 $($($smooth)|+ => Some(visitor.visit(<$with>::new())),)*
@@ -45,16 +45,16 @@ macro_rules! scenes {
 
 include!(concat!(env!("OUT_DIR"), "/scenes.rs"));
 
-/// What is done with a system of which nothing but the rates is needed.
+/// An operation that needs the rates only.
 pub trait VisitRates {
-    /// What comes of it.
+    /// Its result.
     type Out;
-    /// Does it.
+    /// Runs the operation.
     fn visit<Y: System<Scalar = f64> + 'static>(self, system: Y) -> Self::Out;
 }
 
-/// Does something with the generated chains and trees of [`experiments`](crate::scenes::experiments) that have friction: kind and number
-/// of links.
+/// Runs an operation on the generated chain or tree of [`experiments`](crate::scenes::experiments) with friction of a given
+/// kind and number of links.
 pub fn visit_chain<V: VisitRates>(family: &str, links: usize, visitor: V) -> Option<V::Out> {
     Some(match (family, links) {
         ("open", 10) => visitor.visit(chain10_friction::Scene::new()),

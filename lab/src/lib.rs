@@ -1,4 +1,4 @@
-//! What the project measures of itself: the experiments of the thesis, and the benches of the integrators.
+//! Measurements of this project: the experiments of the thesis, and the benches of the integrators.
 
 mod args;
 #[cfg(feature = "generated")]
@@ -16,7 +16,7 @@ use mbd_cli::Outcome;
 
 use args::{Arguments, Command};
 
-/// The command `mbd-lab`: reads the arguments and runs the experiment or the bench. Exit status as of `mbd`.
+/// The command `mbd-lab`: reads the arguments and runs the experiment or the bench. The exit status is that of `mbd`.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     mbd_cli::reported(|out| run(arguments.command, out))

@@ -1,4 +1,4 @@
-//! Values of arguments, read and refused.
+//! Parsers of argument values.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use multibody::codegen::import::words;
@@ -8,7 +8,7 @@ use multibody::runtime::constrained::Stabilisation;
 
 use super::{OutputList, DEFAULT_RUNTIME};
 
-/// A finite number.
+/// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
     let x: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
     if x.is_finite() {
@@ -18,7 +18,7 @@ pub fn finite(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A positive number.
+/// Parses a positive number.
 pub fn positive(text: &str) -> Result<f64, String> {
     let x = finite(text)?;
     if x > 0.0 {
@@ -28,29 +28,29 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// The name of a method.
+/// Parses the name of a method.
 pub fn methods() -> PossibleValuesParser {
     PossibleValuesParser::new(catalogue::entries().map(|e| PossibleValue::new(e.name).help(e.title)))
 }
 
-/// One of a few values, each with its word and what it means.
+/// Parses one of several values, each given with its word and its meaning.
 pub fn one_of<T: Copy + Send + Sync + 'static>(
     choices: impl IntoIterator<Item = (T, &'static str, &'static str)>,
 ) -> impl TypedValueParser<Value = T> {
     let choices: Vec<_> = choices.into_iter().collect();
     let words = choices.iter().map(|&(_, word, meaning)| PossibleValue::new(word).help(meaning));
-    // The parser lets nothing pass that is not in the list.
+    // The parser accepts words of the list only.
     PossibleValuesParser::new(words)
         .map(move |given| choices.iter().find(|(_, word, _)| *word == given).expect("a word of the list").0)
 }
 
 /// How loops are kept closed.
 pub const HOLD: [(Stabilisation, &str, &str); 5] = [
-    (Stabilisation::None, "none", "Not at all: multipliers add up in the momenta, positions drift"),
+    (Stabilisation::None, "none", "Not at all: multipliers accumulate in the momenta, positions drift"),
     (
         Stabilisation::Momenta,
         "momenta",
-        "Momenta are freed of multipliers after every step, positions drift by the error of the method",
+        "Momenta are projected after every step; positions drift by the error of the method",
     ),
     (
         Stabilisation::Mass,
@@ -61,7 +61,7 @@ pub const HOLD: [(Stabilisation, &str, &str); 5] = [
     (Stabilisation::Partition, "partition", "The same, by displacements of dependent coordinates alone"),
 ];
 
-/// A small angle: beyond some degrees, snapping would change the mechanism.
+/// Parses a small angle, rad. Snapping by more than some degrees would change the mechanism.
 pub fn snap(text: &str) -> Result<f64, String> {
     let x = finite(text)?;
     if (0.0..=0.1).contains(&x) {
@@ -71,7 +71,7 @@ pub fn snap(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Three numbers with commas between.
+/// Parses three numbers separated by commas.
 pub fn vector(text: &str) -> Result<[f64; 3], String> {
     let numbers = text.split(',').map(finite).collect::<Result<Vec<f64>, String>>()?;
     numbers.try_into().map_err(|n: Vec<f64>| format!("{} number(s) where x,y,z are expected", n.len()))
@@ -87,7 +87,7 @@ pub fn outputs(text: &str) -> Result<OutputList, String> {
     Output::from_name(text).map(|g| OutputList(vec![g])).ok_or_else(unknown)
 }
 
-/// A path of Rust, `::multibody::runtime`.
+/// Parses a path of Rust, such as `::multibody::runtime`.
 pub fn rust_path(text: &str) -> Result<String, String> {
     let word = |w: &str| {
         w.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
@@ -99,7 +99,7 @@ pub fn rust_path(text: &str) -> Result<String, String> {
     }
 }
 
-/// A name that can stand for a type.
+/// Parses a name that is valid for a type.
 pub fn type_name(text: &str) -> Result<String, String> {
     let word = text.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     if word && text.starts_with(|c: char| c.is_ascii_uppercase()) && text != "Self" {
@@ -109,7 +109,7 @@ pub fn type_name(text: &str) -> Result<String, String> {
     }
 }
 
-/// `double_pendulum` as `DoublePendulum`.
+/// Converts `double_pendulum` to `DoublePendulum`.
 pub fn camel_case(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
     let camel: String = words.map(|w| w[..1].to_ascii_uppercase() + &w[1..]).collect();

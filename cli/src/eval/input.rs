@@ -1,4 +1,4 @@
-//! Reading of the states. All findings of a file come at once, each with the index of its state and its key.
+//! Reads the states. All findings of a file are reported at once, each with the index of its state and its key.
 
 use multibody::codegen::import::words;
 use multibody::codegen::model::Gravity;
@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::outer::{Outer, Unit};
 
-/// All of the file.
+/// The contents of the file.
 pub struct Inputs {
     /// Run-time parameters of the model.
     pub params: Vec<f64>,
@@ -22,7 +22,7 @@ pub struct State {
     pub q: Vec<f64>,
     /// Velocities.
     pub v: Vec<f64>,
-    /// Accelerations for inverse dynamics, as the file has them.
+    /// Accelerations for inverse dynamics, in the layout of the file.
     pub a: Vec<f64>,
     tau: Vec<f64>,
     drive_q: Option<Vec<f64>>,
@@ -51,15 +51,15 @@ impl State {
     }
 }
 
-/// Place in the file, what is wrong, what to do.
+/// A finding: place in the file, what is wrong, what to do.
 pub type Finding = (String, String, String);
 
-/// How far from unit length a quaternion or a cosine-sine pair may be, for decimals that were cut off.
+/// Allowed difference of the length of a quaternion or a cosine-sine pair from one, for numbers with few decimals.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
 const SHAPE: &str = "write {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..]}, ..]}";
 
-/// Reads the text.
+/// Parses the text.
 pub fn read(text: &str, plan: &Plan, outer: &Outer) -> Result<Inputs, Vec<Finding>> {
     let value: Value = serde_json::from_str(text).map_err(|e| {
         let what = e.to_string();
@@ -225,7 +225,7 @@ impl Reader<'_> {
         let names = ["x", "y", "z"].map(String::from);
         let given = self.numbers(place, object, &Wanted { key: "gravity", names: &names, required: false });
         let given = given.and_then(|g| g.try_into().ok());
-        // As the fields of generated code start.
+        // The default values of these fields in generated code.
         input.then(|| given.unwrap_or([0.0, 0.0, -9.81]))
     }
 
@@ -252,7 +252,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Refuses quaternions and cosine-sine pairs that are far from unit length: nothing sensible comes of them.
+    /// Reports quaternions and cosine-sine pairs that do not have unit length, because their results would be meaningless.
     fn units(&mut self, place: &str, q: &[f64], units: Vec<Unit>) {
         for unit in units {
             let norm = q[unit.at..unit.at + unit.len].iter().fold(0.0_f64, |n, x| n.hypot(*x));

@@ -1,4 +1,4 @@
-//! The tree the sweeps run on.
+//! The tree on which the sweeps run.
 
 use std::io::Write;
 
@@ -10,7 +10,7 @@ use multibody::runtime::tree::Source;
 
 use crate::Outcome;
 
-/// Prints every node: where it stands, what its joint does, what is zero in its inertia.
+/// Prints every node: its place, its joint, and the zeros of its inertia.
 pub fn print(plan: &Plan, out: &mut dyn Write) -> Outcome {
     let d = plan.dims;
     writeln!(
@@ -55,7 +55,7 @@ fn one(plan: &Plan, k: usize, node: &PlanNode, out: &mut dyn Write) -> Outcome {
     inertia(plan, node, out)
 }
 
-/// What the joint does with its coordinates.
+/// Description of a joint's motion by its coordinates.
 fn motion(plan: &Plan, node: &PlanNode) -> String {
     let (letter, at) = match node.source {
         Source::State { q, .. } => ("q", q),
@@ -82,7 +82,7 @@ fn motion(plan: &Plan, node: &PlanNode) -> String {
     match node.kind {
         NodeKind::Revolute => format!("Rz({angle}){slide}"),
         NodeKind::Prismatic => {
-            // The angle without the coordinate: what is left of a placement.
+            // The constant part of the angle comes from the placement.
             let turn = angle[coordinate.len()..].trim_start_matches(" + ");
             let turn = if turn.is_empty() { String::new() } else { format!(", Rz({})", turn.trim_start()) };
             format!("z {coordinate}{turn}{slide}")
@@ -144,7 +144,7 @@ fn value(plan: &Plan, value: Value) -> String {
     }
 }
 
-/// An angle in degrees, short where it is a round one.
+/// An angle in degrees, short where it is a round number.
 fn degrees(angle: f64) -> String {
     let degrees = (angle.to_degrees() * 1e6).round() / 1e6;
     format!("{degrees}°")

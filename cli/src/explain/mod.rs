@@ -1,4 +1,4 @@
-//! `mbd explain`: what the generator made of a model on the way.
+//! `mbd explain`: intermediate results of the generator.
 
 mod frames;
 mod program;

@@ -1,4 +1,4 @@
-//! Programs: what was made, what is needed, in which order.
+//! Programs: the operations that were traced, those that are needed, and their order.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -93,7 +93,7 @@ fn place(array: &InputArray, k: usize) -> String {
     }
 }
 
-/// The order: parts, values alive at once, longest chain.
+/// The order: parts, values that are alive at the same time, longest chain.
 pub fn schedule(group: &OutputProgram<Program>, chunk: usize, out: &mut dyn Write) -> Outcome {
     let steps = &group.program.steps;
     let statements = steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
@@ -133,7 +133,7 @@ fn alive(group: &OutputProgram<Program>) -> (usize, usize) {
     let mut ends = vec![0_usize; steps.len() + 1];
     let (mut now, mut most, mut at) = (0_usize, 0, 0);
     for (k, (id, op, _)) in steps.iter().enumerate() {
-        // Operands read for the last time here make room for the result.
+        // Operands that are read for the last time here free a register for the result.
         now -= ends[k];
         if matches!(op, Op::Input(_)) {
             continue;

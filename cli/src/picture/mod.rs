@@ -17,9 +17,9 @@ use super::{Failure, Outcome};
 use shapes::{Line, Shapes};
 use view::{hull, Page, View};
 
-/// What is to be drawn.
+/// Settings of a picture.
 pub struct Drawing {
-    /// Direction to the eye.
+    /// Direction from the mechanism to the eye.
     view: Option<[f64; 3]>,
     /// Frames whose paths are drawn.
     traces: Vec<usize>,
@@ -27,12 +27,12 @@ pub struct Drawing {
     strobes: usize,
 }
 
-/// Points of a path; more make large files and no better picture.
+/// Largest number of points of a path; more points enlarge the file without a visible difference.
 const POINTS: usize = 400;
 
 type Frames = Vec<FrameState<f64>>;
 
-/// What the arguments ask for.
+/// The settings of the arguments.
 pub fn drawing(plan: &Plan, args: &SimulateArgs) -> Outcome<Drawing> {
     let find = |name: &String| {
         let names = || plan.frames.iter().map(|f| f.name.as_str());
@@ -80,7 +80,7 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         let opacity = 0.14 + 0.86 * fade * fade * fade;
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
         let mut lines = shapes.lines(frames);
-        // Nearer things over those behind; what is at the same place keeps its order, whatever rounding says.
+        // Nearer parts are drawn over those behind them; parts at the same distance keep their order in spite of rounding.
         let depth = |line: &Line| (view.depth(line.middle()) / (1e-6 * page.size())).round();
         lines.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         for line in &lines {
@@ -98,7 +98,7 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
     text + &page.foot(&caption(record, drawing))
 }
 
-/// What is told below.
+/// The caption below the picture.
 fn caption(record: &Record, drawing: &Drawing) -> String {
     let end = record.t.last().copied().unwrap_or_default();
     match drawing.strobes {

@@ -1,28 +1,28 @@
-//! What a mechanism looks like: lines between the points where its bodies are held together.
+//! The shape of a mechanism: lines between the points at which its bodies are connected.
 
 use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Mount, Value};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::sweep::FrameState;
 
-/// Corners of a disc.
+/// Number of corners of a disc.
 const CORNERS: usize = 40;
 
-/// Points that belong together, in the ground.
+/// Points that are drawn together, in ground axes, m.
 pub struct Line {
     /// Points.
     pub points: Vec<[f64; 3]>,
     /// Whether they are an outline already.
     pub closed: bool,
-    /// Joints; whether they slide.
+    /// Joints, and whether each is prismatic.
     pub marks: Vec<([f64; 3], bool)>,
-    /// Number of its colour.
+    /// Index of the colour.
     pub colour: usize,
     /// Width, pixels.
     pub width: f64,
 }
 
 impl Line {
-    /// Middle of the points.
+    /// Mean of the points.
     pub fn middle(&self) -> [f64; 3] {
         let n = self.points.len().max(1) as f64;
         std::array::from_fn(|k| self.points.iter().map(|p| p[k]).sum::<f64>() / n)
@@ -44,21 +44,21 @@ struct Rod {
     colour: usize,
 }
 
-/// All of a mechanism.
+/// The shape of a whole mechanism.
 pub struct Shapes {
     ground: Part,
     parts: Vec<Part>,
     rods: Vec<Rod>,
 }
 
-/// A point of a frame in the ground.
+/// A point given in a frame, in ground axes.
 fn placed(frames: &[FrameState<f64>], frame: Option<usize>, p: [f64; 3]) -> [f64; 3] {
     let Some(f) = frame.map(|f| &frames[f]) else { return p };
     std::array::from_fn(|i| f.position[i] + (0..3).map(|k| f.rotation[i][k] * p[k]).sum::<f64>())
 }
 
 impl Shapes {
-    /// Of a plan's model, at default parameters.
+    /// The shape of a plan's model, at default parameters.
     pub fn new(plan: &Plan) -> Shapes {
         let params = plan.default_params();
         let number = |v: Value| match v {
@@ -128,7 +128,7 @@ impl Shapes {
         }
         for (body, part) in model.bodies.iter().zip(&mut parts) {
             let first = part.points.first().copied();
-            // A body that is held at one point is a bar with its mass in the middle.
+            // A body that is connected at one point only is drawn as a bar with its centre of mass in the middle.
             if part.points.iter().all(|p| Some(*p) == first) {
                 let (end, com) = (first.unwrap_or_default(), point(&body.com));
                 part.points.push(std::array::from_fn(|k| 2.0 * com[k] - end[k]));
@@ -138,14 +138,14 @@ impl Shapes {
             let Some(b) = mount.body else { continue };
             let (frame, centre) = (parts[b].frame, point(&mount.placement.xyz));
             parts.push(Part { frame, points: disc(centre, axis, radius), marks: Vec::new(), closed: true, colour: b });
-            // Spokes tell that it turns.
+            // Spokes show the rotation.
             let rim = parts.last().map_or(Vec::new(), |d| vec![d.points[0], d.points[CORNERS / 2]]);
             parts.push(Part { frame, points: rim, marks: Vec::new(), closed: false, colour: b });
         }
         Shapes { ground, parts, rods }
     }
 
-    /// The mechanism where its frames are.
+    /// The mechanism at given poses of its frames.
     pub fn lines(&self, frames: &[FrameState<f64>]) -> Vec<Line> {
         let rods = self.rods.iter().map(|rod| {
             let points: Vec<[f64; 3]> = rod.ends.iter().map(|(f, p)| placed(frames, *f, *p)).collect();
@@ -155,12 +155,12 @@ impl Shapes {
         self.parts.iter().map(|part| line(part, frames)).chain(rods).collect()
     }
 
-    /// What stands still.
+    /// The parts that are fixed to the ground.
     pub fn ground(&self, frames: &[FrameState<f64>]) -> Line {
         Line { width: 1.5, ..line(&self.ground, frames) }
     }
 
-    /// All points, for the extent.
+    /// All points, from which the extent is computed.
     pub fn points(&self, frames: &[FrameState<f64>]) -> Vec<[f64; 3]> {
         let mut points = self.ground.points.clone();
         points.extend(self.lines(frames).into_iter().flat_map(|l| l.points));
@@ -183,7 +183,7 @@ fn line(part: &Part, frames: &[FrameState<f64>]) -> Line {
 fn disc(centre: [f64; 3], axis: [f64; 3], radius: f64) -> Vec<[f64; 3]> {
     let norm = axis.iter().fold(0.0_f64, |n, x| n.hypot(*x));
     let n = axis.map(|x| x / norm);
-    // The axis of the ground that is furthest from the disc's.
+    // The ground axis with the largest angle to the disc's axis.
     let k = (0..3).min_by(|a, b| n[*a].abs().total_cmp(&n[*b].abs())).unwrap_or_default();
     let mut a = n.map(|x| -x * n[k]);
     a[k] += 1.0;

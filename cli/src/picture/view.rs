@@ -1,8 +1,8 @@
-//! From space to the page.
+//! Projection from space onto the page.
 
 use std::fmt::Write as _;
 
-/// A projection along parallel lines.
+/// A parallel projection.
 pub struct View {
     right: [f64; 3],
     up: [f64; 3],
@@ -23,7 +23,7 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
 }
 
 impl View {
-    /// From a direction; if none is given, across the plane in which all points lie.
+    /// The projection along a direction; if none is given, along the normal of the plane in which all points lie.
     pub fn new(direction: Option<[f64; 3]>, points: &[[f64; 3]]) -> View {
         let extent: [f64; 3] = std::array::from_fn(|k| {
             let (low, high) = points.iter().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p[k]), b.max(p[k])));
@@ -38,12 +38,12 @@ impl View {
         View { right, up: cross(eye, right), eye }
     }
 
-    /// To the right and up, m.
+    /// Coordinates of a point to the right and up, m.
     pub fn project(&self, p: [f64; 3]) -> [f64; 2] {
         [dot(p, self.right), dot(p, self.up)]
     }
 
-    /// Towards the eye, m.
+    /// Coordinate of a point towards the eye, m.
     pub fn depth(&self, p: [f64; 3]) -> f64 {
         dot(p, self.eye)
     }
@@ -79,16 +79,16 @@ pub fn hull(points: &[[f64; 2]], flat: f64) -> Vec<[f64; 2]> {
     lower
 }
 
-/// Width of the picture.
+/// Width of the picture, pixels.
 const WIDTH: f64 = 720.0;
 const HEIGHTS: [f64; 2] = [200.0, 640.0];
 const MARGIN: f64 = 24.0;
-/// Below the picture: scale and caption.
+/// Height of the scale and the caption below the picture, pixels.
 const FOOT: f64 = 34.0;
 
 /// Scale and place.
 pub struct Page {
-    /// Pixels a metre.
+    /// Pixels per metre.
     scale: f64,
     left: f64,
     top: f64,
@@ -97,7 +97,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// One that the points fit on.
+    /// A page on which all points fit.
     pub fn new(points: impl Iterator<Item = [f64; 2]>) -> Page {
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
         for p in points {
@@ -127,13 +127,13 @@ impl Page {
         [self.left + p[0] * self.scale, self.top - p[1] * self.scale]
     }
 
-    /// The same in words.
+    /// The same as text.
     pub fn at(&self, p: [f64; 2]) -> String {
         let [x, y] = self.place(p);
         format!("{x:.1},{y:.1}")
     }
 
-    /// What comes first.
+    /// The beginning of the file.
     pub fn head(&self) -> String {
         let height = self.height + FOOT;
         format!(
@@ -142,7 +142,7 @@ impl Page {
         )
     }
 
-    /// Scale, caption, and the end.
+    /// The scale, the caption, and the end of the file.
     pub fn foot(&self, caption: &str) -> String {
         let about = WIDTH / 6.0 / self.scale;
         let decade = 10.0_f64.powf(about.log10().floor());

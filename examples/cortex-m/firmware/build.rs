@@ -1,4 +1,4 @@
-//! Hands the linker script to the linker by its full path.
+//! Passes the linker script to the linker by its full path.
 
 fn main() {
     let here = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets CARGO_MANIFEST_DIR");

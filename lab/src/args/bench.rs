@@ -13,26 +13,26 @@ pub struct BenchArgs {
     pub bench: Bench,
 }
 
-/// Which bench.
+/// The bench to run.
 #[derive(Subcommand)]
 pub enum Bench {
     /// Time and evaluations against the error at the end: scenes × methods × tolerances
     WorkPrecision(WorkArgs),
-    /// Energy and trajectory over a million steps, each method at the work of the classical one
+    /// Energy and trajectory over a million steps, each method with as many evaluations as the classical one
     Longrun(LongArgs),
-    /// What every scene says to every method: runs, or stops with a reason
+    /// Every method on every scene: it runs, or stops with a reason
     Stress(StressArgs),
-    /// All of it, written to reports/accuracy.md and reports/figures
+    /// All benches, written to reports/accuracy.md and reports/figures
     Report(ReportArgs),
 }
 
-/// Which scenes and methods.
+/// Selection of scenes and methods.
 #[derive(Args, Clone)]
 pub struct Choice {
-    /// Scenes, with commas between [default: all]
+    /// Scenes, separated by commas [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub scenes: Vec<String>,
-    /// Methods, with commas between [default: all]
+    /// Methods, separated by commas [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub methods: Vec<String>,
 }
@@ -42,10 +42,10 @@ pub struct Choice {
 pub struct WorkArgs {
     #[command(flatten)]
     pub choice: Choice,
-    /// Directory for one figure a scene
+    /// Directory for one figure of each scene
     #[arg(long, value_name = "DIR")]
     pub figures: Option<PathBuf>,
-    /// File for all samples, one JSON object a line
+    /// File for all samples, one JSON object per line
     #[arg(long, value_name = "FILE")]
     pub samples: Option<PathBuf>,
     /// Samples of rivals, as benches/integrators/run.sh writes them
@@ -58,7 +58,7 @@ pub struct WorkArgs {
 pub struct LongArgs {
     #[command(flatten)]
     pub choice: Choice,
-    /// Steps of the classical method that the runs are as long as
+    /// Length of the runs in steps of the classical method
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub steps: u64,
 }
@@ -79,7 +79,7 @@ pub struct ReportArgs {
     /// Samples of rivals, as benches/integrators/run.sh writes them
     #[arg(long, value_name = "FILE")]
     pub rivals: Option<PathBuf>,
-    /// Steps of the classical method that the long runs are as long as
+    /// Length of the long runs in steps of the classical method
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub steps: u64,
 }

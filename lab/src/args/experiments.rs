@@ -16,12 +16,12 @@ pub struct ExperimentsArgs {
     pub experiment: Experiment,
 }
 
-/// Which experiment.
+/// The experiment to run.
 #[derive(Subcommand)]
 pub enum Experiment {
     /// Momenta against accelerations on a closed loop: tables 7.1 to 7.4, figures 7.9 to 7.15
     Biped(BipedArgs),
-    /// Time of an evaluation over the number of links, open, branched, closed: figures 7.4 to 7.6
+    /// Time of an evaluation over the number of links of open, branched and closed chains: figures 7.4 to 7.6
     Scaling(ScalingArgs),
 }
 

@@ -14,10 +14,10 @@ pub struct Arguments {
     pub command: Command,
 }
 
-/// What to do.
+/// The command to run.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Repeat the experiments of the thesis's chapter 7
+    /// Repeat the experiments of chapter 7 of the thesis
     Experiments(experiments::ExperimentsArgs),
     /// Measure integrators: work against error, long runs, stress
     Bench(bench::BenchArgs),

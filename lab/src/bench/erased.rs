@@ -1,4 +1,4 @@
-//! A system whose type is not known, so that every method is compiled once for all scenes.
+//! A system behind a trait object, so that every method is compiled once for all scenes.
 
 use crate::scenes::{Dynamics, Scene};
 use multibody::runtime::system::LieJoint;
@@ -6,7 +6,7 @@ use multibody::runtime::{
     Accelerated, Conjugate, Differentiable, Energetic, Interpreter, Real, StateDerivatives, System,
 };
 
-/// What a scene is asked for, on slices.
+/// The functions of a scene's system, on slices.
 trait Calls<S> {
     fn rates(&mut self, t: S, q: &[S], p: &[S], qd: &mut [S], pd: &mut [S]);
     fn coordinate_rates(&mut self, q: &[S], v: &[S], qd: &mut [S]);
@@ -15,7 +15,7 @@ trait Calls<S> {
     fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]);
 }
 
-/// A system with room for one state in its own form.
+/// A system with memory for one state in its own types.
 struct Held<Y: System> {
     y: Y,
     q: Y::Coordinates,
@@ -85,11 +85,11 @@ fn derivatives<Y: Dynamics + Differentiable + 'static>(mut y: Y) -> Derivatives<
     })
 }
 
-/// Any scene's system.
+/// The system of any scene.
 pub struct Erased<S: Real> {
     calls: std::cell::RefCell<Box<dyn Calls<S>>>,
     interpreter: Interpreter<S>,
-    /// Generated ones, else the interpreter's.
+    /// Generated derivatives; where there are none, those of the interpreter.
     derivatives: Option<Derivatives<S>>,
 }
 
@@ -99,14 +99,14 @@ impl<S: Real + 'static> Erased<S> {
         Self::new(scene, scene.interpreter::<S>())
     }
 
-    /// Some system of the scene.
+    /// Wraps a system of the scene.
     pub fn new<Y: Dynamics<Scalar = S> + 'static>(scene: &Scene, y: Y) -> Self {
         let held = Held { q: y.neutral(), p: y.zero_momenta(), qd: y.neutral(), pd: y.zero_momenta(), y };
         let calls = std::cell::RefCell::new(Box::new(held) as Box<dyn Calls<S>>);
         Erased { calls, interpreter: scene.interpreter(), derivatives: None }
     }
 
-    /// With derivatives of another instance of it.
+    /// Adds the derivatives of another instance of the system.
     pub fn with_derivatives<Y: Dynamics<Scalar = S> + Differentiable + 'static>(self, y: Y) -> Self {
         Erased { derivatives: Some(derivatives(y)), ..self }
     }

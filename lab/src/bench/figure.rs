@@ -7,17 +7,17 @@ use mbd_cli::plot::{colour, shrunk, SCALE};
 
 /// One line: points `(x, y)`, both positive.
 pub struct Line {
-    /// In the legend.
+    /// Name in the legend.
     pub name: String,
-    /// In order.
+    /// Points, in order.
     pub points: Vec<(f64, f64)>,
-    /// Dashed, without marks: what others are compared with.
+    /// Whether the line is dashed and without marks, as lines that others are compared with are.
     pub thin: bool,
 }
 
 /// Two charts side by side with one legend.
 pub struct Figure {
-    /// Over both.
+    /// Title over both charts.
     pub title: String,
     /// Label of the horizontal axes.
     pub x: [String; 2],
@@ -36,7 +36,7 @@ const LEGEND: u32 = 230 * SCALE;
 const TITLE: u32 = 32 * SCALE;
 
 impl Figure {
-    /// As SVG.
+    /// The figure as SVG.
     pub fn svg(&self) -> Result<String, String> {
         let mut text = String::new();
         {
@@ -74,7 +74,7 @@ impl Figure {
     }
 }
 
-/// Whole powers of ten around all values.
+/// The range of all values, extended to whole powers of ten.
 fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
     let logs = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10);
     let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));

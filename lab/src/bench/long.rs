@@ -1,4 +1,4 @@
-//! Long runs: energy and trajectory at the work of the classical method.
+//! Long runs: energy and trajectory, each method with as many evaluations as the classical one.
 
 use std::time::Instant;
 
@@ -22,24 +22,24 @@ pub struct Row {
     pub method: String,
     /// Tolerance or step.
     pub setting: f64,
-    /// With energy projection.
+    /// Whether steps are projected onto the energy.
     pub projected: bool,
     /// Evaluations divided by those of RK4 at its step.
     pub work: f64,
     /// Time divided by RK4's.
     pub time: f64,
-    /// Largest energy error over the run, relative to the energy above rest at the lowest place.
+    /// Largest energy error over the run, relative to the energy above that of rest at the lowest position.
     pub energy: f64,
     /// Error of a coordinate at the end of the scene's short run, rad or m.
     pub trajectory: Option<f64>,
-    /// Why it stopped.
+    /// Why the run stopped early.
     pub failure: Option<String>,
 }
 
-/// Methods of long runs unless others are asked for.
+/// Default methods of long runs.
 const METHODS: [&str; 5] = ["rk4", "ab6", "dop853", "verner9", "adams"];
 
-/// Methods of a list, or the usual ones; the classical one first, whose work is the measure.
+/// The methods of a list, or the default ones; the classical one comes first, because its work is the reference.
 pub fn methods(asked: &[String]) -> Vec<String> {
     let usual = METHODS.map(String::from);
     let rest = if asked.is_empty() { &usual[..] } else { asked };
@@ -47,8 +47,8 @@ pub fn methods(asked: &[String]) -> Vec<String> {
     std::iter::once("rk4".to_string()).chain(rest.cloned()).collect()
 }
 
-/// Energy at the start above the least the mechanism can have near there: its motion with momenta taken out at every step
-/// comes to rest at the bottom.
+/// Energy at the start above the nearest minimum of the potential energy. The minimum is found by a motion whose momenta are
+/// reduced at every step, so that it comes to rest there.
 pub fn height(scene: &Scene, system: &mut Erased<f64>) -> f64 {
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let (mut q, mut p) = scene.start(system);
@@ -68,7 +68,7 @@ pub fn height(scene: &Scene, system: &mut Erased<f64>) -> f64 {
     before - least
 }
 
-/// A run over `t_end` with looks at the energy.
+/// A run over `t_end`, s, during which the energy is observed.
 struct Long {
     evaluations: u64,
     seconds: f64,
@@ -78,7 +78,8 @@ struct Long {
     failure: Option<String>,
 }
 
-/// Every how many steps the energy is looked at: at every one it would cost as much as the steps of cheap methods.
+/// Number of steps between two evaluations of the energy. Evaluated at every step, it would cost as much as the steps of cheap
+/// methods.
 const LOOK: u64 = 16;
 
 fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, project: bool, t_end: f64) -> Option<Long> {
@@ -115,8 +116,8 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     Some(Long { evaluations: driver.statistics().evaluations, seconds, energy, q, failure })
 }
 
-/// The setting at which a method needs as many evaluations as RK4 at its step: by bisection on a short run, then corrected
-/// on longer ones.
+/// The setting at which a method needs as many evaluations as RK4 at its step. It is found by bisection on a short run and
+/// corrected on longer ones.
 fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) -> Option<f64> {
     let rk4 = 4.0 / scene.rk4_step;
     let adaptive = catalogue::entry(method)?.adaptive;
@@ -125,7 +126,7 @@ fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) ->
         run.failure.is_none().then(|| run.evaluations as f64 / t_end / rk4)
     };
     let short = (t_end / 1000.0).max(scene.t_end);
-    // Powers of ten between which the work is bisected; failures count as too little of it.
+    // Powers of ten between which the setting is bisected; a failure counts as too little work.
     let (mut coarse, mut fine) = if adaptive { (0.0, -14.0) } else { (scene.rk4_step.log10() + 1.5, -5.5) };
     for _ in 0..10 {
         let middle = 0.5 * (coarse + fine);
@@ -138,12 +139,12 @@ fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) ->
     if !adaptive {
         return Some(10.0_f64.powf(at));
     }
-    // log(work) falls with log(tolerance) at this slope.
+    // log(work) decreases with log(tolerance) at this slope.
     let slope = match (work(10.0_f64.powf(at - 1.0), short), work(10.0_f64.powf(at + 1.0), short)) {
         (Some(more), Some(less)) if more > 1.05 * less => 0.5 * (more / less).log10(),
         _ => 0.1,
     };
-    // A rough motion takes more than its first part says: the last correction is by the whole run.
+    // A rough motion can need more work than its first part; the last correction therefore uses the whole run.
     for part in [0.1, 0.1, 1.0, 1.0] {
         match work(10.0_f64.powf(at), part * t_end) {
             Some(n) if part == 1.0 && (0.9..1.02).contains(&n) => break,
@@ -154,7 +155,7 @@ fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) ->
     Some(10.0_f64.powf(at))
 }
 
-/// One scene, some methods, each at the work of RK4 at its step over `steps` of those.
+/// Runs some methods on one scene, each with as many evaluations as `steps` steps of RK4.
 pub fn scene(scene: &Scene, methods: &[String], steps: u64) -> Vec<Row> {
     let (mut system, _) = generated(scene);
     let height = height(scene, &mut system);

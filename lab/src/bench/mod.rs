@@ -1,4 +1,4 @@
-//! `mbd-lab bench`: work against error, long runs, stress, and the report of it all.
+//! `mbd-lab bench`: work against error, long runs, stress, and the report of all three.
 
 mod erased;
 mod figure;
@@ -34,7 +34,7 @@ pub fn run(args: &BenchArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
-/// The scenes of a list of names, or all; the methods of the list must exist.
+/// The scenes of a list of names, or all of them. The methods of the list must exist.
 fn chosen(choice: &Choice) -> Outcome<Vec<Scene>> {
     for name in &choice.methods {
         if catalogue::entry(name).is_none() {
@@ -58,9 +58,9 @@ fn chosen(choice: &Choice) -> Outcome<Vec<Scene>> {
 pub struct Measured {
     /// The scene.
     pub scene: Scene,
-    /// What errors are measured from.
+    /// The reference from which errors are measured.
     pub reference: Option<Reference>,
-    /// Ours, then the rivals'.
+    /// Samples of this project, then of the rivals.
     pub samples: Vec<Sample>,
 }
 
@@ -89,7 +89,7 @@ fn read_rivals(path: Option<&Path>) -> Outcome<Vec<Sample>> {
             Failure::new(format!("{place}: {e}"), "one JSON object a line, as benches/integrators/run.sh writes them")
         })
     });
-    // Lines that tell of something else (times of single evaluations) have no coordinates.
+    // Lines about something else (times of single evaluations) have no coordinates.
     Ok(read.collect::<Outcome<Vec<_>>>()?.into_iter().filter(|s| !s.q.is_empty()).collect())
 }
 
@@ -128,7 +128,7 @@ fn write_figure(measured: &Measured, directory: &Path) -> Outcome {
     write_file(&directory.join(format!("{}.svg", measured.scene.name)), &svg)
 }
 
-/// Scenes of the long runs unless others are asked for.
+/// Default scenes of the long runs.
 pub const LONG: [&str; 4] = ["double_pendulum", "double_pendulum_chaotic", "arm7", "chain10_swing"];
 
 fn longrun(args: &LongArgs, out: &mut dyn Write) -> Outcome {

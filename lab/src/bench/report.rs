@@ -1,4 +1,4 @@
-//! `reports/accuracy.md`: text that people wrote, tables and figures that were measured.
+//! `reports/accuracy.md`: written text with measured tables and figures.
 
 use std::io::Write;
 

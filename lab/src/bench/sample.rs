@@ -7,13 +7,13 @@ use multibody::runtime::integrate::{Statistics, Step, StepError, Tolerances};
 use multibody::runtime::{Energetic, Real, Scalar, System};
 use serde::{Deserialize, Serialize};
 
-/// What was run and what came of it. One line of JSON; the rivals' programs write the same.
+/// A run and its result, one line of JSON. The rivals' programs write the same format.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Sample {
     /// Program.
     pub tool: String,
-    /// Variant of it: code, form, numbers.
+    /// Variant of the program: code, formulation, number type.
     pub variant: String,
     /// Scene.
     pub scene: String,
@@ -21,7 +21,7 @@ pub struct Sample {
     pub method: String,
     /// Tolerance of adaptive methods, step (s) of others, as text.
     pub setting: String,
-    /// Time of the processor, s: the least of some runs.
+    /// Processor time, s: the smallest of several runs.
     pub cpu_s: f64,
     /// Evaluations of the rates.
     pub evaluations: u64,
@@ -32,19 +32,19 @@ pub struct Sample {
     pub iterations: u64,
     /// Largest error of a coordinate at the end, rad or m.
     pub end_error: Option<f64>,
-    /// Change of the energy over the run, J; of conservative scenes.
+    /// Change of the energy over the run, J; for conservative scenes only.
     pub energy_error: Option<f64>,
-    /// Coordinates at the end, in the order of the model; rivals give them.
+    /// Coordinates at the end, in the order of the model; for rivals only.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub q: Vec<f64>,
-    /// Why it stopped early.
+    /// Why the run stopped early.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
 /// Shortest time that is measured, s; shorter runs are repeated.
 const SHORTEST: f64 = 0.02;
-/// Evaluations after which a run is given up: no method needs so many for an error worth having.
+/// Number of evaluations after which a run is stopped, because no method needs as many for a useful error.
 pub const MOST: u64 = 20_000_000;
 
 /// Makes a driver for a system.
@@ -58,21 +58,21 @@ pub fn step(method: &str, setting: f64) -> Step {
     }
 }
 
-/// Result of one run: state at the end and the work.
+/// Result of one run: the state at the end and the work.
 pub struct Run<Y: System> {
     /// Coordinates.
     pub q: Y::Coordinates,
     /// Momenta.
     pub p: Y::Momenta,
-    /// Work.
+    /// Evaluations and steps.
     pub statistics: Statistics,
     /// Time, s.
     pub seconds: f64,
-    /// Failure.
+    /// Failure, if there was one.
     pub failure: Option<StepError>,
 }
 
-/// Runs from zero to `t_end` once.
+/// Runs once from zero to `t_end`, s.
 pub fn run<Y>(
     system: &mut Y,
     make: &Maker<'_, Y>,
@@ -96,7 +96,7 @@ where
     Some(Ok(Run { q, p, statistics: driver.statistics(), seconds, failure }))
 }
 
-/// Runs, repeats short runs, and compares with a reference.
+/// Runs, repeats short runs for their time, and compares the end with a reference.
 pub fn measure<Y>(
     system: &mut Y,
     make: &Maker<'_, Y>,

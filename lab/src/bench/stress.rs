@@ -1,4 +1,4 @@
-//! What every scene says to every method.
+//! Stress: every method on every scene.
 
 use crate::scenes::{self, Scene};
 use multibody::runtime::catalogue::{self, Start};
@@ -11,7 +11,7 @@ use super::sample::step;
 use super::work::{fits, generated, reference, single};
 use mbd_cli::note;
 
-/// What came of one run.
+/// Result of one run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// Scene.
@@ -24,14 +24,14 @@ pub struct Row {
     pub result: Result<f64, String>,
 }
 
-/// Tolerance of adaptive methods; others take the scene's step.
+/// Tolerance of adaptive methods; the others use the scene's step.
 const TOLERANCE: f64 = 1e-8;
-/// The same in single precision.
+/// Tolerance of adaptive methods in single precision.
 const SINGLE: f64 = 1e-4;
-/// Steps times freedoms after which a run is given up, which it says.
+/// Number of steps times degrees of freedom after which a run is stopped with a message.
 const STEPS: u64 = 5_000_000;
 
-/// All scenes with all methods, or those of a list, in f64 and f32, and the models that are refused.
+/// Runs all scenes with all methods, or those of a list, in f64 and f32, and checks the models that must be rejected.
 pub fn rows(scenes: &[Scene], methods: &[String]) -> Vec<Row> {
     let mut rows = Vec::new();
     for scene in scenes {

@@ -1,4 +1,4 @@
-//! Tables (Markdown) and figures of what was measured.
+//! Tables (Markdown) and figures of the measurements.
 
 use std::fmt::Write as _;
 
@@ -11,20 +11,20 @@ use super::stress::Row as StressRow;
 use super::work::Variant;
 use super::Measured;
 
-/// Errors that tables give the work for.
+/// Errors for which the tables give the work.
 const TARGETS: [f64; 5] = [1e-4, 1e-6, 1e-8, 1e-10, 1e-12];
 
-/// Runs of one method by one program, coarse to fine.
+/// Runs of one method by one program, from coarse to fine settings.
 pub struct Series<'a> {
-    /// Program, unless it is this one, and variant.
+    /// Variant, with the program if it is not this one.
     pub name: String,
     /// Method.
     pub method: &'a str,
-    /// Runs that came to the end.
+    /// Runs that reached the end.
     pub samples: Vec<&'a Sample>,
 }
 
-/// Samples by program, variant and method, in the order of their first.
+/// Groups samples by program, variant and method, in the order of their first sample.
 pub fn series(samples: &[Sample]) -> Vec<Series<'_>> {
     let mut all: Vec<Series> = Vec::new();
     for sample in samples {
@@ -45,7 +45,8 @@ pub fn series(samples: &[Sample]) -> Vec<Series<'_>> {
 }
 
 impl Series<'_> {
-    /// Time (s) and evaluations for an end error: between two runs by straight lines in logarithms; the cheapest way.
+    /// Time (s) and evaluations for an error at the end, by linear interpolation of logarithms between two runs; the smallest
+    /// where several pairs of runs give one.
     pub fn cost(&self, error: f64) -> Option<(f64, f64)> {
         let point = |s: &Sample| (s.end_error.unwrap_or(f64::INFINITY).max(1e-17), s.cpu_s, s.evaluations as f64);
         let mut best: Option<(f64, f64)> = None;
@@ -69,7 +70,7 @@ impl Series<'_> {
     }
 }
 
-/// Seconds as a number with a unit.
+/// A time as a number with a unit.
 fn seconds(s: f64) -> String {
     match s {
         s if s < 1e-3 => format!("{:.3} ms", s * 1e3),
@@ -78,7 +79,7 @@ fn seconds(s: f64) -> String {
     }
 }
 
-/// One scene: time and evaluations for given errors at the end.
+/// Table of one scene: time and evaluations for given errors at the end.
 pub fn work(measured: &Measured) -> String {
     let Measured { scene, reference, samples } = measured;
     let mut text = format!("### {} (`{}`), {} s\n\n", scene.title, scene.name, scene.t_end);
@@ -128,7 +129,7 @@ pub fn figure(measured: &Measured) -> Option<Figure> {
     let (code, interpreted) = (all.iter().any(|s| s.name == Variant::Hamilton.name()), Variant::Interpreted.name());
     let chosen: Vec<&Series> = LINES
         .iter()
-        // Scenes without generated code show the interpreter's lines in their place.
+        // Scenes without generated code show the interpreter's lines instead.
         .filter_map(|(name, method)| {
             let place = match *name {
                 name if code => name,
@@ -162,7 +163,7 @@ pub fn figure(measured: &Measured) -> Option<Figure> {
     })
 }
 
-/// Ratios of our time to the rivals', where they ran.
+/// Ratios of our time to that of the rivals, for the scenes that they ran.
 pub fn ratios(measured: &[Measured]) -> String {
     let mut text = String::from(
         "| scene | error | best explicit | RK4 / Pinocchio RK4 | DOP853 / Pinocchio DOP853 | best / best of MuJoCo | best / Drake |\n|---|---|---|---|---|---|---|\n",
@@ -204,7 +205,7 @@ pub fn ratios(measured: &[Measured]) -> String {
     text
 }
 
-/// Long runs of one scene.
+/// Table of the long runs of one scene.
 pub fn long(scene: &Scene, rows: &[LongRow]) -> String {
     let mut text = format!("### {} (`{}`)\n\n", scene.title, scene.name);
     text += "| method | setting | work | time | energy error | trajectory error | energy, projected | trajectory, projected |\n|---|---|---|---|---|---|---|---|\n";
@@ -229,7 +230,8 @@ pub fn long(scene: &Scene, rows: &[LongRow]) -> String {
     text
 }
 
-/// Stress: one line a scene and number type, with the worst of those that ran, and what the others said.
+/// Table of the stress runs: one line for each scene and number type, with the largest error and the messages of the methods
+/// that stopped.
 pub fn stress(rows: &[StressRow]) -> String {
     let mut text = String::from("| scene | method | setting | error at the end, or why not |\n|---|---|---|---|\n");
     for row in rows {

@@ -10,7 +10,7 @@ use super::erased::Erased;
 use super::sample::{end_error, measure, run, step, Maker, Sample};
 use mbd_cli::note;
 
-/// How a scene is run.
+/// Variant in which a scene is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
     /// Generated code in canonical form, f64.
@@ -24,10 +24,10 @@ pub enum Variant {
 }
 
 impl Variant {
-    /// All.
+    /// All variants.
     pub const ALL: [Variant; 4] = [Variant::Hamilton, Variant::Acceleration, Variant::Interpreted, Variant::Single];
 
-    /// As tables name it.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Variant::Hamilton => "generated",
@@ -37,8 +37,8 @@ impl Variant {
         }
     }
 
-    /// Whether a method is run in it: all with generated code, with the interpreter where there is none, and of the explicit
-    /// ones a choice in the others.
+    /// Whether a method is run in this variant. All methods are run with generated code, or with the interpreter where there is
+    /// no code; the other variants run a selection of the explicit methods.
     fn runs(self, method: &Entry, code: bool) -> bool {
         let few = ["rk4", "dop853", "verner9"];
         match self {
@@ -50,13 +50,13 @@ impl Variant {
     }
 }
 
-/// State at the end that others are compared with.
+/// Reference state at the end.
 pub struct Reference {
     /// Coordinates.
     pub q: Vec<f64>,
-    /// How far two computations of it are apart.
+    /// Difference between two computations of it.
     pub error: f64,
-    /// How it was computed.
+    /// Method by which it was computed.
     pub how: &'static str,
 }
 
@@ -95,12 +95,12 @@ pub fn single(scene: &Scene) -> Erased<f32> {
     visit_f32(scene.name, Boxed(scene)).unwrap_or_else(|| Erased::interpreted(scene))
 }
 
-/// Scenes of at most so many freedoms have a reference in double-double numbers.
+/// Largest number of degrees of freedom for which the reference is computed in double-double numbers.
 const WIDE: usize = 14;
 
-/// A state at the end that is right to far more digits than what is compared with it, where that can be had in seconds.
+/// A state at the end with far more correct digits than the runs that are compared with it, where this takes seconds only.
 pub fn reference(scene: &Scene) -> Option<Reference> {
-    // The largest would take minutes for digits that nobody asks for.
+    // For the largest scenes it would take minutes, for digits that are not needed.
     let (tight, other) = if scene.v.len() > HUGE { (1e-8, "adams") } else { (1e-14, "dop853") };
     let solve = |system: &mut Erased<f64>, method: &str| -> Option<Vec<f64>> {
         let (q, p) = scene.start(system);
@@ -129,13 +129,14 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
     Some(Reference { error: end_error(&quick, &other), q: quick, how })
 }
 
-/// Time after which a series of ever finer runs ends, s.
+/// Time, s, after which a series of finer and finer runs ends.
 const LONGEST: f64 = 0.15;
-/// With more freedoms than this only some methods are run: implicit ones factor dense matrices, others take minutes.
+/// With more degrees of freedom than this, only some methods are run: implicit methods factor dense matrices, and others take
+/// minutes.
 const LARGE: usize = 20;
-/// Which these are.
+/// These methods.
 const CHOICE: [&str; 6] = ["rk4", "tsit5", "dop853", "verner9", "ab6", "adams"];
-/// With more freedoms than this a run takes seconds: two methods.
+/// With more degrees of freedom than this, a run takes seconds, and only two methods are run.
 const HUGE: usize = 200;
 
 /// Whether a method is run on a scene at all.
@@ -147,7 +148,7 @@ pub fn fits(scene: &Scene, method: &Entry) -> bool {
     }
 }
 
-/// One method at all its settings.
+/// Runs one method at all its settings.
 fn series<Y>(
     system: &mut Y,
     make: &Maker<'_, Y>,
@@ -184,7 +185,7 @@ where
         let (slow, failed) = (sample.cpu_s > LONGEST, sample.failure.is_some());
         let error = sample.end_error.unwrap_or(f64::INFINITY);
         samples.push(sample);
-        // Finer steps of an explicit method on a stiff scene come through where coarse ones do not.
+        // On a stiff scene, finer steps of an explicit method can succeed where coarse ones fail.
         if slow || (failed && method.adaptive) || error < 1e-13 {
             break;
         }

@@ -27,10 +27,10 @@ pub fn run(args: &BipedArgs, out: &mut dyn Write) -> Outcome {
     projected(&mut study, if args.quick { args.steps.min(1000) } else { args.steps }, out)
 }
 
-/// Every way to the end; the coordinates of the first.
+/// Runs every formulation to the end. Returns the coordinates of the first one.
 fn agreement<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome<Vec<f64>> {
     note(format_args!("reference"));
-    // Errors of order 9 are below round-off long before.
+    // With order 9 the errors are far below round-off.
     let h = if args.quick { 1e-3 } else { 2.5e-4 };
     let ways = [
         ("minimal coordinates, accelerations", study.minimal_end(Kind::Velocities, h)),
@@ -84,12 +84,12 @@ fn panel(label: &str, names: &[&str], traces: &[&Traces]) -> Panel {
     Panel { label: label.into(), t: traces.first().map_or(Vec::new(), |t| t.t.clone()), lines }
 }
 
-/// Figures 7.9 to 7.13 and what they say in numbers.
+/// Figures 7.9 to 7.13, and their ranges as numbers.
 fn motion<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write) -> Outcome {
     note(format_args!("figures 7.9 to 7.13"));
     let [q, v, p] = study.motion(STEP);
     let methods = [
-        // The one nearest to the scales of the thesis's figures; its table 7.1 has order 5.
+        // This method is nearest to the scales of the thesis's figures; the thesis's table 7.1 uses order 5.
         ("Runge-Kutta-Fehlberg, order 4", Method::Fehlberg { lower: true }),
         ("Runge-Kutta-Fehlberg, order 5", Method::Fehlberg { lower: false }),
         ("Runge-Kutta 4", Method::Classical),
@@ -116,7 +116,7 @@ fn motion<Y: Closed>(study: &mut Study<Y>, args: &BipedArgs, out: &mut dyn Write
     draw("figure_7_13", "Error of the energy, steps of 1 ms", panel("error [J]", &names, &[&lagrange[1], &hamilton[1]]))
 }
 
-/// The long run that is put back on the loop after every step.
+/// The long run with position correction after every step.
 fn projected<Y: Closed>(study: &mut Study<Y>, steps: u64, out: &mut dyn Write) -> Outcome {
     let every = (steps / 10).max(1);
     let [after, before, energy] = study.projected(STEP, steps, |step| {

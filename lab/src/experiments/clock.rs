@@ -1,8 +1,8 @@
-//! Times of calls.
+//! Timing of calls.
 
 use std::time::Instant;
 
-/// Shortest time of a call of each, s, over rounds that take turns: what disturbs one disturbs the others too.
+/// Shortest time of a call of each function, s, over interleaved rounds, so that a disturbance affects all functions alike.
 pub fn least(calls: &mut [&mut dyn FnMut()], rounds: u32, round: f64) -> Vec<f64> {
     let counts: Vec<u32> = calls.iter_mut().map(|call| count(call, round)).collect();
     let mut best = vec![f64::INFINITY; calls.len()];
@@ -20,7 +20,7 @@ fn time(call: &mut dyn FnMut(), count: u32) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-/// How many calls fill a round of so many seconds; they warm up the caches besides.
+/// Number of calls that fill a round of a given length, s. Counting them also warms up the caches.
 fn count(call: &mut dyn FnMut(), round: f64) -> u32 {
     let mut count = 1;
     while count < 1 << 24 && time(call, count) < 0.5 * round {
@@ -40,9 +40,9 @@ pub struct Line {
 }
 
 impl Line {
-    /// Through points whose distances count relative to their sizes.
+    /// The line through points, with distances relative to their values.
     pub fn through(points: &[(f64, f64)]) -> Line {
-        // Weights 1/y²: the small ones say as much as the large ones.
+        // With weights 1/y², small values count as much as large ones.
         let sum = |f: &dyn Fn(f64, f64) -> f64| points.iter().map(|&(x, y)| f(x, y) / (y * y)).sum::<f64>();
         let (w, x, y) = (sum(&|_, _| 1.0), sum(&|x, _| x), sum(&|_, y| y));
         let (xx, xy) = (sum(&|x, _| x * x), sum(&|x, y| x * y));

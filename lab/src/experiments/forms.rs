@@ -1,6 +1,6 @@
 //! The equations of a mechanism with loops in the four forms that are compared, on plain numbers.
 //!
-//! Joints have one freedom each, so that there are as many coordinates as velocities.
+//! Every joint has one degree of freedom, so that there are as many coordinates as velocities.
 
 use multibody::runtime::{Accelerated, Conjugate, Constrained, Energetic, System};
 
@@ -25,16 +25,16 @@ impl<Y> Closed for Y where
 {
 }
 
-/// What stands beside the coordinates in a state.
+/// The second half of a state, after the coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Momenta: Hamilton's equations.
+    /// Momenta, with Hamilton's equations.
     Momenta,
-    /// Velocities: accelerations.
+    /// Velocities, with accelerations.
     Velocities,
 }
 
-/// Room for the two halves of a state and of its rates.
+/// Memory for the two halves of a state and of its rates.
 struct Halves {
     q: Vec<f64>,
     p: Vec<f64>,
@@ -59,8 +59,8 @@ impl Halves {
     }
 }
 
-/// All coordinates, with augmented momenta (the loops held by `σ`, which begins every step at zero) or with velocities (the loops
-/// held by accelerations alone).
+/// All coordinates, with augmented momenta (`σ` starts every step at zero) or with velocities (the accelerations satisfy the
+/// constraints, positions and velocities drift).
 pub struct Whole<'a, Y> {
     system: &'a mut Y,
     kind: Kind,
@@ -68,7 +68,7 @@ pub struct Whole<'a, Y> {
 }
 
 impl<'a, Y: Closed> Whole<'a, Y> {
-    /// Of a mechanism.
+    /// The equations of a mechanism.
     pub fn new(system: &'a mut Y, kind: Kind) -> Self {
         let room = Halves::new(system);
         Whole { system, kind, room }
@@ -100,23 +100,24 @@ impl<Y: Closed> Equation for Whole<'_, Y> {
     }
 }
 
-/// Independent coordinates alone, with their momenta or their velocities; the others follow from the loops at every evaluation.
+/// Independent coordinates with their momenta or their velocities. The other coordinates follow from the loops at every
+/// evaluation.
 pub struct Minimal<'a, Y> {
     system: &'a mut Y,
     kind: Kind,
     independent: Vec<usize>,
     dependent: Vec<usize>,
-    /// Rows of the loops that the dependent coordinates are solved from.
+    /// Rows of the loops from which the dependent coordinates are computed.
     rows: Vec<usize>,
     room: Halves,
     residual: Vec<f64>,
     entries: Vec<f64>,
-    /// `Φ` of those rows, dense.
+    /// `Φ` of these rows, dense.
     phi: Vec<Vec<f64>>,
 }
 
 impl<'a, Y: Closed> Minimal<'a, Y> {
-    /// Of a mechanism, near coordinates `q`; the choice of rows stays. The rows left over must follow from them.
+    /// The equations of a mechanism near coordinates `q`. The chosen rows do not change; the other rows must depend on them.
     pub fn new(system: &'a mut Y, kind: Kind, independent: &[usize], q: &[f64]) -> Self {
         let mut room = Halves::new(system);
         room.q.copy_from_slice(q);
@@ -150,14 +151,14 @@ impl<'a, Y: Closed> Minimal<'a, Y> {
         self.rows.iter().map(|&r| self.dependent.iter().map(|&d| self.phi[r][d]).collect()).collect()
     }
 
-    /// Newton's method for the dependent coordinates, from where they are.
+    /// Solves for the dependent coordinates by Newton's method, from their present values.
     fn close(&mut self) {
         let mut last = f64::INFINITY;
         for _ in 0..20 {
             self.look();
             let step = solve(self.square(), self.rows.iter().map(|&r| self.residual[r]).collect());
             let size = step.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
-            // At round-off it no longer shrinks.
+            // At the level of round-off the residual no longer decreases.
             if size < 1e-9 && size >= 0.5 * last || size == 0.0 {
                 break;
             }
@@ -217,7 +218,7 @@ impl<Y: Closed> Equation for Minimal<'_, Y> {
         self.room.rates(self.system, self.kind);
         let mut pd = self.room.pd.clone();
         if self.kind == Kind::Momenta {
-            // The momenta of dependent joints stay zero: what the loops' multipliers must do for it acts on the others too.
+            // The momenta of dependent joints stay zero. The multipliers that achieve this act on the other joints too.
             let transposed = (0..self.dependent.len())
                 .map(|k| self.rows.iter().map(|&r| self.phi[r][self.dependent[k]]).collect())
                 .collect();
@@ -233,7 +234,7 @@ impl<Y: Closed> Equation for Minimal<'_, Y> {
     }
 }
 
-/// Rows that a square matrix of full rank is made of, found by elimination with complete pivoting.
+/// Rows that form a square matrix of full rank, found by elimination with complete pivoting.
 fn leading(mut a: Vec<Vec<f64>>, count: usize) -> Vec<usize> {
     let mut left: Vec<usize> = (0..a.len()).collect();
     let mut columns: Vec<usize> = (0..count).collect();

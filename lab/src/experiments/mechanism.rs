@@ -1,4 +1,4 @@
-//! From the text of a model to a system at its start.
+//! Makes a system at its start from the text of a model.
 
 use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::model::Model;
@@ -9,15 +9,15 @@ use multibody::runtime::Interpreter;
 
 use mbd_cli::{Failure, Outcome};
 
-/// A mechanism whose joints have one freedom each.
+/// A mechanism whose joints have one degree of freedom each.
 pub struct Mechanism {
     /// Its equations.
     pub system: Interpreter<f64>,
-    /// Coordinates at the start; loops are closed but for the digits of the file.
+    /// Coordinates at the start; loops are closed to the digits of the file.
     pub q: Vec<f64>,
 }
 
-/// Reads a model file that this program wrote or brings along.
+/// Reads a model that this program wrote or contains.
 pub fn read(text: &str) -> Outcome<Mechanism> {
     let (model, findings) = load("model.toml", text, &ImportOptions::default());
     let model = model.ok_or_else(|| Failure::new(findings.to_string(), "report this: the model is built in"))?;
@@ -29,7 +29,7 @@ pub fn read(text: &str) -> Outcome<Mechanism> {
     Ok(Mechanism { system, q })
 }
 
-/// The starts of the file; forks of trees open by 0.3 rad to both sides.
+/// The starts of the file; at the forks of trees, the branches start at ±0.3 rad.
 fn start(model: &Model, plan: &Plan) -> Vec<f64> {
     let mut q = plan.start();
     for (q, joint) in q.iter_mut().zip(&model.joints) {

@@ -1,5 +1,5 @@
-//! `mbd-lab experiments`: chapter 7 of the thesis again, beside its numbers. What its text leaves open is settled in
-//! `docs/experiments.md`.
+//! `mbd-lab experiments`: repeats chapter 7 of the thesis and prints its numbers too. `docs/experiments.md` states how points
+//! are settled that the thesis leaves open.
 
 mod biped;
 mod clock;
@@ -27,14 +27,14 @@ pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
-/// Makes the directory of the figures, before hours of work find out that it cannot be made.
+/// Makes the directory of the figures before the measurements start, so that a failure is reported at once.
 fn directory(path: Option<&Path>) -> Outcome {
     let Some(path) = path else { return Ok(()) };
     std::fs::create_dir_all(path)
         .map_err(|e| Failure::new(format!("cannot make `{}`: {e}", path.display()), "name another directory"))
 }
 
-/// Draws a figure and says where it is.
+/// Draws a figure and prints its path.
 fn figure(out: &mut dyn Write, directory: &Path, name: &str, title: &str, x: &str, panels: &[Panel]) -> Outcome {
     let picture = plot::svg_over(title, x, panels)
         .map_err(|e| Failure::new(format!("cannot draw `{name}`: {e}"), "look at the tables"))?;

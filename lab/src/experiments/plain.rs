@@ -1,7 +1,7 @@
-//! Equations on plain numbers and explicit steps of them whose errors can be looked at, number by number.
+//! Equations on plain numbers, and explicit steps whose errors can be examined component by component.
 //!
-//! The library's solvers weigh all errors into one number; the thesis's tables tell them apart, and count evaluations as
-//! MATLAB's `ode45` does.
+//! The library's solvers combine all errors in one norm. The thesis's tables separate them, and count evaluations as MATLAB's
+//! `ode45` does.
 
 use multibody::runtime::integrate::tableau::Tableau;
 use multibody::runtime::integrate::Constant;
@@ -10,7 +10,7 @@ use multibody::runtime::integrate::Constant;
 pub trait Equation {
     /// Rates of a state.
     fn rates(&mut self, y: &[f64], rates: &mut [f64]);
-    /// What may be done to a state between two steps: multipliers begin at zero again. Whether anything was done.
+    /// Modifies a state between two steps, so that the multipliers start at zero again. Returns whether it changed the state.
     fn between(&mut self, _y: &mut [f64]) -> bool {
         false
     }
@@ -29,12 +29,12 @@ pub struct Walk<'a, const S: usize> {
     pub error: Vec<f64>,
     /// Evaluations so far.
     pub evaluations: u64,
-    /// Whether the result of lower order is carried on, the one that the error is estimated of.
+    /// Whether the run continues with the result of lower order, whose error is estimated.
     pub lower: bool,
 }
 
 impl<'a, const S: usize> Walk<'a, S> {
-    /// From a state.
+    /// Starts at a state.
     pub fn new(equation: &'a mut dyn Equation, tableau: &'static Tableau<S>, y: &[f64]) -> Self {
         let zero = vec![0.0; y.len()];
         Walk {
@@ -67,13 +67,13 @@ impl<'a, const S: usize> Walk<'a, S> {
     }
 
     fn combine(&mut self, h: f64, weights: &[Constant]) {
-        // The small terms first: the state is rounded once.
+        // The small terms are added first, so that the state is rounded once.
         self.next.fill(0.0);
         sum(&mut self.next, h, weights, &self.k);
         self.next.iter_mut().zip(&self.y).for_each(|(next, y)| *next += y);
     }
 
-    /// Tries a step of `h` s: the new state and, if the method has any, its estimated errors.
+    /// Attempts a step of `h` s: computes the new state and, if the method estimates them, its errors.
     pub fn attempt(&mut self, h: f64) -> &[f64] {
         self.start();
         let tableau = self.tableau;
@@ -92,7 +92,7 @@ impl<'a, const S: usize> Walk<'a, S> {
         &self.next
     }
 
-    /// Goes where the last attempt led.
+    /// Accepts the last attempt.
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.y, &mut self.next);
         let changed = self.equation.between(&mut self.y);
@@ -102,7 +102,7 @@ impl<'a, const S: usize> Walk<'a, S> {
         }
     }
 
-    /// Steps of the same size to the end, `each` called after every one of them.
+    /// Makes steps of the same size to the end, and calls `each` after every step.
     pub fn fixed(&mut self, h: f64, end: f64, mut each: impl FnMut(f64, &Self)) {
         let steps = (end / h).round() as u64;
         for step in 1..=steps {
@@ -125,7 +125,7 @@ fn sum(to: &mut [f64], h: f64, weights: &[Constant], rates: &[Vec<f64>]) {
 fn relative(values: &[f64], sizes: impl Iterator<Item = f64>, threshold: f64) -> f64 {
     values.iter().zip(sizes).fold(0.0, |worst: f64, (v, size)| {
         let ratio = v.abs() / size.max(threshold);
-        // What is not a number must not be lost.
+        // A value that is not a number must not be lost.
         if ratio > worst || ratio.is_nan() {
             ratio
         } else {
@@ -134,7 +134,7 @@ fn relative(values: &[f64], sizes: impl Iterator<Item = f64>, threshold: f64) ->
     })
 }
 
-/// What a run with error control gave.
+/// Result of a run with error control.
 pub struct Controlled {
     /// State at the end.
     pub y: Vec<f64>,
@@ -142,7 +142,7 @@ pub struct Controlled {
     pub evaluations: u64,
 }
 
-/// A run from time 0 with the steps of MATLAB's `ode45`, absolute and relative tolerance alike: L. F. Shampine, M. W. Reichelt,
+/// A run from time 0 with the step-size control of MATLAB's `ode45`, with equal absolute and relative tolerances: L. F. Shampine, M. W. Reichelt,
 /// The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the step becomes too small.
 ///
 /// `ode45` itself has the tableau of Dormand and Prince.
@@ -154,7 +154,7 @@ pub fn controlled<const S: usize>(
     tolerance: f64,
 ) -> Option<Controlled> {
     const POWER: f64 = 0.2;
-    // The absolute tolerance over the relative one.
+    // The ratio of the absolute to the relative tolerance.
     let threshold = 1.0;
     let mut walk = Walk::new(equation, tableau, start);
     let largest = 0.1 * end;

@@ -18,13 +18,13 @@ use mbd_cli::note;
 use mbd_cli::plot::Panel;
 use mbd_cli::Outcome;
 
-/// Loops of planar mechanisms: a pin, of whose five rows three say nothing new in a plane.
+/// Loops of planar mechanisms are closed by a revolute joint; three of its five rows are redundant in a plane.
 const PIN: &str = "pin";
 
 /// Kinds of systems, as the legends name them.
 const FAMILIES: [&str; 3] = ["open", "tree", "closed"];
 
-/// Numbers of links, in all 32 as in the thesis.
+/// Numbers of links, 32 in all as in the thesis.
 fn sizes(family: &str, quick: bool) -> &'static [usize] {
     match (family, quick) {
         ("tree", true) => &[15, 30],
@@ -42,17 +42,17 @@ fn text(family: &str, n: usize) -> String {
     }
 }
 
-/// What was measured of one system.
+/// Measurements of one system.
 struct Measured {
     family: &'static str,
     n: usize,
     /// Time of an evaluation, s.
     evaluation: f64,
-    /// Evaluations for a second of motion; none where the steps became too small.
+    /// Evaluations for a second of motion; `None` where the steps became too small.
     second: Option<u64>,
 }
 
-/// How long is measured.
+/// Length of the measurements.
 struct Effort {
     rounds: u32,
     round: f64,
@@ -74,7 +74,7 @@ impl Effort {
     }
 }
 
-/// One evaluation at the start, moving.
+/// One evaluation at the start, with velocities.
 fn call(mechanism: &mut Mechanism) -> Box<dyn FnMut() + '_> {
     let Mechanism { system, q, .. } = mechanism;
     let (mut p, mut qd, mut pd) = (system.zero_momenta(), system.neutral(), system.zero_momenta());
@@ -126,7 +126,7 @@ fn of<'a>(all: &'a [Measured], family: &'a str) -> impl Iterator<Item = &'a Meas
     all.iter().filter(move |m| m.family == family)
 }
 
-/// Figure 7.6 in numbers, with a line through every family.
+/// Figure 7.6 as a table, with a fitted line for every family.
 fn evaluations(all: &[Measured]) -> String {
     let mut text = head("Figure 7.6: time of an evaluation, µs", &["links", "open", "tree", "closed"]);
     let mut sizes: Vec<usize> = all.iter().map(|m| m.n).collect();
@@ -162,7 +162,7 @@ impl Measured {
     }
 }
 
-/// Figures 7.4 and 7.5 in numbers.
+/// Figures 7.4 and 7.5 as a table.
 fn seconds(all: &[Measured]) -> String {
     let columns = ["links", "evaluations, open", "tree", "closed", "their time, ms, open", "tree", "closed"];
     let title = "Figures 7.5 and 7.4: a second of motion, Runge-Kutta-Fehlberg, both tolerances 1e-6";
@@ -209,7 +209,7 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
     draw("figure_7_6", "Time of an evaluation, interpreter", "µs", &|m| 1e6 * m.evaluation)
 }
 
-/// Generated code beside the interpreter, rounds of all systems in turn.
+/// Generated code and the interpreter, with interleaved rounds of all systems.
 #[cfg(feature = "generated")]
 fn code(effort: &Effort) -> Outcome<String> {
     use crate::generated::visit_chain;
@@ -260,7 +260,7 @@ impl crate::generated::VisitRates for Repeated<'_> {
     }
 }
 
-/// The closed chain against the open one, by the kind of the loop.
+/// Time of the closed chain relative to the open one, for several kinds of loops.
 fn ratios(quick: bool, effort: &Effort) -> Outcome<String> {
     let kinds = ["pin", "spherical", "point_on_line"];
     let columns = ["links", "open, µs", "closed / open, pin (5 rows)", "ball joint (3 rows)", "point on line (2 rows)"];

@@ -7,17 +7,17 @@ use super::plain::{controlled, Controlled, Walk};
 
 /// End of the motion, s.
 pub const END: f64 = 0.85;
-/// Both forms, as the thesis's columns have them.
+/// Both formulations, in the order of the thesis's columns.
 pub const KINDS: [Kind; 2] = [Kind::Velocities, Kind::Momenta];
 /// The coordinates of the minimal states.
 pub const INDEPENDENT: [usize; 3] = [0, 1, 2];
-/// Length of an interval that steps are counted in, s.
+/// Length of an interval in which steps are counted, s.
 const INTERVAL: f64 = 0.01;
 /// Length of the links and distance of the feet, m.
 const LENGTH: f64 = 0.25;
 const FOOT: f64 = 0.25;
 
-/// The mechanism and where it starts.
+/// The mechanism and its start.
 pub struct Study<Y> {
     /// Mechanism with one closed loop.
     pub system: Y,
@@ -25,22 +25,22 @@ pub struct Study<Y> {
     pub start: Vec<f64>,
 }
 
-/// Coordinates at the end and how far the energy strayed, J.
+/// Coordinates at the end, and the largest change of the energy.
 pub struct Ended {
     /// Coordinates.
     pub q: Vec<f64>,
-    /// Largest change of the energy.
+    /// Largest change of the energy, J.
     pub energy: f64,
 }
 
-/// Method of fixed steps.
+/// Method with fixed steps.
 #[derive(Clone, Copy)]
 pub enum Method {
-    /// Kutta's of order 4.
+    /// The classical method of order 4.
     Classical,
     /// Fehlberg's pair.
     Fehlberg {
-        /// Whether its result of order 4 is carried on, not that of order 5.
+        /// Whether the run continues with its result of order 4 instead of 5.
         lower: bool,
     },
 }
@@ -49,11 +49,11 @@ pub enum Method {
 pub struct Fixed {
     /// Mean error of the coordinates at the end.
     pub end: f64,
-    /// Mean estimated error of a step, of the coordinates and of what stands beside them.
+    /// Mean estimated error of a step: of the coordinates, and of the momenta or velocities.
     pub truncation: [f64; 2],
 }
 
-/// A run with control of every step's absolute errors.
+/// A run with control of the absolute errors of every step.
 pub struct Adaptive {
     /// Mean error of the coordinates at the end.
     pub end: f64,
@@ -61,13 +61,13 @@ pub struct Adaptive {
     pub truncation: f64,
     /// Evaluations.
     pub evaluations: u64,
-    /// Steps tried in every interval.
+    /// Attempted steps in every interval.
     pub tried: Vec<u64>,
-    /// In how many intervals each number of the state had the largest error most often.
+    /// For each component of the state, the number of intervals in which it had the largest error most often.
     pub wins: Vec<u64>,
 }
 
-/// What is drawn over time.
+/// Values that are drawn over time.
 #[derive(Default)]
 pub struct Traces {
     /// Times, s.
@@ -83,7 +83,7 @@ impl Traces {
         all.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &x| [a.min(x), b.max(x)])
     }
 
-    /// Largest value without its sign.
+    /// Largest absolute value.
     pub fn size(&self) -> f64 {
         self.lines.iter().fold(0.0, |m, line| size(line).max(m))
     }
@@ -99,7 +99,7 @@ impl Traces {
     }
 }
 
-/// How far the second foot is from its place, along x and y, m.
+/// Displacement of the second foot from its place, along x and y, m.
 fn gap(q: &[f64]) -> [f64; 2] {
     let (mut angle, mut place) = (0.0, [-FOOT, 0.0]);
     for joint in [0, 1, 3, 4] {
@@ -125,7 +125,7 @@ fn distance(y: &[f64], reference: &[f64]) -> f64 {
 }
 
 impl<Y: Closed> Study<Y> {
-    /// A mechanism, closed from coordinates near by.
+    /// A mechanism whose loop is closed from coordinates nearby.
     pub fn new(mut system: Y, near: &[f64]) -> Self {
         let start: Vec<f64> = INDEPENDENT.iter().map(|&i| near[i]).chain([0.0; 3]).collect();
         let start = Minimal::new(&mut system, Kind::Velocities, &INDEPENDENT, near).coordinates(&start);
@@ -148,7 +148,7 @@ impl<Y: Closed> Study<Y> {
     pub fn minimal_end(&mut self, kind: Kind, h: f64) -> Ended {
         let (y, mut states) = (self.minimal_start(), Vec::new());
         Walk::new(&mut self.minimal(kind), &VERNER9, &y).all(h, END, &mut states);
-        // Once more from the start, so that the loop stays in its branch.
+        // The run starts again from the start, so that the loop stays in its branch.
         let mut form = self.minimal(kind);
         let start = form.energy(&y);
         let energy = states.iter().fold(0.0_f64, |m, y| m.max((form.energy(y) - start).abs()));
@@ -198,7 +198,7 @@ impl<Y: Closed> Study<Y> {
         Some((distance(&y, reference), evaluations))
     }
 
-    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance, for all numbers or for the coordinates alone.
+    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance for all components or for the coordinates alone.
     pub fn adaptive(&mut self, kind: Kind, tolerance: f64, partial: bool, reference: &[f64]) -> Adaptive {
         let y = self.minimal_start();
         let mut form = self.minimal(kind);
@@ -224,7 +224,7 @@ impl<Y: Closed> Study<Y> {
                 steps += 1.0;
                 walk.accept();
                 left -= h;
-                // An interval's end cuts a step short; it says nothing against the longer one.
+                // The end of an interval shortens a step; the longer step is kept for the next one.
                 step = (h * factor).max(if h < step { step } else { 0.0 }).min(INTERVAL);
             }
             tried.push(count);
@@ -280,7 +280,7 @@ impl<Y: Closed> Study<Y> {
         traces
     }
 
-    /// `steps` classical steps of `h` s, coordinates put back on the loop after each: largest residual then and before, and the
+    /// `steps` classical steps of `h` s, with position correction after each: largest residual after and before it, and the
     /// largest change of the energy, J.
     pub fn projected(&mut self, h: f64, steps: u64, mut tell: impl FnMut(u64)) -> [f64; 3] {
         let y = self.whole_start();

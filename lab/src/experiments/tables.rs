@@ -1,14 +1,14 @@
-//! Tables (Markdown) of the biped, each number beside the thesis's.
+//! Tables (Markdown) of the biped, each number next to that of the thesis.
 
 use std::fmt::Write as _;
 
 use super::study::{Adaptive, Ended, Fixed};
 use super::thesis;
 
-/// Names of the numbers of the minimal states, in both forms.
+/// Names of the components of the minimal states, in both formulations.
 const NAMES: [[&str; 6]; 2] = [["q1", "q2", "q3", "q̇1", "q̇2", "q̇3"], ["q1", "q2", "q3", "p1", "p2", "p3"]];
 
-/// Ours, and the thesis's in brackets.
+/// Our number, with that of the thesis in brackets.
 fn pair(ours: f64, theirs: f64) -> String {
     format!("{ours:.1e} ({theirs:.1e})")
 }
@@ -23,7 +23,7 @@ pub fn row(text: &mut String, cells: &[String]) {
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
-/// Coordinates at the end by every way of computing them.
+/// Coordinates at the end by every formulation.
 pub fn agreement(ways: &[(&str, Ended)]) -> String {
     let mut text = head(
         "Coordinates at 0.85 s",
@@ -145,7 +145,7 @@ pub fn wins(runs: &[Adaptive; 2]) -> String {
     text
 }
 
-/// Ranges of figures 7.9 to 7.13 beside the thesis's axes.
+/// Ranges of figures 7.9 to 7.13, and of the thesis's axes.
 pub fn ranges(ours: &[[f64; 2]]) -> String {
     let mut text = head("Figures 7.9 to 7.13", &["figure", "shows", "from", "to", "thesis's axis"]);
     for ((figure, shows, [low, high]), ours) in thesis::AXES.iter().zip(ours) {

@@ -1,4 +1,4 @@
-//! What the thesis printed, to stand beside our own numbers.
+//! Numbers printed in the thesis, for comparison with our own.
 
 /// Table 7.1: step (s), end error in acceleration and in Hamiltonian form, mean truncation error of the coordinates in both.
 pub const FIXED: [(f64, [f64; 2], [f64; 2]); 5] = [
@@ -9,7 +9,7 @@ pub const FIXED: [(f64, [f64; 2], [f64; 2]); 5] = [
     (1e-4, [3.8e-11, 2.9e-11], [1.4e-16, 1.3e-16]),
 ];
 
-/// Beside table 7.1: mean truncation error of the velocities and of the momenta with steps of 1 ms.
+/// In the text of table 7.1: mean truncation error of the velocities and of the momenta with steps of 1 ms.
 pub const SECOND_HALF: [f64; 2] = [1.1e-9, 4.5e-12];
 
 /// Table 7.2 of ODE45: tolerance, end error, evaluations of the accelerations and of Hamilton's equations.
@@ -45,5 +45,5 @@ pub const AXES: [(&str, &str, [f64; 2]); 5] = [
 /// Section 7.2, a chain of 100 links, open: evaluations for one second, seconds for one of them, for all.
 pub const CHAIN100: (u64, f64, f64) = (5379, 8.5e-5, 0.46);
 
-/// Section 7.2, a chain of 20 links: seconds for one evaluation, axes crosswise and planar.
+/// Section 7.2, a chain of 20 links: seconds for one evaluation, with alternating axes and planar.
 pub const CHAIN20: [f64; 2] = [2.4e-5, 1.75e-5];

@@ -1,4 +1,4 @@
-//! What benchmarks ask of a system, by one name for the interpreter and for generated code.
+//! The functions of a system that the benchmarks call, under one name for the interpreter and for generated code.
 
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::search;
@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use super::Scene;
 use multibody::runtime::{Accelerated, Conjugate, Energetic, Interpreter, Scalar};
 
-/// A system with energy, accelerations and momenta.
+/// A system that gives its energy, accelerations and momenta.
 pub trait Dynamics: Energetic + Accelerated + Conjugate {}
 
 impl<Y: Energetic + Accelerated + Conjugate> Dynamics for Y {}
@@ -22,7 +22,7 @@ impl Scene {
         Interpreter::new(plan.tree(&params), gravity)
     }
 
-    /// Coordinates and momenta at the start, of a system made from its model.
+    /// Coordinates and momenta of a scene at its start.
     pub fn start<Y: Dynamics>(&self, system: &mut Y) -> (Y::Coordinates, Y::Momenta) {
         let (mut q, mut v) = (system.neutral(), system.zero_momenta());
         fill(q.as_mut(), &self.q);

@@ -1,5 +1,5 @@
 //! Model files of thesis 7.2 for any number of links, and of mechanisms with many loops: open and closed chains, trees,
-//! four-bars. Coordinates to begin with stand in the files.
+//! four-bars. The files contain the initial coordinates.
 
 use super::text::{forking, thesis_link_about, Link, Text, FRICTION, GRAVITY, LENGTH};
 
@@ -13,7 +13,7 @@ pub fn open(n: usize) -> String {
     super::text::chain(&format!("open{n}"), n, FRICTION)
 }
 
-/// Tree of `n ≥ 15` links that forks three times, each of its branches with a fifteenth of them.
+/// Tree of `n ≥ 15` links that forks three times, with a fifteenth of the links in each branch.
 pub fn tree(n: usize) -> String {
     let comment = format!("Planar tree of {n} links (thesis 7.2) that forks three times.");
     forking(&format!("tree{n}"), &comment, 4, FRICTION, |k| n / BRANCHES + usize::from(k < n % BRANCHES))
@@ -24,15 +24,15 @@ fn arc(i: usize, n: usize) -> f64 {
     1.2 - 2.0 * (i as f64 - 0.5) / n as f64
 }
 
-/// Chain of `n` links in an arc, its last tip held where it starts by a loop of the given type; `crosswise`: every second pin
-/// is about y, at a small angle.
+/// Chain of `n` links on an arc. A loop of the given type fixes its tip where it starts. With `crosswise`, every second joint
+/// rotates about y, at a small angle.
 pub fn closed(n: usize, kind: &str, crosswise: bool) -> String {
     let comment = format!("Closed chain of {n} equal links (thesis 7.2) in an arc; the last tip is held by a loop.");
     let axis = |i: usize| if !crosswise || i % 2 == 1 { Z } else { Y };
     chain(&format!("closed{n}"), &comment, n, axis, Some(kind))
 }
 
-/// Open chain of `n` links with pins about z and y in turn.
+/// Open chain of `n` links with revolute joints about z and y in turn.
 pub fn crosswise(n: usize) -> String {
     let comment = format!("Open chain of {n} equal links, pins about z and y in turn (thesis 7.2).");
     chain(&format!("crosswise{n}"), &comment, n, |i| if i % 2 == 1 { Z } else { Y }, None)
@@ -41,7 +41,7 @@ pub fn crosswise(n: usize) -> String {
 fn chain(name: &str, comment: &str, n: usize, axis: impl Fn(usize) -> [f64; 3], closed: Option<&str>) -> String {
     let mut text = Text::new(name, comment, GRAVITY);
     let mut parent: Option<String> = None;
-    // Axes of the last link in the ground's, and its tip.
+    // Axes of the last link in ground axes, and its tip.
     let (mut axes, mut tip) = ([[1.0, 0.0, 0.0], Y, Z], [0.0; 3]);
     let mut before = 0.0;
     for i in 1..=n {
@@ -64,7 +64,7 @@ fn chain(name: &str, comment: &str, n: usize, axis: impl Fn(usize) -> [f64; 3], 
     text.finish()
 }
 
-/// Turns axes about their third or their second one.
+/// Rotates axes about their third or their second one.
 fn turn(axes: &mut [[f64; 3]; 3], about_z: bool, angle: f64) {
     let (s, c) = angle.sin_cos();
     let (a, b) = if about_z { (0, 1) } else { (2, 0) };
@@ -75,7 +75,7 @@ fn turn(axes: &mut [[f64; 3]; 3], about_z: bool, angle: f64) {
     }
 }
 
-/// Lengths of a four-bar, m: crank, coupler, rocker, and the distance of its two pins on what carries it.
+/// Lengths of a four-bar, m: crank, coupler, rocker, and the distance of its two joints on the ground or on the bar that carries it.
 const FOUR_BAR: [f64; 4] = [0.1, 0.2, 0.2, 0.2];
 /// Angles of the three bars from the line of the pins at the start; solved for the crank's, rad.
 const CRANK: f64 = 1.0;
@@ -84,7 +84,7 @@ const CRANK: f64 = 1.0;
 fn four_bar_start() -> [f64; 2] {
     let [crank, coupler, rocker, base] = FOUR_BAR;
     let (x, y) = (base - crank * CRANK.cos(), -crank * CRANK.sin());
-    // Triangle of coupler, rocker and the line from the crank's tip to the rocker's pin.
+    // Triangle of coupler, rocker and the line from the crank's tip to the rocker's joint.
     let (across, along) = (x.hypot(y), y.atan2(x));
     let angle = ((coupler.powi(2) + across.powi(2) - rocker.powi(2)) / (2.0 * coupler * across)).acos();
     let coupler_angle = along + angle;
@@ -121,7 +121,7 @@ pub fn four_bars(count: usize, kind: &str, series: bool) -> String {
     text.finish()
 }
 
-/// A uniform bar of 1 kg/m on a pin about z.
+/// A uniform bar of 1 kg/m on a revolute joint about z.
 fn bar(text: &mut Text, name: &str, parent: Option<&str>, length: f64, at: f64) {
     let across = length.powi(3) / 12.0;
     text.link(&Link {

@@ -15,7 +15,7 @@ macro_rules! file {
     };
 }
 
-/// All of them, in the order of reports.
+/// All scenes, in the order of reports.
 pub(super) static SCENES: [Entry; 22] = [
     Entry {
         name: "double_pendulum",
@@ -267,19 +267,19 @@ fn sizes(model: &Model) -> (usize, usize) {
     model.joints.iter().fold((0, 0), |(q, v), j| (q + j.kind.nq(), v + j.kind.nv()))
 }
 
-/// Zero coordinates, at rest; of models without quaternions.
+/// Zero coordinates at rest, for models without quaternions.
 fn rest(model: &Model) -> (Vec<f64>, Vec<f64>) {
     let (nq, nv) = sizes(model);
     (vec![0.0; nq], vec![0.0; nv])
 }
 
-/// Coordinates 0.3 and -0.3 in turn, all velocities alike (rad, rad/s); of models without quaternions.
+/// Coordinates 0.3 and -0.3 in turn and equal velocities (rad, rad/s), for models without quaternions.
 fn swing(model: &Model, speed: f64) -> (Vec<f64>, Vec<f64>) {
     let (nq, nv) = sizes(model);
     ((0..nq).map(|k| if k % 2 == 0 { 0.3 } else { -0.3 }).collect(), vec![speed; nv])
 }
 
-/// A tree at rest, straight but for ±0.3 rad where it forks.
+/// A tree at rest, straight except for ±0.3 rad at its forks.
 fn forked(model: &Model) -> (Vec<f64>, Vec<f64>) {
     let (mut q, v) = rest(model);
     for (q, joint) in q.iter_mut().zip(&model.joints) {

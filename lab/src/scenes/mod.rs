@@ -1,7 +1,6 @@
-//! Scenes of the benchmarks and of the integrators' tests: a model, a start, how long to run, and what must come of it.
+//! Scenes of the benchmarks and of the integrators' tests: a model, a start, the length of the run, and the required result.
 //!
-//! `list.rs` is the list; a further scene is a further entry there. Not part of the library's interface: it may change in
-//! any release.
+//! `list.rs` is the list of scenes; a new scene is a new entry there.
 
 mod dynamics;
 pub mod experiments;
@@ -16,25 +15,25 @@ use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::{Model, Value};
 
-/// What must come of a run.
+/// Required result of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Expect {
-    /// It comes to the end, within the error stated for the method and its step or tolerances.
+    /// The run reaches the end, with at most the error stated for the method and its step or tolerances.
     Runs,
-    /// The mass matrix is singular at the start, which no check of the file can see: a typed failure, no numbers.
+    /// The mass matrix is singular at the start, which the checks of the file cannot find: a typed error and no numbers.
     Stops,
 }
 
 /// A model and its motion.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Short name, as of a file.
+    /// Short name, valid as a file name.
     pub name: &'static str,
     /// One line for tables and figures.
     pub title: &'static str,
-    /// Name of the model file, in `models/`, or of one that is not stored: the ending tells the format.
+    /// Name of the model file in `models/`, or of a file that is not stored; its extension states the format.
     pub file: String,
-    /// Its text. A URDF has its damping in it even where `model` has none.
+    /// Text of the model file. That of a URDF contains its damping, even where `model` has none.
     pub text: Cow<'static, str>,
     /// The model. Joint forces are zero and parameters have their defaults.
     pub model: Model,
@@ -42,20 +41,20 @@ pub struct Scene {
     pub q: Vec<f64>,
     /// Velocities at the start.
     pub v: Vec<f64>,
-    /// End, s; the start is at 0.
+    /// End of the run, s; it starts at 0.
     pub t_end: f64,
-    /// Step at which the classical method of order 4 runs it with an error that can still be seen, s.
+    /// Step, s, at which the classical method of order 4 has an error well above round-off.
     pub rk4_step: f64,
     /// Whether the energy is a constant of the motion.
     pub conservative: bool,
-    /// What must come of a run.
+    /// Required result of a run.
     pub expect: Expect,
 }
 
-/// A model that must not be accepted.
+/// A model that must be rejected.
 #[derive(Clone, Copy, Debug)]
 pub struct Refused {
-    /// Short name, as of a file.
+    /// Short name, valid as a file name.
     pub name: &'static str,
     /// One line for tables.
     pub title: &'static str,
@@ -63,11 +62,11 @@ pub struct Refused {
     pub file: &'static str,
     /// Its text.
     pub text: &'static str,
-    /// Part of the finding that refuses it.
+    /// Part of the error message.
     pub finding: &'static str,
 }
 
-/// An entry of the list: how a scene is made.
+/// An entry of the list, from which a scene is made.
 struct Entry {
     name: &'static str,
     title: &'static str,
@@ -80,13 +79,13 @@ struct Entry {
     expect: Expect,
 }
 
-/// Where a model comes from.
+/// Source of a model.
 enum Source {
     /// A file of `models/`: name and text.
     File(&'static str, &'static str),
-    /// A URDF there, base as given, its damping left out.
+    /// A URDF of `models/` with the given base, without its damping.
     Undamped(&'static str, &'static str, Base),
-    /// Text that is written for the name of the scene.
+    /// Text that is generated for the name of the scene.
     Made(fn(&str) -> String),
 }
 
@@ -95,7 +94,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
     list::SCENES.iter().map(|e| e.name)
 }
 
-/// The scene of a name.
+/// The scene with a name.
 pub fn by_name(name: &str) -> Option<Scene> {
     list::SCENES.iter().find(|e| e.name == name).map(Entry::scene)
 }
@@ -105,20 +104,20 @@ pub fn all() -> Vec<Scene> {
     list::SCENES.iter().map(Entry::scene).collect()
 }
 
-/// Models that are to be refused before anything runs.
+/// Models that must be rejected before anything runs.
 pub fn refused() -> &'static [Refused] {
     &list::REFUSED
 }
 
 impl Refused {
-    /// What the reader and the checks say.
+    /// The message of the reader and the checks.
     pub fn read(&self) -> (Option<Model>, Diagnostics) {
         load(self.file, self.text, &ImportOptions::default())
     }
 }
 
 impl Entry {
-    /// Reads the model, which a test does for every entry.
+    /// Reads the model; a test does so for every entry.
     fn scene(&self) -> Scene {
         let (file, text, base) = match self.model {
             Source::File(file, text) => (file.to_string(), Cow::Borrowed(text), Base::Fixed),

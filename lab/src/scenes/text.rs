@@ -1,11 +1,11 @@
-//! Model files of chains and trees, written out: the number of links is an argument.
+//! Model files of chains and trees with any number of links.
 
 use std::fmt::Write;
 
-/// A model file that grows.
+/// A model file under construction.
 pub(super) struct Text(String);
 
-/// A body and the pin that carries it.
+/// A body and the revolute joint that carries it.
 pub(super) struct Link<'a> {
     /// Names of the body and of its parent, `None` for the ground.
     pub name: &'a str,
@@ -14,22 +14,22 @@ pub(super) struct Link<'a> {
     pub mass: f64,
     /// Centre of mass, m.
     pub com: [f64; 3],
-    /// Moments about it, kg m².
+    /// Moments of inertia about the centre of mass, kg m².
     pub inertia: [f64; 3],
-    /// Place of the pin on the parent, m.
+    /// Position of the joint on the parent, m.
     pub place: [f64; 3],
     pub axis: [f64; 3],
-    /// N m s/rad.
+    /// Damping, N m s/rad.
     pub damping: f64,
 }
 
 impl Text {
-    /// The head of a file. `gravity` in m/s².
+    /// Starts a file; `gravity` in m/s².
     pub fn new(name: &str, comment: &str, gravity: [f64; 3]) -> Text {
         Text(format!("# {comment}\nname = \"{name}\"\ngravity = {gravity:?}\n"))
     }
 
-    /// One more link; its joint is called `pin_` and the name of the body.
+    /// Adds a link; its joint is named `pin_` followed by the name of the body.
     pub fn link(&mut self, link: &Link<'_>) {
         let Link { name, mass, com, inertia, place, axis, .. } = link;
         // Writing to a string cannot fail.
@@ -46,12 +46,12 @@ impl Text {
         }
     }
 
-    /// Coordinate of the last joint to begin with.
+    /// Sets the initial coordinate of the last joint.
     pub fn start(&mut self, q: f64, held: bool) {
         let _ = writeln!(self.0, "start = {q:?}\nheld = {held}");
     }
 
-    /// A loop between a place on a body and one on another or the ground, m.
+    /// Adds a loop between a point of a body and a point of another body or of the ground, m.
     pub fn close(&mut self, name: &str, kind: &str, ends: [(&str, [f64; 3]); 2]) {
         for (end, (body, place)) in ["a", "b"].iter().zip(ends) {
             let _ = write!(self.0, "\n[[frame]]\nname = \"{name}_{end}\"\nbody = \"{body}\"\nxyz = {place:?}\n");
@@ -68,19 +68,19 @@ impl Text {
     }
 }
 
-/// A link of thesis 7.2, kg and m: uniform and slender, so `m l²/3` about its pin.
+/// A link of thesis 7.2, kg and m: uniform and slender, with `m l²/3` about its joint.
 const MASS: f64 = 0.01;
 pub(super) const LENGTH: f64 = 0.05;
-/// Viscous friction of every pin there, N m s/rad.
+/// Viscous friction of every joint in thesis 7.2, N m s/rad.
 pub(super) const FRICTION: f64 = 0.001;
-/// In the plane x-y, m/s².
+/// Gravity in the plane x-y, m/s².
 pub(super) const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
 
 fn thesis_link(text: &mut Text, name: &str, parent: Option<&str>, damping: f64) {
     thesis_link_about(text, name, parent, [0.0, 0.0, 1.0], damping);
 }
 
-/// The same on a pin about any axis.
+/// The same link on a revolute joint about any axis.
 pub(super) fn thesis_link_about(text: &mut Text, name: &str, parent: Option<&str>, axis: [f64; 3], damping: f64) {
     let across = MASS * LENGTH * LENGTH / 12.0;
     text.link(&Link {
@@ -95,7 +95,7 @@ pub(super) fn thesis_link_about(text: &mut Text, name: &str, parent: Option<&str
     });
 }
 
-/// Open planar chain of thesis 7.2, straight along x at zero angles, pins about z.
+/// Open planar chain of thesis 7.2, straight along x at zero angles, with joints about z.
 pub(super) fn chain(name: &str, n: usize, damping: f64) -> String {
     let comment = format!("Open planar chain of {n} equal links (thesis 7.2), along x at zero angles.");
     let mut text = Text::new(name, &comment, GRAVITY);
@@ -115,7 +115,7 @@ pub(super) fn tree(name: &str, levels: u32, damping: f64) -> String {
     forking(name, &comment, levels, damping, |_| 10)
 }
 
-/// A tree whose branch number `k`, counted as the links are, has `links(k)` links.
+/// A tree whose branch `k` has `links(k)` links; branches are numbered in the order of the links.
 pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, links: impl Fn(usize) -> usize) -> String {
     let mut text = Text::new(name, comment, GRAVITY);
     let mut tips: Vec<Option<String>> = vec![None];
@@ -126,7 +126,7 @@ pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, link
             let mut parent = tips[branch / 2].clone();
             for k in 0..links(count) {
                 number += 1;
-                // The first link of a branch says to which side it forks.
+                // The first link of a branch determines the side of the fork.
                 let side = match (level, k, branch % 2) {
                     (0, ..) | (_, 1.., _) => "",
                     (_, _, 0) => "left",
@@ -144,7 +144,7 @@ pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, link
     text.finish()
 }
 
-/// Six slender links of 0.3 m in space, hanging at zero angles, pins about y and x in turn; the first weighs `mass` kg, each
+/// Six slender links of 0.3 m in space, hanging at zero angles, with joints about y and x in turn; the first weighs `mass` kg, each
 /// further one `ratio` times the one before.
 pub(super) fn tapered(name: &str, mass: f64, ratio: f64) -> String {
     let comment = format!("Six links in space, each of {ratio:?} times the mass of the one before, no friction.");

@@ -1,4 +1,4 @@
-//! Start-up, semihosting output and measurement: everything of the firmware that is not the run itself.
+//! Start-up, semihosting output and measurement: everything in the firmware except the run itself.
 //!
 //! All `unsafe` of the example is in this file: registers of the core, the stack's memory, and the debugger's call.
 #![no_std]
@@ -6,8 +6,8 @@
 use core::arch::{asm, global_asm};
 use scenes::{Bits, End, Unusable};
 
-// The vector table (stack top, then handlers; every fault goes to one) and the reset handler. In assembly because it has
-// to come before the first instruction that uses a float register, and before anything lies on the stack it paints.
+// The vector table (stack top, then handlers; every fault goes to one) and the reset handler. They are in assembly because they
+// must run before the first instruction that uses a float register, and before anything is on the stack that they paint.
 global_asm!(
     "
     .section .vector_table, \"a\"
@@ -108,7 +108,7 @@ pub fn read_counter() -> (u32, bool) {
     unsafe { (0x00FF_FFFF - SYSTICK.add(2).read_volatile(), SYSTICK.read_volatile() & (1 << 16) != 0) }
 }
 
-/// Bytes of stack that no longer hold the paint, by the deepest one.
+/// Number of bytes of stack that the run has used: from the top down to the deepest one without the paint.
 fn stack_used() -> u32 {
     let (mut at, top) = (&raw const _stack_limit, &raw const _stack_top);
     // SAFETY: between these two addresses is the painted stack and nothing else.
@@ -157,12 +157,13 @@ where
     exit(!wrapped)
 }
 
-/// The compiler wants one. What it calls exists nowhere: an image in which anything can panic does not link.
+/// The panic handler that the compiler requires. It calls a function that is not defined, so that an image in which anything can
+/// panic does not link.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
     extern "C" {
         fn this_image_can_panic() -> !;
     }
-    // SAFETY: never linked, so never called.
+    // SAFETY: the function is never linked and therefore never called.
     unsafe { this_image_can_panic() }
 }

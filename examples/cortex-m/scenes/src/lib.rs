@@ -1,4 +1,4 @@
-//! What the firmware and its host twin both run: generated dynamics in steps of 1 ms.
+//! The runs of the firmware and of its host twin: generated dynamics in steps of 1 ms.
 #![no_std]
 
 use mbd_runtime::constrained::{Projection, WithPostStep};
@@ -44,35 +44,35 @@ mbd_macros::mbd_model! {
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
-/// Number of steps of the run of a minute, and after how many of them the energy is looked at.
+/// Number of steps of the run of a minute, and number of steps between two evaluations of the energy.
 pub const MINUTE: (u32, u32) = (60_000, 100);
 
-/// Number of steps of the four-bar's run, and after how many of them the energy is looked at.
+/// Number of steps of the four-bar's run, and number of steps between two evaluations of the energy.
 pub const LOOP: (u32, u32) = (3000, 100);
-/// Where the four-bar starts, rad: closed, its crank at 60 degrees.
+/// Coordinates at which the four-bar starts, rad: closed, with the crank at 60 degrees.
 const FOURBAR: [f64; 3] = [1.047_197_551_196_597_6, -0.541_626_669_742_253_2, 1.633_456_164_175_602_2];
 
-/// Where a run ended, and what it took.
+/// The end of a run and its work.
 pub struct End<Y: System> {
     /// Coordinates.
     pub q: Y::Coordinates,
     /// Momenta.
     pub p: Y::Momenta,
-    /// Of the run of a minute, in J, as the system itself finds them: energy at the start, its largest change, largest
+    /// Energies of the run of a minute, J, as the system itself computes them: energy at the start, largest change, largest
     /// kinetic energy.
     pub energy: Option<[Y::Scalar; 3]>,
-    /// Steps.
+    /// Number of steps.
     pub steps: u32,
-    /// Evaluations of the dynamics.
+    /// Number of evaluations of the dynamics.
     pub evaluations: u64,
 }
 
-/// The number of the step after which the state is unusable. (The integrator's own error holds the time as a double:
-/// passing it on would bring a conversion in software into the single-precision image.)
+/// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a double,
+/// and passing it on would add a software conversion to the single-precision image.)
 #[derive(Debug)]
 pub struct Unusable(pub u32);
 
-/// The method of Runge and Kutta of order 4: four evaluations of the dynamics a step.
+/// The method of Runge and Kutta of order 4: four evaluations of the dynamics in each step.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -85,8 +85,8 @@ where
     short(system, method)
 }
 
-/// The implicit midpoint rule with two iterations: the derivatives of the dynamics once, their matrix factored once, and two
-/// evaluations of the dynamics a step.
+/// The implicit midpoint rule with two iterations. Each step evaluates the derivatives of the dynamics once, factors their matrix
+/// once, and evaluates the dynamics twice.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -100,7 +100,7 @@ where
 }
 
 /// A minute by Adams and Bashforth's method of order 6 with compensated sums, from rest at ±0.3 rad in turn: one evaluation of
-/// the dynamics a step, and some more in the first five.
+/// the dynamics in each step, and some more in the first five.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -132,7 +132,7 @@ where
     watched(system, method, MINUTE, (q, p), watch)
 }
 
-/// A run of so many steps with a look at every state, and at the energy every so many steps.
+/// A run with a given number of steps, which passes every state to a function, and evaluates the energy at intervals.
 fn watched<Y, M>(
     system: &mut Y,
     method: M,
@@ -161,8 +161,8 @@ where
     Ok(End { energy: Some([start, change, largest]), ..end })
 }
 
-/// Three seconds of the four-bar from rest by the method of Runge and Kutta of order 4. At every end of a step, always the same
-/// work: momenta are freed of the multipliers, then positions moved back once.
+/// Three seconds of the four-bar from rest by the method of Runge and Kutta of order 4. The end of every step does the same
+/// work: one momentum projection and one position correction.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -192,7 +192,7 @@ where
     watched(system, method, LOOP, (q, p), watch)
 }
 
-/// [`STEPS`] steps from rest, each joint 0.2 rad further out than the one before.
+/// [`STEPS`] steps from rest, each joint 0.2 rad further than the one before.
 fn short<Y, M>(system: &mut Y, method: M) -> Result<End<Y>, Unusable>
 where
     Y: System,
@@ -232,9 +232,9 @@ where
     Ok(End { q, p, energy: None, steps, evaluations: method.statistics().evaluations })
 }
 
-/// A number's bits, for a comparison that cannot be talked round.
+/// The bits of a number, for an exact comparison.
 pub trait Bits: Copy {
-    /// The bits; of an `f32` in the lower half.
+    /// The bits; those of an `f32` are in the lower half.
     fn bits(self) -> u64;
 }
 

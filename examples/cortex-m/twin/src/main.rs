@@ -1,5 +1,5 @@
-//! Prints what the scene named by the argument ends with, as the firmware does: bits, one number a line. Of runs that
-//! look at the energy also its true error, and of the four-bar how far it is open at most.
+//! Prints the end of the run of a scene, as the firmware does: the bits of one number per line. For runs that evaluate the energy
+//! it also prints the true energy error, and for the four-bar the largest residual of the loop.
 
 use mbd_runtime::{Constrained, Energetic};
 use scenes::{Bits, FourbarF32, FourbarF64, Ur5F32, Ur5F64};
@@ -29,7 +29,7 @@ fn main() {
     fail(&format!("no scene `{wanted}`; there are: {}", known.join(", ")));
 }
 
-/// The energy of every state of a run, found in double precision.
+/// The energies of the states of a run, computed in double precision.
 #[derive(Default)]
 struct Watch {
     start: Option<f64>,
@@ -44,8 +44,8 @@ impl Watch {
         self.largest = self.largest.max(kinetic);
     }
 
-    /// The largest change relative to the largest kinetic energy, which is also what lies between the start and the lowest
-    /// potential energy met.
+    /// The largest change relative to the largest kinetic energy, which is also the difference between the energy of the start and
+    /// the lowest potential energy met.
     fn error(&self, what: &str) -> f64 {
         let Watch { change, largest, .. } = self;
         eprintln!("{what}: energy off by {change:.2e} J at most, largest kinetic energy {largest:.2} J");
@@ -53,7 +53,7 @@ impl Watch {
     }
 }
 
-/// Of UR5's minute.
+/// Energy error of the UR5's minute.
 fn minute() -> f64 {
     let (mut exact, mut energy) = (Ur5F64::new(), Watch::default());
     let run = scenes::watched_minute(&mut Ur5F32::new(), |q, p| {
@@ -63,7 +63,7 @@ fn minute() -> f64 {
     energy.error("UR5, one minute")
 }
 
-/// Of the four-bar, and the largest residual of its loop, m and rad, at the states as they are.
+/// Energy error of the four-bar, and the largest residual of its loop, m and rad.
 fn fourbar<Y>(mut system: Y) -> [(&'static str, f64); 2]
 where
     Y: Constrained + Energetic,
