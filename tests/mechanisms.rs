@@ -68,7 +68,7 @@ fn closed(plan: &Plan) -> (Interpreter<f64>, Vec<f64>) {
         q[at..at + 4].iter_mut().for_each(|x| *x /= norm);
     }
     let start = q.clone();
-    let closing = Closing { held: &held, ..Closing::default() };
+    let closing = Closing::holding(&held);
     let found = close(&mut interpreter, &mut q, &closing).unwrap_or_else(|e| panic!("{}: {e}", plan.model.name));
     assert!(found.residual <= 1e-12, "{}: {}", plan.model.name, found.residual);
     for slot in &plan.slots {

@@ -77,7 +77,7 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
     interpreter.check_rank(start).map_err(|e| source::rank_failure(&e))?;
     let held = plan.held();
     let mut q = start.to_vec();
-    let closing = Closing { held: &held, ..Closing::default() };
+    let closing = Closing::holding(&held);
     let closed = match close(interpreter, &mut q, &closing) {
         Ok(closed) => closed,
         Err(error) => {

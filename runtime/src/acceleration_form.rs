@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::system::{Accelerated, Conjugate, Energetic, LieJoint, System};
+use crate::system::{system_within, Accelerated, Conjugate, Energetic, LieJoint, System};
 
 /// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] at whose place of momenta velocities stand, so that
 /// every integrator runs it. Against [`System`] itself it shows what momenta are good for.
@@ -13,32 +13,22 @@ use crate::system::{Accelerated, Conjugate, Energetic, LieJoint, System};
 pub struct AccelerationForm<Y> {
     /// The mechanism, with its inputs.
     pub system: Y,
-    groups: Vec<LieJoint>,
+    lie_joints: Vec<LieJoint>,
 }
 
 impl<Y: System> AccelerationForm<Y> {
-    /// Of a mechanism.
+    /// The acceleration form of a mechanism.
     pub fn new(system: Y) -> Self {
-        let groups = system.lie_joints().iter().map(|g| LieJoint { momenta: false, ..*g }).collect();
-        AccelerationForm { system, groups }
+        let lie_joints = system.lie_joints().iter().map(|g| LieJoint { momenta: false, ..*g }).collect();
+        AccelerationForm { system, lie_joints }
     }
 }
 
 impl<Y: Accelerated> System for AccelerationForm<Y> {
-    type Scalar = Y::Scalar;
-    type Coordinates = Y::Coordinates;
-    type Momenta = Y::Momenta;
-
-    fn neutral(&self) -> Y::Coordinates {
-        self.system.neutral()
-    }
-
-    fn zero_momenta(&self) -> Y::Momenta {
-        self.system.zero_momenta()
-    }
+    system_within!(system: Y);
 
     fn lie_joints(&self) -> &[LieJoint] {
-        &self.groups
+        &self.lie_joints
     }
 
     /// Velocities stand for `p`, accelerations for `pd`.
@@ -53,14 +43,10 @@ impl<Y: Accelerated> System for AccelerationForm<Y> {
         self.system.coordinate_rates(q, v, qd);
         self.system.generalized_accelerations(q, v, a);
     }
-
-    fn coordinate_rates(&self, q: &Y::Coordinates, v: &Y::Momenta, qd: &mut Y::Coordinates) {
-        self.system.coordinate_rates(q, v, qd);
-    }
 }
 
 impl<Y: Accelerated + Conjugate + Energetic> Energetic for AccelerationForm<Y> {
-    /// By way of the momenta.
+    /// Kinetic and potential energy, J, found from the momenta of the velocities.
     fn energies(&mut self, q: &Y::Coordinates, v: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
         let mut p = self.system.zero_momenta();
         self.system.conjugate_momenta(q, v, &mut p);

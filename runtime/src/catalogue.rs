@@ -10,8 +10,9 @@ use crate::integrate::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplic
 use crate::integrate::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
 use crate::system::{Differentiable, Energetic, Real, System};
 
-/// What there is to know of a method before it is made.
+/// What is known of a method before it is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Entry {
     /// Name.
     pub name: &'static str,
@@ -91,7 +92,7 @@ where
     }
 }
 
-/// Where a run starts and how its steps are chosen.
+/// Where a run starts, and how its steps are chosen.
 #[derive(Debug)]
 pub struct Start<'a, Y: System> {
     /// Coordinates.
@@ -104,7 +105,7 @@ pub struct Start<'a, Y: System> {
     pub compensated: bool,
 }
 
-/// What comes of asking for a method: none if there is none of that name.
+/// The result of asking for a method: `None` if no method has that name.
 pub type Made<'a, Y> = Option<Result<Box<dyn Drive<Y> + 'a>, StepError>>;
 
 fn boxed<'a, Y, M>(system: &mut Y, method: M, start: &Start<'_, Y>) -> Made<'a, Y>
@@ -143,7 +144,7 @@ macro_rules! catalogue {
             }
         }
 
-        /// The same with work at the end of every step, see [`constrained`](crate::constrained).
+        /// The method of that name with a post-step at the end of every step, see [`constrained`](crate::constrained).
         pub fn $with_post_step<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, post_step: B) -> Made<'a, Y>
         where
             Y: $bound + 'a,
@@ -193,7 +194,7 @@ catalogue! {
         "abm6" "Adams-Bashforth-Moulton, order 6" false sums!(Abm6, system, c);
         "abm8" "Adams-Bashforth-Moulton, order 8" false sums!(Abm8, system, c);
         "adams" "Adams-Bashforth-Moulton, variable steps and orders" true sums!(VariableAdams, system, c);
-        "gauss12" "Gauss-Legendre, order 12, by insertion" false sums!(Gauss12FixedPoint, system, c);
+        "gauss12" "Gauss-Legendre, order 12, by fixed-point iteration" false sums!(Gauss12FixedPoint, system, c);
     }
 }
 
@@ -223,7 +224,7 @@ pub fn entries() -> impl Iterator<Item = &'static Entry> {
     EXPLICIT.iter().chain(IMPLICIT)
 }
 
-/// What is known of a method.
+/// The entry of a method by its name.
 pub fn entry(name: &str) -> Option<&'static Entry> {
     entries().find(|e| e.name == name)
 }

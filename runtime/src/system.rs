@@ -80,7 +80,8 @@ pub trait System {
     fn neutral(&self) -> Self::Coordinates;
     /// Zero momenta.
     fn zero_momenta(&self) -> Self::Momenta;
-    /// Joints whose coordinates or momenta are more than numbers to be added to, in the order of the state.
+    /// Joints whose configurations form a Lie group other than a vector space, in the order of the state: displacements are not
+    /// just added to their coordinates.
     fn lie_joints(&self) -> &[LieJoint];
     /// Index into `q` of the first component of every unit quaternion.
     fn quaternions(&self) -> impl Iterator<Item = usize> {
@@ -102,6 +103,32 @@ pub trait System {
     /// `q̇ = N(q) v`: coordinate rates of given velocities.
     fn coordinate_rates(&self, q: &Self::Coordinates, v: &Self::Momenta, qd: &mut Self::Coordinates);
 }
+
+/// What `impl System` of a wrapper takes over from the system in its field `$inner`: states, their names, kinematics.
+macro_rules! system_within {
+    ($inner:ident: $system:ty) => {
+        type Scalar = <$system as System>::Scalar;
+        type Coordinates = <$system as System>::Coordinates;
+        type Momenta = <$system as System>::Momenta;
+
+        fn neutral(&self) -> Self::Coordinates {
+            self.$inner.neutral()
+        }
+
+        fn zero_momenta(&self) -> Self::Momenta {
+            self.$inner.zero_momenta()
+        }
+
+        fn part_name(&self, part: crate::system::Part) -> Option<&str> {
+            self.$inner.part_name(part)
+        }
+
+        fn coordinate_rates(&self, q: &Self::Coordinates, v: &Self::Momenta, qd: &mut Self::Coordinates) {
+            self.$inner.coordinate_rates(q, v, qd);
+        }
+    };
+}
+pub(crate) use system_within;
 
 /// A part of a mechanism that may have a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,19 +152,19 @@ pub struct LieJoint {
     pub momenta: bool,
 }
 
-/// Kind of group.
+/// The Lie group of a joint's configurations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LieGroup {
-    /// A rotation: unit quaternion; angular velocity in body axes.
+    /// Rotations: a unit quaternion; angular velocity in body axes.
     SO3,
-    /// A position in outer axes and a rotation; linear and angular velocity in body axes.
+    /// Poses: a position in outer axes and a unit quaternion; linear and angular velocity in body axes.
     SE3,
-    /// Two positions in outer axes and an angle; linear velocity in body axes.
+    /// Planar poses: two positions in outer axes and an angle; linear velocity in body axes.
     SE2,
 }
 
 impl LieGroup {
-    /// Numbers of coordinates and velocities.
+    /// Numbers of coordinates and of velocities.
     pub const fn sizes(self) -> (usize, usize) {
         match self {
             LieGroup::SO3 => (4, 3),

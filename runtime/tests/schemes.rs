@@ -1,8 +1,7 @@
 //! Displacements one after the other, step doubling, the semi-implicit Euler method.
 
 use mbd_runtime::integrate::{
-    Chart, Euler, Limits, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling, Stepper, Tolerances,
-    Verner9,
+    Chart, Euler, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling, Stepper, Tolerances, Verner9,
 };
 use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::System;
@@ -197,7 +196,7 @@ fn step_doubling_meets_tolerances() {
         let (mut q, mut p) = Swing::START;
         let step = Step::Adaptive(Tolerances::new(tolerance));
         let mut solver = Solver::new(&mut Swing, method, step, 0.0, &q, &p).unwrap();
-        solver.limits = Limits { steps: 100_000, ..Limits::default() };
+        solver.limits.steps = 100_000;
         solver.run(&mut Swing, time).unwrap();
         solver.state(&Swing, &mut q, &mut p);
         let s = solver.statistics();

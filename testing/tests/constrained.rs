@@ -155,7 +155,7 @@ fn split(text: &str) -> OpenAndClosed<Mechanism, Mechanism> {
 /// A closed state: coordinates near a guess, velocities near others.
 fn state(y: &mut OpenAndClosed<Mechanism, Mechanism>, q: &[f64], v: &[f64], held: &[bool]) -> State {
     let (mut q, mut v, mut p) = (q.to_vec(), v.to_vec(), vec![0.0; v.len()]);
-    let closed = close(y, &mut q, &Closing { held, ..Closing::default() }).unwrap();
+    let closed = close(y, &mut q, &Closing::holding(held)).unwrap();
     let met = complete(y, 0.0, &q, &mut v, &[], 1e-12).unwrap();
     assert!(closed.residual < 1e-14 && met.residual < 1e-13, "{closed:?} {met:?}");
     y.open.conjugate_momenta(&q, &v, &mut p);
@@ -425,7 +425,7 @@ fn past_the_change_point() {
         for settle in [false, true] {
             let (mut q, mut p) = start.clone();
             let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = WithPostStep::new(&m, Dop853::new(&m), Repartition { settle });
+            let method = WithPostStep::new(&m, Dop853::new(&m), Repartition { project_momenta: settle });
             let mut solver = Solver::new(&mut m, method, step, 0.0, &q, &p).unwrap();
             let mut worst = 0.0_f64;
             while solver.time() < 3.0 {
@@ -520,7 +520,7 @@ fn nothing_is_allocated() {
     for settle in [false, true] {
         let (mut q, mut p) = start.clone();
         let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap().with_ratio(1.1);
-        let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { settle });
+        let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta: settle });
         check("minimal", &mut m, method, &(q, p));
         assert!(m.switches().0 > 0);
     }
@@ -567,7 +567,7 @@ fn comparison() {
         for (k, settle) in [false, true].into_iter().enumerate() {
             let (mut q, mut p) = start.clone();
             let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { settle });
+            let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta: settle });
             let end = timed(&mut m, method, &(q, p));
             note(5 + k, end, &mut y);
         }

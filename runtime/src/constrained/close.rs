@@ -9,6 +9,7 @@ use crate::Scalar;
 
 /// How positions are closed.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Closing<'a> {
     /// What counts as closed, m and rad.
     pub tolerance: f64,
@@ -26,6 +27,7 @@ impl Default for Closing<'_> {
 
 /// Positions or velocities that meet the constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Closed {
     /// Iterations made.
     pub iterations: u32,
@@ -33,6 +35,13 @@ pub struct Closed {
     pub residual: f64,
     /// Number of rows that are independent of one another there, where `held` columns are left out.
     pub rank: usize,
+}
+
+impl<'a> Closing<'a> {
+    /// The defaults, with the coordinates of some velocities held.
+    pub fn holding(held: &'a [bool]) -> Self {
+        Closing { held, ..Closing::default() }
+    }
 }
 
 /// Halvings of a step after which it is given up.

@@ -1,4 +1,4 @@
-//! Minimal coordinates.
+//! Coordinate partitioning: minimal coordinates (thesis 5.3, C.7.1).
 
 use alloc::vec::Vec;
 
@@ -7,7 +7,7 @@ use super::post_step::PostStep;
 use super::rows::{named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
-use crate::system::{Constrained, Energetic, LieJoint, Real, System};
+use crate::system::{system_within, Constrained, Energetic, LieJoint, Real, System};
 use crate::Scalar;
 
 /// Iterations for the dependent coordinates of one evaluation.
@@ -168,7 +168,7 @@ where
         Ok(())
     }
 
-    /// The same into `self.q`. Leaves `Φ` there, with the dependents factored.
+    /// As [`CoordinatePartition::close`], into `self.q`. Leaves `Φ` there, with the dependents factored.
     fn find(&mut self, start: &Y::Coordinates) -> Result<(), ConstraintError> {
         self.q.as_mut().copy_from_slice(start.as_ref());
         let epsilon = Y::Scalar::epsilon();
@@ -314,17 +314,7 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    type Scalar = Y::Scalar;
-    type Coordinates = Y::Coordinates;
-    type Momenta = Y::Momenta;
-
-    fn neutral(&self) -> Y::Coordinates {
-        self.system.neutral()
-    }
-
-    fn zero_momenta(&self) -> Y::Momenta {
-        self.system.zero_momenta()
-    }
+    system_within!(system: Y);
 
     fn lie_joints(&self) -> &[LieJoint] {
         self.system.lie_joints()
@@ -348,10 +338,6 @@ where
         self.turn_rates(q, qd);
         self.gauge(pd);
     }
-
-    fn coordinate_rates(&self, q: &Y::Coordinates, v: &Y::Momenta, qd: &mut Y::Coordinates) {
-        self.system.coordinate_rates(q, v, qd);
-    }
 }
 
 impl<Y> Energetic for CoordinatePartition<Y>
@@ -364,14 +350,14 @@ where
     }
 }
 
-/// The [`PostStep`] of minimal coordinates: closes the dependents at the end of every step, and changes the partition before
+/// The [`PostStep`] of a [`CoordinatePartition`]: closes the dependents at the end of every step, and changes the partition before
 /// the next one where it has become poor.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Repartition {
     /// Whether each step begins with `σ = 0` rather than `p_dep = 0`: `p_dep` is then what it is in `M v`, and stays so during
     /// the step. Costs one solve a step more; where the mechanism is nearly singular the gauge `p_dep = 0` has multipliers that
     /// grow beyond all bounds. Not for methods that remember rates of the past, which go on in the gauge they are in.
-    pub settle: bool,
+    pub project_momenta: bool,
 }
 
 impl<Y> PostStep<CoordinatePartition<Y>> for Repartition
@@ -390,7 +376,7 @@ where
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
         system.close(q)?;
-        if self.settle {
+        if self.project_momenta {
             if !remembers {
                 system.system.project_momenta(t, q, p, &mut system.dq, &mut system.residual);
             }
@@ -408,6 +394,6 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<bool, ConstraintError> {
-        system.watch(t, q, if self.settle { None } else { Some(p) })
+        system.watch(t, q, if self.project_momenta { None } else { Some(p) })
     }
 }

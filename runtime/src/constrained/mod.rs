@@ -1,15 +1,15 @@
-//! Motion of [`Constrained`] systems.
+//! Integration of [`Constrained`] systems: closed loops, couplings, rolling.
 //!
 //! | method | momenta | positions | cost at the end of a step |
 //! | --- | --- | --- | --- |
-//! | [`Stabilisation::None`] | `σ` adds up | drift | nothing |
-//! | [`Stabilisation::Momenta`] | re-zeroed | drift, by the method's error | one solve |
-//! | [`Stabilisation::Mass`] | re-zeroed | closed | one solve, and one for each iteration and the last look |
-//! | `Stabilisation::Gradient` | re-zeroed | closed | one solve, `Φ` and a small QR for each iteration |
-//! | `Stabilisation::Partition` | re-zeroed | closed | one solve, `Φ` and a small LU for each iteration |
+//! | [`Stabilisation::None`] | `σ` accumulates | drift | nothing |
+//! | [`Stabilisation::Momenta`] | projected | drift, by the method's error | one solve |
+//! | [`Stabilisation::Mass`] | projected | closed | one solve, and one for each iteration and for the last residuals |
+//! | `Stabilisation::Gradient` | projected | closed | one solve, `Φ` and a small QR for each iteration |
+//! | `Stabilisation::Partition` | projected | closed | one solve, `Φ` and a small LU for each iteration |
 //! | `CoordinatePartition` with `Repartition` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
-//! | [`Rattle`] | re-zeroed | closed | inside of the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
-//! | [`RadauIndex2`] | re-zeroed | drift | inside of the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
+//! | [`Rattle`] | projected | closed | within the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
+//! | [`RadauIndex2`] | projected | drift | within the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
 //!
 //! The first five are done by a [`Projection`] around any method ([`WithPostStep`]; by name `catalogue::explicit_with_post_step` and
 //! `implicit_with_post_step`). [`Projection::fixed_work`] is [`Stabilisation::Mass`] with a number of iterations that is fixed when it is

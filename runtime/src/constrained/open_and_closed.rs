@@ -1,9 +1,9 @@
-//! A mechanism with its constraints, and without.
+//! A mechanism with its constraints, and without them.
 
-use crate::system::{Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
+use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 
-/// The same mechanism twice: `open`, whose constraints are not looked at, and `closed`. Both have the same state layout, and the
-/// same inputs, which are set in both. As a [`System`] it is the closed one.
+/// A mechanism twice: `open`, without its constraints, and `closed`, with them. Both have the same state layout. Inputs are to be
+/// set in both. As a [`System`] it is the closed one.
 #[derive(Clone, Debug)]
 pub struct OpenAndClosed<O, C> {
     /// Without constraints.
@@ -13,16 +13,8 @@ pub struct OpenAndClosed<O, C> {
 }
 
 impl<O, C: System> System for OpenAndClosed<O, C> {
-    type Scalar = C::Scalar;
-    type Coordinates = C::Coordinates;
-    type Momenta = C::Momenta;
+    system_within!(closed: C);
 
-    fn neutral(&self) -> C::Coordinates {
-        self.closed.neutral()
-    }
-    fn zero_momenta(&self) -> C::Momenta {
-        self.closed.zero_momenta()
-    }
     fn lie_joints(&self) -> &[LieJoint] {
         self.closed.lie_joints()
     }
@@ -35,9 +27,6 @@ impl<O, C: System> System for OpenAndClosed<O, C> {
         pd: &mut C::Momenta,
     ) {
         self.closed.rates_at(t, q, p, qd, pd);
-    }
-    fn coordinate_rates(&self, q: &C::Coordinates, v: &C::Momenta, qd: &mut C::Coordinates) {
-        self.closed.coordinate_rates(q, v, qd);
     }
 }
 
@@ -90,7 +79,7 @@ impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     }
 }
 
-/// What methods that work with multipliers of their own need of a system.
+/// A constrained system that also gives its rates without constraints, for methods that find the multipliers themselves.
 pub trait Unconstrained: Constrained
 where
     Self::Scalar: Real,

@@ -1,19 +1,20 @@
-//! Work at the ends of steps, around any method.
+//! Changes of the state at the ends of steps, around any method.
 
 use super::ConstraintError;
 use crate::integrate::{Chart, Field, Point, Statistics, StepError, Stepper};
 use crate::system::{Real, System};
 
-/// What is done to a state where a step ends.
+/// A change of the state at the end of every step, such as a [`Projection`](super::Projection).
 pub trait PostStep<Y: System> {
     /// Whether [`PostStep::restart`] does anything.
     const RESTARTS: bool = false;
 
-    /// Changes the state at the end of a step that is about to be accepted, or inside of it, by little or by what means nothing
-    /// to the motion. With `remembers` the method holds on to rates of the past, and momenta must not jump.
+    /// Changes the state `(q, p)` at time `t` (s), at the end of a step that is about to be accepted or within it: slightly, or along
+    /// gauge directions, which change nothing in the motion. With `remembers` the method uses rates of past steps, and momenta must
+    /// not jump.
     ///
     /// # Errors
-    /// [`ConstraintError`].
+    /// [`ConstraintError`]; the step fails then.
     fn close(
         &mut self,
         system: &mut Y,
@@ -23,8 +24,8 @@ pub trait PostStep<Y: System> {
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
 
-    /// Changes the state from which the next step starts, with the system if need be; whether it did. The method begins anew
-    /// then.
+    /// May change the system and the state from which the next step starts. Returns whether it did: the method then forgets past
+    /// steps.
     ///
     /// # Errors
     /// [`ConstraintError`].
@@ -39,7 +40,7 @@ pub trait PostStep<Y: System> {
     }
 }
 
-/// A method `M` with work `B` at the end of every step.
+/// A method `M` with a [`PostStep`] `B` at the end of every step.
 ///
 /// The end of a step is changed before it is accepted, so a [`Solver`](crate::integrate::Solver) never shows another one, and
 /// so is dense output. A rate at the end that the method found for its error estimate does not hold any longer: pairs with a first
@@ -48,7 +49,7 @@ pub trait PostStep<Y: System> {
 pub struct WithPostStep<Y: System, M, B> {
     /// The method.
     method: M,
-    /// What is done at the ends.
+    /// The change at the ends of steps.
     pub post_step: B,
     delta: Point<Y>,
     end: Point<Y>,
@@ -64,7 +65,7 @@ where
     M: Stepper<Y>,
     B: PostStep<Y>,
 {
-    /// Around a method.
+    /// Puts a post-step around a method.
     pub fn new(system: &Y, method: M, post_step: B) -> Self {
         let state = || (system.neutral(), system.zero_momenta());
         WithPostStep {

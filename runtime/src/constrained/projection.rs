@@ -11,19 +11,20 @@ use crate::Scalar;
 
 /// What is done at the end of every step; see the module's table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Stabilisation {
-    /// Nothing: multipliers `σ` add up in the momenta, positions drift.
+    /// Nothing is done: multipliers `σ` accumulate in the momenta, positions drift.
     None,
     /// Momenta are freed of `σ` ([`Constrained::project_momenta`]); positions drift with the method's error.
     Momenta,
-    /// After that positions are moved back, least in the metric of the mass matrix ([`Constrained::position_correction`]);
-    /// momenta stay.
+    /// As `Momenta`; then positions are corrected by the displacement that is least in the metric of the mass matrix
+    /// ([`Constrained::position_correction`]), and momenta stay.
     #[default]
     Mass,
-    /// The same with displacements of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
+    /// As `Mass`, with the displacement of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
     #[cfg(feature = "alloc")]
     Gradient,
-    /// The same with displacements of dependent coordinates alone, which are chosen anew each time.
+    /// As `Mass`, with a displacement of dependent coordinates alone, which are chosen anew each time.
     #[cfg(feature = "alloc")]
     Partition,
 }

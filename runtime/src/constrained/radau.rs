@@ -11,12 +11,12 @@ use crate::Scalar;
 /// Iterations of a step.
 const ITERATIONS: u32 = 100;
 
-/// The three-stage Radau IIA method on the equations of index 2, steps of given size: `q̇`, `ṗ − Φᵀλ` of the open system with
+/// The three-stage Radau IIA method on the equations of index 2, with fixed steps: `q̇`, `ṗ − Φᵀλ` of the open system with
 /// `Φ v = b` at every stage, and so at the end of the step, which is the last one. Order 5 in the state, 3 in the multipliers (E.
 /// Hairer, C. Lubich, M. Roche, *The Numerical Solution of Differential-Algebraic Systems by Runge-Kutta Methods*, 1989, table
 /// 2.3). Positions drift with the method's error; [`Projection`](super::Projection) brings them back.
 ///
-/// Stages are solved for by inserting, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
+/// Stages are solved for by fixed-point iteration, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
 /// projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
 pub type RadauIndex2<Y> = Integrator<Y, RadauIndex2Scheme<Y>>;
 
@@ -92,7 +92,7 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// The same method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+    /// This method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
     #[must_use]
     pub fn with_iterations(self, n: u32) -> Self {
         self.map(|scheme| RadauIndex2Scheme { fixed: Some(n), ..scheme })

@@ -17,7 +17,7 @@ const ITERATIONS: u32 = 100;
 /// `p½ = p₀ + h/2 (ṗ(q₀, p½) − Φ₀ᵀλ)`, `q₁ = q₀ + h/2 (q̇(q₀, p½) + q̇(q₁, p½))` with `φ(q₁) = 0`;
 /// `p₁ = p½ + h/2 (ṗ(q₁, p½) − Φ₁ᵀμ)` with `Φ₁ v₁ = 0`.
 ///
-/// `q̇`, `ṗ` are those of the open system, and all of it is solved by inserting: 3 evaluations, a correction of positions and two
+/// `q̇`, `ṗ` are those of the open system, and all of it is solved by fixed-point iteration: 3 evaluations, a correction of positions and two
 /// sweeps for its multipliers each time. Momenta are `M v` at both ends. Constraints and open system must not depend on time, and
 /// be holonomic for the energy's sake.
 pub type Rattle<Y> = Integrator<Y, RattleScheme<Y>>;
@@ -77,7 +77,7 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// The same method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+    /// This method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
     #[must_use]
     pub fn with_iterations(self, n: u32) -> Self {
         self.map(|scheme| RattleScheme { fixed: Some(n), ..scheme })

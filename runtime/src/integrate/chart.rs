@@ -11,7 +11,7 @@
 //! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
 //! the exponential: its inverse differential is a polynomial.
 
-use super::group::normalise;
+use super::lie_joint::normalise;
 use super::StepError;
 use crate::constant::Constant;
 use crate::system::{LieJoint, Real, System};
@@ -27,29 +27,29 @@ pub struct Point<Y: System> {
 }
 
 impl<Y: System> Point<Y> {
-    /// No displacement.
+    /// The zero displacement.
     pub fn zero(system: &Y) -> Self {
         Point { x: system.zero_momenta(), p: system.zero_momenta() }
     }
 
-    /// Both halves.
+    /// Coordinates and momenta.
     pub fn parts(&self) -> [&[Y::Scalar]; 2] {
         [self.x.as_ref(), self.p.as_ref()]
     }
 
-    /// Both halves, to be changed.
+    /// Coordinates and momenta, to be changed.
     pub fn parts_mut(&mut self) -> [&mut [Y::Scalar]; 2] {
         [self.x.as_mut(), self.p.as_mut()]
     }
 
-    /// All components zero.
+    /// Sets all components to zero.
     #[inline]
     pub fn clear(&mut self) {
         self.x.as_mut().fill(Y::Scalar::zero());
         self.p.as_mut().fill(Y::Scalar::zero());
     }
 
-    /// Takes the components of another.
+    /// Copies the components of another displacement.
     #[inline]
     pub fn copy_from(&mut self, other: &Self) {
         self.x.as_mut().copy_from_slice(other.x.as_ref());
@@ -123,18 +123,19 @@ where
     }
 }
 
-/// The state that displacements start from.
+/// The state that displacements start from, in local coordinates about it.
 #[derive(Clone, Debug)]
 pub struct Chart<Y: System> {
     /// Coordinates.
     q: Y::Coordinates,
     /// Momenta; those of groups in outer axes.
     p: Y::Momenta,
-    /// What rounding took from the sums of the last steps, where sums are compensated.
+    /// What rounding removed from the sums of the last steps, where sums are compensated.
     carry: Option<Point<Y>>,
 }
 
-/// Stretches of the state that are moved by addition, positions of groups included, each with the group at its end.
+/// Iterates over the stretches of the state that are moved by addition, positions of Lie joints included, each with the Lie
+/// joint at its end.
 struct Stretches<'a> {
     groups: core::slice::Iter<'a, LieJoint>,
     at: (usize, usize),
@@ -169,12 +170,12 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// About the neutral state. `compensated` sums of steps carry on what rounding takes from them.
+    /// A chart about the neutral state. With `compensated`, sums of steps carry on what rounding takes from them.
     pub fn new(system: &Y, compensated: bool) -> Self {
         Chart { q: system.neutral(), p: system.zero_momenta(), carry: compensated.then(|| Point::zero(system)) }
     }
 
-    /// About another state.
+    /// Moves the chart to another state at `time` (s).
     ///
     /// # Errors
     /// [`StepError::Quaternion`] where a quaternion is off the unit sphere by more than 1e-3; it is scaled otherwise.
@@ -196,7 +197,7 @@ where
         Ok(())
     }
 
-    /// The state itself.
+    /// Gives the state that displacements start from.
     pub fn base(&self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         q.as_mut().copy_from_slice(self.q.as_ref());
         p.as_mut().copy_from_slice(self.p.as_ref());
@@ -205,12 +206,12 @@ where
         }
     }
 
-    /// The state itself as it is held: momenta of groups in outer axes.
+    /// The state that displacements start from as the chart stores it: momenta of Lie joints in outer axes.
     pub(super) fn held(&self) -> (&[Y::Scalar], &[Y::Scalar]) {
         (self.q.as_ref(), self.p.as_ref())
     }
 
-    /// Sizes of the state's components: of coordinates and momenta; zero for rotations.
+    /// Absolute values of the state's components; zero for rotations.
     pub fn size(&self, system: &Y, out: &mut Point<Y>) {
         out.clear();
         let (q, x) = (self.q.as_ref(), out.x.as_mut());
@@ -373,7 +374,7 @@ where
         }
     }
 
-    /// The other way: takes `step` off the front of `point`, which becomes a displacement from where `step` leads.
+    /// Inverse of [`Chart::compose`]: takes `step` off the front of `point`, which becomes a displacement from where `step` leads.
     pub fn relative(system: &Y, step: &Point<Y>, point: &mut Point<Y>) {
         let (x, p) = (point.x.as_mut(), point.p.as_mut());
         for (p, dp) in p.iter_mut().zip(step.p.as_ref()) {

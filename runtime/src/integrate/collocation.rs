@@ -2,11 +2,11 @@
 //!
 //! The unknowns are displacements `z_i` of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`. They are solved for as
 //! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8 describe: simplified Newton iteration, or
-//! insertion ([`Iteration`]), from the last step's polynomial, which is rewritten about the new state; or, without a last step,
+//! fixed-point iteration ([`Iteration`]), from the last step's polynomial, which is rewritten about the new state; or, without a last step,
 //! from the solution of the linearised equations. The iteration ends when its rate of contraction says that what is left is
-//! below a hundredth of the allowed error, or, in steps of given size, below round-off.
+//! below a hundredth of the allowed error, or, in fixed steps, below round-off.
 //!
-//! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; insertion is faster for
+//! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point iteration is faster for
 //! generated code of mechanisms that are not.
 //!
 //! Gauss methods are symplectic and symmetric where displacements are plain sums. With groups they keep their order, but the
@@ -24,7 +24,7 @@ use crate::Scalar;
 
 /// Part of the allowed error that the iteration may leave.
 const PART: f64 = 0.01;
-/// Round-off, in epsilons of the state, down to which a step of given size is iterated, and at which a single change that is
+/// Round-off, in epsilons of the state, down to which a fixed step is iterated, and at which a single change that is
 /// not smaller than the one before ends it.
 const FLOOR: f64 = 0.25;
 const STUCK: f64 = 16.0;
@@ -236,7 +236,7 @@ where
         scale: Option<&Point<Y>>,
     ) -> Result<(), StepError> {
         self.weigh(step, system, scale);
-        // One good contraction says little about the next step's, and with insertion about the next iteration's.
+        // One good contraction says little about the next step's, and with fixed-point iteration about the next iteration's.
         let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
         self.eta = libm::pow(self.eta, 0.8).max(least);
         let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
@@ -249,7 +249,7 @@ where
             change = libm::sqrt(sum / S as f64);
             if k > 1 {
                 let theta = change / last;
-                // Two at a time: what insertion changes in coordinates it changes in momenta one iteration later.
+                // Two at a time: what fixed-point iteration changes in coordinates it changes in momenta one iteration later.
                 mean = if k == 2 { theta } else { libm::sqrt(theta * mean) };
                 self.keep = mean <= KEEP;
                 let slowest = theta.max(mean);

@@ -3,9 +3,9 @@
 /// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero nothing is controlled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
-    /// In the unit of the component.
+    /// Absolute part, in the unit of the component.
     pub absolute: f64,
-    /// Relative to its size.
+    /// Part relative to the size of the component.
     pub relative: f64,
 }
 
@@ -25,9 +25,9 @@ pub struct Tolerances {
 /// Which errors the step is chosen by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
-    /// Those of coordinates and momenta.
+    /// The errors of coordinates and momenta.
     Full,
-    /// Those of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway, and where
+    /// The errors of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway, and where
     /// they have small fast parts this saves steps.
     Coordinates,
 }
@@ -43,7 +43,7 @@ impl Tolerances {
         }
     }
 
-    /// The same, with steps chosen by the errors of coordinates alone.
+    /// These tolerances, with steps chosen by the errors of the coordinates alone.
     pub const fn coordinates_only(self) -> Self {
         Tolerances { control: Control::Coordinates, ..self }
     }
@@ -54,12 +54,13 @@ impl Tolerances {
 pub enum Step {
     /// Always this many seconds, but for the last one before the end.
     Fixed(f64),
-    /// By the error.
+    /// Chosen by the error, which these tolerances limit.
     Adaptive(Tolerances),
 }
 
 /// Bounds of the work.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Smallest step, s; zero: where the time would no longer change.
     pub min_step: f64,

@@ -39,7 +39,7 @@ where
         Self::from_scheme(system, Doubling::new(system, method, false), false)
     }
 
-    /// The result is that of two half steps plus its estimated error: one order more (local extrapolation).
+    /// Step doubling with local extrapolation: the result is that of two half steps plus its estimated error, of one order more.
     pub fn extrapolated(system: &Y, method: M) -> Self {
         Self::from_scheme(system, Doubling::new(system, method, true), false)
     }

@@ -6,21 +6,21 @@ use super::StepError;
 use crate::system::{Real, System};
 use crate::Scalar;
 
-/// Which way a function must reach zero.
+/// In which direction a function must reach zero to count as an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
-    /// From below.
+    /// From negative values to zero.
     Rising,
-    /// From above.
+    /// From positive values to zero.
     Falling,
-    /// Either way.
+    /// From either side.
     Both,
 }
 
-/// What is asked of one function.
+/// How one function is watched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Watch {
-    /// Which way it must reach zero.
+    /// In which direction it must reach zero.
     pub direction: Direction,
     /// Whether the run ends there.
     pub terminal: bool,
@@ -33,7 +33,7 @@ pub struct Watch {
 /// rotation has two quaternions of opposite sign; along a run the sign does not jump, so components may be watched, but where
 /// a run starts anew it is the caller's: functions that are even in the quaternion do not depend on it.
 pub trait Events<Y: System, const N: usize> {
-    /// What is asked of each function.
+    /// How each function is watched.
     fn watches(&self) -> [Watch; N];
 
     /// The functions at time `t` (s) and a state.
@@ -47,7 +47,7 @@ pub trait Events<Y: System, const N: usize> {
 /// Why a run with events ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome<S> {
-    /// The end was reached.
+    /// The end of the time span was reached.
     End,
     /// A terminal event; the state is the one there.
     Event {

@@ -12,7 +12,7 @@ pub struct Field<Y: System> {
     pub(super) q: Y::Coordinates,
     pub(super) p: Y::Momenta,
     qd: Y::Coordinates,
-    /// Whether the state was given by the last [`Field::store`].
+    /// Whether `(q, p)` is the state that the last [`Field::store`] gave.
     pub(super) stored: bool,
     evaluations: u64,
 }
@@ -34,12 +34,12 @@ where
         self.evaluations
     }
 
-    /// The chart.
+    /// The chart about the state that displacements start from.
     pub fn chart(&self) -> &Chart<Y> {
         &self.chart
     }
 
-    /// Takes a state as the one displacements start from. If it is the one that [`Field::store`] gave, nothing is done: so
+    /// Takes the state `(q, p)` at time `t` (s) as the one that displacements start from. If it is the one that [`Field::store`] gave, nothing is done: so
     /// what was carried over from rounded sums lives on.
     ///
     /// # Errors

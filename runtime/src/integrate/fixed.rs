@@ -24,7 +24,7 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// The same method with exactly `n` iterations a step, for real time.
+    /// This method with exactly `n` iterations a step, for real time.
     pub fn with_iterations(self, n: u32) -> Integrator<Y, FixedIterations<Collocation<Y, T, I, S>>> {
         self.map(|method| FixedIterations { method, n })
     }

@@ -1,4 +1,4 @@
-//! The collocation methods there are.
+//! The collocation methods by name.
 
 use super::collocation::{Collocation, Formula};
 use super::integrator::Integrator;
@@ -46,10 +46,10 @@ formulas! {
         "Radau IIA of order 5 with the error estimate of `RADAU5`: L-stable, for stiff mechanisms.";
 }
 
-/// Gauss-Legendre of order 12 by insertion, which needs no derivatives: symplectic and symmetric; for long regular motion, with
+/// Gauss-Legendre of order 12 by fixed-point iteration, which needs no derivatives: symplectic and symmetric; for long regular motion, with
 /// compensated sums.
 pub type Gauss12FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss12, FixedPoint, 6>>;
-/// [`Gauss6`] by insertion: no derivatives are needed.
+/// [`Gauss6`] by fixed-point iteration, which needs no derivatives.
 pub type Gauss6FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss6, FixedPoint, 3>>;
 
 /// `(−13 ∓ 7 √6) / 3, −1/3`: Hairer and Wanner, IV.8, eq. 8.19.

@@ -6,7 +6,7 @@ use super::stepper::{hermite, Statistics, Stepper};
 use super::StepError;
 use crate::system::{Real, System};
 
-/// A step under way, as far as it is the same for every method.
+/// What every method knows of the step that it is making.
 #[derive(Clone, Debug)]
 pub struct Attempt<Y: System> {
     /// The equation; displacements start from the state in its chart.
@@ -191,7 +191,7 @@ where
         &self.scheme
     }
 
-    /// The same method with another scheme in place of its own.
+    /// This method with another scheme in place of its own.
     pub(crate) fn map<T>(self, scheme: impl FnOnce(S) -> T) -> Integrator<Y, T> {
         Integrator { step: self.step, scheme: scheme(self.scheme) }
     }

@@ -1,7 +1,8 @@
 //! Integrators of [`System`](crate::System)s. No allocation in a step.
 //!
-//! A method is a [`Stepper`]: `step` takes one step of a given size, for control loops; a [`Solver`] drives it over a time
-//! with error control, dense output, events and statistics. Methods work on displacements from the state at the start of a
+//! A method is a [`Stepper`]: `step` takes one step of a size that the caller gives, for control loops; a [`Solver`] drives it over
+//! a time with error control, dense output, events and statistics. All methods share the shell [`Integrator`]; a method of
+//! your own is a [`Scheme`] in it. Methods work on displacements from the state at the start of a
 //! step ([`chart`]), so joints with quaternions stay on their group in all of them.
 //!
 //! # Worst case of implicit methods
@@ -18,28 +19,28 @@
 //! | [`Gauss12FixedPoint`] | 0 | 0 | `1 + 6 n` |
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
-//! This is so with `with_iterations`. Otherwise `n` is at most 30 (60 by insertion) in a step of given size and 10
-//! (20) in one by error control, all of it twice if the first try fails, and two evaluations more where an error is estimated; a
-//! step that has used it up is [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
+//! These are the numbers of methods made by `with_iterations`. Otherwise `n` is at most 30 (60 by fixed-point iteration) in a
+//! fixed step and 10 (20) in a step under error control. All of it is done twice if the first try fails, and two evaluations are
+//! added where an error is estimated; a step that has used them up ends with [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
 mod adams;
 pub mod chart;
 mod collocation;
 mod control;
 mod doubling;
+mod energy_projection;
 mod events;
 mod explicit;
 mod field;
 mod fixed;
 mod formulas;
-mod group;
 #[cfg(test)]
 mod implicit_tests;
 mod integrator;
 mod jacobian;
+mod lie_joint;
 mod linear;
 mod newton;
-mod projection;
 mod rosenbrock;
 #[cfg(test)]
 mod scenes;
@@ -55,6 +56,7 @@ pub use chart::{Chart, Point};
 pub use collocation::{Collocation, Formula};
 pub use control::{Control, Limits, Step, Tolerance, Tolerances};
 pub use doubling::{Doubling, StepDoubling};
+pub use energy_projection::EnergyProjection;
 pub use events::{Direction, Events, Outcome, Watch};
 pub use explicit::{method, CashKarp, Dop853, Euler, Explicit, Method, Midpoint, Rk4, Rkf45, Tsit5, Verner9};
 pub use field::Field;
@@ -64,7 +66,6 @@ pub use formulas::{
 };
 pub use integrator::{Attempt, FromSystem, Integrator, Scheme};
 pub use newton::{FixedPoint, Iteration, Newton};
-pub use projection::EnergyProjection;
 pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::{SemiImplicit, SemiImplicitEuler};
 pub use solver::Solver;

@@ -1,4 +1,4 @@
-//! How the equations of an implicit method's stages are solved: by simplified Newton iteration, or by inserting.
+//! How the equations of an implicit method's stages are solved: by simplified Newton iteration, or by fixed-point iteration.
 
 use super::chart::Point;
 use super::field::Field;
@@ -6,9 +6,9 @@ use super::linear::{Jacobian, Lu};
 use super::tableau::Mode;
 use crate::system::{Differentiable, Real, System};
 
-/// What improves the displacements `z_i` of a collocation method's stages, `z_i = h Σ_j a_ij f(z_j)`.
+/// An iteration for the displacements `z_i` of a collocation method's stages, `z_i = h Σ_j a_ij f(z_j)`.
 pub trait Iteration<Y: System, const S: usize> {
-    /// Iterations after which a step of given size is given up, and one that may be chosen smaller.
+    /// Largest numbers of iterations: in a fixed step, and in a step that error control may make smaller.
     const LIMITS: [u32; 2];
     /// Whether derivatives are used.
     const DERIVATIVES: bool;
@@ -16,23 +16,23 @@ pub trait Iteration<Y: System, const S: usize> {
     /// Room for one system, and a method with these modes.
     fn new(system: &Y, modes: &'static [Mode<S>]) -> Self;
 
-    /// Rate at the start of the step, and the derivatives there. Not called if none are used.
+    /// Evaluates the rate at the start of the step and the derivatives there. Not called if no derivatives are used.
     fn linearise(&mut self, field: &mut Field<Y>, system: &mut Y, t: Y::Scalar, rate: &mut Point<Y>);
 
-    /// Gets ready for steps of `h` s.
+    /// Factors the matrices of a step of `h` s.
     ///
     /// # Errors
-    /// Column without a pivot.
+    /// The index of the first column without a pivot.
     fn factor(&mut self, h: Y::Scalar) -> Result<(), usize>;
 
-    /// From residuals `h Σ_j a_ij f(z_j) − z_i` to the changes of the `z_i`, in place.
+    /// Replaces the residuals `h Σ_j a_ij f(z_j) − z_i` by the changes of the `z_i`.
     fn correct(&mut self, residuals: &mut [Point<Y>; S]);
 
     /// `y ← μ (1 − h μ J)⁻¹ y` with the real eigenvalue `μ` of the method, where it has one.
     fn filter(&mut self, y: &mut Point<Y>);
 }
 
-/// Changes are the residuals themselves. Needs no derivatives; converges where `h ‖∂f/∂y‖` is well below one.
+/// Fixed-point iteration: the changes are the residuals. It needs no derivatives, and converges where `h ‖∂f/∂y‖` is well below one.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedPoint;
 

@@ -1,4 +1,4 @@
-//! What all methods have in common.
+//! What a method can do for its callers.
 
 use super::chart::Point;
 use super::field::Field;
@@ -8,16 +8,17 @@ use crate::Scalar;
 
 /// Work done since a method was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Steps that were accepted.
     pub steps: u64,
-    /// Steps that were tried again with a smaller one.
+    /// Steps that were rejected, and tried again with a smaller size.
     pub rejections: u64,
     /// Evaluations of the rates.
     pub evaluations: u64,
     /// Evaluations of their derivatives.
     pub jacobians: u64,
-    /// Factorisations of a matrix.
+    /// Factorisations of the matrices of a step; those of one step count as one.
     pub factorisations: u64,
     /// Iterations of implicit equations.
     pub iterations: u64,
@@ -36,19 +37,19 @@ where
     /// Order of convergence.
     fn order(&self) -> u32;
 
-    /// Order of the result that the error is estimated of, where it is: the estimate falls with `h` to one more.
+    /// Order of the result whose error is estimated, if an error is estimated: the estimate is of one order more in `h`.
     fn error_order(&self) -> Option<u32>;
 
-    /// Takes a state.
+    /// Starts from the state `(q, p)` at time `t` (s); past steps are forgotten.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`].
+    /// [`StepError::Quaternion`] where a quaternion is not of unit length.
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError>;
 
-    /// As [`Stepper::begin`], but if the state is the one that the method gave last, its history goes on.
+    /// As [`Stepper::begin`], but a method with a history keeps it if the state is the one that the method gave last.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`].
+    /// As [`Stepper::begin`].
     fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
         self.begin(system, t, q, p)
     }
@@ -72,7 +73,7 @@ where
         None
     }
 
-    /// The equation, and the displacement of the last attempt.
+    /// The equation, whose chart is about the start of the step, and the displacement of the last attempt.
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>);
 
     /// Rate at the start of the step, known after [`Stepper::begin`] and [`Stepper::accept`].
@@ -82,13 +83,14 @@ where
     /// the next attempt.
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y>;
 
-    /// Moves the state by the displacement of the last attempt, at most corrected a little, and gets ready for the next.
+    /// Moves the state by the displacement of the last attempt, which may have been corrected slightly, and prepares the next
+    /// attempt.
     ///
     /// # Errors
     /// [`StepError::NotFinite`]; the state has not moved then.
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
 
-    /// As [`Stepper::accept`], where the next attempt begins anew: nothing is made ready for it.
+    /// As [`Stepper::accept`], for callers who call [`Stepper::begin`] before the next attempt: nothing is prepared for it.
     ///
     /// # Errors
     /// As [`Stepper::accept`].
@@ -96,11 +98,12 @@ where
         self.accept(system, t, h)
     }
 
-    /// The displacement of the last attempt has been changed, and the rate at its end with it: if that was evaluated, it
-    /// does not hold. Nothing to do for methods that keep no such rate.
+    /// Tells the method that the caller has changed the displacement of the last attempt: a rate at its end that was evaluated
+    /// before is no longer valid.
     fn corrected(&mut self) {}
 
-    /// Whether rates of past steps are used, so that a state must not jump, however little that means to the motion.
+    /// Whether rates of past steps are used. Momenta must not jump then, not even along a gauge direction, which changes nothing
+    /// in the motion.
     fn remembers(&self) -> bool {
         false
     }
@@ -108,7 +111,7 @@ where
     /// Displacement at `t + θ h` within the last attempt, before it is accepted.
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>);
 
-    /// Work done.
+    /// Work done since the method was made.
     fn statistics(&self) -> Statistics;
 
     /// One step of `h` s from time `t` (s). Nothing is kept from one call to the next that the state does not carry, but for

@@ -12,7 +12,7 @@ fn branches_follow_the_start() {
     let mut y = Closed::new(Sticks::four_bar(BAR));
     for (guess, side) in [([0.0, 1.0, 1.5, 2.5], 1.0), ([0.0, 1.0, 1.0, -2.0], -1.0)] {
         let mut q = guess.to_vec();
-        let closing = Closing { held: &[true, true], ..Closing::default() };
+        let closing = Closing::holding(&[true, true]);
         let closed = close(&mut y, &mut q, &closing).unwrap();
         assert_eq!((q[0], q[1]), (0.0, 1.0));
         // Round-off of a residual of numbers of size 10.
@@ -78,7 +78,7 @@ fn bodies_are_moved_on_their_group() {
     q[2] -= 0.1;
     let held = [true, true, true, false, false, false];
     // The centre of mass lies in a distance that the pin cannot have; free, it is brought nearer.
-    assert!(close(&mut y, &mut q.clone(), &Closing { held: &held, ..Closing::default() }).is_err());
+    assert!(close(&mut y, &mut q.clone(), &Closing::holding(&held)).is_err());
     let closed = close(&mut y, &mut q, &Closing::default()).unwrap();
     assert!(closed.residual < 1e-15 && closed.rank == 3, "{closed:?}");
     let norm: f64 = q[3..].iter().map(|x| x * x).sum();
@@ -87,7 +87,7 @@ fn bodies_are_moved_on_their_group() {
     let mut q = y.model.leaning(0.7);
     let centre = [0.0, 0.3, 0.0];
     q[..3].copy_from_slice(&centre);
-    let closed = close(&mut y, &mut q, &Closing { held: &held, ..Closing::default() }).unwrap();
+    let closed = close(&mut y, &mut q, &Closing::holding(&held)).unwrap();
     assert!(closed.residual < 1e-12 && closed.rank == 2, "{closed:?}");
     assert_eq!(&q[..3], &centre);
 }

@@ -124,7 +124,7 @@ impl<T: Model> Closed<T> {
     /// Closed, from a guess.
     pub fn closed(&mut self, guess: &[f64], held: &[bool]) -> Result<Vec<f64>, ConstraintError> {
         let mut q = guess.to_vec();
-        close(self, &mut q, &Closing { held, ..Closing::default() }).map(|_| q)
+        close(self, &mut q, &Closing::holding(held)).map(|_| q)
     }
 }
 

@@ -36,7 +36,9 @@ where
             let norm = quaternion.iter().map(|x| x * x).sum::<f64>().sqrt();
             quaternion.iter_mut().for_each(|x| *x /= norm);
         }
-        let Ok(closed) = close(system, q, &Closing { tolerance: 1e-13, ..Closing::default() }) else { continue };
+        let mut closing = Closing::default();
+        closing.tolerance = 1e-13;
+        let Ok(closed) = close(system, q, &closing) else { continue };
         let (mut p, mut sigma) = (system.zero_momenta(), system.zero_rows());
         v.as_mut().iter_mut().for_each(|v| *v = random.next());
         system.conjugate_momenta(q, v, &mut p);

@@ -1,4 +1,4 @@
-//! Back onto the surface of constant energy.
+//! Projection of states onto the surface of constant energy.
 
 use super::chart::Point;
 use super::stepper::Stepper;
@@ -28,7 +28,8 @@ where
     Y: Energetic,
     Y::Scalar: Real,
 {
-    /// Onto the energy of a state, in at most so many iterations a step, of which one is enough where steps are small.
+    /// Projection onto the energy of the state `(q, p)`, in at most `iterations` iterations a step; one is enough where steps are
+    /// small.
     pub fn new(system: &mut Y, q: &Y::Coordinates, p: &Y::Momenta, iterations: u32) -> Self {
         let (kinetic, potential) = system.energies(q, p);
         EnergyProjection {
@@ -65,7 +66,7 @@ where
                 first = off;
             }
             let factor = off / square;
-            // At rest in an equilibrium there is no way to go.
+            // At rest in an equilibrium the gradient is zero: there is no direction to move in.
             if !factor.is_finite() {
                 break;
             }

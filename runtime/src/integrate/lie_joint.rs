@@ -43,7 +43,7 @@ fn phi_rate<S: Scalar>(phi: Vec3<S>, w: Vec3<S>) -> Vec3<S> {
     add3(sub3(w, scale3(half, cross(phi, w))), scale3(quarter * dot3(phi, w), phi))
 }
 
-/// The other way.
+/// Inverse of [`phi_rate`]: the angular velocity in outer axes.
 fn angular<S: Scalar>(phi: Vec3<S>, rate: Vec3<S>) -> Vec3<S> {
     let (half, quarter) = (S::constant(0.5), S::constant(0.25));
     let scale = S::one() / (S::one() + quarter * dot3(phi, phi));
@@ -127,7 +127,7 @@ impl LieJoint {
         }
     }
 
-    /// The other way.
+    /// Inverse of [`LieJoint::outward`]: momenta from outer axes to body axes.
     pub(super) fn inward<S: Scalar>(&self, q: &[S], shift: Vec3<S>, p: &mut [S]) {
         if self.momenta {
             let r = self.rotation(q);
@@ -151,7 +151,7 @@ impl LieJoint {
         }
     }
 
-    /// The same in place.
+    /// Moves the quaternion by a displacement `x`, in place.
     pub(super) fn advance<S: Scalar>(&self, x: &[S], q: &mut [S]) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
             let turned = turned(three(x, phi), &q[at..at + 4]);
@@ -169,7 +169,7 @@ impl LieJoint {
         self.rates_of_spin(x, state, w, xd, pd);
     }
 
-    /// The same from the angular velocity in outer axes.
+    /// As [`LieJoint::rates`], from the angular velocity in outer axes.
     fn rates_of_spin<S: Scalar>(&self, x: &[S], (q, p): (&[S], &[S]), w: Vec3<S>, xd: &mut [S], pd: &mut [S]) {
         if let Some(phi) = self.phi() {
             put(xd, phi, phi_rate(three(x, phi), w));
@@ -185,7 +185,7 @@ impl LieJoint {
         }
     }
 
-    /// Appends the displacement `(step, dp)` to `(x, p)`: what addition alone would get wrong.
+    /// Appends the displacement `(step, dp)` to `(x, p)`, as far as addition of the components does not do it.
     pub(super) fn compose<S: Scalar>(&self, (step, dp): (&[S], &[S]), x: &mut [S], p: &mut [S]) {
         if self.momenta && self.kind != LieGroup::SO3 {
             // About the point where the first of both begins.
@@ -207,7 +207,7 @@ impl LieJoint {
         }
     }
 
-    /// The same from velocities `v` in body axes; the rates of positions are found as well.
+    /// As [`LieJoint::rates`], from velocities `v` in body axes; the rates of positions are found as well.
     pub(super) fn rates_of_velocity<S: Scalar>(
         &self,
         x: &[S],
