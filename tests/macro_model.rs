@@ -5,6 +5,7 @@ use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::search;
 use multibody::runtime::integrate::{Rk4, Stepper};
+use multibody::runtime::system::Part;
 use multibody::runtime::{Interpreter, System};
 
 /// Types as a user's public module has them.
@@ -77,9 +78,7 @@ fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
     let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
-    let params = plan.default_params();
-    let gravity = plan.gravity(&params);
-    Interpreter::new(plan.tree(&params), gravity)
+    plan.interpreter(&plan.default_params())
 }
 
 /// Numbers in (-1, 1) that no coincidence favours.
@@ -103,6 +102,10 @@ macro_rules! compare {
             let (mut made, mut interpreter) = (made::$made::new(), interpreter($file, $base));
             assert_eq!(made.neutral().as_slice(), interpreter.neutral());
             assert_eq!(made.lie_joints(), interpreter.lie_joints());
+            for part in (0..=NV).flat_map(|k| [Part::Velocity(k), Part::Constraint(k)]) {
+                assert_eq!(made.part_name(part), interpreter.part_name(part));
+            }
+            assert!(made.part_name(Part::Velocity(NV - 1)).is_some());
             for seed in 0..5 {
                 let (mut q, mut p, mut v) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
                 numbers(seed, &mut q);

@@ -282,3 +282,70 @@ impl<Y: System> core::fmt::Display for Named<'_, ConstraintError, Y> {
         self.error.describe(f, &|part| self.system.part_name(part))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::string::ToString;
+
+    use super::*;
+    use crate::system::LieJoint;
+
+    /// Two velocities, one of them with a name, and a constraint.
+    struct Arm;
+
+    impl System for Arm {
+        type Scalar = f64;
+        type Coordinates = [f64; 2];
+        type Momenta = [f64; 2];
+
+        fn neutral(&self) -> [f64; 2] {
+            [0.0; 2]
+        }
+
+        fn zero_momenta(&self) -> [f64; 2] {
+            [0.0; 2]
+        }
+
+        fn lie_joints(&self) -> &[LieJoint] {
+            &[]
+        }
+
+        fn part_name(&self, part: Part) -> Option<&str> {
+            match part {
+                Part::Velocity(1) => Some("elbow"),
+                Part::Constraint(0) => Some("coupler"),
+                _ => None,
+            }
+        }
+
+        fn rates_at(&mut self, _: f64, _: &[f64; 2], _: &[f64; 2], _: &mut [f64; 2], _: &mut [f64; 2]) {}
+
+        fn coordinate_rates(&self, _: &[f64; 2], _: &[f64; 2], _: &mut [f64; 2]) {}
+    }
+
+    #[test]
+    fn messages_name_the_parts_of_a_system() {
+        let error = ConstraintError::RankLoss { constraint: 0, rank: 1, before: 2 };
+        assert!(error.to_string().starts_with("1 of 2 rows are left independent at constraint 0: "));
+        assert!(error
+            .named(&Arm)
+            .to_string()
+            .starts_with("1 of 2 rows are left independent at constraint `coupler`: "));
+        let step = StepError::Constraint { time: 0.5, error };
+        assert!(step.to_string().starts_with("in the step from t = 0.5 s: 1 of 2 rows"));
+        assert!(step.named(&Arm).to_string().contains("at constraint `coupler`: "));
+        // The fourth component is the momentum of the second velocity; the first velocity has no name.
+        for (index, told) in [
+            (3, "component 3 of the state's change (velocity `elbow`) is"),
+            (0, "component 0 of the state's change is"),
+        ] {
+            let error = StepError::NotFinite { time: 0.0, index };
+            assert!(error
+                .to_string()
+                .starts_with(&std::format!("component {index} of the state's change is not finite")));
+            assert!(error.named(&Arm).to_string().starts_with(told), "{}", error.named(&Arm));
+        }
+    }
+}
