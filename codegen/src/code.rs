@@ -1,4 +1,4 @@
-//! The program of an output, rolled where that is better.
+//! The code of an output: straight-line code, or rolled code where that is faster.
 
 use std::collections::BTreeSet;
 
@@ -10,17 +10,17 @@ use crate::rolled::{rolled, RolledProgram};
 use crate::symbolic::{Counts, Op, Operand, Program, ProgramResult};
 use crate::trace::trace;
 
-/// What computes an output.
+/// The code of an output.
 #[derive(Clone, Debug)]
 pub enum Code {
-    /// One operation after the other.
+    /// Straight-line code.
     Straight(Program),
-    /// Loops over like links.
+    /// Rolled code: loops over like links.
     Rolled(RolledProgram),
 }
 
 impl Code {
-    /// Operations that are executed.
+    /// Counts of the operations that are executed.
     pub fn counts(&self) -> Counts {
         match self {
             Code::Straight(program) => program.counts(),
@@ -28,7 +28,7 @@ impl Code {
         }
     }
 
-    /// Numbers of the inputs that are read.
+    /// Indices of the inputs that are read.
     pub fn used_inputs(&self) -> BTreeSet<usize> {
         match self {
             Code::Straight(program) => {
@@ -53,7 +53,7 @@ pub fn compile(plan: &Plan, output: Output, options: &Options) -> Result<OutputP
     Ok(program)
 }
 
-/// Refuses infinities, which no literal can state, and with them models that divide by zero whatever the state is.
+/// Rejects infinite numbers, which literals cannot express, and thus models that divide by zero in every state.
 fn finite(plan: &Plan, output: Output, code: &Code, precision: Precision) -> Result<(), GenerateError> {
     let fits = |x: f64| match precision {
         Precision::F64 => x.is_finite(),

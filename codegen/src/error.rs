@@ -1,10 +1,10 @@
-//! What a sound model and options can still get wrong.
+//! Errors of code generation that remain possible with a valid model.
 
 use std::fmt;
 
 use crate::output::Output;
 
-/// Why no code could be generated.
+/// Reason why no code was generated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum GenerateError {
@@ -27,8 +27,8 @@ pub enum GenerateError {
         /// Name of the model.
         model: String,
     },
-    /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where parameters
-    /// are involved.
+    /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where
+    /// parameters are involved.
     InfiniteNumber {
         /// The output whose code contains it.
         output: Output,

@@ -1,5 +1,4 @@
-//! The only door: a model and options in, straight-line Rust out. The macro, the command line and build scripts all come
-//! through here.
+//! Generation of Rust code from a model and options. The macro, the command and build scripts all use it.
 
 use crate::code::{compile, Code};
 use crate::emit;
@@ -12,7 +11,7 @@ use crate::symbolic::Counts;
 pub use crate::trace::{chosen_frames, trace};
 use crate::trace::{coordinate_rates, sizes};
 
-/// Generated code and what is known about it.
+/// Generated code and information about it.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Generated {
@@ -20,15 +19,15 @@ pub struct Generated {
     pub source: String,
     /// Operations of each function.
     pub counts: Vec<(Output, Counts)>,
-    /// What was changed on the way.
+    /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
 }
 
 /// Generates code for a checked model.
 ///
 /// # Errors
-/// An unknown frame name in the options, an output that the model does not have, or a number that is not finite in the code (a
-/// freedom without inertia, which the checks cannot see where parameters are involved).
+/// An unknown frame name in the options, an output that the model does not have, or a number that is not finite in the
+/// code (a freedom without inertia, which the checks cannot see where parameters are involved).
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, GenerateError> {
     let options = &options.of_model(!model.constraints.is_empty());
     let plan = &search::plan(model, options.searches());

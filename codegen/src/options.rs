@@ -1,4 +1,4 @@
-//! What is to be generated, and how.
+//! Options of the generator.
 
 use crate::output::{Output, Search};
 
@@ -21,12 +21,12 @@ impl Precision {
     }
 }
 
-/// How faithfully the emitted operations follow those of the sweeps.
+/// Arithmetic of the generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Arithmetic {
-    /// The operations as the sweeps make them: the bits of the interpreter.
+    /// The operations of the sweeps unchanged, which give the bits of the interpreter.
     Exact,
-    /// Rewritten, regrouped, fused and scheduled for speed: other rounding, no larger errors.
+    /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger errors.
     #[default]
     Fast,
 }
@@ -41,15 +41,15 @@ impl Arithmetic {
     }
 }
 
-/// Where generated code takes loops.
+/// Where the generator writes rolled code (loops over like links).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RolledCode {
-    /// Over runs of like links that are long enough to gain by it, branch by branch.
+    /// For runs of like links that are long enough to be faster, branch by branch.
     #[default]
     Auto,
     /// Wherever links repeat.
     Always,
-    /// Nowhere: straight-line code.
+    /// Nowhere: straight-line code throughout.
     Never,
 }
 
@@ -67,16 +67,16 @@ impl RolledCode {
     }
 }
 
-/// How the joints are eliminated.
+/// Strategy by which the elimination of the joints is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EliminationStrategy {
-    /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of those whose
-    /// rounding errors are not much larger than those of one joint at a time.
+    /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of
+    /// those whose rounding errors are not much larger than those of one joint at a time.
     #[default]
     Fastest,
     /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding errors.
     Fewest,
-    /// Every joint by itself.
+    /// One joint at a time.
     Single,
 }
 
@@ -98,20 +98,20 @@ impl EliminationStrategy {
 /// Angles this close to a multiple of 90° are taken as one, rad (see [`PlanOptions::snap`]).
 pub const DEFAULT_SNAP: f64 = 1e-6;
 
-/// How the structure is chosen.
+/// Choice of the structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanOptions {
     /// Angles of placements and directions of axes closer than this to right angles become exact, rad. 0 keeps every
-    /// number of the description. A decimal π/2 costs a term wherever an exact zero would have stood.
+    /// number of the description. A decimal approximation of π/2 would cost a term in place of an exact zero.
     pub snap: f64,
-    /// Joints that are solved together.
+    /// Strategy of elimination.
     pub elimination: EliminationStrategy,
-    /// Whether accelerations get a search of their own. Without it they are right, and cost what the elimination chosen for the
-    /// rates makes them cost.
+    /// Whether a separate elimination is searched for accelerations. Without it they use the elimination that was
+    /// chosen for the rates.
     pub accelerations: bool,
-    /// Whether the mass matrix gets one.
+    /// Whether the depth of the mass matrix is searched.
     pub mass_matrix: bool,
-    /// Rolled code for runs of like links: long chains are laid out for it.
+    /// Where rolled code is used for runs of like links.
     pub rolled: RolledCode,
 }
 
@@ -127,24 +127,24 @@ impl Default for PlanOptions {
     }
 }
 
-/// How code is generated.
+/// Options of the generated code.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Name of the generated type.
     pub type_name: String,
-    /// What it computes.
+    /// Outputs that it computes.
     pub outputs: Vec<Output>,
-    /// Its numbers.
+    /// Number type.
     pub precision: Precision,
     /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
     pub efforts: bool,
     /// Names of the frames for outputs that have a result for each frame; empty means all.
     pub frames: Vec<String>,
-    /// How the structure is chosen.
+    /// Choice of the structure.
     pub plan: PlanOptions,
     /// Path of the runtime crate in the generated code.
     pub runtime: String,
-    /// Where the model came from, for the header.
+    /// Source of the model, for the header.
     pub source: String,
     /// Longer bodies are written in blocks of this many statements.
     pub chunk: usize,
@@ -153,8 +153,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// The options for a model with or without constraints: where the outputs are [`Output::DEFAULT`], or all of a model without constraints, a model with
-    /// constraints also gets the outputs that only such models have, and not those that they lack.
+    /// The options for a model with or without constraints: where the outputs are [`Output::DEFAULT`], or all of a
+    /// model without constraints, a model with constraints also gets the outputs that only such models have, and not
+    /// those that they lack.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
         let mut asked: Vec<Output> = self.outputs.clone();
@@ -167,7 +168,7 @@ impl Options {
         options
     }
 
-    /// [`Options::plan`] without the searches that no output profits from.
+    /// [`Options::plan`] without the searches that no requested output needs.
     pub fn searches(&self) -> PlanOptions {
         let asked = |search| self.outputs.iter().any(|output| output.spec().search == search);
         PlanOptions {

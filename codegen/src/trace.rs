@@ -1,4 +1,4 @@
-//! The sweeps run on symbols: from a plan to the straight-line program of each output.
+//! Tracing: runs the sweeps on symbols, from a plan to the straight-line program of each output.
 
 mod directional;
 
@@ -16,7 +16,7 @@ use crate::plan::Plan;
 use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
 use directional::Directional;
 
-/// Arrays of symbols, their entries numbered through.
+/// Arrays of symbols with consecutively numbered entries.
 struct Symbols<'g> {
     graph: &'g Graph,
     arrays: Vec<InputArray>,
@@ -33,9 +33,9 @@ impl<'g> Symbols<'g> {
     }
 }
 
-/// What a function is given, as symbols.
+/// The inputs of a function as symbols.
 pub(crate) struct SymbolicInputs<'g> {
-    /// Input arrays, numbered through.
+    /// All input arrays, with consecutively numbered entries.
     pub arrays: Vec<InputArray>,
     /// Coordinates.
     pub q: Vec<Expr<'g>>,
@@ -76,7 +76,7 @@ impl<'g> SymbolicInputs<'g> {
         self.arrays.iter().take_while(|array| array.name != name).map(InputArray::len).sum()
     }
 
-    /// As the sweeps take it.
+    /// The inputs in the form that the sweeps take.
     pub fn inputs(&self) -> Inputs<'_, Expr<'g>> {
         let [drive_q, drive_v, drive_a] = &self.drive;
         Inputs { tau: &self.tau, drive_q, drive_v, drive_a, wrenches: &self.wrenches, gravity: self.gravity }
@@ -128,7 +128,7 @@ pub(crate) fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
     }
 }
 
-/// Refuses an output that the model does not have.
+/// Rejects an output that the model does not have.
 fn check_availability(plan: &Plan, output: Output) -> Result<(), GenerateError> {
     let model = || plan.model.name.clone();
     match output.spec().availability {
@@ -138,7 +138,7 @@ fn check_availability(plan: &Plan, output: Output) -> Result<(), GenerateError> 
     }
 }
 
-/// Part of a row's diagonal below which it counts as redundant.
+/// Fraction of a row's diagonal entry below which the row counts as redundant.
 pub(crate) fn tolerance(precision: Precision) -> f64 {
     match precision {
         Precision::F64 => f64::rank_tolerance(),
@@ -146,7 +146,8 @@ pub(crate) fn tolerance(precision: Precision) -> f64 {
     }
 }
 
-/// How the programs of some options are rewritten. Whoever wants the fewest operations gets none twice to save time.
+/// The rewriting of programs for given options. Where the fewest operations are asked for, nothing is computed twice to
+/// save time.
 pub(crate) fn rewrite(options: &Options) -> Rewrite {
     match (options.arithmetic, options.plan.elimination) {
         (Arithmetic::Exact, _) => Rewrite::None,
@@ -175,7 +176,7 @@ pub fn trace(plan: &Plan, output: Output, options: &Options) -> Result<OutputPro
     Ok(OutputProgram { spec, inputs: given.arrays, program })
 }
 
-/// Results that the sweeps have not named are called after their array and their place in it.
+/// Names results that the sweeps have not named after their array and their index.
 fn name_results(graph: &Graph, spec: &Spec, sizes: &Sizes, results: &[Vec<Expr>]) {
     for (array, values) in spec.results.iter().zip(results) {
         let lengths = array.lengths(sizes);
@@ -192,13 +193,13 @@ fn name_results(graph: &Graph, spec: &Spec, sizes: &Sizes, results: &[Vec<Expr>]
     }
 }
 
-/// One run of the sweeps on symbols.
+/// A run of the sweeps on symbols.
 struct Run<'a, 'g> {
     graph: &'g Graph,
     plan: &'a Plan,
-    /// The mechanism in the groups of joints that are eliminated together.
+    /// The mechanism with the chosen elimination.
     tree: &'a Tree<Expr<'g>>,
-    /// The mechanism joint by joint.
+    /// The mechanism with one joint eliminated at a time.
     physical: &'a Tree<Expr<'g>>,
     given: &'a SymbolicInputs<'g>,
     frames: &'a [usize],
@@ -210,7 +211,7 @@ impl<'g> Run<'_, 'g> {
         let (tree, trace, given) = (self.tree, self.graph, self.given);
         let (q, second, third, u) = (&given.q, &given.second, &given.third, &given.inputs());
         let sweeps = Sweeps { tree, trace };
-        // Where another elimination suits accelerations better.
+        // The tree for accelerations, where another elimination is better for them.
         let other = Sweeps { tree: tree.for_accelerations(), trace };
         let w = &mut Workspace::new(tree);
         let v = &mut vec![Expr::zero(); tree.dims.nv];

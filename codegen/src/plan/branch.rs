@@ -1,11 +1,11 @@
-//! A branch by itself: what a form costs there hardly depends on what else the tree carries.
+//! Parts of a mechanism. The cost of an elimination in a branch hardly depends on the other branches.
 
 use super::structure::{NodeKind, Plan, PlanConstraint, PlanNode, PoseStep};
 use crate::model::Value;
 
 impl Plan {
-    /// The same mechanism without all that neither carries node `i` nor is carried by it, and the number in it of every
-    /// node. What is cut off leaves no trace: results of such a plan are those of another mechanism.
+    /// The part of the mechanism that consists of node `i`, its ancestors and its descendants, and the new number of
+    /// every node. The rest is removed completely, so that the results of such a plan are those of another mechanism.
     pub(crate) fn branch(&self, i: usize) -> (Plan, Vec<Option<usize>>) {
         let mut keep = vec![false; self.nodes.len()];
         std::iter::successors(Some(i), |&k| self.nodes[k].parent).for_each(|k| keep[k] = true);
@@ -30,7 +30,7 @@ impl Plan {
             node
         });
         let mut plan = Plan { nodes: nodes.collect(), solve_at_ground: left(&self.solve_at_ground), ..self.clone() };
-        // Frames matter for wrenches alone.
+        // Frames are needed for wrenches only.
         plan.wrenches.retain(|(frame, _)| self.frames[*frame].node.is_some_and(|k| keep[k]));
         for frame in &mut plan.frames {
             frame.node = frame.node.and_then(|k| numbers[k]);
@@ -41,7 +41,8 @@ impl Plan {
         (plan, numbers)
     }
 
-    /// All of a plan that decides which form is best, in letters: two plans with the same letters differ in numbers only.
+    /// The structure of a plan as text: two plans with the same text differ in numbers only, and have the same best
+    /// elimination.
     pub(crate) fn letters(&self) -> String {
         let value = |v: &Value| match v {
             Value::Const(x) if *x == 0.0 => '0',

@@ -1,4 +1,4 @@
-//! From the model to its plan.
+//! Builds the plan of a model.
 
 use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
@@ -7,8 +7,8 @@ use super::{constraints, elements, frames, shared};
 use crate::model::{self, JointKind, JointMotion, Model};
 
 impl Plan {
-    /// The plan of a model, with its freedoms eliminated one joint at a time. Angles of placements and directions of axes closer
-    /// than `snap` to right angles become exact, rad; 0 keeps every number of the description.
+    /// The plan of a model, with its freedoms eliminated one joint at a time. Angles of placements and directions of
+    /// axes closer than `snap` to right angles become exact, rad; 0 keeps every number of the description.
     pub fn new(model: &Model, snap: f64) -> Plan {
         let mut notices = Vec::new();
         let elements = elements::elements(model, snap, &mut notices);
@@ -50,7 +50,7 @@ fn wrenches(model: &Model, frames: &[PlanFrame]) -> Vec<(usize, WrenchAxes)> {
     model.wrenches.iter().map(of).collect()
 }
 
-/// State and drive indices of the moving joints, depth first.
+/// Indices of the moving joints into the state and the drives, depth first.
 fn slots(model: &Model) -> (Dims, Vec<Slot>) {
     let mut dims = Dims::default();
     let mut slots = Vec::new();

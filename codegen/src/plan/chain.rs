@@ -1,17 +1,18 @@
-//! The freedoms of a chain of single-freedom joints: which are eliminated one by one, which together, and where.
+//! Elimination of a chain of joints with one degree of freedom each: which are eliminated one by one, which together,
+//! and where.
 
 use mbd_runtime::tree::{Source, Unknown};
 
 use super::structure::Plan;
 
-/// How the freedoms of a chain are eliminated.
+/// Elimination of the degrees of freedom of a chain.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChainElimination {
     /// Joints before this one (of a chain that starts at the ground) keep their screws, which are carried outward; they
     /// are solved together at the ground.
     pub split: usize,
-    /// Joints from this one on are solved together: at `base`, or with those before `split` where the two meet. The last
-    /// joint stands for no block.
+    /// Joints from this one on are solved together: at `base`, or with those before `split` where the two meet. The
+    /// number of the last joint means that there is no block.
     pub base: usize,
     /// For every joint, whether it is eliminated before its own motion.
     pub before_joint: Vec<bool>,
@@ -22,13 +23,13 @@ pub struct ChainElimination {
 }
 
 impl ChainElimination {
-    /// A chain of `len` joints as rolled code, whose time is that of the shortest way through a link: one joint at a time,
-    /// before its motion.
+    /// The elimination of a chain of `len` joints in rolled code: one joint at a time, before its motion, which has the
+    /// shortest critical path through a link.
     pub fn rolled(len: usize) -> ChainElimination {
         ChainElimination { split: 0, base: len - 1, before_joint: vec![true; len], accumulating: 0, rolled: true }
     }
 
-    /// In words, for a chain of `len` joints.
+    /// Description for a chain of `len` joints.
     pub fn words(&self, len: usize) -> String {
         if self.rolled {
             return "a loop".to_string();
@@ -54,8 +55,8 @@ impl ChainElimination {
         words.join("; ")
     }
 
-    /// Eliminates the freedoms of a chain in this way. `chain` has the nodes of `plan`, inner joint first; each eliminates its
-    /// freedom by itself so far.
+    /// Eliminates the freedoms of a chain in this way. `chain` has the nodes of `plan`, inner joint first; each
+    /// eliminates its freedom by itself so far.
     pub fn apply(&self, plan: &mut Plan, chain: &[usize]) {
         for (&i, &before_joint) in chain.iter().zip(&self.before_joint) {
             let node = &mut plan.nodes[i];
@@ -93,7 +94,8 @@ impl ChainElimination {
     }
 }
 
-/// Makes the freedom of node `i` one that is solved further inboard; returns its number among the unknowns.
+/// Defers the degree of freedom of node `i`, which is then solved closer to the ground. Returns its number among the
+/// unknowns.
 fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
     let Source::State { v, .. } = plan.nodes[i].source else { return None };
     let g = plan.unknowns.len();

@@ -12,7 +12,7 @@ use super::rigid::Rigid;
 use super::structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PoseStep};
 use crate::model::{ConstraintKind, LoopKind, Model, Mount, Value};
 
-/// Frames of loops: carrier and pose with the axes where the rows want them.
+/// Frames of loops: the element that carries each, and its pose with the axes that the rows need.
 pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carried; 2]>> {
     let carried = |mount: &Mount, turn: Option<PoseStep>| {
         let (carrier, mut pose) = mount.body.map_or((None, Vec::new()), |b| elements.bodies[b].clone());
@@ -30,7 +30,7 @@ pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carr
     each.collect()
 }
 
-/// Turns of the two frames that put their axes where the rows want them.
+/// Rotations of the two frames that give them the axes that the rows need.
 fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
     let to = |axis: [f64; 3]| Rigid::align_z(direction(axis, snap, &mut |_| {}));
     let z = |axis: [f64; 3]| {
@@ -118,8 +118,8 @@ fn velocities(plan: &Plan, nodes: &[usize]) -> Vec<usize> {
     all.into_iter().collect()
 }
 
-/// Marks the nodes where the columns of the rows `slots` are open, and where they are solved: where all paths have met, and all
-/// coordinates shared by several joints of the cycle have been solved.
+/// Marks the nodes where the columns of the rows `slots` are open, and where they are solved: where all paths have met,
+/// and all coordinates shared by several joints of the cycle have been solved.
 fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usize>]) {
     let ways: Vec<Vec<usize>> = members.iter().map(|i| i.map_or(Vec::new(), |i| plan.ancestors(i))).collect();
     let cycle = bond.cycle();
@@ -133,7 +133,7 @@ fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usi
     };
     let at_ground = shared.iter().any(|g| plan.solve_at_ground.contains(g));
     let longest = ways.iter().max_by_key(|way| way.len()).cloned().unwrap_or_default();
-    // A member that is its own base, as that of a coupling, is eliminated before the row.
+    // A coordinate that is solved at its own node, as in a coupling, is eliminated before the row.
     let base = longest.iter().copied().find(|i| {
         let met = ways.iter().all(|way| way.contains(i));
         let inboard = |k: usize| plan.ancestors(*i).iter().skip(1).any(|&a| a == k);

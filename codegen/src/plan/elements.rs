@@ -1,4 +1,4 @@
-//! Splits joints into elementary ones and merges what fixed joints hold together.
+//! Splits joints into elementary joints, and merges bodies that are connected by fixed joints.
 
 use super::placement::{direction, placement, rotation};
 use super::structure::{NodeKind, PoseStep};
@@ -8,7 +8,7 @@ use crate::model::{JointKind, Model};
 /// that frame at zero coordinates of the second.
 #[derive(Clone, Debug)]
 pub struct Element {
-    /// Element that carries it.
+    /// The element that carries it.
     pub parent: Option<usize>,
     /// Element frame in the parent's element frame, at zero coordinates.
     pub pose: Vec<PoseStep>,

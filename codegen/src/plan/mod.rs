@@ -1,5 +1,6 @@
-//! From the model to the structure the sweeps run on: elementary joints, merged bodies, chosen body frames, unknowns of several
-//! joints. A plan is built without tracing or counting anything; [`Plan::tree`] turns its numbers into any scalar.
+//! Builds from a model the structure on which the sweeps run: elementary joints, merged bodies, chosen body frames,
+//! unknowns of several joints. A plan is built without tracing or counting anything; [`Plan::tree`] turns its numbers
+//! into any scalar.
 
 mod branch;
 mod build;

@@ -1,4 +1,4 @@
-//! Paths of the tree that are eliminated or laid out as one: chains to the tips, unbranched paths, runs of parallel joints.
+//! Paths of the tree that are eliminated or rolled together: chains to the tips, unbranched paths, runs of parallel joints.
 
 use mbd_runtime::tree::{Source, Unknown};
 
@@ -21,7 +21,8 @@ fn is_single(node: &PlanNode) -> bool {
     single && plain && matches!(node.source, Source::State { .. })
 }
 
-/// Whether node `i` has one freedom of the state, which is solved by itself, though columns of constraints may pass through.
+/// Whether node `i` has one freedom of the state, which is solved by itself, though columns of constraints may pass
+/// through.
 pub fn is_single_but_for_rows(plan: &Plan, i: usize) -> bool {
     let mut node = plan.nodes[i].clone();
     node.elimination.open.retain(|g| !matches!(plan.unknowns[*g], Unknown::Row(_)));
@@ -60,7 +61,7 @@ pub fn unbranched_paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
 }
 
 /// Runs of revolute joints about parallel axes: the nodes whose frames need not rotate, because all that they carry next
-/// turns about the same axis.
+/// rotates about the same axis.
 pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     let swings = |i: usize| {
         let node = &plan.nodes[i];
@@ -80,7 +81,7 @@ pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     runs
 }
 
-/// Whether one of these nodes, or of their children, is laid out for rolled code: a frame that does not rotate leaves its turn
+/// Whether one of these nodes, or of their children, is laid out for rolled code: a non-rotating frame leaves its rotation
 /// to its children.
 pub fn touches_rolled(plan: &Plan, nodes: &[usize]) -> bool {
     let touches = |k: usize, i: usize| k == i || plan.nodes[k].parent == Some(i);

@@ -1,4 +1,4 @@
-//! Placements of the model as steps, with right angles made exact.
+//! Placements of the model as elementary transforms, with exact right angles.
 
 use mbd_runtime::spatial::{Axis, ElementaryTransform, Mat3, Vec3};
 
@@ -39,7 +39,7 @@ pub fn direction(axis: [f64; 3], snap: f64, notice: &mut dyn FnMut(f64)) -> Vec3
     unit.map(|x| x / n)
 }
 
-/// Steps of an orientation.
+/// Elementary transforms of an orientation.
 pub fn rotation(r: &Rotation, snap: f64, notice: &mut dyn FnMut(f64)) -> Vec<PoseStep> {
     let mut about = |axis: Axis, angle: Value| match angle {
         Value::Const(x) => {
@@ -61,7 +61,7 @@ pub fn rotation(r: &Rotation, snap: f64, notice: &mut dyn FnMut(f64)) -> Vec<Pos
     }
 }
 
-/// Steps of a placement: displacement, then orientation.
+/// Elementary transforms of a placement: displacement, then orientation.
 pub fn placement(p: &Placement, snap: f64, notice: &mut dyn FnMut(f64)) -> Vec<PoseStep> {
     let shifts = [Axis::X, Axis::Y, Axis::Z].into_iter().zip(p.xyz);
     let mut steps: Vec<PoseStep> =
@@ -70,7 +70,7 @@ pub fn placement(p: &Placement, snap: f64, notice: &mut dyn FnMut(f64)) -> Vec<P
     steps
 }
 
-/// The pose of constant steps, `None` if one is a parameter.
+/// The pose of constant transforms; `None` if one contains a parameter.
 pub fn constant(steps: &[PoseStep]) -> Option<Rigid> {
     let mut rot: Mat3<f64> = Rigid::IDENTITY.rot;
     let mut pos = [0.0; 3];

@@ -1,4 +1,4 @@
-//! Constant poses and their factoring into elementary steps.
+//! Constant poses and their factoring into elementary transforms.
 
 use mbd_runtime::spatial::{Axis, Mat3, Vec3};
 
@@ -18,7 +18,7 @@ pub struct Rigid {
 }
 
 impl Rigid {
-    /// The frame itself.
+    /// The identity.
     pub const IDENTITY: Rigid = Rigid { rot: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], pos: [0.0; 3] };
 
     /// `self ∘ other`.
@@ -33,7 +33,7 @@ impl Rigid {
         out
     }
 
-    /// The opposite pose.
+    /// The inverse pose.
     pub fn inverse(&self) -> Rigid {
         let rot: Mat3<f64> = std::array::from_fn(|i| std::array::from_fn(|k| self.rot[k][i]));
         let p = self.pos;
@@ -64,7 +64,7 @@ impl Rigid {
     }
 }
 
-/// `Z(γ, b) X(α, a) Z(θ, d)`: a pose as three screws, the last left to the joint it leads to.
+/// `Z(γ, b) X(α, a) Z(θ, d)`: a pose as three screws, the last of which belongs to the next joint.
 #[derive(Clone, Debug)]
 pub struct Screws {
     /// Steps up to the last screw.
@@ -108,9 +108,9 @@ fn shift_step(steps: &mut Vec<PoseStep>, axis: Axis, r: f64) {
     }
 }
 
-/// Factors a pose into screws. Axes that nearly coincide in direction have their common normal far away: then the
-/// displacement is made first and the screws only turn. `lengths` is the size of what the displacement was made of, which
-/// tells its round-off.
+/// Factors a pose into screws. The common normal of nearly parallel axes is far away; the displacement is then applied
+/// first, and the screws only rotate. `lengths` is the size of the lengths from which the displacement was computed,
+/// which determines its round-off.
 pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let (rot, pos) = (&t.rot, t.pos);
     let size = pos.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -118,7 +118,7 @@ pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let sin_alpha = rot[0][2].hypot(rot[1][2]);
     let mut steps = Vec::new();
     if sin_alpha < ROUND_OFF {
-        // Parallel axes: the first screw only points x at the other axis.
+        // For parallel axes, the first screw only points x at the other axis.
         let (x, y) = (clean(pos[0], scale), clean(pos[1], scale));
         let gamma = if y == 0.0 { (1.0, 0.0) } else { clean_turn(x, y) };
         let a = gamma.0 * x + gamma.1 * y;
@@ -134,8 +134,8 @@ pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let sign = if rot[1][2] > 0.0 { -1.0 } else { 1.0 };
     let mut gamma = clean_turn(-rot[1][2] * sign, rot[0][2] * sign);
     if gamma.1.abs() < ROUND_OFF / sin_alpha {
-        // The nearer the axes to parallel, the less certain the direction of their normal. What is dropped here comes back
-        // in the last turn, which is what is left of the rotation.
+        // The closer the axes are to parallel, the less accurate is the direction of their normal. The part that is
+        // dropped here is contained in the last rotation, which is the rest of the rotation.
         gamma = (gamma.0.signum(), 0.0);
     }
     let alpha = clean_turn(rot[2][2], sign * sin_alpha);
@@ -145,7 +145,7 @@ pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let mut d = -across[1] / alpha.1;
     let mut b = pos[2] - alpha.0 * d;
     if b.abs() <= ROUND_OFF * scale / sin_alpha {
-        // As little certain as the normal; all but `b sin α` of it comes back in the last slide.
+        // This is as inaccurate as the normal; all of it except `b sin α` is contained in the last displacement.
         (b, d) = (0.0, d + alpha.0 * b);
     }
     if sin_alpha < 1e-6 || b.abs().max(d.abs()) > 20.0 * size {
@@ -163,7 +163,7 @@ pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     Screws { steps, turn, slide: clean(d, scale) }
 }
 
-/// A constant pose as steps, nothing left over.
+/// A constant pose as elementary transforms, without a rest.
 pub fn all_steps(t: &Rigid) -> Vec<PoseStep> {
     let Screws { mut steps, turn, slide } = screws(t, 0.0);
     shift_step(&mut steps, Axis::Z, slide);
@@ -192,7 +192,7 @@ mod tests {
                 }
                 let axis = r.turn([0.0, 0.0, 1.0]);
                 assert!(axis.iter().zip(a).all(|(x, y)| (x - y).abs() < f64::EPSILON), "{axis:?} {a:?}");
-                // The smallest rotation turns about an axis across z.
+                // The smallest rotation is about an axis across z.
                 if off > 0.0 {
                     assert_eq!(r.rot[0][1], r.rot[1][0], "{a:?}");
                 }

@@ -6,7 +6,7 @@ use mbd_runtime::tree::Source;
 use crate::model::JointKind;
 use crate::plan::{Plan, Slot};
 
-/// Where the joints stand in Pinocchio's model of the same URDF: depth first, the children of a link in the alphabetical
+/// The places of the joints in Pinocchio's model of the same URDF: depth first, the children of a link in the alphabetical
 /// order of their joints; angles of planar and unbounded joints as cosine and sine.
 pub fn pinocchio(plan: &Plan) -> Layout {
     let mut order: Vec<&Slot> = Vec::new();
@@ -23,7 +23,7 @@ pub fn pinocchio(plan: &Plan) -> Layout {
     })
 }
 
-/// Where the joints stand in a MuJoCo model whose bodies have the order of this one: quaternions w, x, y, z, the linear
+/// The places of the joints in a MuJoCo model whose bodies have the order of this one: quaternions w, x, y, z, the linear
 /// velocity of a free joint in world axes.
 pub fn mujoco(plan: &Plan) -> Layout {
     let order: Vec<&Slot> = plan.slots.iter().collect();
@@ -35,7 +35,7 @@ pub fn mujoco(plan: &Plan) -> Layout {
 }
 
 fn visit<'a>(plan: &'a Plan, body: Option<usize>, order: &mut Vec<&'a Slot>) {
-    // A stack, not recursion: chains may be long.
+    // A stack in place of recursion, because chains may be long.
     let children = |body: Option<usize>| {
         let mut joints: Vec<usize> =
             (0..plan.model.joints.len()).filter(|&k| plan.model.joints[k].parent == body).collect();

@@ -5,10 +5,10 @@ use mbd_runtime::tree::{Dims, Elimination, Source, Unknown, WrenchAxes};
 
 use crate::model::{JointKind, LoopKind, Model, Param, Value};
 
-/// One elementary step of a pose.
+/// One elementary transform of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseStep {
-    /// A constant turn.
+    /// A constant rotation about an axis.
     Turn {
         /// Axis.
         axis: Axis,
@@ -17,7 +17,7 @@ pub enum PoseStep {
         /// Sine.
         s: f64,
     },
-    /// A turn by a number of the model.
+    /// A rotation by a number of the model.
     TurnBy {
         /// Axis.
         axis: Axis,
@@ -35,18 +35,18 @@ pub enum PoseStep {
     Rotate(Mat3<f64>),
 }
 
-/// Kind of a node's joint; the turn or slide is about z of the node frame.
+/// Kind of a node's joint; rotations are about z, and translations along z, of the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeKind {
-    /// Turn.
+    /// Rotation about z.
     Revolute,
-    /// Slide.
+    /// Translation along z.
     Prismatic,
-    /// Turn with a slide.
+    /// Screw motion about z.
     Helical(Value),
-    /// Two slides and a turn.
+    /// Two translations and a rotation.
     Planar,
-    /// Rotation.
+    /// Any rotation.
     Spherical,
     /// Any motion.
     Floating,
@@ -66,7 +66,8 @@ impl NodeKind {
 /// A joint of the tree and the bodies that move with it.
 #[derive(Clone, Debug)]
 pub struct PlanNode {
-    /// Name for people: the child body; the joint for the massless body inside a universal or cylindrical joint.
+    /// Name for messages: that of the child body, or that of the joint for the massless body inside a universal or
+    /// cylindrical joint.
     pub name: String,
     /// Parent node.
     pub parent: Option<usize>,
@@ -80,17 +81,17 @@ pub struct PlanNode {
     pub source: Source,
     /// Ratios and offsets of a mimic, leader first.
     pub follow: Vec<(Value, Value)>,
-    /// Constant turn added to the angle, rad.
+    /// Constant rotation added to the angle, rad.
     pub phase: f64,
-    /// Further right angles.
+    /// Number of right angles added to the angle.
     pub quarter: u8,
-    /// Constant slide along z, m.
+    /// Constant displacement along z, m.
     pub slide: f64,
     /// Constant inertia `[m, mcx, mcy, mcz, xx, xy, xz, yy, yz, zz]` at the node frame.
     pub inertia: [f64; 10],
     /// Bodies with parameters in their inertia or pose: body index and pose in the node frame.
     pub variable: Vec<(usize, Vec<PoseStep>)>,
-    /// How its freedoms are eliminated.
+    /// Elimination of its degrees of freedom.
     pub elimination: Elimination,
     /// Whether the generator may make it part of rolled code.
     pub rolled: bool,
@@ -139,15 +140,15 @@ pub struct Plan {
     pub wrenches: Vec<(usize, WrenchAxes)>,
     /// Loops and couplings.
     pub constraints: Vec<PlanConstraint>,
-    /// What was changed on the way.
+    /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
     /// See [`mbd_runtime::tree::Tree`].
     pub matrix_depth: usize,
-    /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
+    /// The same plan with another elimination for accelerations, if that is cheaper.
     pub accelerations: Option<Box<Plan>>,
 }
 
-/// What a constraint binds, on nodes.
+/// The nodes that a constraint connects.
 #[derive(Clone, Debug)]
 pub enum PlanBond {
     /// Two frames.
@@ -239,7 +240,7 @@ impl Plan {
         .collect()
     }
 
-    /// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
+    /// Initial coordinates: those of the model's `start`s, neutral where it states none.
     pub fn start(&self) -> Vec<f64> {
         let mut q = vec![0.0; self.dims.nq];
         for slot in &self.slots {
@@ -260,7 +261,7 @@ impl Plan {
         q
     }
 
-    /// Velocities of joints that stay where they start when loops are closed.
+    /// Which velocities belong to joints that keep their start when loops are closed.
     pub fn held(&self) -> Vec<bool> {
         let mut held = vec![false; self.dims.nv];
         for start in self.model.starts.iter().filter(|s| s.held) {
@@ -277,7 +278,7 @@ impl Plan {
         std::iter::successors(Some(i), |&i| self.nodes[i].parent).collect()
     }
 
-    /// Closes the columns of some unknowns, which are then solved nowhere.
+    /// Removes the columns of some unknowns, which are then not solved for.
     pub(crate) fn close_columns(&mut self, unknowns: &[usize]) {
         for node in &mut self.nodes {
             node.elimination.retain_columns(|g| !unknowns.contains(&g));
@@ -311,7 +312,7 @@ impl PlanConstraint {
         self.bond.cycle()
     }
 
-    /// With other numbers for the nodes, all of which have one.
+    /// The same with new numbers for the nodes, all of which have one.
     pub(crate) fn renumbered(&self, numbers: &[Option<usize>]) -> PlanConstraint {
         let mut out = self.clone();
         let renumber = |i: &mut usize| *i = numbers[*i].unwrap_or_default();
@@ -325,7 +326,7 @@ impl PlanConstraint {
         out
     }
 
-    /// What of it decides which form is best.
+    /// The part of it that decides which elimination is best.
     pub(crate) fn letters(&self) -> String {
         match &self.bond {
             PlanBond::Cut { kind, frames, paths } => {

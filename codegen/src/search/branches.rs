@@ -1,5 +1,5 @@
-//! The search over a whole tree, branch by branch: each chain that ends at a tip is searched with what carries it alone, and what
-//! is found for it is taken for every branch like it.
+//! The search over a whole tree, branch by branch: each chain that ends at a tip is searched together with its ancestors
+//! only, and the result is used for every branch that is alike.
 
 use super::chain::{Candidate, ChainSearch};
 use super::objective::Objective;
@@ -8,10 +8,10 @@ use crate::options::{EliminationStrategy, PlanOptions, RolledCode};
 use crate::output::Output;
 use crate::plan::{parallel_runs, tip_chains, touches_rolled, ChainElimination, Plan};
 
-/// Eliminations of a chain that are tried for the accelerations, beside their neighbours.
+/// Number of eliminations of a chain that are tried for the accelerations, in addition to their neighbours.
 const TRIED_FOR_ACCELERATIONS: usize = 6;
 
-/// Chooses an elimination for every chain that ends at a tip, and says what was tried.
+/// Chooses an elimination for every chain that ends at a tip, and records the candidates.
 pub fn choose(plan: &mut Plan, options: PlanOptions) -> Vec<Candidate> {
     let mut candidates = Vec::new();
     if plan.nodes.len() > LARGEST {
@@ -59,20 +59,20 @@ pub fn choose(plan: &mut Plan, options: PlanOptions) -> Vec<Candidate> {
     candidates
 }
 
-/// A chain with what carries it, and what it is searched for.
+/// A chain with its ancestors, and the objectives of its search.
 struct Branch {
     letters: String,
     plan: Plan,
     /// Nodes of the chain in the branch's plan.
     chain: Vec<usize>,
-    /// For rates and for accelerations.
+    /// One for the rates and one for the accelerations.
     objectives: [Objective; 2],
 }
 
-/// What was found for a branch, and is right for every one like it, such as the other leg.
+/// The result of the search for a branch, which is used for every branch that is alike, such as the other leg.
 struct Cached {
     letters: String,
-    /// For rates and for accelerations.
+    /// One for the rates and one for the accelerations.
     eliminations: [Option<ChainElimination>; 2],
     tried: Vec<Candidate>,
 }
@@ -104,8 +104,8 @@ impl Branch {
         let ChainSearch { chosen, tried, mut seen, .. } = search;
         let mut second = None;
         if options.accelerations {
-            // Those eliminations come first that lead to velocities with the fewest operations: what the rates need beside
-            // them differs from elimination to elimination, what the accelerations need hardly does.
+            // Eliminations whose velocities need the fewest operations come first. The other operations of the rates
+            // differ between eliminations, those of the accelerations hardly do.
             seen.sort_by_key(|(operations, _)| *operations);
             let first = seen.into_iter().take(TRIED_FOR_ACCELERATIONS).map(|(_, elimination)| elimination);
             let mut search = ChainSearch::new(&self.plan, &self.chain, self.objectives[1]);

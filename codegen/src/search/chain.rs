@@ -1,4 +1,4 @@
-//! The search for the elimination of one chain: from a few to begin with, by steps to better neighbours.
+//! The search for the elimination of one chain: it starts from a few candidates and moves to better neighbours.
 
 use super::evaluation::{self, Evaluation};
 use super::objective::Objective;
@@ -8,7 +8,7 @@ use crate::plan::{ChainElimination, Plan};
 use crate::rolled;
 use crate::symbolic::Cost;
 
-/// The longest block that is tried; beyond, the columns cost more than they save and conditioning suffers.
+/// The longest block that is tried. With longer blocks, the columns cost more than they save, and the rounding errors grow.
 const LONGEST: usize = 10;
 
 /// The shortest chain that is tried as rolled code.
@@ -19,18 +19,18 @@ const TRIED_AS_ROLLED: usize = 8;
 pub struct Candidate {
     /// First and last node of the branch.
     pub branch: [usize; 2],
-    /// Nodes of the branch and of what carries it.
+    /// Number of nodes of the branch and its ancestors.
     pub nodes: usize,
-    /// The elimination in words.
+    /// Description of the elimination.
     pub form: String,
-    /// Cost of the rates of the branch and of what carries it, without joint forces.
+    /// Cost of the rates of the branch and its ancestors, without joint forces.
     pub cost: Cost,
-    /// Rounding error in multiples of that of one joint at a time, measured where the elimination costs less than those before:
-    /// of the array that loses most, in the mean, the median or the worst states.
+    /// Rounding error relative to that of one joint at a time, for the array and the statistic (mean, median, worst
+    /// states) in which it is largest. It is measured if the elimination costs less than those before.
     pub loss: Option<f64>,
     /// Whether the elimination was refused for its rounding errors.
     pub refused: bool,
-    /// Whether it was taken.
+    /// Whether it was chosen.
     pub taken: bool,
 }
 
@@ -41,16 +41,16 @@ pub struct ChainSearch<'a> {
     objective: Objective,
     estimator: ErrorEstimator,
     best: f64,
-    /// The best so far.
+    /// The best elimination so far.
     pub chosen: Option<ChainElimination>,
-    /// All that was tried, in order.
+    /// All candidates, in order.
     pub tried: Vec<Candidate>,
     /// All straight-line eliminations so far, with the operations that lead to velocities.
     pub seen: Vec<(usize, ChainElimination)>,
 }
 
 impl<'a> ChainSearch<'a> {
-    /// Nothing tried yet. `plan` has the chain with one joint at a time.
+    /// A search without candidates. `plan` eliminates the chain one joint at a time.
     pub fn new(plan: &'a Plan, chain: &'a [usize], objective: Objective) -> ChainSearch<'a> {
         let estimator = ErrorEstimator::new(plan, objective.output);
         let (best, tried, seen) = (f64::INFINITY, Vec::new(), Vec::new());
@@ -71,7 +71,7 @@ impl<'a> ChainSearch<'a> {
         }
     }
 
-    /// Takes an elimination if it costs less than all before and is accurate.
+    /// Tries an elimination, and keeps it if it costs less than all before and is accurate.
     fn consider(&mut self, elimination: ChainElimination) -> bool {
         let mut candidate = self.plan.clone();
         elimination.apply(&mut candidate, self.chain);
@@ -82,7 +82,7 @@ impl<'a> ChainSearch<'a> {
             let Some(cost) = rolled::cost(&candidate, output, &options) else { return false };
             evaluation.cost = cost;
         }
-        // Accumulated momenta matter to the rates alone.
+        // Accumulated momenta affect the rates only.
         let seen = (evaluation.velocity_operations(), ChainElimination { accumulating: 0, ..elimination.clone() });
         if !elimination.rolled && !self.seen.contains(&seen) {
             self.seen.push(seen);
@@ -110,7 +110,7 @@ impl<'a> ChainSearch<'a> {
         taken
     }
 
-    /// Tries eliminations that differ a little from the best; says whether one of them is better.
+    /// Tries eliminations that differ slightly from the best. Returns whether one of them is better.
     fn neighbours(&mut self, from_ground: bool) -> bool {
         let Some(best) = self.chosen.clone() else { return false };
         let len = self.chain.len();
@@ -127,12 +127,12 @@ impl<'a> ChainSearch<'a> {
             before_joint[len - 1 - k] ^= true;
             near.push(ChainElimination { before_joint, ..best.clone() });
         }
-        // All of them are tried, not only up to the first that is better.
+        // All neighbours are tried, even after one that is better.
         near.into_iter().filter(|elimination| self.consider(elimination.clone())).count() > 0
     }
 }
 
-/// The eliminations to begin with.
+/// The eliminations with which the search starts.
 fn first_eliminations(len: usize, from_ground: bool) -> Vec<ChainElimination> {
     let mut all = Vec::new();
     let mut add = |split: usize, base: usize, from: usize, accumulating: usize| {

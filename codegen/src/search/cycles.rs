@@ -1,5 +1,5 @@
-//! Joints inside closed loops: columns of multipliers pass through all of them, so that what makes columns cheap (frames that do
-//! not rotate) and what does without columns (momenta accumulated from the tips) pays more there.
+//! Joints inside closed loops: columns of multipliers pass through all of them. Non-rotating frames, which make columns
+//! cheaper, and accumulated momenta, which need no columns, therefore save more there.
 
 use super::objective::Objective;
 use crate::plan::{parallel_runs, Plan};
@@ -29,7 +29,7 @@ pub fn choose(plan: &mut Plan, single: &Plan, objective: Objective) {
     }
 }
 
-/// Makes a choice for the joints of a cycle and for the frames inside it.
+/// Sets a choice for the joints of a cycle and for the frames inside it.
 fn set(plan: &mut Plan, [joints, frames]: [&[usize]; 2], (accumulates, non_rotating): (bool, bool)) {
     joints.iter().for_each(|&i| plan.nodes[i].elimination.accumulates_momentum = accumulates);
     frames.iter().for_each(|&i| plan.nodes[i].elimination.non_rotating = non_rotating);
@@ -52,7 +52,7 @@ fn cycles(plan: &Plan) -> Vec<Vec<usize>> {
     all
 }
 
-/// The smallest part of the mechanism that holds some nodes, and the number in it of every node.
+/// The smallest part of the mechanism that contains some nodes, and the new number of every node.
 fn part(plan: &Plan, nodes: &[usize]) -> (Plan, Vec<Option<usize>>) {
     let ways: Vec<Vec<usize>> = nodes.iter().map(|&i| plan.ancestors(i)).collect();
     let common = ways.first().and_then(|way| way.iter().copied().find(|i| ways.iter().all(|other| other.contains(i))));

@@ -8,7 +8,8 @@ use crate::plan::Plan;
 use crate::symbolic::{self, Cost, Label, Program};
 use crate::trace::trace;
 
-/// The options that candidates are compared with. Joint forces cost the rates an addition each, whatever the elimination.
+/// The options with which candidates are compared. They have no joint forces, which cost one addition each with every
+/// elimination.
 pub fn options(output: Output) -> Options {
     Options { efforts: output != Output::Rates, arithmetic: Arithmetic::Exact, ..Options::default() }
 }
@@ -28,7 +29,7 @@ impl Evaluation {
         Some(Evaluation { cost: symbolic::cost(&program), program })
     }
 
-    /// Operations that lead to velocities.
+    /// Number of operations of the velocities.
     pub fn velocity_operations(&self) -> usize {
         use Quantity::{BiasMomentum, Inertia, Pivot, Velocity};
         let velocities = |(_, what): &Label| matches!(what, Inertia | Pivot | BiasMomentum | Velocity);

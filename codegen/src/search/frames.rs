@@ -1,11 +1,11 @@
-//! Frames of parallel revolute joints, which need not rotate.
+//! Non-rotating frames for runs of parallel revolute joints.
 
 use super::objective::Objective;
 use crate::options::EliminationStrategy;
 use crate::plan::{touches_rolled, Plan};
 
-/// Lets the frames of every run of parallel joints rotate or not, whichever costs less, if that is accurate; `single` has one
-/// joint at a time.
+/// Chooses rotating or non-rotating frames for every run of parallel joints, whichever costs less, if that is accurate.
+/// `single` is the plan with one joint at a time.
 pub fn toggle(plan: &mut Plan, single: &Plan, runs: &[Vec<usize>], objective: Objective) {
     for run in runs {
         if objective.strategy == EliminationStrategy::Fastest && touches_rolled(plan, run) {

@@ -1,5 +1,5 @@
-//! Rows of constraints along which nothing can move, whatever the coordinates are: three of the five rows of a revolute joint that
-//! closes a loop of parallel revolute joints. The structure of the tree says so, in symbolic zeros.
+//! Rows of constraints along which nothing can move, whatever the coordinates are: three of the five rows of a revolute
+//! joint that closes a loop of parallel revolute joints. They are found by symbolic zeros.
 
 use mbd_runtime::sweep::Sweeps;
 use mbd_runtime::tree::Tree;

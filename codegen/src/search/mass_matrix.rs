@@ -1,14 +1,15 @@
-//! How far outward the mass matrix carries screws.
+//! The depth to which the mass matrix carries screws outward.
 
 use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
 use crate::trace::trace;
 
-/// Trees with more nodes than this are not searched.
+/// Largest number of nodes of a tree that is searched.
 const LARGEST: usize = 60;
 
-/// Sets [`Plan::matrix_depth`] to the depth with the fewest operations. The search ends where they grow twice.
+/// Sets [`Plan::matrix_depth`] to the depth with the fewest operations. The search ends when the number of operations
+/// has grown twice.
 pub fn choose(plan: &mut Plan) {
     if plan.nodes.len() > LARGEST {
         return;

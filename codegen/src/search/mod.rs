@@ -1,13 +1,14 @@
-//! The search for the fastest elimination. It stands above tracing and rolled code: it builds candidate plans, makes their
-//! programs, and keeps the plan whose programs the cost model likes best.
+//! The search for the fastest elimination. It uses tracing and rolled code: it builds candidate plans, makes their
+//! programs, and keeps the plan with the smallest estimated cost.
 //!
-//! With one joint at a time, every reduced inertia `M'` is full. Where several freedoms are eliminated together, the inertia of
-//! the outer bodies stays that of a rigid body as it is carried inward (three zeros in four after regrouping) and each joint adds
-//! a column; such a block is solved at its innermost joint. On a chain from the ground, the inner joints can also send their
-//! screws outward to meet those columns half-way. A joint can be eliminated before its own motion, where nothing divided waits
-//! for its turn. Momentum rates come from quadratic forms or from accumulated momenta. Frames between parallel joints need not
-//! rotate. What is best depends on the zeros of the model, so the candidates are generated and counted, branch by branch, and one
-//! is refused if its rounding errors are much larger than those of one joint at a time.
+//! With one joint at a time, every reduced inertia `M'` is full. Where several freedoms are eliminated together, the
+//! inertia of the outer bodies stays that of a rigid body as it is carried inward (three zeros in four after
+//! regrouping) and each joint adds a column; such a block is solved at its innermost joint. On a chain from the ground,
+//! the inner joints can also send their screws outward to meet those columns half-way. A joint can be eliminated before
+//! its own motion, so that the division does not wait for its rotation. Momentum rates come from quadratic forms or
+//! from accumulated momenta. Frames between parallel joints need not rotate. The best choice depends on the zeros of
+//! the model. Candidates are therefore generated and counted, branch by branch, and a candidate is refused if its
+//! rounding errors are much larger than those of one joint at a time.
 
 mod branches;
 mod chain;
@@ -28,10 +29,10 @@ use crate::plan::Plan;
 pub use chain::Candidate;
 pub use wide::Wide;
 
-/// Trees with more nodes than this are not searched: counting a candidate means to generate it.
+/// Largest number of nodes of a tree that is searched, because counting a candidate means generating it.
 const LARGEST: usize = 150;
 
-/// A plan and what was tried on the way to it.
+/// A plan and the candidates of its search.
 #[derive(Clone, Debug)]
 pub struct Chosen {
     /// The plan with its eliminations chosen.
@@ -40,8 +41,8 @@ pub struct Chosen {
     pub candidates: Vec<Candidate>,
 }
 
-/// Chooses what is eliminated where in a plan that eliminates one joint at a time, and which runs of links are laid out for
-/// rolled code. [`PlanOptions::snap`] has no part in it.
+/// Chooses the eliminations of a plan that eliminates one joint at a time, and the runs of links for rolled code.
+/// [`PlanOptions::snap`] is not used.
 pub fn best(mut plan: Plan, options: PlanOptions) -> Chosen {
     idle_rows::close(&mut plan);
     rolled_runs::lay_out(&mut plan, options);

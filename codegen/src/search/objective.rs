@@ -1,4 +1,4 @@
-//! What the search makes small, and which losses of accuracy it accepts.
+//! The objective of the search, and the losses of accuracy that it accepts.
 
 use super::evaluation::Evaluation;
 use super::rounding::{ErrorEstimator, LIMIT};
@@ -10,14 +10,14 @@ use crate::symbolic::Cost;
 /// The cost of one output under one strategy.
 #[derive(Clone, Copy)]
 pub struct Objective {
-    /// What counts as cost.
+    /// The measure of cost.
     pub strategy: EliminationStrategy,
-    /// Whose cost it is.
+    /// The output whose cost it is.
     pub output: Output,
 }
 
 impl Objective {
-    /// The number that is made small.
+    /// The number that the search minimises.
     pub fn of_cost(self, cost: &Cost) -> f64 {
         match self.strategy {
             EliminationStrategy::Fastest => cost.cycles(),

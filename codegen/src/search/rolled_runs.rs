@@ -1,4 +1,4 @@
-//! Which runs of links are laid out for rolled code.
+//! Choice of the runs of links for rolled code.
 
 use super::evaluation::Evaluation;
 use super::LARGEST;
@@ -6,17 +6,18 @@ use crate::options::{EliminationStrategy, PlanOptions, RolledCode};
 use crate::output::Output;
 use crate::plan::{is_single_but_for_rows, unbranched_paths, Plan};
 
-/// Chains from this length on are rolled without a search if their straight-line code is long: then it is far slower.
+/// Chains from this length on are rolled without a search if their straight-line code is long, because it is then much
+/// slower.
 const ALWAYS: usize = 24;
 
-/// Bytes of such code: more than a first-level cache has.
+/// Size of long code, bytes: more than a first-level cache has.
 const LONG: f64 = 49152.0;
 
 /// The length from which chains are rolled whose elimination is not searched for speed.
 const ALWAYS_OTHERWISE: usize = 16;
 
-/// Marks what may become rolled code: all that repeats, or what is long enough to gain by it for certain. The search of a chain
-/// adds to it.
+/// Marks the runs that may become rolled code: all runs, or those that are long enough to be faster in any case. The
+/// search of a chain marks more.
 pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
     let fastest = options.elimination == EliminationStrategy::Fastest;
     let least = match (options.rolled, fastest) {

@@ -1,5 +1,5 @@
-//! Double-double numbers as a scalar: what rounding errors are measured against.
+//! Double-double numbers as a scalar, the reference of rounding errors.
 
-/// A double-double number, 106 bits, with the sines and cosines of programs on doubles: they are inputs of the algebra, the
-/// same under every elimination, and what is compared are the roundings after them.
+/// A double-double number of 106 bits, whose sines and cosines are those of programs on doubles. They are the same with
+/// every elimination, so that only the roundings after them are compared.
 pub type Wide = mbd_runtime::wide::Wide<true>;

@@ -1,4 +1,4 @@
-//! What a program costs to run, estimated without rewriting it: the judge of forms.
+//! Estimate of a program's running time without rewriting it, by which eliminations are compared.
 
 use super::machine::{latency, pipe, Pipe, PIPES, WIDTH};
 use super::passes::chains::{best_plan, Arrival};
@@ -8,38 +8,39 @@ use super::{Op, Operand, Program, ProgramResult};
 /// Bytes of code for each instruction, fused products among them, spills included: 12.5 to 13.4.
 pub const BYTES: f64 = 12.5;
 
-/// Code beyond this is fetched from the second-level cache.
+/// Code size, bytes, beyond which code is fetched from the second-level cache.
 const CACHE: f64 = 32768.0;
 
-/// Bytes of such code that one cycle brings.
+/// Bytes of such code that are fetched in one cycle.
 const FETCH: f64 = 24.0;
 
 /// Cost of a program, as [`Rewrite::Shortest`](super::passes::Rewrite::Shortest) will regroup and fuse it. Sines and
-/// cosines are in the critical path, and left out of all other figures: forms do not differ in them.
+/// cosines are part of the critical path, and left out of all other numbers, because eliminations do not differ in them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// Additions, multiplications and divisions.
     pub operations: usize,
-    /// Instructions that compute, a fused product and sum being one.
+    /// Arithmetic instructions; a fused product and sum is one.
     pub instructions: usize,
-    /// Cycles from the inputs to the last result, if nothing but operands is waited for.
+    /// Critical path: cycles from the inputs to the last result, with unlimited pipes.
     pub critical_path: u32,
-    /// Cycles that the busiest pipes need for all instructions: what many independent states or lanes cost.
+    /// Throughput: cycles that the busiest pipe needs for all instructions. It determines the time of many independent
+    /// states or lanes.
     pub throughput: f64,
-    /// Bytes of code, roughly.
+    /// Estimated size of the code, bytes.
     pub bytes: f64,
 }
 
 impl Cost {
-    /// Cycles for one state among others, roughly: [`machine::cycles`](super::machine::cycles), and what fetching long code
-    /// takes. Within 20 % of times measured on Zen 5, for chains and robots of 3 to 35 freedoms.
+    /// Estimated cycles for one of several successive states: [`machine::cycles`](super::machine::cycles), and the time of
+    /// fetching long code. Within 20 % of times measured on Zen 5, for chains and robots of 3 to 35 degrees of freedom.
     pub fn cycles(&self) -> f64 {
         let ideal = super::machine::cycles(self.critical_path, self.throughput, self.instructions);
         ideal + (self.bytes - CACHE).max(0.0) / FETCH
     }
 }
 
-/// Estimates the cost of a program. Time is linear in its length: no graph is made.
+/// Estimates the cost of a program in time linear in its length, without making a graph.
 pub fn cost(program: &Program) -> Cost {
     let opened = Opened::new(program);
     let mut tally = Tally { ready: vec![0; opened.ops.len()], opened: &opened, multiply: 0, add: 0, instructions: 0 };
@@ -62,16 +63,17 @@ pub fn cost(program: &Program) -> Cost {
 
 struct Tally<'p> {
     opened: &'p Opened,
-    /// When each node is there.
+    /// Cycle in which each node is available.
     ready: Vec<u32>,
-    /// Cycles that instructions occupy pipes.
+    /// Cycles for which instructions occupy the pipes.
     multiply: u32,
     add: u32,
     instructions: u32,
 }
 
 impl Tally<'_> {
-    /// Counts what one node needs, opened terms included, and says when its value is there.
+    /// Counts the instructions of one node, including those of split terms. Returns the cycle in which its value is
+    /// available.
     fn step(&mut self, op: &Op) -> u32 {
         match op {
             Op::Add(..) | Op::Sub(..) => {
@@ -99,7 +101,7 @@ impl Tally<'_> {
         }
     }
 
-    /// An instruction that stands by itself.
+    /// Counts an instruction that is not fused.
     fn single(&mut self, op: &Op) {
         if matches!(op, Op::Sin(_) | Op::Cos(_)) {
             return;
@@ -120,7 +122,8 @@ impl Tally<'_> {
         }
     }
 
-    /// When the last product of some factors can start, the earliest multiplied first; the products before it are counted.
+    /// Cycle in which the last product of some factors can start, if the earliest are multiplied first. Counts the
+    /// products before it.
     fn before_last_product(&mut self, factors: Vec<Operand>) -> u32 {
         let mut times: Vec<u32> = factors.into_iter().map(|f| self.at(f)).collect();
         times.sort_unstable();
@@ -140,7 +143,7 @@ mod tests {
     use super::*;
     use crate::symbolic::{passes, Graph};
 
-    /// The estimate is what the pass really makes, but for what sharing saves.
+    /// The estimate equals the cost of the rewritten program, except for operations that sharing saves.
     #[test]
     fn estimates_what_regrouping_makes() {
         let graph = Graph::default();

@@ -1,4 +1,4 @@
-//! Programs run on numbers: what tests compare.
+//! Evaluation of programs on numbers, for tests.
 
 use mbd_runtime::Scalar;
 

@@ -1,4 +1,4 @@
-//! The graph and its handles.
+//! The graph of operations, and symbolic scalars.
 
 use std::cell::{Cell, RefCell};
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ pub enum Operand {
     Node(u32),
 }
 
-/// One operation. Negative signs live on the edges: see [`Expr`].
+/// One operation. Negative signs belong to the operands; see [`Expr`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Op {
     /// Input `k`.
@@ -29,7 +29,7 @@ pub enum Op {
     Mul(Operand, Operand),
     /// `a / b`.
     Div(Operand, Operand),
-    /// `±a · b ± c`; made by passes, never by sweeps.
+    /// `±a · b ± c`; passes make it, sweeps do not.
     Fma(Fma),
     /// `1 / ±a` where that is above `±floor`, else zero.
     ReciprocalAbove(FlooredReciprocal),
@@ -41,7 +41,8 @@ pub enum Op {
     Cos(u32),
 }
 
-/// A product and a sum in one operation: `±a · b ± c`. One rounding where the target fuses, two where it does not.
+/// A product and a sum in one operation, `±a · b ± c`, with one rounding where the target has the instruction, and two
+/// where it does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Fma {
     /// First factor.
@@ -56,21 +57,21 @@ pub struct Fma {
     pub minus_addend: bool,
 }
 
-/// What is inverted, and where it counts as zero. Signs cannot be taken outside.
+/// Operands of a reciprocal that is zero up to a floor. Their signs cannot be moved to the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct FlooredReciprocal {
-    /// What is inverted.
+    /// The value that is inverted.
     pub value: Operand,
-    /// What it has to exceed.
+    /// The floor that the value must exceed.
     pub floor: Operand,
-    /// Whether the negative of `value` is meant.
+    /// Whether the negative of `value` is inverted.
     pub minus_value: bool,
-    /// Whether the negative of `floor` is meant.
+    /// Whether the negative of `floor` is the floor.
     pub minus_floor: bool,
 }
 
 impl Op {
-    /// The operands, where there are any.
+    /// The operands of the operation.
     pub fn operands(&self) -> impl Iterator<Item = Operand> {
         let all = match *self {
             Op::Input(_) => [None; 3],
@@ -83,10 +84,10 @@ impl Op {
     }
 }
 
-/// Where a node came from: tree node (`None`: ground) and quantity.
+/// Origin of an operation: node of the tree (`None`: ground) and quantity.
 pub type Label = (Option<usize>, Quantity);
 
-/// What a value is called: an entry of something of a body that has a letter.
+/// Name of a value: an entry of a quantity of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Name {
     /// Tree node (`None`: ground).
@@ -115,11 +116,11 @@ struct Inner {
     ops: Vec<Op>,
     labels: Vec<Label>,
     names: Vec<Option<Name>>,
-    // Looked up, never iterated: order is that of `ops`.
+    // Entries are looked up and never iterated; the order is that of `ops`.
     memo: HashMap<Op, u32>,
 }
 
-/// A graph of operations, each standing once, in the order of first use.
+/// A graph of operations in the order of their first use. Equal operations exist once.
 #[derive(Debug)]
 pub struct Graph {
     inner: RefCell<Inner>,
@@ -155,7 +156,7 @@ impl Graph {
         self.inner.borrow().ops.len()
     }
 
-    /// Whether nothing has been created.
+    /// Whether the graph is empty.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -166,7 +167,7 @@ impl Graph {
         (inner.ops[id as usize], inner.labels[id as usize])
     }
 
-    /// Names a node; its first name stays.
+    /// Names a node that has no name yet.
     pub fn set_name(&self, id: u32, name: Name) {
         self.inner.borrow_mut().names[id as usize].get_or_insert(name);
     }
@@ -184,7 +185,7 @@ impl Graph {
         }
     }
 
-    /// `a · b + c`, as one operation where neither is a constant that makes it less.
+    /// `a · b + c`, as one operation unless a constant among the operands simplifies it.
     pub fn fma<'g>(&'g self, a: Expr<'g>, b: Expr<'g>, c: Expr<'g>) -> Expr<'g> {
         let trivial = |e: Expr| [0.0, 1.0, -1.0].iter().any(|&x| e.is(x));
         if trivial(a) || trivial(b) || c.is(0.0) || (a.graph(b).is_none()) {
@@ -269,7 +270,7 @@ impl Add for Expr<'_> {
         if a == b && a_neg != b_neg {
             return Expr::Const(0.0);
         }
-        // Nodes in order of age, a constant last; the first operand's sign goes outside.
+        // Operands are sorted by age, a constant last; the sign of the first operand moves to the result.
         let first = |x: Operand| (matches!(x, Operand::Const(_)), x);
         if first(b) < first(a) {
             std::mem::swap(&mut a, &mut b);
@@ -363,7 +364,7 @@ impl Scalar for Expr<'_> {
 
     fn reciprocal_above(self, floor: Self) -> Self {
         match (self, floor) {
-            // Nothing is above a floor that is not negative.
+            // Zero is not above a floor that is not negative.
             (Expr::Const(0.0), _) => self,
             (Expr::Const(x), Expr::Const(y)) => Expr::Const(Scalar::reciprocal_above(x, y)),
             (Expr::Node { graph, .. }, _) | (_, Expr::Node { graph, .. }) => {
@@ -406,11 +407,11 @@ mod tests {
         same(c(4.0).reciprocal_above(c(1.0)), c(0.25));
         same(c(0.0).reciprocal_above(c(0.0)), c(0.0));
         same(c(0.0).reciprocal_above(x), c(0.0));
-        // The sign of what is inverted decides.
+        // The sign of the inverted value decides.
         assert_ne!((-x).reciprocal_above(y).split(), (-(x.reciprocal_above(y))).split());
         same((-x).sin_cos().0, -(x.sin_cos().0));
         same((-x).sin_cos().1, x.sin_cos().1);
-        // What is not exact stays as it is written.
+        // Rewritings that are not exact are not made.
         let (Expr::Node { id, .. }, true) = ((x + c(1.0)) + c(2.0), true) else { panic!() };
         assert!(matches!(g.get(id).0, Op::Add(Operand::Node(_), Operand::Const(_))));
     }

@@ -1,15 +1,15 @@
-//! The processor that programs are scheduled for and judged by: a Zen 4 or Skylake in outline.
+//! Model of the processor for schedules and cost estimates: roughly a Zen 4 or Skylake.
 
 use super::{Op, Operand, Program, ProgramResult};
 
-/// Cycles from the operands of an operation to its result.
+/// Latency of an operation, in cycles.
 pub fn latency(op: &Op) -> u32 {
     match op {
         Op::Input(_) => 0,
         Op::Add(..) | Op::Sub(..) => SUM,
         Op::Mul(..) | Op::Fma(_) => PRODUCT,
         Op::Div(..) => DIVISION,
-        // A division, and a mask.
+        // A division and a mask.
         Op::ReciprocalAbove(_) => DIVISION + 1,
         Op::Sqrt(_) => 15,
         Op::Sin(_) | Op::Cos(_) => SINE,
@@ -25,36 +25,37 @@ const DIVISION: u32 = 13;
 /// Latency of a sine with its cosine.
 pub const SINE: u32 = 40;
 
-/// Pipes that multiply, and pipes that add.
+/// Number of pipes that multiply, and of pipes that add.
 pub const PIPES: usize = 2;
 
-/// Instructions that one cycle takes at the most.
+/// Largest number of instructions in one cycle.
 pub const WIDTH: u32 = 4;
 
-/// Instructions that the processor looks ahead: shorter programs overlap with the evaluation before them.
+/// Number of instructions that the processor looks ahead. Shorter programs overlap with the evaluation before them.
 const WINDOW: f64 = 250.0;
 
-/// Cycles for one state among others, roughly: the larger of path and throughput, and a quarter of the smaller for what does
-/// not overlap. Sines come first and overlap with the work before; most latencies are shorter than in the model.
+/// Estimated cycles for one of several successive states: the larger of critical path and throughput, plus a quarter of
+/// the smaller for the part that does not overlap. Sines come first and overlap with the work before; most latencies
+/// are shorter than in the model.
 pub fn cycles(critical_path: u32, throughput: f64, instructions: usize) -> f64 {
     let path = waiting(critical_path, instructions);
     path.max(throughput) + 0.25 * path.min(throughput)
 }
 
-/// Cycles of the longest path that show in the time of a program.
+/// Cycles of the critical path that contribute to the time of a program.
 pub fn waiting(critical_path: u32, instructions: usize) -> f64 {
     let shows = (instructions as f64 / WINDOW).min(1.0);
     0.85 * shows * f64::from(critical_path.saturating_sub(SINE))
 }
 
-/// Where an operation is executed.
+/// Execution unit of an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pipe {
     /// Products, fused or not, and divisions.
     Multiply,
     /// Sums.
     Add,
-    /// Nowhere: inputs are read from memory by their users.
+    /// None: inputs are read from memory by the operations that use them.
     None,
 }
 
@@ -66,13 +67,13 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
         Op::Mul(..) | Op::Fma(_) => (Pipe::Multiply, 1),
         Op::Div(..) | Op::ReciprocalAbove(_) => (Pipe::Multiply, 5),
         Op::Sqrt(_) => (Pipe::Multiply, 7),
-        // Half of a pair: about thirty products for both.
+        // Half of a pair; both together take about thirty products.
         Op::Sin(_) | Op::Cos(_) => (Pipe::Multiply, 15),
     }
 }
 
 impl Program {
-    /// Cycles from the inputs to the last result, if nothing but operands is waited for.
+    /// Critical path: cycles from the inputs to the last result, with unlimited pipes.
     pub fn critical_path(&self) -> u32 {
         let mut ready = vec![0; self.width()];
         for (id, op, _) in &self.steps {
@@ -84,7 +85,7 @@ impl Program {
         self.outputs.iter().map(last).max().unwrap_or(0)
     }
 
-    /// Cycles that the pipes need at least for all operations, sines and cosines left out.
+    /// Smallest number of cycles that the pipes need for all operations except sines and cosines.
     pub fn throughput(&self) -> f64 {
         let busy = |which: Pipe| {
             let trigonometry = |op: &Op| matches!(op, Op::Sin(_) | Op::Cos(_));
@@ -95,7 +96,7 @@ impl Program {
         busiest.max(self.instructions() as f64 / f64::from(WIDTH))
     }
 
-    /// Operations that become instructions: inputs, sines and cosines left out, a fused product and sum being one.
+    /// Number of operations that become instructions: all except inputs, sines and cosines; a fused product and sum is one.
     pub fn instructions(&self) -> usize {
         self.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_) | Op::Sin(_) | Op::Cos(_))).count()
     }

@@ -1,8 +1,8 @@
 //! Symbolic scalars over a hash-consed graph, and straight-line programs made of them.
 //!
-//! The only rewriting is exact in IEEE arithmetic for finite values: `0 + x`, `1 · x`, `0 · x`, signs, `x − x`, folding
-//! of constants, order of commutative operands, sharing of equal operations. A program therefore gives the bits that the
-//! same sweep gives on numbers, up to the sign of zero.
+//! When an operation is made, only rewritings are applied that are exact in IEEE arithmetic for finite values: `0 + x`,
+//! `1 · x`, `0 · x`, signs, `x − x`, folding of constants, order of commutative operands, sharing of equal operations.
+//! A program therefore gives the same bits as the sweep on numbers, up to the sign of zero.
 
 mod cost;
 mod evaluate;

@@ -1,4 +1,4 @@
-//! Live operations of a graph, in order, and what they cost.
+//! Programs: the operations of a graph that results need, in order, and their counts.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use mbd_runtime::sweep::Quantity;
 
 use super::{Expr, Graph, Label, Name, Op, Operand};
 
-/// A signed result: a constant or a node.
+/// A result of a program: a constant, or a node with a sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ProgramResult {
     /// A constant.
@@ -15,14 +15,14 @@ pub enum ProgramResult {
     Node(u32, bool),
 }
 
-/// Operations by kind.
+/// Numbers of operations by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Additions and subtractions.
     pub additions: usize,
     /// Multiplications.
     pub multiplications: usize,
-    /// Divisions, guarded reciprocals among them.
+    /// Divisions, including reciprocals with a floor.
     pub divisions: usize,
     /// Square roots.
     pub roots: usize,
@@ -31,7 +31,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Additions, multiplications and divisions: the number to compare.
+    /// Total of additions, multiplications and divisions, by which programs are compared.
     pub fn total(&self) -> usize {
         self.additions + self.multiplications + self.divisions
     }
@@ -63,21 +63,21 @@ impl Counts {
     }
 }
 
-/// A straight-line program: what the outputs need, nothing else, operands before their use.
+/// A straight-line program: the operations that its results need, operands before their use.
 #[derive(Clone, Debug, Default)]
 pub struct Program {
-    /// Live nodes in order: node id, operation, origin.
+    /// Operations in order: node id, operation, origin.
     pub steps: Vec<(u32, Op, Label)>,
     /// Results, in the order they were asked for.
     pub outputs: Vec<ProgramResult>,
     /// Names of nodes, in the order of their ids.
     pub names: Vec<(u32, Name)>,
-    /// Operations the sweeps made, live or not, inputs left out.
+    /// Number of operations that the sweeps made, needed or not, without inputs.
     pub created: BTreeMap<Quantity, usize>,
 }
 
 impl Program {
-    /// The program of some outputs; everything they do not need is left out.
+    /// The program of some results; operations that they do not need are left out.
     pub fn new(graph: &Graph, outputs: &[Expr]) -> Program {
         let outputs: Vec<ProgramResult> = outputs
             .iter()
@@ -92,7 +92,7 @@ impl Program {
                 live[*id as usize] = true;
             }
         }
-        // Operands are older than the node that uses them: one pass backward marks everything.
+        // Operands are older than the operations that use them, so that one pass backward marks everything.
         for id in (0..live.len()).rev() {
             if live[id] {
                 mark(graph, id, &mut live);
@@ -125,12 +125,13 @@ impl Program {
         self.names.binary_search_by_key(&id, |(id, _)| *id).ok().map(|k| self.names[k].1)
     }
 
-    /// Operations that are executed.
+    /// Counts of the operations that are executed.
     pub fn counts(&self) -> Counts {
         self.counts_where(|_| true)
     }
 
-    /// Operations whose origin satisfies a condition; a pair of sine and cosine counts where its first half stands.
+    /// Counts of the operations whose origin satisfies a condition. A pair of sine and cosine counts at the place of
+    /// its first half.
     pub fn counts_where(&self, condition: impl Fn(&Label) -> bool) -> Counts {
         let mut counts = Counts::default();
         let mut angles = std::collections::BTreeSet::new();
@@ -146,7 +147,7 @@ impl Program {
         counts
     }
 
-    /// `−(a − b)` that is only ever an output becomes `b − a`.
+    /// Replaces `−(a − b)` by `b − a` where it is used as a result only.
     pub(crate) fn turn_negated_differences(&mut self) {
         let mut inner = std::collections::BTreeSet::new();
         for (_, op, _) in &self.steps {

@@ -1,4 +1,4 @@
-//! Programs run in several states at once.
+//! Evaluation of programs in several states at once.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -6,7 +6,7 @@ use mbd_runtime::Scalar;
 
 use crate::symbolic::Program;
 
-/// States that are run at once.
+/// Number of states that are evaluated at once.
 pub const LANES: usize = 8;
 
 /// One number in every state.

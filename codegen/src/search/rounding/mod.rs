@@ -1,11 +1,11 @@
-//! What an elimination costs in accuracy, measured on a few states: one that loses too much is not chosen.
+//! Rounding errors of eliminations, measured on a few states. An elimination that loses too much accuracy is not chosen.
 //!
-//! Programs are run on doubles and compared with the interpreter on double-double numbers. The interpreter starts from the numbers
-//! of the model: a constant that a program folds is rounded, and eliminations differ in what becomes of that. States and numbers
-//! are the same on every machine, and so is the choice.
+//! Programs are run on doubles and compared with the interpreter on double-double numbers. The interpreter starts from
+//! the numbers of the model: constants that a program computes in advance are rounded, and eliminations differ in the
+//! effect of these roundings. States and numbers are the same on every machine, and so is the choice.
 //!
-//! Programs are measured as the sweeps make them. What [`Arithmetic::Fast`](crate::options::Arithmetic::Fast) does to them
-//! afterwards changes the error little, whatever the elimination, and takes longer than all the rest.
+//! Programs are measured before they are rewritten for [`Arithmetic::Fast`](crate::options::Arithmetic::Fast). The
+//! rewriting changes the error little with every elimination, and it would take longer than everything else.
 
 mod lanes;
 mod state;
@@ -23,21 +23,21 @@ use crate::plan::Plan;
 use crate::symbolic::Program;
 use crate::trace::trace;
 
-/// States that errors are measured on: few for large trees, in which roundings average out.
+/// Number of states in which errors are measured. Large trees need few, because their roundings average out.
 const STATES: RangeInclusive<usize> = 64..=256;
 
 /// Nodes in all states together, beyond which there are fewer states.
 const WORK: usize = 1600;
 
-/// The largest [`ErrorEstimator::loss`] of an elimination that is chosen. Over many states the median error is to stay below 2
-/// times that of one joint at a time, the worst below 3 times; rewriting for speed costs about a tenth, and what is measured on a
-/// few hundred states is known to a tenth.
+/// The largest [`ErrorEstimator::loss`] of an elimination that is chosen. Over many states the median error is to stay
+/// below 2 times that of one joint at a time, the worst below 3 times; rewriting for speed costs about a tenth, and the
+/// measurement on a few hundred states has an error of a tenth.
 pub const LIMIT: f64 = 1.6;
 
-/// One state in so many is counted among the worst.
+/// One state in this number counts among the worst.
 const RARE: usize = 16;
 
-/// What the worst errors may grow by, in multiples of what the middle ones may.
+/// Allowed growth of the worst errors relative to that of the median errors.
 const WORST: f64 = 1.5;
 
 /// Errors below two roundings of the largest result are not compared.
@@ -51,7 +51,7 @@ struct Sample {
 
 /// Measures rounding errors of programs against those of one joint at a time.
 pub struct ErrorEstimator {
-    /// Results that are measured by their largest: `q̇` and `ṗ`, or accelerations.
+    /// Arrays whose errors are relative to their largest entries: `q̇` and `ṗ`, or accelerations.
     parts: Vec<Range<usize>>,
     samples: Vec<Sample>,
     /// Errors of one joint at a time, part by part.
@@ -71,7 +71,7 @@ impl Errors {
         Errors([mean(&errors), middle, mean(worst)].map(|x| x.max(FLOOR)))
     }
 
-    /// In multiples of others.
+    /// Ratios to other errors.
     fn times(self, others: Errors) -> f64 {
         let [mean, median, worst]: [f64; 3] = std::array::from_fn(|k| self.0[k] / others.0[k]);
         mean.max(median).max(worst / WORST)
@@ -138,11 +138,11 @@ fn rotating(plan: &Plan) -> Plan {
 fn error(results: &[[f64; LANES]], lane: usize, exact: &[Wide]) -> Option<f64> {
     let (mut size, mut off) = (f64::MIN_POSITIVE, 0.0_f64);
     for (r, x) in results.iter().zip(exact) {
-        // A result that is not a number must not vanish in a maximum.
+        // A result that is not a number must not be lost in a maximum.
         let d = if r[lane].is_finite() { (x.0 - r[lane]).hi().abs() } else { f64::INFINITY };
         (size, off) = (size.max(x.0.hi().abs()), off.max(d));
     }
-    // A quarter of a rounding stands for exact results, which have no logarithm.
+    // Exact results, whose error has no logarithm, count as a quarter of a rounding.
     exact.iter().all(|x| x.0.hi().is_finite()).then(|| (off / size).max(FLOOR / 8.0))
 }
 

@@ -1,4 +1,4 @@
-//! States that rounding errors are measured in.
+//! States in which rounding errors are measured.
 
 use mbd_runtime::tree::Source;
 use mbd_runtime::{Interpreter, Scalar};
@@ -21,7 +21,7 @@ pub struct State {
 }
 
 impl State {
-    /// The state of a seed: turns up to 3 rad, slides up to 0.6 m, velocities up to 1.5; no momenta yet.
+    /// The state of a seed: angles up to 3 rad, displacements up to 0.6 m, velocities up to 1.5; no momenta yet.
     pub fn new(plan: &Plan, seed: u64) -> State {
         let d = plan.dims;
         let (mut q, mut drive_q) = (random(seed, 0, d.nq, 3.0), random(seed, 1, d.drive_q, 3.0));
@@ -90,7 +90,7 @@ impl State {
     }
 }
 
-/// Numbers evenly from `[-size, size)`: splitmix64.
+/// Uniformly distributed numbers in `[-size, size)`, by SplitMix64.
 fn random(seed: u64, stream: u64, n: usize, size: f64) -> Vec<f64> {
     let mut state = (seed << 8 | stream).wrapping_mul(0xd1b5_4a32_d192_ed03);
     let next = || {
