@@ -4,11 +4,11 @@ use alloc::vec::Vec;
 
 use crate::system::{system_within, Accelerated, Conjugate, Energetic, LieJoint, System};
 
-/// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] at whose place of momenta velocities stand, so that
-/// every integrator runs it. Against [`System`] itself it shows what momenta are good for.
+/// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] with velocities in place of momenta, which every
+/// integrator can run. A comparison with the [`System`] itself shows the effect of momenta as state variables.
 ///
-/// Velocities of joints with quaternions and of planar joints are in body axes. Their rates are added up as they stand: what is
-/// conserved exactly of momenta is not of velocities.
+/// Velocities of joints with quaternions and of planar joints are in body axes, and their rates are integrated component by
+/// component. Momenta that are conserved exactly in canonical form are therefore not conserved exactly here.
 #[derive(Clone, Debug)]
 pub struct AccelerationForm<Y> {
     /// The mechanism, with its inputs.
@@ -31,7 +31,7 @@ impl<Y: Accelerated> System for AccelerationForm<Y> {
         &self.lie_joints
     }
 
-    /// Velocities stand for `p`, accelerations for `pd`.
+    /// `p` are velocities, `pd` accelerations.
     fn rates_at(
         &mut self,
         _t: Y::Scalar,

@@ -1,12 +1,12 @@
 //! Rates of many states: columns in, columns out.
 //!
-//! A column holds one coordinate of every state, `q[k][s]` is coordinate `k` of state `s`: so neighbouring states are computed
-//! side by side in vector registers, and nothing is transposed on the way. Generated types have a method
-//! `rates_batch`; with feature `rayon`, `rates_parallel` gives the states to several threads.
+//! A column holds one coordinate of every state: `q[k][s]` is coordinate `k` of state `s`. Neighbouring states are
+//! therefore computed together in vector registers without a transposition. Generated types have a method
+//! `rates_batch`; with feature `rayon`, `rates_parallel` distributes the states over several threads.
 
 use crate::Scalar;
 
-/// What can be wrong with the columns of a batch.
+/// An error in the columns of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BatchError {
@@ -30,7 +30,8 @@ impl core::error::Error for BatchError {}
 
 /// A system whose rates can be computed for many states in one call. `NT` is `NV`, or 0 without joint forces.
 pub trait RatesBatch<T, const NQ: usize, const NV: usize, const NT: usize> {
-    /// Computes the rates of any number of states; the columns are those of `q` (rad, m), `p`, `tau` (N m, N), `q̇` and `ṗ`.
+    /// Computes the rates of any number of states; the columns are those of `q` (rad, m), `p`, `tau` (N m, N), `q̇` and
+    /// `ṗ`.
     ///
     /// # Errors
     /// [`BatchError::Lengths`]; nothing is written then.
@@ -44,7 +45,7 @@ pub trait RatesBatch<T, const NQ: usize, const NV: usize, const NT: usize> {
     ) -> Result<(), BatchError>;
 }
 
-/// The length that all columns have.
+/// The common length of all columns.
 fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, BatchError> {
     let mut lengths = lengths.into_iter();
     let expected = lengths.next().unwrap_or(0);
@@ -54,7 +55,7 @@ fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, BatchError>
     }
 }
 
-/// Reads states `at..at + L` of the columns. Places behind the last state take the last one again: a state that exists.
+/// Reads states `at..at + L` of the columns. Places after the last state are filled with the last state, which is valid.
 #[inline(always)]
 fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usize, block: &mut [[T; L]; N]) {
     for (column, lanes) in columns.iter().zip(block) {
@@ -68,7 +69,7 @@ fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usiz
     }
 }
 
-/// Writes a block to states `at..at + L` of the columns; what lies behind the last state is dropped.
+/// Writes a block to states `at..at + L` of the columns; places after the last state are dropped.
 #[inline(always)]
 fn store<T: Scalar, const L: usize, const N: usize>(block: &[[T; L]; N], at: usize, columns: &mut [&mut [T]; N]) {
     for (lanes, column) in block.iter().zip(columns) {
@@ -110,7 +111,7 @@ pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT
     Ok(())
 }
 
-/// [`RatesBatch::rates_batch`] on the threads of rayon's pool. Every state's numbers are those of one thread alone.
+/// [`RatesBatch::rates_batch`] on the threads of rayon's pool. The results of every state are those of a single thread.
 ///
 /// # Errors
 /// [`BatchError::Lengths`]; nothing is written then.
@@ -127,7 +128,7 @@ where
     S: RatesBatch<T, NQ, NV, NT> + Sync,
     T: Scalar + Send + Sync,
 {
-    /// Fewer states are not worth a thread; a multiple of all block sizes.
+    /// Smallest number of states for a thread; a multiple of all block sizes.
     const GRAIN: usize = 256;
     let inputs = q.iter().chain(&p).chain(&tau).map(|c| c.len());
     let n = length(inputs.chain(qd.iter().chain(&pd).map(|c| c.len())))?;

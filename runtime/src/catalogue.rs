@@ -16,15 +16,15 @@ use crate::system::{Differentiable, Energetic, Real, System};
 pub struct Entry {
     /// Name.
     pub name: &'static str,
-    /// One line.
+    /// Description in one line.
     pub title: &'static str,
     /// Whether it estimates its error, so that it can choose its steps.
     pub adaptive: bool,
-    /// Whether it asks for derivatives of the rates.
+    /// Whether it needs derivatives of the rates.
     pub implicit: bool,
 }
 
-/// A [`Solver`] whose method is not known at compile time; its functions.
+/// The functions of a [`Solver`] whose method is chosen at run time.
 pub trait Drive<Y: System> {
     /// [`Solver::limits`].
     fn limits(&mut self) -> &mut Limits;
@@ -99,9 +99,9 @@ pub struct Start<'a, Y: System> {
     pub q: &'a Y::Coordinates,
     /// Momenta.
     pub p: &'a Y::Momenta,
-    /// Steps.
+    /// Fixed step, or tolerances.
     pub step: Step,
-    /// With compensated sums where the method has them.
+    /// Whether sums are compensated, where the method supports it.
     pub compensated: bool,
 }
 
@@ -128,7 +128,7 @@ macro_rules! catalogue {
             $(Entry { name: $name, title: $title, adaptive: $adaptive, implicit: $implicit },)*
         ];
 
-        /// One of them by name, at time zero. A method that estimates no error takes [`Step::Fixed`] only.
+        /// Makes a method by name, at time zero. A method without an error estimate accepts [`Step::Fixed`] only.
         pub fn $make<'a, Y>(name: &str, $system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
         where
             Y: $bound + 'a,
@@ -210,7 +210,7 @@ catalogue! {
     }
 }
 
-/// Any method by name, at time zero.
+/// Makes any method by name, at time zero.
 pub fn any<'a, Y>(name: &str, system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
 where
     Y: Differentiable + 'a,

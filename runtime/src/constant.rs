@@ -2,12 +2,12 @@
 
 use crate::Scalar;
 
-/// A real constant as a sum of two doubles: the nearest double and what that leaves, together good to 2⁻¹⁰⁰ relative.
+/// A real constant as a sum of two doubles: the nearest double and the remainder, with a relative error of 2⁻¹⁰⁰.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant {
     hi: f64,
     lo: f64,
-    /// `hi` in single precision: small processors convert in software only.
+    /// `hi` in single precision, stored because small processors convert in software only.
     single: f32,
 }
 
@@ -19,13 +19,13 @@ impl Constant {
         Constant { hi, lo, single: hi as f32 }
     }
 
-    /// In a type of numbers, rounded once: for `f64` the nearest double.
+    /// The constant in a number type, rounded once; for `f64` it is the nearest double.
     #[inline]
     pub fn get<S: Scalar>(self) -> S {
         S::rounded(self)
     }
 
-    /// Whether it is zero: a term that need not be added.
+    /// Whether it is zero, so that a term with it need not be added.
     #[inline]
     pub const fn is_zero(self) -> bool {
         self.hi == 0.0
@@ -37,7 +37,7 @@ impl Constant {
         self.single
     }
 
-    /// What the nearest double leaves.
+    /// The remainder after the nearest double.
     #[inline]
     pub const fn lo(self) -> f64 {
         self.lo
@@ -108,7 +108,7 @@ const fn halves(a: f64) -> (f64, f64) {
 /// `n / d`.
 ///
 /// # Panics
-/// If `d` is zero; of a constant the compiler says so.
+/// If `d` is zero; in a constant, the compiler reports it.
 pub const fn ratio(n: i64, d: i64) -> Constant {
     assert!(d != 0, "a ratio has a denominator other than zero");
     let magnitude = Constant::integer(n.unsigned_abs() as u128).over(Constant::integer(d.unsigned_abs() as u128));
@@ -118,7 +118,7 @@ pub const fn ratio(n: i64, d: i64) -> Constant {
 /// A decimal number of at most 38 digits: `-0.5`, `1.25e-3`, `7`.
 ///
 /// # Panics
-/// If the text is anything else; of a constant the compiler says so.
+/// If the text is anything else; in a constant, the compiler reports it.
 pub const fn decimal(text: &str) -> Constant {
     let text = text.as_bytes();
     let (value, end) = number(text, 0);
@@ -129,7 +129,7 @@ pub const fn decimal(text: &str) -> Constant {
 /// Exactly `N` numbers of a text, separated by spaces: decimals or ratios, `2/55`.
 ///
 /// # Panics
-/// If they are not `N` numbers; of a constant the compiler says so.
+/// If they are not `N` numbers; in a constant, the compiler reports it.
 pub const fn list<const N: usize>(text: &str) -> [Constant; N] {
     let (list, len) = row(text);
     assert!(len == N, "the text has fewer numbers than the list");
@@ -139,7 +139,7 @@ pub const fn list<const N: usize>(text: &str) -> [Constant; N] {
 /// A strictly lower triangular matrix of a text a row: row `i` has `i` numbers.
 ///
 /// # Panics
-/// If it does not; of a constant the compiler says so.
+/// If it does not; in a constant, the compiler reports it.
 pub const fn lower<const N: usize>(rows: [&str; N]) -> [[Constant; N]; N] {
     let mut matrix = [[Constant::ZERO; N]; N];
     let mut i = 0;

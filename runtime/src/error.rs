@@ -1,8 +1,8 @@
-//! What can go wrong in a step, and with constraints.
+//! Errors of steps and of constraints.
 
 use crate::system::{Part, System};
 
-/// A step that must not be used.
+/// Reason why a step failed.
 ///
 /// Times are those of the start of the step, in s. An adaptive driver keeps the last accepted state; a step function
 /// leaves `q` and `p` as they were.
@@ -26,16 +26,16 @@ pub enum StepError {
         /// Its norm.
         norm: f64,
     },
-    /// The error stays above the tolerances down to steps that no longer change the time.
+    /// The error stays above the tolerances even for steps so small that they no longer change the time.
     StepTooSmall {
         /// Time, s.
         time: f64,
-        /// Step at which it was given up, s.
+        /// The last step that was attempted, s.
         step: f64,
         /// Error of that step relative to the tolerances; not a number where the rates were not finite.
         error: f64,
     },
-    /// Steps are to be chosen by an error that the method does not estimate.
+    /// Adaptive steps were requested from a method without an error estimate.
     NoEstimate {
         /// Time, s.
         time: f64,
@@ -71,7 +71,7 @@ pub enum StepError {
     Constraint {
         /// Time, s.
         time: f64,
-        /// What is wrong with them.
+        /// The error of the constraints.
         error: ConstraintError,
     },
 }
@@ -144,18 +144,18 @@ impl core::fmt::Display for StepError {
 
 impl core::error::Error for StepError {}
 
-/// Constraints that do not hold, or cannot.
+/// Reason why constraints cannot be satisfied.
 ///
-/// Constraints are numbered as in [`Row::constraint`](crate::system::Row): by their place among the loops and couplings of the
-/// description.
+/// Constraints are numbered as in [`Row::constraint`](crate::system::Row): by their place among the loops and couplings
+/// of the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConstraintError {
     /// No positions were found that close the constraints.
     NotClosed {
-        /// The constraint that is furthest from closing.
+        /// The constraint with the largest residual.
         constraint: usize,
-        /// How far, m or rad.
+        /// Its residual, m or rad.
         residual: f64,
         /// Number of rows that are independent of one another where the search ended, coordinates that are held left out.
         rank: usize,
@@ -164,9 +164,9 @@ pub enum ConstraintError {
         /// Iterations made.
         iterations: u32,
     },
-    /// No velocities were found that meet the constraints.
+    /// No velocities were found that satisfy the constraints.
     Incompatible {
-        /// The constraint whose row is furthest from being met.
+        /// The constraint with the largest residual of its velocities.
         constraint: usize,
         /// By how much, m/s or rad/s.
         residual: f64,

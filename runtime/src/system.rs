@@ -1,8 +1,8 @@
-//! What an integrator sees of a mechanism.
+//! The traits through which an integrator uses a mechanism.
 
 use crate::Scalar;
 
-/// A scalar that can be compared, for code that watches results (integrators), never for sweeps.
+/// A scalar that can be compared, for code that examines results (integrators). Sweeps use [`Scalar`] only.
 pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
     /// Whether it is neither infinite nor NaN.
     fn is_finite(self) -> bool;
@@ -50,7 +50,7 @@ impl Real for f32 {
     fn epsilon() -> f64 {
         f32::EPSILON.into()
     }
-    // Without a detour over doubles, which small processors have in software only.
+    // Direct conversions, because small processors have doubles in software only.
     fn from_index(index: usize) -> Self {
         index as f32
     }
@@ -80,8 +80,8 @@ pub trait System {
     fn neutral(&self) -> Self::Coordinates;
     /// Zero momenta.
     fn zero_momenta(&self) -> Self::Momenta;
-    /// Joints whose configurations form a Lie group other than a vector space, in the order of the state: displacements are not
-    /// just added to their coordinates.
+    /// Joints whose configurations form a Lie group other than a vector space, in the order of the state: displacements
+    /// are not just added to their coordinates.
     fn lie_joints(&self) -> &[LieJoint];
     /// Index into `q` of the first component of every unit quaternion.
     fn quaternions(&self) -> impl Iterator<Item = usize> {
@@ -96,7 +96,7 @@ pub trait System {
         qd: &mut Self::Coordinates,
         pd: &mut Self::Momenta,
     );
-    /// Name of a part, for messages; none where it is not known.
+    /// Name of a part, for messages; `None` where it is not known.
     fn part_name(&self, _part: Part) -> Option<&str> {
         None
     }
@@ -139,16 +139,17 @@ pub enum Part {
     Constraint(usize),
 }
 
-/// A joint whose state lies on a Lie group: where it stands, and of which kind it is.
+/// A joint whose state lies on a Lie group: its group, and its place in the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LieJoint {
-    /// Kind.
+    /// The group.
     pub kind: LieGroup,
     /// Index of its first coordinate.
     pub q: usize,
     /// Index of its first velocity and momentum.
     pub v: usize,
-    /// Whether what stands at the place of momenta are momenta, which turn with the body; not so in acceleration form.
+    /// Whether the second half of the state holds momenta, whose components change with the rotation of the body. In
+    /// acceleration form it holds velocities.
     pub momenta: bool,
 }
 
@@ -173,7 +174,7 @@ impl LieGroup {
         }
     }
 
-    /// How many coordinates, from the first on, are positions or angles that displacements are added to.
+    /// Number of coordinates, from the first on, that are positions or angles, to which displacements are added.
     pub const fn positions(self) -> usize {
         match self {
             LieGroup::SO3 => 0,
@@ -216,7 +217,7 @@ pub trait Energetic: System {
     note = "a generated type has it with `momenta` among its outputs: `outputs = [rates, momenta, ..]`"
 )]
 pub trait Conjugate: System {
-    /// `(q, v) → p`.
+    /// `(q, v) → p`: the momenta of given velocities.
     fn conjugate_momenta(&mut self, q: &Self::Coordinates, v: &Self::Momenta, p: &mut Self::Momenta);
 }
 
@@ -227,15 +228,15 @@ pub trait Conjugate: System {
     note = "a generated type has it with `accelerations` among its outputs: `outputs = [rates, accelerations, ..]`"
 )]
 pub trait Accelerated: System {
-    /// `(q, v) → v̇`.
+    /// `(q, v) → v̇`: the rates of the components of `v`.
     fn generalized_accelerations(&mut self, q: &Self::Coordinates, v: &Self::Momenta, a: &mut Self::Momenta);
 }
 
 /// A [`System`] that gives the derivatives of its rates as well.
 ///
-/// Columns with respect to `q` are derivatives along `q̇ = N(q) e_k`, the direction in which velocity `k` alone moves the
-/// coordinates: for angles and slides the partial derivatives, for joints with quaternions and planar joints those with
-/// respect to a small displacement in body axes. Joint forces add to `ṗ`: `∂ṗ/∂τ = 1`, `∂v/∂τ = 0`.
+/// Columns with respect to `q` are derivatives along `q̇ = N(q) e_k`, the direction in which velocity `k` alone moves
+/// the coordinates: for angles and displacements the partial derivatives, for joints with quaternions and planar joints
+/// those with respect to a small displacement in body axes. Joint forces add to `ṗ`: `∂ṗ/∂τ = 1`, `∂v/∂τ = 0`.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not give the derivatives of its rates",
     label = "the trait `Differentiable` is not implemented",
@@ -247,7 +248,7 @@ pub trait Differentiable: System {
 
     /// A zero matrix.
     fn square(&self) -> Self::Square;
-    /// Whether the rates change with time at a fixed state. Rosenbrock methods then ask for them twice more in a step.
+    /// Whether the rates change with time at a fixed state. Rosenbrock methods then evaluate them twice more in each step.
     fn depends_on_time(&self) -> bool {
         false
     }
@@ -289,7 +290,7 @@ impl<V, M> StateDerivatives<V, M> {
         [[&self.dv_dq, &self.dv_dp], [&self.dpd_dq, &self.dpd_dp]]
     }
 
-    /// The four blocks, to be changed.
+    /// The four blocks, for changing them.
     pub fn blocks_mut(&mut self) -> [[&mut M; 2]; 2] {
         [[&mut self.dv_dq, &mut self.dv_dp], [&mut self.dpd_dq, &mut self.dpd_dp]]
     }
@@ -300,8 +301,8 @@ impl<V, M> StateDerivatives<V, M> {
 pub struct Row {
     /// Index of the loop or coupling it belongs to, in the order of the description.
     pub constraint: usize,
-    /// Whether it is the derivative of a condition on positions, which can be closed; others (a knife edge) bind velocities
-    /// alone, and have no residual.
+    /// Whether the row is the derivative of a condition on positions, which has a residual. Other rows (a knife edge)
+    /// constrain velocities only.
     pub holonomic: bool,
     /// Its first entry among all entries of `Φ`.
     pub first: usize,
@@ -311,12 +312,13 @@ pub struct Row {
 
 /// A [`System`] with constraints between its joints: closed loops, couplings, rolling.
 ///
-/// Its momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). Every `σ` belongs to the same motion, so that a one-step method
-/// may begin each step with `σ = 0` ([`Constrained::project_momenta`]), and rates may leave out what changes `σ` alone: it is the
-/// integral of `λ`, but for joints that close a loop to the ground.
-/// Constraints hold in the velocities of every evaluation, to round-off; redundant rows are recognised and left out. `Φ`
-/// is `rows × nv`, one column for each velocity, and the force of the constraints on the joints is `−Φᵀλ`. It is given by the
-/// entries that can be other than zero, row by row.
+/// The momenta are the augmented momenta `p⁺ = M v + Φᵀσ` (5.7). The motion does not depend on `σ`. A one-step method
+/// may therefore start each step with `σ = 0` ([`Constrained::project_momenta`]), and the rates may leave out terms
+/// that change `σ` alone: `σ` is the integral of `λ`, except for joints that close a loop to the ground.
+///
+/// The velocities of every evaluation satisfy the constraints to round-off; redundant rows are recognised and left out.
+/// `Φ` is `rows × nv`, one column for each velocity, and the force of the constraints on the joints is `−Φᵀλ`. It is
+/// given by the entries that can be other than zero, row by row.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not give its constraints",
     label = "the trait `Constrained` is not implemented",
@@ -338,8 +340,8 @@ pub trait Constrained: System {
     fn entry_columns(&self) -> &[usize];
     /// Residuals `φ(q)` of the positions (m, rad; zero for rows that are not holonomic) and the entries of `Φ(q)`.
     fn constraint_residuals(&mut self, q: &Self::Coordinates, residual: &mut Self::Rows, jacobian: &mut Self::Entries);
-    /// Velocities `v` and multipliers `σ` of a state, and its momenta freed of them: `p := p⁺ − Φᵀσ = M v`, which is the
-    /// mass-orthogonal projection onto `Φ v = b`.
+    /// Projects the momenta of a state: computes its velocities `v` and multipliers `σ`, and sets `p := p⁺ − Φᵀσ = M
+    /// v`. This is the projection onto `Φ v = b` that is orthogonal in the metric of the mass matrix.
     fn project_momenta(
         &mut self,
         t: Self::Scalar,
@@ -348,9 +350,9 @@ pub trait Constrained: System {
         v: &mut Self::Momenta,
         sigma: &mut Self::Rows,
     );
-    /// One step of Newton's method onto the closed positions, least in the metric of the mass matrix: residuals `φ(q)`,
-    /// displacement `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ` (`nv` numbers, body axes where velocities have them), and the pivots of
-    /// `Φ M⁻¹Φᵀ`, zero for rows that were left out as redundant.
+    /// One step of Newton's method towards closed positions, with the displacement that is least in the metric of the
+    /// mass matrix: residuals `φ(q)`, displacement `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ` (`nv` numbers, body axes where velocities
+    /// have them), and the pivots of `Φ M⁻¹Φᵀ`, zero for rows that were left out as redundant.
     fn position_correction(
         &mut self,
         q: &Self::Coordinates,

@@ -32,14 +32,16 @@ pub struct Switch {
 ///
 /// `ṗ_ind = ṗ⁺_ind − Φ_indᵀ y`, `Φ_dᵀ y = ṗ⁺_dep`, `p_dep = 0`.
 ///
-/// State and sizes are those of the constrained system, so that every method runs it; of the dependent coordinates the state
-/// is no more than where Newton's method starts from at each evaluation, and `ṗ_dep = 0`. A motion is never wrong for want of
-/// `p_dep = 0`: every constant `p_dep` is a gauge too.
+/// State and sizes are those of the constrained system, so that every method runs it; of the dependent coordinates the
+/// state is no more than where Newton's method starts from at each evaluation, and `ṗ_dep = 0`. A motion is never wrong
+/// for want of `p_dep = 0`: every constant `p_dep` is a gauge too.
 ///
-/// Dependent velocities are single freedoms, chosen for each group of coupled rows by complete pivoting, with as many rows as
-/// are independent; redundant ones are left out. [`Repartition`] changes the choice between steps where it has become poor.
+/// Dependent velocities are single freedoms, chosen for each group of coupled rows by complete pivoting, with as many
+/// rows as are independent; redundant ones are left out. [`Repartition`] changes the choice between steps where it has
+/// become poor.
 ///
-/// Where the dependents cannot be found, rates are not numbers, which every method reports; [`CoordinatePartition::trouble`] says why.
+/// Where the dependents cannot be found, rates are not numbers, which every method reports;
+/// [`CoordinatePartition::trouble`] says why.
 #[derive(Clone, Debug)]
 pub struct CoordinatePartition<Y: Constrained> {
     /// The system itself; inputs may be set between calls.
@@ -108,7 +110,8 @@ where
     /// coordinates and momenta as [`CoordinatePartition::choose`].
     ///
     /// # Errors
-    /// As [`CoordinatePartition::new`], and [`ConstraintError::RankLoss`] where the other velocities do not determine these.
+    /// As [`CoordinatePartition::new`], and [`ConstraintError::RankLoss`] where the other velocities do not determine
+    /// these.
     pub fn choose_among(
         &mut self,
         dependents: &[usize],
@@ -230,8 +233,8 @@ where
         }
     }
 
-    /// Exchanges dependents for independents that move more than `ratio` times as fast, and changes momenta that are given to the
-    /// new gauge `p_dep = 0`. Whether any were.
+    /// Exchanges dependents for independents that move more than `ratio` times as fast, and changes momenta that are
+    /// given to the new gauge `p_dep = 0`. Whether any were.
     ///
     /// # Errors
     /// As [`CoordinatePartition::close`]; the dependents are chosen anew before.
@@ -350,13 +353,13 @@ where
     }
 }
 
-/// The [`PostStep`] of a [`CoordinatePartition`]: closes the dependents at the end of every step, and changes the partition before
-/// the next one where it has become poor.
+/// The [`PostStep`] of a [`CoordinatePartition`]: closes the dependents at the end of every step, and changes the
+/// partition before the next one where it has become poor.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Repartition {
-    /// Whether each step begins with `σ = 0` rather than `p_dep = 0`: `p_dep` is then what it is in `M v`, and stays so during
-    /// the step. Costs one solve a step more; where the mechanism is nearly singular the gauge `p_dep = 0` has multipliers that
-    /// grow beyond all bounds. Not for methods that remember rates of the past, which go on in the gauge they are in.
+    /// Whether each step starts with `σ = 0` instead of `p_dep = 0`: `p_dep` is then that of `M v`, and constant during the
+    /// step. This costs one more solve in each step. Where the mechanism is nearly singular, the multipliers of the gauge
+    /// `p_dep = 0` grow without bound. Not for methods that use rates of past steps, whose gauge must not change.
     pub project_momenta: bool,
 }
 

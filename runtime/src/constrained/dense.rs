@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 
 use crate::system::Real;
 
-/// Rows that stand out of the others by less than this part of the largest count as dependent on them: the square root of the
-/// part of a pivot of `Φ M⁻¹ Φᵀ` that kernels leave a row out at.
+/// Rows that stand out of the others by less than this part of the largest count as dependent on them: the square root
+/// of the part of a pivot of `Φ M⁻¹ Φᵀ` that kernels leave a row out at.
 pub(super) fn rank_tolerance<S: Real>() -> S {
     S::rank_tolerance().sqrt()
 }
@@ -15,7 +15,8 @@ fn dot<S: Real>(a: &[S], b: &[S]) -> S {
     a.iter().zip(b).fold(S::zero(), |sum, (a, b)| sum + *a * *b)
 }
 
-/// An orthonormal basis `Q` of the rows of a matrix `A = L Q`, by the modified Gram-Schmidt process with the largest row first.
+/// An orthonormal basis `Q` of the rows of a matrix `A = L Q`, by the modified Gram-Schmidt process with the largest
+/// row first.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Basis<S> {
     rank: usize,
@@ -64,7 +65,7 @@ impl<S: Real> Basis<S> {
             if k == 0 {
                 largest = norm;
             }
-            // Not a number is never larger.
+            // A value that is not a number never compares as larger.
             if size == S::zero() || norm <= rank_tolerance::<S>() * largest {
                 break;
             }
@@ -90,8 +91,8 @@ impl<S: Real> Basis<S> {
 
     /// The `x` of least norm among those with the least `|A x − b|`.
     pub fn solve(&mut self, b: &[S], m: usize, n: usize, x: &mut [S]) {
-        // L has full column rank: the normal equations are r × r. Where no row depends on others L is triangular but for the
-        // order of its rows, and they are met exactly; their condition only slows a Newton iteration down.
+        // L has full column rank: the normal equations are r × r. Where no row depends on others L is triangular but
+        // for the order of its rows, and they are met exactly; their condition only slows a Newton iteration down.
         let r = self.rank;
         for i in 0..r {
             self.z[i] = (0..m).fold(S::zero(), |sum, k| sum + self.l[k * m + i] * b[k]);
@@ -124,8 +125,8 @@ impl<S: Real> Basis<S> {
     }
 }
 
-/// Rows and columns of pivots into `found`, the largest of what is left each time, until that is below `tolerance` of the first.
-/// The matrix is destroyed.
+/// Rows and columns of pivots into `found`, the largest of what is left each time, until that is below `tolerance` of
+/// the first. The matrix is destroyed.
 pub(super) fn pivots<S: Real>(a: &mut [S], m: usize, n: usize, tolerance: S, found: &mut Vec<(usize, usize)>) {
     found.clear();
     let mut first = S::zero();
@@ -141,7 +142,7 @@ pub(super) fn pivots<S: Real>(a: &mut [S], m: usize, n: usize, tolerance: S, fou
         if found.is_empty() {
             first = size;
         }
-        // Not a number is never larger.
+        // A value that is not a number never compares as larger.
         if size == S::zero() || size <= tolerance * first {
             break;
         }
@@ -178,7 +179,7 @@ impl<S: Real> Lu<S> {
         }
     }
 
-    /// Factors what stands in `a`; false if a pivot is zero or not a number.
+    /// Factors the matrix in `a`. Returns false if a pivot is zero or not a number.
     pub fn factor(&mut self) -> bool {
         let n = self.n;
         for k in 0..n {

@@ -11,16 +11,18 @@
 //! | [`Rattle`] | projected | closed | within the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
 //! | [`RadauIndex2`] | projected | drift | within the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
 //!
-//! The first five are done by a [`Projection`] around any method ([`WithPostStep`]; by name `catalogue::explicit_with_post_step` and
-//! `implicit_with_post_step`). [`Projection::fixed_work`] is [`Stabilisation::Mass`] with a number of iterations that is fixed when it is
-//! compiled, for firmware. A `CoordinatePartition` is a [`System`](crate::System) of its own, and the last two are methods on a
-//! system with and without its constraints ([`OpenAndClosed`]).
+//! The first five are done by a [`Projection`] around any method ([`WithPostStep`]; by name
+//! `catalogue::explicit_with_post_step` and `implicit_with_post_step`). [`Projection::fixed_work`] is
+//! [`Stabilisation::Mass`] with a number of iterations that is fixed when it is compiled, for firmware. A
+//! `CoordinatePartition` is a [`System`](crate::System) of its own, and the last two are methods on a system with and
+//! without its constraints ([`OpenAndClosed`]).
 //!
-//! Methods that remember rates of past steps keep their multipliers `σ`, as their history requires. [`Stabilisation::Mass`] is the
-//! choice where nothing speaks for another: it costs little, and of a mechanism that passes a singular position it loses least.
-//! Fixed steps pass such a position; a tight error control sees the rates' round-off there and may not get by.
+//! Methods that remember rates of past steps keep their multipliers `σ`, as their history requires.
+//! [`Stabilisation::Mass`] is the general choice: it costs little, and it loses the least energy when a mechanism
+//! passes a singular position. Fixed steps pass such a position; with tight tolerances, the error estimate contains the
+//! round-off of the rates there, and the run may stop.
 //!
-//! Functions `close` and `complete` find states to begin with.
+//! The functions `close` and `complete` compute consistent initial states.
 
 #[cfg(feature = "alloc")]
 mod basic;

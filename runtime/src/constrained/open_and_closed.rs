@@ -2,13 +2,13 @@
 
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 
-/// A mechanism twice: `open`, without its constraints, and `closed`, with them. Both have the same state layout. Inputs are to be
-/// set in both. As a [`System`] it is the closed one.
+/// A mechanism twice: `open`, without its constraints, and `closed`, with them. Both have the same state layout. Inputs
+/// are to be set in both. As a [`System`] it is the closed one.
 #[derive(Clone, Debug)]
 pub struct OpenAndClosed<O, C> {
-    /// Without constraints.
+    /// The mechanism without constraints.
     pub open: O,
-    /// With them.
+    /// The mechanism with constraints.
     pub closed: C,
 }
 

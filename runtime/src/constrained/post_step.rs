@@ -9,9 +9,9 @@ pub trait PostStep<Y: System> {
     /// Whether [`PostStep::restart`] does anything.
     const RESTARTS: bool = false;
 
-    /// Changes the state `(q, p)` at time `t` (s), at the end of a step that is about to be accepted or within it: slightly, or along
-    /// gauge directions, which change nothing in the motion. With `remembers` the method uses rates of past steps, and momenta must
-    /// not jump.
+    /// Changes the state `(q, p)` at time `t` (s), at the end of a step that is about to be accepted or within it:
+    /// slightly, or along gauge directions, which change nothing in the motion. With `remembers` the method uses rates
+    /// of past steps, and momenta must not jump.
     ///
     /// # Errors
     /// [`ConstraintError`]; the step fails then.
@@ -24,8 +24,8 @@ pub trait PostStep<Y: System> {
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
 
-    /// May change the system and the state from which the next step starts. Returns whether it did: the method then forgets past
-    /// steps.
+    /// May change the system and the state from which the next step starts. Returns whether it did: the method then
+    /// forgets past steps.
     ///
     /// # Errors
     /// [`ConstraintError`].
@@ -42,9 +42,9 @@ pub trait PostStep<Y: System> {
 
 /// A method `M` with a [`PostStep`] `B` at the end of every step.
 ///
-/// The end of a step is changed before it is accepted, so a [`Solver`](crate::integrate::Solver) never shows another one, and
-/// so is dense output. A rate at the end that the method found for its error estimate does not hold any longer: pairs with a first
-/// stage that is the last one's make one evaluation more.
+/// The end of a step is changed before the step is accepted. A [`Solver`](crate::integrate::Solver) and its dense
+/// output therefore only show the changed state. A rate at the end that the method has evaluated for its error estimate
+/// is no longer valid: pairs whose last stage is the first stage of the next step make one evaluation more.
 #[derive(Clone, Debug)]
 pub struct WithPostStep<Y: System, M, B> {
     /// The method.
@@ -84,7 +84,8 @@ where
         &self.method
     }
 
-    /// Changes a displacement that ends at time `t` as the post_step wants it: `other`, or that of the last attempt.
+    /// Changes a displacement that ends at time `t` by the work at the end of the step: `other`, or that of the last
+    /// attempt.
     fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
         let WithPostStep { method, post_step, delta, old, new: (q, p), .. } = self;
         let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
@@ -96,7 +97,7 @@ where
         Ok(())
     }
 
-    /// The method takes the displacement as the post_step left it.
+    /// The method takes the displacement as the work at the end of the step left it.
     fn hand_over(&mut self) {
         let delta = self.method.parts().1;
         if delta.parts() != self.delta.parts() {
@@ -106,7 +107,7 @@ where
         self.end_known = false;
     }
 
-    /// What the post_step does before the next step.
+    /// Work before the next step.
     fn restart(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         if B::RESTARTS {
             let (q, p) = (&mut self.new.0, &mut self.new.1);
@@ -156,7 +157,7 @@ where
         let delta = self.method.parts().1;
         self.delta.copy_from(delta);
         self.end_known = false;
-        // What will be rejected anyway is left alone.
+        // A step that will be rejected is not changed.
         if error <= 1.0 && delta.not_finite().is_none() {
             let result = self.close(system, t + h, None);
             result.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
@@ -196,10 +197,10 @@ where
         self.restart(system, t, h)
     }
 
-    /// That of the method, changed by the post_step; where it cannot be, that of the method.
+    /// The method's interpolation, changed by the work; where this fails, the method's interpolation.
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.method.interpolate(system, t, h, theta, out);
-        // A displacement is changed at last, when nothing can fail any more.
+        // The displacement is changed last, when nothing can fail any more.
         let _ = self.close(system, t + theta * h, Some(out));
     }
 

@@ -1,4 +1,4 @@
-//! Projection of states onto the constraints where steps end.
+//! Projection of states onto the constraints at the ends of steps.
 
 #[cfg(feature = "alloc")]
 use super::basic::Basic;
@@ -15,7 +15,7 @@ use crate::Scalar;
 pub enum Stabilisation {
     /// Nothing is done: multipliers `σ` accumulate in the momenta, positions drift.
     None,
-    /// Momenta are freed of `σ` ([`Constrained::project_momenta`]); positions drift with the method's error.
+    /// Momenta are projected ([`Constrained::project_momenta`]); positions drift by the method's error.
     Momenta,
     /// As `Momenta`; then positions are corrected by the displacement that is least in the metric of the mass matrix
     /// ([`Constrained::position_correction`]), and momenta stay.
@@ -29,12 +29,12 @@ pub enum Stabilisation {
     Partition,
 }
 
-/// When positions count as closed, and how many iterations that may take.
+/// The residual at which positions count as closed, and the number of iterations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
     /// Largest number of iterations at the end of a step.
     pub iterations: u32,
-    /// Residual, m and rad, below which positions are left alone.
+    /// Residual, m and rad, below which positions are not corrected.
     pub tolerance: f64,
 }
 
@@ -44,22 +44,22 @@ impl Default for Effort {
     }
 }
 
-/// Projects the state onto the constraints where a step ends: the [`PostStep`] of any method. Momenta are freed of the
-/// multipliers first; then positions are moved and momenta stay, which disturbs the energy least.
+/// Projects the state onto the constraints where a step ends: the [`PostStep`] of any method. Momenta are
+/// projected first. Then positions are corrected with the momenta unchanged, which changes the energy least.
 ///
-/// Methods that remember rates of past steps keep their multipliers `σ`: they are taken off the momenta, and put back where the
-/// positions are then.
+/// Methods that remember rates of past steps keep their multipliers `σ`: they are removed from the momenta, and added
+/// again at the corrected positions.
 ///
-/// The policy `P` says how much work is done: [`ToTolerance`] iterates until the residuals are small, [`FixedWork`] always does
-/// the same, for a processor that counts its cycles. [`Stabilisation::Momenta`], [`Stabilisation::Mass`] and [`FixedWork`]
-/// allocate nothing.
+/// The policy `P` says how much work is done: [`ToTolerance`] iterates until the residuals are small, [`FixedWork`]
+/// always does the same, for processors with a fixed time budget. [`Stabilisation::Momenta`], [`Stabilisation::Mass`]
+/// and [`FixedWork`] allocate nothing.
 #[derive(Clone, Debug)]
 pub struct Projection<Y: Constrained, P = ToTolerance<Y>> {
     room: Room<Y>,
     policy: P,
 }
 
-/// Room for one projection.
+/// Memory for one projection.
 #[derive(Clone, Debug)]
 pub struct Room<Y: Constrained> {
     /// Velocities; displacement of an iteration.
@@ -83,12 +83,12 @@ impl<Y: Constrained> Room<Y> {
     }
 }
 
-/// How much work a [`Projection`] does.
+/// The work of a [`Projection`].
 pub trait Policy<Y: Constrained> {
-    /// Whether momenta are freed of their multipliers. `remembers` as in [`PostStep::close`].
+    /// Whether momenta are projected. `remembers` as in [`PostStep::close`].
     fn frees_momenta(&self, remembers: bool) -> bool;
 
-    /// Moves positions back.
+    /// Corrects positions.
     ///
     /// # Errors
     /// [`ConstraintError`].
@@ -100,8 +100,9 @@ pub trait Policy<Y: Constrained> {
     ) -> Result<(), ConstraintError>;
 }
 
-/// Exactly `N` iterations with [`Stabilisation::Mass`], whatever the residuals are: nothing is compared with a tolerance, and
-/// numbers stay in the precision of the system. One projection of momenta and one solve for each iteration.
+/// Exactly `N` iterations with [`Stabilisation::Mass`], whatever the residuals are: nothing is compared with a
+/// tolerance, and numbers stay in the precision of the system. One projection of momenta and one solve for each
+/// iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedWork<const N: usize>;
 
@@ -137,7 +138,7 @@ pub struct ToTolerance<Y: Constrained> {
     effort: Effort,
     /// The largest pivot of every row so far.
     most: Y::Rows,
-    /// Largest residual before the last end of a step was corrected.
+    /// Largest residual before the last correction.
     found: Y::Scalar,
     rank: Option<usize>,
     changes: u32,
@@ -150,7 +151,7 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    /// Room for one system; iterates until the residuals are small.
+    /// A projection for one system that iterates until the residuals are small.
     pub fn new(system: &Y, stabilisation: Stabilisation, effort: Effort) -> Self {
         let policy = ToTolerance {
             stabilisation,
@@ -168,13 +169,13 @@ where
         Projection { room: Room::new(system), policy }
     }
 
-    /// Room for one system; exactly `N` iterations at the end of every step.
+    /// A projection for one system with exactly `N` iterations at the end of every step.
     pub fn fixed_work<const N: usize>(system: &Y) -> Projection<Y, FixedWork<N>> {
         Projection { room: Room::new(system), policy: FixedWork }
     }
 
-    /// The largest residual of the last state that was corrected, at the end of a step or inside of it, before anything was
-    /// done, m or rad.
+    /// The largest residual, m or rad, of the last state that was corrected, at the end of a step or inside it, before the
+    /// correction.
     pub fn drift(&self) -> Y::Scalar {
         self.policy.found
     }
@@ -202,7 +203,8 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent rows.
+    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent
+    /// rows.
     fn correct(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates) -> usize {
         #[cfg(feature = "alloc")]
         if let Some(basic) = &mut self.basic {
@@ -217,9 +219,10 @@ where
         room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
     }
 
-    /// Whether rows depend on one another much more than they used to. Positions are left alone there: several ways lead on from a
-    /// singular position, and at a distance `s` from it a correction by `φ/s` turns the way by `φ/s²`, which takes energy from
-    /// momenta that stay. Pivots go with `s²`. What is left open is put back when the position has been passed.
+    /// Whether the rows are much closer to linear dependence than before. Positions are not corrected then. Several
+    /// motions continue from a singular position; at a distance `s` from it, a correction by `φ/s` rotates the
+    /// direction of motion by `φ/s²`, which changes the energy, because the momenta stay. Pivots are proportional to
+    /// `s²`. The residual is corrected after the position has been passed.
     fn near_fork(&mut self, pivots: &Y::Rows) -> bool {
         let part = Y::Scalar::constant(libm::cbrt(Y::Scalar::epsilon()));
         let mut near = false;
@@ -277,7 +280,7 @@ where
             }
             Chart::displace(system, &mut room.v, q);
         }
-        // All iterations are used up: round-off is left, or the step went too far.
+        // All iterations are used. The residual is round-off, or the step was too large.
         system.constraint_residuals(q, &mut room.residual, &mut room.entries);
         let (at, size) = worst(room.residual.as_ref());
         let residual = size.to_f64();

@@ -1,4 +1,4 @@
-//! Radau IIA on the equations with multipliers.
+//! Radau IIA on the equations of index 2.
 
 use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
@@ -8,16 +8,17 @@ use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, St
 use crate::system::Real;
 use crate::Scalar;
 
-/// Iterations of a step.
+/// Largest number of iterations in a step.
 const ITERATIONS: u32 = 100;
 
-/// The three-stage Radau IIA method on the equations of index 2, with fixed steps: `q̇`, `ṗ − Φᵀλ` of the open system with
-/// `Φ v = b` at every stage, and so at the end of the step, which is the last one. Order 5 in the state, 3 in the multipliers (E.
-/// Hairer, C. Lubich, M. Roche, *The Numerical Solution of Differential-Algebraic Systems by Runge-Kutta Methods*, 1989, table
-/// 2.3). Positions drift with the method's error; [`Projection`](super::Projection) brings them back.
+/// The three-stage Radau IIA method on the equations of index 2, with fixed steps: `q̇`, `ṗ − Φᵀλ` of the open system
+/// with `Φ v = b` at every stage, and so at the end of the step, which is the last one. Order 5 in the state, 3 in the
+/// multipliers (E. Hairer, C. Lubich, M. Roche, *The Numerical Solution of Differential-Algebraic Systems by
+/// Runge-Kutta Methods*, 1989, table 2.3). Positions drift with the method's error; [`Projection`](super::Projection)
+/// brings them back.
 ///
-/// Stages are solved for by fixed-point iteration, multipliers by the projection of each stage's momenta: 3 evaluations, 3 of `Φ` and 3
-/// projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
+/// Stages are solved for by fixed-point iteration, multipliers by the projection of each stage's momenta: 3
+/// evaluations, 3 of `Φ` and 3 projections an iteration. It is not for stiff systems. Momenta are `M v` at both ends.
 pub type RadauIndex2<Y> = Integrator<Y, RadauIndex2Scheme<Y>>;
 
 /// The scheme of [`RadauIndex2`].
@@ -47,7 +48,7 @@ where
     size: (f64, f64),
 }
 
-/// By cofactors: the matrix of the method is far from singular.
+/// The inverse by cofactors; the matrix of the method is far from singular.
 fn inverse<S: Scalar>(a: &[[S; 3]; 3]) -> [[S; 3]; 3] {
     let minor = |i: usize, j: usize| {
         let (r, s, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
@@ -92,7 +93,8 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// This method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+    /// This method with exactly `n` iterations per step, for real time. The remaining error of the iteration adds to
+    /// that of the method.
     #[must_use]
     pub fn with_iterations(self, n: u32) -> Self {
         self.map(|scheme| RadauIndex2Scheme { fixed: Some(n), ..scheme })
@@ -128,7 +130,7 @@ where
         step.statistics.evaluations += 1;
     }
 
-    /// Stages from rates; the largest change relative to the state.
+    /// Computes the stages from the rates. Returns the largest change relative to the state.
     fn insert(&mut self, h: Y::Scalar) -> f64 {
         let mut change = (0.0_f64, 0.0_f64);
         for (z, row) in self.z.iter_mut().zip(&self.a) {
@@ -146,7 +148,7 @@ where
         part(change.0, self.size.0).max(part(change.1, self.size.1))
     }
 
-    /// One iteration; how much it changed.
+    /// Makes one iteration. Returns the size of its change.
     fn iterate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> f64 {
         for i in 0..3 {
             self.stage(step, system, t, h, i);
@@ -186,7 +188,7 @@ where
             if !change.is_finite() || change > 1e8 {
                 return Err(ConstraintError::NoConvergence { iterations: iteration, change });
             }
-            // Round-off, or as near to it as it comes.
+            // The change is at the level of round-off or no longer decreases.
             if change <= 4.0 * epsilon || (iteration > 3 && change >= last && change <= 1e3 * epsilon) {
                 return Ok(());
             }
@@ -227,7 +229,7 @@ where
         _scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
         let [_, _, end] = &self.lambda;
-        // Multipliers go on from the end of the last step.
+        // The iteration starts from the multipliers at the end of the last step.
         let usable = worst(end.as_ref()).1.is_finite();
         let [first, second, end] = &mut self.lambda;
         if !usable {

@@ -1,4 +1,4 @@
-//! RATTLE for any Hamiltonian.
+//! RATTLE for Hamiltonians that are not separable.
 
 use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
@@ -7,19 +7,21 @@ use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, St
 use crate::system::Real;
 use crate::Scalar;
 
-/// Iterations of a step.
+/// Largest number of iterations in a step.
 const ITERATIONS: u32 = 100;
 
-/// RATTLE (H. C. Andersen, 1983) for Hamiltonians that are not separable (E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical
-/// Integration*, VII.1.4, (1.26)), order 2: positions and velocities meet the constraints at the end of each step, and where
-/// displacements are plain sums the method is symplectic and symmetric, so that the energy does not drift.
+/// RATTLE (H. C. Andersen, 1983) for Hamiltonians that are not separable (E. Hairer, C. Lubich, G. Wanner, *Geometric
+/// Numerical Integration*, VII.1.4, (1.26)), order 2: positions and velocities satisfy the constraints at the end of
+/// each step. Without joints with quaternions the method is symplectic and symmetric, so that the energy does not
+/// drift.
 ///
 /// `p½ = p₀ + h/2 (ṗ(q₀, p½) − Φ₀ᵀλ)`, `q₁ = q₀ + h/2 (q̇(q₀, p½) + q̇(q₁, p½))` with `φ(q₁) = 0`;
 /// `p₁ = p½ + h/2 (ṗ(q₁, p½) − Φ₁ᵀμ)` with `Φ₁ v₁ = 0`.
 ///
-/// `q̇`, `ṗ` are those of the open system, and all of it is solved by fixed-point iteration: 3 evaluations, a correction of positions and two
-/// sweeps for its multipliers each time. Momenta are `M v` at both ends. Constraints and open system must not depend on time, and
-/// be holonomic for the energy's sake.
+/// `q̇`, `ṗ` are those of the open system, and all of it is solved by fixed-point iteration: 3 evaluations, a
+/// correction of positions and two sweeps for its multipliers each time. Momenta are `M v` at both ends. The
+/// constraints and the open system must not depend on time, and the energy is kept only if all constraints are
+/// holonomic.
 pub type Rattle<Y> = Integrator<Y, RattleScheme<Y>>;
 
 /// The scheme of [`Rattle`].
@@ -77,7 +79,8 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
-    /// This method with exactly `n` iterations a step, for real time: what is not converged counts as an error of the method.
+    /// This method with exactly `n` iterations per step, for real time. The remaining error of the iteration adds to
+    /// that of the method.
     #[must_use]
     pub fn with_iterations(self, n: u32) -> Self {
         self.map(|scheme| RattleScheme { fixed: Some(n), ..scheme })
@@ -105,7 +108,8 @@ where
         step.statistics.evaluations += 1;
     }
 
-    /// One iteration; how much it changed the end's positions, or they are off, relative to the largest.
+    /// Makes one iteration. Returns the larger of the change and the residual of the end's positions, relative to the
+    /// largest position.
     fn iterate(
         &mut self,
         step: &mut Attempt<Y>,
@@ -124,7 +128,7 @@ where
         for ((p, rate), force) in self.half.p.as_mut().iter_mut().zip(self.first.p.as_ref()).zip(forces) {
             *p = half * (*rate - *force);
         }
-        // Once more at the new momenta: multipliers that worked on old ones would swing.
+        // The second evaluation uses the new momenta; with multipliers for the old ones the iteration would oscillate.
         self.open(step, system, t, false);
         step.delta.p.as_mut().copy_from_slice(self.half.p.as_ref());
         self.open(step, system, t + h, true);
@@ -140,12 +144,12 @@ where
         let change = worst(self.other.as_ref()).1.to_f64().abs();
         let open = self.correct(step, system, t, h)?;
         step.statistics.iterations += 1;
-        // Not a number is no small change.
+        // A change that is not a number must not count as small.
         let change = if change.is_finite() { change.max(open) } else { f64::INFINITY };
         Ok(if change == 0.0 { 0.0 } else { change / size })
     }
 
-    /// Multipliers that bring the end nearer to where it is closed, and how far off it is.
+    /// Improves the multipliers so that the residual of the end decreases. Returns the residual.
     fn correct(
         &mut self,
         step: &mut Attempt<Y>,
@@ -188,9 +192,9 @@ where
             if !change.is_finite() || (iteration > 4 && change > 1e3) {
                 return Err(ConstraintError::NoConvergence { iterations: iteration, change });
             }
-            // Round-off, or as near to it as it comes.
+            // The change is at the level of round-off or no longer decreases.
             if change <= 2.0 * epsilon || (iteration > 3 && change >= last && change <= 256.0 * epsilon) {
-                // Momenta lag by one.
+                // The momenta are one iteration behind.
                 return self.iterate(step, system, t, h).map(|_| ());
             }
             last = change;
@@ -225,7 +229,7 @@ where
         if !worst(self.lambda.as_ref()).1.is_finite() {
             self.lambda.as_mut().fill(Y::Scalar::zero());
         }
-        // From the multipliers of the last step, which change little, and from rest.
+        // The iteration starts from the multipliers of the last step, which change little, or from zero.
         self.half.clear();
         step.delta.clear();
         self.solve(step, system, t, h).map_err(wrong)?;

@@ -1,15 +1,17 @@
-//! Local coordinates about a state: what the methods integrate.
+//! Local coordinates about a state, which the methods integrate.
 //!
-//! A step is a displacement from the state at its start, with as many components as there are velocities. Coordinates of
-//! ordinary joints are moved by it as they stand. A rotation is moved by a vector `φ` in outer axes, `R = cay(φ) R₀`
-//! (Cayley map: quaternion `(φ/2, 1)` scaled to unit length), so it stays a rotation whatever the method does; and the
-//! momenta of its joint are taken in outer axes, those of a joint that also moves along about the point where the step began:
+//! A step is a displacement from the state at its start, with as many components as there are velocities. It is added
+//! to the coordinates of ordinary joints. A rotation is displaced by a vector `φ` in the axes of the parent ("outer
+//! axes"), `R = cay(φ) R₀` (Cayley map: quaternion `(φ/2, 1)` scaled to unit length), so that it stays a rotation with
+//! every method. The momenta of such a joint are taken in outer axes; if its origin moves too, about the point where
+//! the step started:
 //!
-//! `π = R p_lin`, `μ = R p_ang + x × π`, so that `π̇ = R (ṗ_lin + ω × p_lin)`, `μ̇ = R (ṗ_ang + ω × p_ang) + ẋ × π + x × π̇`.
+//! `π = R p_lin`, `μ = R p_ang + x × π`, so that `π̇ = R (ṗ_lin + ω × p_lin)`, `μ̇ = R (ṗ_ang + ω × p_ang) + ẋ × π + x
+//! × π̇`.
 //!
-//! The momenta of a body that nothing acts on are then constants, and any method keeps them to round-off. After Bogfjellmo
-//! and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map in place of
-//! the exponential: its inverse differential is a polynomial.
+//! The momenta of a body on which nothing acts are then constants, and every method keeps them to round-off. After
+//! Bogfjellmo and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map
+//! in place of the exponential: its inverse differential is a polynomial.
 
 use super::lie_joint::normalise;
 use super::StepError;
@@ -90,7 +92,8 @@ impl<Y: System> Point<Y> {
 /// where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
 fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
-    // Minus zero and a first term are that term, which the compiler knows; plus zero would be added.
+    // The sum starts at minus zero: minus zero plus a term is that term, and the compiler removes this addition. It
+    // could not remove an addition of plus zero.
     let nothing = -S::zero();
     let whole = out.len() - out.len() % 4;
     let mut chunks = out.chunks_exact_mut(4);
@@ -313,8 +316,8 @@ where
         Ok(())
     }
 
-    /// Moves coordinates by a displacement in the axes that velocities have, body axes of groups, which is turned into outer
-    /// axes on the way.
+    /// Moves coordinates by a displacement in the axes that velocities have, body axes of groups, which is transformed
+    /// into outer axes.
     pub fn displace(system: &Y, dx: &mut Y::Momenta, q: &mut Y::Coordinates) {
         let (q, x) = (q.as_mut(), dx.as_mut());
         for group in system.lie_joints() {
@@ -330,8 +333,8 @@ where
         }
     }
 
-    /// Turns forces on the joints, in the axes that momenta of a state have, into rates of the momenta of a displacement
-    /// `point` that leads to the coordinates `q`.
+    /// Transforms forces on the joints, in the axes that momenta of a state have, into rates of the momenta of a
+    /// displacement `point` that leads to the coordinates `q`.
     pub fn forces(system: &Y, q: &Y::Coordinates, point: &Point<Y>, forces: &mut Y::Momenta) {
         for group in system.lie_joints() {
             group.outward(q.as_ref(), group.shift(point.x.as_ref()), forces.as_mut());
@@ -374,7 +377,8 @@ where
         }
     }
 
-    /// Inverse of [`Chart::compose`]: takes `step` off the front of `point`, which becomes a displacement from where `step` leads.
+    /// Inverse of [`Chart::compose`]: takes `step` off the front of `point`, which becomes a displacement from where
+    /// `step` leads.
     pub fn relative(system: &Y, step: &Point<Y>, point: &mut Point<Y>) {
         let (x, p) = (point.x.as_mut(), point.p.as_mut());
         for (p, dp) in p.iter_mut().zip(step.p.as_ref()) {

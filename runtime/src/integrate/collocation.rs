@@ -1,16 +1,16 @@
 //! Collocation methods: Gauss-Legendre and Radau IIA.
 //!
-//! The unknowns are displacements `z_i` of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`. They are solved for as
-//! E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8 describe: simplified Newton iteration, or
-//! fixed-point iteration ([`Iteration`]), from the last step's polynomial, which is rewritten about the new state; or, without a last step,
-//! from the solution of the linearised equations. The iteration ends when its rate of contraction says that what is left is
-//! below a hundredth of the allowed error, or, in fixed steps, below round-off.
+//! The unknowns are displacements `z_i` of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`. They are solved for as E.
+//! Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8 describe: simplified Newton iteration,
+//! or fixed-point iteration ([`Iteration`]), from the last step's polynomial, which is rewritten about the new state;
+//! or, without a last step, from the solution of the linearised equations. The iteration ends when its rate of
+//! contraction says that what is left is below a hundredth of the allowed error, or, in fixed steps, below round-off.
 //!
-//! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point iteration is faster for
-//! generated code of mechanisms that are not.
+//! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point
+//! iteration is faster for generated code of mechanisms that are not.
 //!
-//! Gauss methods are symplectic and symmetric where displacements are plain sums. With groups they keep their order, but the
-//! coordinates of a step are those about its start, not its middle, so a step back does not lead back exactly.
+//! Gauss methods are symplectic and symmetric where displacements are plain sums. With joints on Lie groups they keep their
+//! order, but the chart of a step is that at its start and not at its middle, so that a step back does not return exactly.
 
 use super::chart::{Chart, Point};
 use super::integrator::{Attempt, FromSystem, Scheme};
@@ -22,7 +22,7 @@ use crate::constant::Constant;
 use crate::system::{Real, System};
 use crate::Scalar;
 
-/// Part of the allowed error that the iteration may leave.
+/// Fraction of the allowed error that may remain after the iteration.
 const PART: f64 = 0.01;
 /// Round-off, in epsilons of the state, down to which a fixed step is iterated, and at which a single change that is
 /// not smaller than the one before ends it.
@@ -31,7 +31,7 @@ const STUCK: f64 = 16.0;
 /// Derivatives are used for another step if the iteration contracted as well as this with them.
 const KEEP: f64 = 0.02;
 
-/// Where the derivatives in use are from.
+/// The state at which the derivatives in use were evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Derivatives {
     None,
@@ -65,12 +65,13 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     f: [Point<Y>; S],
     r: [Point<Y>; S],
     first: Point<Y>,
-    /// What counts as solved.
+    /// Changes below which the equations count as solved.
     weight: Point<Y>,
     derivatives: Derivatives,
     /// Step that the matrix is factored for; zero: none.
     factored: Y::Scalar,
-    /// Whether the last iteration contracted well enough to use its derivatives again, and what it leaves of its last change.
+    /// Whether the last iteration contracted well enough to use its derivatives again, and what it leaves of its last
+    /// change.
     keep: bool,
     eta: f64,
     /// Stages and start of the last step, from the present state; the size of that step, zero if there is none.
@@ -220,13 +221,13 @@ where
             let part = Y::Scalar::constant(PART);
             for (w, scale) in self.weight.parts_mut().into_iter().flatten().zip(scale.parts().into_iter().flatten()) {
                 let allowed = part * *scale;
-                // What is not controlled need not be solved either.
+                // A component without error control need not be solved accurately either.
                 *w = if allowed > *w || allowed == Y::Scalar::zero() { allowed } else { *w };
             }
         }
     }
 
-    /// Iterates until solved.
+    /// Iterates until the equations are solved.
     fn converge(
         &mut self,
         step: &mut Attempt<Y>,
@@ -236,7 +237,8 @@ where
         scale: Option<&Point<Y>>,
     ) -> Result<(), StepError> {
         self.weigh(step, system, scale);
-        // One good contraction says little about the next step's, and with fixed-point iteration about the next iteration's.
+        // One good contraction says little about the next step's, and with fixed-point iteration about the next
+        // iteration's.
         let least = if I::DERIVATIVES { 1e-2 } else { 0.1 };
         self.eta = libm::pow(self.eta, 0.8).max(least);
         let (mut last, mut grown, mut change) = (f64::INFINITY, 0, f64::NAN);
@@ -249,7 +251,8 @@ where
             change = libm::sqrt(sum / S as f64);
             if k > 1 {
                 let theta = change / last;
-                // Two at a time: what fixed-point iteration changes in coordinates it changes in momenta one iteration later.
+                // Two at a time: what fixed-point iteration changes in coordinates it changes in momenta one iteration
+                // later.
                 mean = if k == 2 { theta } else { libm::sqrt(theta * mean) };
                 self.keep = mean <= KEEP;
                 let slowest = theta.max(mean);

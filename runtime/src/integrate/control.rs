@@ -1,6 +1,7 @@
-//! How the steps of a run are chosen, and what bounds them.
+//! The choice of the steps of a run, and its limits.
 
-/// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero nothing is controlled.
+/// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero, the component is not
+/// controlled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Absolute part, in the unit of the component.
@@ -18,22 +19,22 @@ pub struct Tolerances {
     pub rotations: f64,
     /// Momenta. The size of a momentum counts as at least a thousandth of the largest one.
     pub momenta: Tolerance,
-    /// Which errors the step is chosen by.
+    /// The errors by which the step is chosen.
     pub control: Control,
 }
 
-/// Which errors the step is chosen by.
+/// The errors by which the step is chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
     /// The errors of coordinates and momenta.
     Full,
-    /// The errors of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway, and where
-    /// they have small fast parts this saves steps.
+    /// The errors of coordinates alone: table 7.3 of the thesis. Momenta follow from the coordinates' history anyway,
+    /// and where they have small fast parts this saves steps.
     Coordinates,
 }
 
 impl Tolerances {
-    /// One number for all: rad and m for coordinates and rotations, relative to the size for momenta.
+    /// One tolerance for all components: rad and m for coordinates and rotations, relative to the size for momenta.
     pub const fn new(tolerance: f64) -> Self {
         Tolerances {
             coordinates: Tolerance { absolute: tolerance, relative: 0.0 },
@@ -49,24 +50,24 @@ impl Tolerances {
     }
 }
 
-/// How the size of steps is found.
+/// The choice of the step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// Always this many seconds, but for the last one before the end.
+    /// A fixed step, s; the last step before the end may be shorter.
     Fixed(f64),
     /// Chosen by the error, which these tolerances limit.
     Adaptive(Tolerances),
 }
 
-/// Bounds of the work.
+/// Limits of the work.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Smallest step, s; zero: where the time would no longer change.
+    /// Smallest step, s; with zero, the smallest step that still changes the time.
     pub min_step: f64,
     /// Largest step, s.
     pub max_step: f64,
-    /// First step, s; zero: chosen from the rates.
+    /// First step, s; with zero, it is chosen from the rates.
     pub first_step: f64,
     /// Steps of one call, rejected ones included.
     pub steps: u64,

@@ -1,4 +1,4 @@
-//! Two half steps against one.
+//! Step doubling: two half steps compared with a full step.
 
 use super::chart::{Chart, Point};
 use super::integrator::{Attempt, Integrator, Scheme};
@@ -7,12 +7,13 @@ use super::StepError;
 use crate::system::{Real, System};
 use crate::Scalar;
 
-/// Error control for a one-step method that estimates no error: every step is made again as two halves. Of order `p`, the two
-/// results differ by `2ᵖ − 1` times the error of the better one, that of the halves, which is kept.
+/// Error control for a one-step method that estimates no error: every step is made a second time as two half steps. Of
+/// order `p`, the two results differ by `2ᵖ − 1` times the error of the better one, that of the halves, which is kept.
 ///
-/// The second half starts in its own chart; both results are compared in the chart of the start. A method of `s` evaluations
-/// needs `3 s − 1` a step, since one step and the first half share their first evaluation. E. Hairer, S. P. Nørsett,
-/// G. Wanner, *Solving Ordinary Differential Equations I*, 1993, II.4, eq. 4.4 to 4.6. Not for multistep methods.
+/// The second half starts in its own chart; both results are compared in the chart of the start. A method of `s`
+/// evaluations needs `3 s − 1` a step, since one step and the first half share their first evaluation. E. Hairer, S. P.
+/// Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, 1993, II.4, eq. 4.4 to 4.6. Not for multistep
+/// methods.
 pub type StepDoubling<Y, M> = Integrator<Y, Doubling<Y, M>>;
 
 /// The scheme of [`StepDoubling`] over a method `M`.
@@ -20,7 +21,7 @@ pub type StepDoubling<Y, M> = Integrator<Y, Doubling<Y, M>>;
 pub struct Doubling<Y: System, M> {
     method: M,
     extrapolate: bool,
-    /// The method stands at the start of the step, not amid it.
+    /// Whether the method is at the start of the step, and not in its middle.
     ready: bool,
     start: Point<Y>,
     whole: Point<Y>,
@@ -34,12 +35,13 @@ where
     Y::Scalar: Real,
     M: Stepper<Y>,
 {
-    /// Step doubling over a method of the same system. The result is that of two half steps.
+    /// Step doubling with a method of the same system. The result is that of the two half steps.
     pub fn over(system: &Y, method: M) -> Self {
         Self::from_scheme(system, Doubling::new(system, method, false), false)
     }
 
-    /// Step doubling with local extrapolation: the result is that of two half steps plus its estimated error, of one order more.
+    /// Step doubling with local extrapolation: the result is that of two half steps plus its estimated error, of one
+    /// order more.
     pub fn extrapolated(system: &Y, method: M) -> Self {
         Self::from_scheme(system, Doubling::new(system, method, true), false)
     }
@@ -73,7 +75,7 @@ where
         Ok(())
     }
 
-    /// Result of two half steps, from the start.
+    /// Result of the two half steps, as a displacement from the start.
     fn halves(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         let half = Y::Scalar::constant(0.5) * h;
         self.method.attempt(system, t, half, None)?;

@@ -22,16 +22,16 @@ pub enum Direction {
 pub struct Watch {
     /// In which direction it must reach zero.
     pub direction: Direction,
-    /// Whether the run ends there.
+    /// Whether the event ends the run.
     pub terminal: bool,
 }
 
 /// `N` functions of time and state whose zeros are events.
 ///
-/// They should be smooth: they are compared at the ends of each eighth of a step (seven points within it), so that a function
-/// that reaches zero and comes back between two of these is not seen. A value that is not a number counts as none at all. A
-/// rotation has two quaternions of opposite sign; along a run the sign does not jump, so components may be watched, but where
-/// a run starts anew it is the caller's: functions that are even in the quaternion do not depend on it.
+/// They should be smooth: they are compared at the ends of each eighth of a step (seven points within it), so that a
+/// function that reaches zero and returns between two of these is not noticed. A value that is not a number is ignored.
+/// A rotation has two quaternions of opposite sign; along a run the sign does not jump, so components may be watched,
+/// but where a run starts anew it is the caller's: functions that are even in the quaternion do not depend on it.
 pub trait Events<Y: System, const N: usize> {
     /// How each function is watched.
     fn watches(&self) -> [Watch; N];
@@ -58,13 +58,13 @@ pub enum Outcome<S> {
     },
 }
 
-/// Stretches of a step at whose ends the functions are compared.
+/// Number of intervals of a step at whose ends the functions are compared.
 const STRETCHES: u32 = 8;
 
-/// Most functions of a run: the solver remembers with a bit each which ended it.
+/// Largest number of functions of a run; the solver stores in one bit for each which of them ended it.
 const MOST: usize = 64;
 
-/// What is known of the functions.
+/// State of the functions during a run.
 struct Track<S, const N: usize> {
     watches: [Watch; N],
     /// Which side of zero each was on: −1, 1; 0 while it is not known.
@@ -192,8 +192,8 @@ where
         Ok(None)
     }
 
-    /// Ends the run at the root `theta` of function `k`, which is being looked at. Whatever else has happened by then is told
-    /// too: where two come at once, rounding must not hide one of them behind the new start.
+    /// Ends the run at the root `theta` of function `k`, which is being looked at. Whatever else has happened by then
+    /// is told too: where two come at once, rounding must not hide one of them behind the new start.
     fn stop<const N: usize>(
         &mut self,
         system: &mut Y,
@@ -217,9 +217,9 @@ where
         Ok(Outcome::Event { index: k, time: self.time() })
     }
 
-    /// Where function `k` reaches zero between its last value and `b`, where it has: in the last step, `θ`, not before the
-    /// root. By the ITP method of Oliveira and Takahashi (ACM TOMS 47, 2020): as fast as a secant, never slower than halving
-    /// by more than one evaluation.
+    /// Where function `k` reaches zero between its last value and `b`, where it has: in the last step, `θ`, not before
+    /// the root. By the ITP method of Oliveira and Takahashi (ACM TOMS 47, 2020): as fast as a secant, never slower
+    /// than halving by more than one evaluation.
     fn locate<const N: usize>(
         &mut self,
         system: &mut Y,

@@ -10,10 +10,10 @@ use crate::system::{Real, System};
 
 /// A method with `S` stages, and `X` more for dense output, by name.
 pub trait Method<const S: usize, const X: usize> {
-    /// Its coefficients.
+    /// Coefficients of the method.
     const TABLEAU: &'static Tableau<S>;
-    /// Those that are not zero, row by row. Made by the compiler: nothing of it lies in memory that is written, and where a
-    /// loop over few stages is unrolled, weights become operands.
+    /// Those that are not zero, row by row. They are computed at compile time, so that they are not in writable memory;
+    /// where a loop over few stages is unrolled, the weights become operands.
     const WEIGHTS: &'static Rows<S> = &Rows::new(Self::TABLEAU);
 }
 
@@ -129,7 +129,8 @@ where
     Y::Scalar: Real,
     T: Method<S, X>,
 {
-    /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq. 10.17).
+    /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq.
+    /// 10.17).
     fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
         for (norm_, weights) in norms.iter_mut().zip(&T::WEIGHTS.error).take(T::TABLEAU.error.len()) {

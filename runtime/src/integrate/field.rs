@@ -4,7 +4,7 @@ use super::chart::{Chart, Point};
 use super::StepError;
 use crate::system::{Real, System};
 
-/// The rates of a system about a state, and how often they were asked for.
+/// The rates of a system in the chart about a state, and the number of their evaluations.
 #[derive(Clone, Debug)]
 pub struct Field<Y: System> {
     pub(super) chart: Chart<Y>,
@@ -22,7 +22,7 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// Room for one system; `compensated` as in [`Chart::new`].
+    /// Makes it for one system; `compensated` as in [`Chart::new`].
     pub fn new(system: &Y, compensated: bool) -> Self {
         let (q, p) = (system.neutral(), system.zero_momenta());
         let chart = Chart::new(system, compensated);
@@ -39,8 +39,8 @@ where
         &self.chart
     }
 
-    /// Takes the state `(q, p)` at time `t` (s) as the one that displacements start from. If it is the one that [`Field::store`] gave, nothing is done: so
-    /// what was carried over from rounded sums lives on.
+    /// Takes the state `(q, p)` at time `t` (s) as the one that displacements start from. If it is the one that
+    /// [`Field::store`] gave, nothing is done: so what was carried over from rounded sums lives on.
     ///
     /// # Errors
     /// [`StepError::Quaternion`].
@@ -52,13 +52,13 @@ where
         Ok(())
     }
 
-    /// Whether a state is the one that [`Field::store`] gave last, and nothing has been evaluated since: where methods with
-    /// a history go on.
+    /// Whether a state is the one that [`Field::store`] gave last, and nothing has been evaluated since. Methods with
+    /// a history then continue.
     pub fn holds(&self, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
         self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref()
     }
 
-    /// Gives the state that displacements start from.
+    /// Copies the state from which displacements start.
     pub fn store(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         self.chart.base(system, &mut self.q, &mut self.p);
         q.as_mut().copy_from_slice(self.q.as_ref());
@@ -66,7 +66,7 @@ where
         self.stored = true;
     }
 
-    /// Moves the state that displacements start from.
+    /// Moves the state from which displacements start.
     ///
     /// # Errors
     /// [`StepError::NotFinite`]; nothing has moved then.
@@ -84,8 +84,8 @@ where
         self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);
     }
 
-    /// The coordinates' part of [`Field::rates`] where what stands at the place of momenta are velocities: `q̇ = N(q) v`, which
-    /// takes no evaluation of the system. Momenta of `out` are without meaning.
+    /// The coordinates' part of [`Field::rates`] in acceleration form: `q̇ = N(q) v`, which needs no evaluation of the
+    /// system. The momenta of `out` are meaningless.
     pub fn velocities(&mut self, system: &Y, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
         system.coordinate_rates(&self.q, &self.p, &mut self.qd);

@@ -1,4 +1,5 @@
-//! The shell of all methods: the state, the rates at both ends of a step, the order of events. A [`Scheme`] adds its stages.
+//! The parts that all methods have in common: the state, the rates at both ends of a step, and the order of calls. A
+//! [`Scheme`] adds the stages of a method.
 
 use super::chart::{Chart, Point};
 use super::field::Field;
@@ -9,7 +10,7 @@ use crate::system::{Real, System};
 /// What every method knows of the step that it is making.
 #[derive(Clone, Debug)]
 pub struct Attempt<Y: System> {
-    /// The equation; displacements start from the state in its chart.
+    /// The rates of the system; displacements start from the state in its chart.
     pub field: Field<Y>,
     /// Displacement from the start of the step to its end.
     pub delta: Point<Y>,
@@ -19,7 +20,7 @@ pub struct Attempt<Y: System> {
     pub start_known: bool,
     /// Whether [`Attempt::end`] holds the rate at the end of this step.
     pub end_known: bool,
-    /// Work done. Evaluations are those that the field does not count itself.
+    /// Work done so far. Evaluations are those that the field does not count itself.
     pub statistics: Statistics,
 }
 
@@ -46,14 +47,16 @@ where
         &self.end
     }
 
-    /// Turns the rate at the end of an accepted step into the rate at the start of the next one: `start`. Overwrites `work`.
+    /// Turns the rate at the end of an accepted step into the rate at the start of the next one: `start`. Overwrites
+    /// `work`.
     pub fn hand_on(&self, system: &Y, start: &mut Point<Y>, work: &mut Point<Y>) {
         start.copy_from(&self.end);
         work.copy_from(&self.delta);
         Chart::follow(system, &self.delta, work, start);
     }
 
-    /// The error of an implicit step whose matrix has no pivot in a column: the rate at the start tells whose fault it is.
+    /// The error of an implicit step whose matrix has no pivot in a column: the rate at the start shows whether the
+    /// rates or the matrix are the cause.
     pub(super) fn singular(rate: &Point<Y>, t: Y::Scalar, h: Y::Scalar, column: usize) -> StepError {
         match rate.not_finite() {
             Some(index) => StepError::NotFinite { time: t.to_f64(), index },
@@ -62,13 +65,14 @@ where
     }
 }
 
-/// What a method adds to the [`Integrator`]: how the displacement of a step is found, and its error.
+/// The part of a method that differs from other methods: how it computes the displacement of a step and its error.
 pub trait Scheme<Y>
 where
     Y: System,
     Y::Scalar: Real,
 {
-    /// Whether rates of past steps are used. The history goes on as long as states are those that the method gave.
+    /// Whether rates of past steps are used. The history continues as long as each step starts from the state that the
+    /// method returned last.
     const MULTISTEP: bool = false;
     /// Whether the rate at the end of a step is always evaluated when the step is accepted, for the next one to start with.
     const ENDS_WITH_RATE: bool = false;
@@ -81,11 +85,12 @@ where
         None
     }
 
-    /// Forgets past steps: the next one starts from a new state.
+    /// Discards past steps; the next step starts from a new state.
     fn begin(&mut self) {}
 
     /// Computes the displacement `step.delta` of a step of `h` s from time `t` (s), and its error as
-    /// [`Stepper::attempt`] says. The rate at the end is not known before; a scheme that finds it may say so.
+    /// [`Stepper::attempt`] says. The rate at the end is unknown before. A scheme that evaluates it sets
+    /// [`Attempt::end_known`].
     ///
     /// # Errors
     /// As [`Stepper::attempt`].
@@ -103,7 +108,7 @@ where
         None
     }
 
-    /// The place of the rate at the start of the step.
+    /// The memory for the rate at the start of the step.
     fn start(&mut self) -> &mut Point<Y>;
 
     /// Evaluates the rate at the start of the step, unless it is known.
@@ -116,7 +121,7 @@ where
         false
     }
 
-    /// Displacement at `t + θ h` within the step; unless a scheme knows better, the cubic through both ends and their rates.
+    /// Displacement at `t + θ h` within the step; by default the cubic through both ends and their rates.
     fn interpolate(
         &mut self,
         step: &mut Attempt<Y>,
@@ -137,9 +142,9 @@ where
     }
 }
 
-/// A [`Scheme`] that a system alone determines.
+/// A [`Scheme`] that can be made from a system without further arguments.
 pub trait FromSystem<Y: System> {
-    /// Room for one system.
+    /// Makes it for one system.
     fn new(system: &Y) -> Self;
 }
 
@@ -169,7 +174,7 @@ where
         Integrator { step, scheme }
     }
 
-    /// Room for one system.
+    /// Makes it for one system.
     pub fn new(system: &Y) -> Self
     where
         S: FromSystem<Y>,
@@ -177,8 +182,8 @@ where
         Self::from_scheme(system, S::new(system), false)
     }
 
-    /// With compensated sums: what rounding takes from a step is added to the next, but for quaternions. Of use where steps
-    /// are small against the precision, above all in `f32`.
+    /// The method with compensated sums: the rounding error of a step is added to the next step, except for
+    /// quaternions. This helps where steps are small relative to the precision, above all in `f32`.
     pub fn compensated(system: &Y) -> Self
     where
         S: FromSystem<Y>,

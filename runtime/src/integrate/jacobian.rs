@@ -1,11 +1,12 @@
 //! Derivatives of the rates in a chart.
 //!
-//! A system gives the derivatives of velocities and momentum rates by small displacements in body axes and by momenta in body
-//! axes ([`Differentiable`]). In a chart that is all there is to it but for joints on groups: there the displacement leads to
-//! the state, and the state's rates to those of the displacement, by the formulas of [`super::lie_joint`]. These are run on
-//! [`Dual`] numbers, once for each of the at most 24 directions of a joint, and give: how the state follows the displacement
-//! (`inner`), the rates of the displacement the velocities and momentum rates (`outer`), and what the former depend on the
-//! displacement beside (`direct`). Then `J = outer · D · inner + direct` with the system's derivatives `D`.
+//! A system gives the derivatives of velocities and momentum rates by small displacements in body axes and by momenta
+//! in body axes ([`Differentiable`]). In a chart that is all there is to it but for joints on groups: there the
+//! displacement leads to the state, and the state's rates to those of the displacement, by the formulas of
+//! [`super::lie_joint`]. These are run on [`Dual`] numbers, once for each of the at most 24 directions of a joint, and
+//! give: how the state follows the displacement (`inner`), the rates of the displacement the velocities and momentum
+//! rates (`outer`), and what the former depend on the displacement beside (`direct`). Then `J = outer · D · inner +
+//! direct` with the system's derivatives `D`.
 
 use super::chart::Point;
 use super::field::Field;
@@ -21,7 +22,7 @@ type Table<S> = [[S; 2 * NV]; 2 * NV];
 
 /// One joint about a state.
 struct Joint<S> {
-    /// As if it stood first.
+    /// The joint, with indices as if it were the first one.
     group: LieJoint,
     /// State of the chart, momenta in outer axes.
     base: ([S; NQ], [S; NV]),

@@ -1,7 +1,7 @@
 //! Dense linear equations of twice as many unknowns as there are velocities: LU factors with partial pivoting.
 //!
-//! A matrix stands in four blocks of the type that derivatives come in, so there is room for it wherever there is for them,
-//! without a heap; a vector is a [`Point`]. Real and complex matrices share the code: an element is `[S; C]`, with `C` parts.
+//! A matrix is stored in four blocks of the type of the derivatives, so that it needs no heap; a vector is a [`Point`].
+//! Real and complex matrices share the code: an element is `[S; C]`, with `C` parts.
 
 use super::chart::Point;
 use crate::system::{Differentiable, Real, StateDerivatives, System};
@@ -25,7 +25,8 @@ impl<Y: Differentiable> Matrix<Y> {
         block.as_ref().len()
     }
 
-    /// Both halves of a row. No row is beyond the last; asking for one must not become a panic path of firmware, though.
+    /// Both halves of a row. The index is never beyond the last row, but the code must not contain a panic path for
+    /// firmware.
     #[inline]
     fn row(&self, i: usize) -> Option<[&[Y::Scalar]; 2]> {
         let (nv, [top, bottom]) = (self.half(), &self.blocks);
@@ -53,7 +54,7 @@ impl<Y: Differentiable> Matrix<Y> {
         }
     }
 
-    /// Row `i` becomes the numbers of a point.
+    /// Sets row `i` to the components of a point.
     fn put_row(&mut self, i: usize, point: &Point<Y>) {
         if let Some(row) = self.row_mut(i) {
             for (to, from) in row.into_iter().zip(point.parts()) {
@@ -94,7 +95,7 @@ fn put<S: Scalar>([x, p]: [&mut [S]; 2], i: usize, value: S) {
 
 #[inline]
 fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
-    // Four sums: one alone waits for itself.
+    // Four partial sums, because a single one would wait for its own latency.
     let mut sums = [S::zero(); 4];
     let (mut a, mut b) = (a.chunks_exact(4), b.chunks_exact(4));
     for (a, b) in a.by_ref().zip(b.by_ref()) {
@@ -145,7 +146,7 @@ fn inverse<S: Scalar, const C: usize>(a: [S; C]) -> [S; C] {
 pub(super) struct Lu<Y: Differentiable, const C: usize> {
     /// `L` below the diagonal, `U` above, inverses of the pivots on it.
     parts: [Matrix<Y>; C],
-    /// With which later row each was exchanged.
+    /// For each row, the later row with which it was exchanged.
     exchanged: Point<Y>,
     /// A row that is at work, and one that waits.
     pivot: [Point<Y>; C],

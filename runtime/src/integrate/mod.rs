@@ -1,14 +1,14 @@
 //! Integrators of [`System`](crate::System)s. No allocation in a step.
 //!
-//! A method is a [`Stepper`]: `step` takes one step of a size that the caller gives, for control loops; a [`Solver`] drives it over
-//! a time with error control, dense output, events and statistics. All methods share the shell [`Integrator`]; a method of
-//! your own is a [`Scheme`] in it. Methods work on displacements from the state at the start of a
-//! step ([`chart`]), so joints with quaternions stay on their group in all of them.
+//! A method is a [`Stepper`]: `step` takes one step of a size that the caller gives, for control loops; a [`Solver`]
+//! drives it over a time with error control, dense output, events and statistics. All methods share the shell
+//! [`Integrator`]; a method of your own is a [`Scheme`] in it. Methods work on displacements from the state at the
+//! start of a step ([`chart`]), so joints with quaternions stay on their group in all of them.
 //!
 //! # Worst case of implicit methods
 //!
-//! Work of one step on a mechanism with `nv` velocities. A factorisation is one of a matrix of `2 nv` rows (a complex one counts
-//! as four real ones).
+//! The table states the work of one step on a mechanism with `nv` velocities. A factorisation is that of a matrix of `2
+//! nv` rows (a complex one counts as four real ones).
 //!
 //! | method, `n` iterations a step | derivatives | factorisations | evaluations of the rates |
 //! | --- | --- | --- | --- |
@@ -19,9 +19,10 @@
 //! | [`Gauss12FixedPoint`] | 0 | 0 | `1 + 6 n` |
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
-//! These are the numbers of methods made by `with_iterations`. Otherwise `n` is at most 30 (60 by fixed-point iteration) in a
-//! fixed step and 10 (20) in a step under error control. All of it is done twice if the first try fails, and two evaluations are
-//! added where an error is estimated; a step that has used them up ends with [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
+//! These are the numbers of methods made by `with_iterations`. Otherwise `n` is at most 30 (60 by fixed-point
+//! iteration) in a fixed step and 10 (20) in a step under error control. All of it is done twice if the first try
+//! fails, and two evaluations are added where an error is estimated; a step that has used them up ends with
+//! [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
 mod adams;
 pub mod chart;

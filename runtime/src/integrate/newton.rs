@@ -1,4 +1,5 @@
-//! How the equations of an implicit method's stages are solved: by simplified Newton iteration, or by fixed-point iteration.
+//! How the equations of an implicit method's stages are solved: by simplified Newton iteration, or by fixed-point
+//! iteration.
 
 use super::chart::Point;
 use super::field::Field;
@@ -13,7 +14,7 @@ pub trait Iteration<Y: System, const S: usize> {
     /// Whether derivatives are used.
     const DERIVATIVES: bool;
 
-    /// Room for one system, and a method with these modes.
+    /// Makes it for one system and a method with these modes.
     fn new(system: &Y, modes: &'static [Mode<S>]) -> Self;
 
     /// Evaluates the rate at the start of the step and the derivatives there. Not called if no derivatives are used.
@@ -32,7 +33,8 @@ pub trait Iteration<Y: System, const S: usize> {
     fn filter(&mut self, y: &mut Point<Y>);
 }
 
-/// Fixed-point iteration: the changes are the residuals. It needs no derivatives, and converges where `h ‖∂f/∂y‖` is well below one.
+/// Fixed-point iteration: the changes are the residuals. It needs no derivatives, and converges where `h ‖∂f/∂y‖` is
+/// well below one.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedPoint;
 
@@ -55,8 +57,9 @@ impl<Y: System, const S: usize> Iteration<Y, S> for FixedPoint {
     fn filter(&mut self, _: &mut Point<Y>) {}
 }
 
-/// Simplified Newton iteration with the derivatives at the start of a step: `R` real modes and `C` pairs of complex ones, one
-/// matrix of the size of the state for each. E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.8.
+/// Simplified Newton iteration with the derivatives at the start of a step: `R` real modes and `C` pairs of complex
+/// ones, one matrix of the size of the state for each. E. Hairer, G. Wanner, Solving Ordinary Differential Equations
+/// II, IV.8.
 #[derive(Clone, Debug)]
 pub struct Newton<Y: Differentiable, const S: usize, const R: usize, const C: usize> {
     jacobian: Jacobian<Y>,

@@ -1,4 +1,4 @@
-//! Rosenbrock methods: linearly implicit, one matrix a step, no iteration.
+//! Rosenbrock methods: linearly implicit, with one matrix per step and no iteration.
 
 use super::chart::Point;
 use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
@@ -175,7 +175,7 @@ where
         theta: Y::Scalar,
         out: &mut Point<Y>,
     ) {
-        // θ (y₁ + (1 − θ) (D₁ + θ (D₂ + θ D₃))), inside out.
+        // θ (y₁ + (1 − θ) (D₁ + θ (D₂ + θ D₃))), evaluated from the innermost bracket.
         out.clear();
         for row in self.tableau.dense.iter().rev() {
             out.scale(theta);

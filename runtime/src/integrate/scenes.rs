@@ -122,7 +122,8 @@ impl<S: Real> Scene<S> {
     }
 }
 
-/// Pins and a slider; a spherical joint and pins; a floating tree with a planar and a spherical joint.
+/// Revolute joints and a prismatic one; a spherical joint and revolute joints; a floating tree with a planar and a
+/// spherical joint.
 pub fn three<S: Real>() -> [Scene<S>; 3] {
     let pins = chain(&[Kind::Revolute, Kind::Prismatic, Kind::Revolute], 40.0, 0.0);
     let ball = chain(&[Kind::Spherical, Kind::Revolute], 5.0, 0.0);

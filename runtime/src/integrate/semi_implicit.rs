@@ -10,15 +10,16 @@ use crate::Scalar;
 ///
 /// `p₁ = p₀ + h ṗ(q₀, p₀)`, `q₁ = q₀ + h q̇(q₀, p₁)`: two evaluations a step;
 ///
-/// in acceleration form ([`SemiImplicitEuler::of_velocities`]) `v₁ = v₀ + h v̇(q₀, v₀)`, `q₁ = q₀ + h N(q₀) v₁`: one, which is
-/// what game engines do.
+/// in acceleration form ([`SemiImplicitEuler::of_velocities`]) `v₁ = v₀ + h v̇(q₀, v₀)`, `q₁ = q₀ + h N(q₀) v₁`: one,
+/// which is what game engines do.
 ///
-/// The symplectic Euler method takes `ṗ(q₀, p₁)` instead. Where the Hamiltonian is separable, `H = T(p) + V(q)`, `ṗ` does
-/// not depend on `p`, both are the same, and the method is symplectic: the error of the energy stays of the size of `h` over
-/// very long times. Kinetic energies of mechanisms `pᵀ M(q)⁻¹ p / 2` are not separable unless the mass matrix is constant. Then
-/// this method is explicit, of order 1, and not symplectic: the energy drifts with time, in proportion to `h`. What it has
-/// over Euler's method is that it remains stable, for small steps, on oscillations that springs and gravity make. Of joints with
-/// quaternions the momenta are those of [`chart`](super::chart), and the rotation takes the new ones.
+/// The symplectic Euler method takes `ṗ(q₀, p₁)` instead. Where the Hamiltonian is separable, `H = T(p) + V(q)`, `ṗ`
+/// does not depend on `p`, both are the same, and the method is symplectic: the error of the energy stays of the size
+/// of `h` over very long times. Kinetic energies of mechanisms `pᵀ M(q)⁻¹ p / 2` are not separable unless the mass
+/// matrix is constant. Then this method is explicit, of order 1, and not symplectic: the energy drifts with time, in
+/// proportion to `h`. What it has over Euler's method is that it remains stable, for small steps, on oscillations that
+/// springs and gravity make. Of joints with quaternions the momenta are those of [`chart`](super::chart), and the
+/// rotation takes the new ones.
 ///
 /// E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2006, I.1.2 and VI.3, theorem 3.3.
 pub type SemiImplicitEuler<Y> = Integrator<Y, SemiImplicit<Y>>;
@@ -26,7 +27,7 @@ pub type SemiImplicitEuler<Y> = Integrator<Y, SemiImplicit<Y>>;
 /// The scheme of [`SemiImplicitEuler`].
 #[derive(Clone, Debug)]
 pub struct SemiImplicit<Y: System> {
-    /// Velocities stand at the place of momenta.
+    /// Whether the state holds velocities in place of momenta.
     velocities: bool,
     start: Point<Y>,
     stage: Point<Y>,

@@ -1,4 +1,4 @@
-//! Drives a method over a time: error control, dense output, statistics.
+//! Runs a method over a time: error control, dense output, statistics.
 
 use super::chart::Point;
 use super::control::{Control, Limits, Step, Tolerance, Tolerances};
@@ -7,9 +7,9 @@ use super::{EnergyProjection, StepError};
 use crate::system::{Energetic, Real, System};
 use crate::Scalar;
 
-/// Share of the step that the error would allow which is taken.
+/// The next step as a fraction of the step that the error would allow.
 const SAFETY: f64 = 0.9;
-/// No step is smaller, s.
+/// Smallest step, s.
 const LEAST: f64 = 1e-15;
 /// A step changes by at most these factors.
 const SHRINK: f64 = 0.2;
@@ -17,19 +17,19 @@ const GROW: f64 = 6.0;
 /// Weight of the last error in the choice of the next step: a PI controller (Gustafsson, ACM TOMS 17, 1991).
 const INTEGRAL: f64 = 0.04;
 
-/// Drives a method `M` over a time. It owns the state; look at it with [`Solver::state`].
+/// Runs a method `M` over a time. It owns the state; [`Solver::state`] copies it.
 #[derive(Clone, Debug)]
 pub struct Solver<Y: System, M> {
     method: M,
     step: Step,
-    /// Bounds of the work.
+    /// Limits of the work.
     pub limits: Limits,
     t: Y::Scalar,
-    /// What rounding took from the time.
+    /// Rounding error of the time.
     t_carry: Y::Scalar,
     /// The attempt that has not been accepted yet: the state is at its end.
     pending: Option<Pending<Y::Scalar>>,
-    /// Next step, s; zero: to be chosen.
+    /// Next step, s; zero if it has not been chosen.
     next: f64,
     last_error: f64,
     rejections: u64,
@@ -38,7 +38,7 @@ pub struct Solver<Y: System, M> {
     scale: Point<Y>,
     size: Point<Y>,
     at: Point<Y>,
-    /// A state that events are looked at.
+    /// A state at which events are evaluated.
     pub(super) looked: (Y::Coordinates, Y::Momenta),
     /// Which events the last run ended with, a bit for each, and when.
     pub(super) handled: (u64, Y::Scalar),
@@ -97,7 +97,7 @@ where
         Ok(solver)
     }
 
-    /// Begins anew from another state: after an event, an impact, a change of inputs.
+    /// Starts again from another state: after an event, an impact, or a change of inputs.
     ///
     /// # Errors
     /// [`StepError::Quaternion`].
@@ -121,13 +121,13 @@ where
     pub fn cut(&mut self, system: &mut Y, theta: Y::Scalar) -> Result<(), StepError> {
         let time = self.look(system, theta);
         self.cut += u64::from(self.pending.is_some());
-        // The motion goes on as it was: so does the choice of steps.
+        // The motion continues unchanged, and so does the choice of steps.
         (self.t, self.t_carry, self.pending) = (time, Y::Scalar::zero(), None);
         self.method.begin(system, time, &self.looked.0, &self.looked.1)
     }
 
-    /// Looks at the state at `t + θ h` of the last step; its time. At the end it is the state that the next step starts from,
-    /// bit for bit.
+    /// Computes the state at `t + θ h` of the last step. Returns its time. At the end it is the state that the next
+    /// step starts from, bit for bit.
     pub(super) fn look(&mut self, system: &mut Y, theta: Y::Scalar) -> Y::Scalar {
         let Solver { method, at, looked: (q, p), .. } = self;
         match self.pending {
@@ -170,7 +170,7 @@ where
         }
     }
 
-    /// Work done.
+    /// The work done so far.
     pub fn statistics(&self) -> Statistics {
         let mut statistics = self.method.statistics();
         statistics.steps += self.cut + u64::from(self.pending.is_some());
@@ -207,7 +207,7 @@ where
     /// [`StepError`]; the state is then that of the last accepted step.
     pub fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
         self.project_momenta(system)?;
-        // Small against the time, it is exact; and it is what a last step must be to land on the end.
+        // Where it is small against the time, this difference is exact. It is the step that ends exactly at the end.
         let rest = t_end - self.t - self.t_carry;
         if rest <= Y::Scalar::zero() {
             return Ok(());
@@ -222,7 +222,7 @@ where
         if h.is_nan() || h <= 0.0 {
             return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
         }
-        // A rest that differs from the step by rounding is the step.
+        // A remainder that differs from the step by rounding only counts as one step.
         let slack = 1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
         let over = rest.to_f64() - h;
         let step = if over < -slack { rest } else { Y::Scalar::constant(h) };
@@ -265,7 +265,7 @@ where
         (self.t, self.pending.map_or(Y::Scalar::zero(), |step| step.h))
     }
 
-    /// Accepts what is pending.
+    /// Accepts the pending step.
     fn project_momenta(&mut self, system: &mut Y) -> Result<(), StepError> {
         if let Some(step) = self.pending {
             self.method.accept(system, self.t, step.h)?;
@@ -280,7 +280,7 @@ where
         delta.not_finite().map_or(Ok(()), |index| Err(StepError::NotFinite { time, index }))
     }
 
-    /// One step by the error.
+    /// Makes one adaptive step.
     fn controlled(
         &mut self,
         system: &mut Y,
@@ -301,7 +301,7 @@ where
         let mut rejected = false;
         loop {
             let last = rest <= h * 1.0001;
-            // Two steps of half the rest rather than a last one of next to nothing.
+            // Two steps of half the remainder are better than a full step and a very small last one.
             let tried = if last {
                 rest
             } else if rest < 2.0 * h {
@@ -323,7 +323,7 @@ where
                     SAFETY * libm::pow(size, 0.75 * INTEGRAL - exponent) * libm::pow(self.last_error, INTEGRAL)
                 });
                 let factor = factor.clamp(SHRINK, if rejected { 1.0 } else { GROW });
-                // A step cut short by the end says little about the next.
+                // A step that the end has shortened says little about the next step.
                 self.next = if tried < h { h.max(tried * factor) } else { tried * factor };
                 self.last_error = error.max(1e-4);
                 self.wait(step, last.then_some(t_end));

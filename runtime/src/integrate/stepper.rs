@@ -16,19 +16,19 @@ pub struct Statistics {
     pub rejections: u64,
     /// Evaluations of the rates.
     pub evaluations: u64,
-    /// Evaluations of their derivatives.
+    /// Evaluations of the derivatives of the rates.
     pub jacobians: u64,
     /// Factorisations of the matrices of a step; those of one step count as one.
     pub factorisations: u64,
-    /// Iterations of implicit equations.
+    /// Iterations for implicit equations.
     pub iterations: u64,
 }
 
 /// A method that goes from one state to the next.
 ///
-/// A step is made in three parts, so that a [`Solver`](super::Solver) can look at it before it counts: [`Stepper::begin`]
-/// takes a state, [`Stepper::attempt`] computes a displacement from it, [`Stepper::accept`] moves to it and has what the next
-/// attempt needs. [`Stepper::step`] is all of it at once, for loops that keep the state themselves.
+/// A step has three parts, so that a [`Solver`](super::Solver) can examine it before it is accepted: [`Stepper::begin`]
+/// takes a state, [`Stepper::attempt`] computes a displacement from it, and [`Stepper::accept`] moves to the new state and
+/// prepares the next attempt. [`Stepper::step`] does all three, for loops that keep the state themselves.
 pub trait Stepper<Y>
 where
     Y: System,
@@ -55,7 +55,8 @@ where
     }
 
     /// Tries a step of `h` s from time `t`. With `scale`, returns the error relative to it, root mean square over all
-    /// components whose scale is not zero; 0 where no error is estimated. A NaN means that the step is too large to be judged.
+    /// components whose scale is not zero; 0 where no error is estimated. NaN means that the step is too large for an
+    /// estimate.
     ///
     /// # Errors
     /// Of implicit methods: [`StepError::NoConvergence`], [`StepError::Singular`].
@@ -67,8 +68,9 @@ where
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError>;
 
-    /// Of methods that choose their order: takes the order for the next attempt from the errors of the last one, which met
-    /// the tolerances, and returns by which factor the step may change. Others leave that to the solver.
+    /// For methods that choose their order: chooses the order of the next attempt by the errors of the last one, which
+    /// met the tolerances, and returns the factor by which the step may change. Other methods return `None`, and the
+    /// solver chooses.
     fn advise(&mut self) -> Option<f64> {
         None
     }
@@ -83,8 +85,8 @@ where
     /// the next attempt.
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y>;
 
-    /// Moves the state by the displacement of the last attempt, which may have been corrected slightly, and prepares the next
-    /// attempt.
+    /// Moves the state by the displacement of the last attempt, which may have been corrected slightly, and prepares
+    /// the next attempt.
     ///
     /// # Errors
     /// [`StepError::NotFinite`]; the state has not moved then.
@@ -98,12 +100,12 @@ where
         self.accept(system, t, h)
     }
 
-    /// Tells the method that the caller has changed the displacement of the last attempt: a rate at its end that was evaluated
-    /// before is no longer valid.
+    /// Tells the method that the caller has changed the displacement of the last attempt: a rate at its end that was
+    /// evaluated before is no longer valid.
     fn corrected(&mut self) {}
 
-    /// Whether rates of past steps are used. Momenta must not jump then, not even along a gauge direction, which changes nothing
-    /// in the motion.
+    /// Whether rates of past steps are used. Momenta must not jump then, not even along a gauge direction, which
+    /// changes nothing in the motion.
     fn remembers(&self) -> bool {
         false
     }
@@ -114,8 +116,8 @@ where
     /// Work done since the method was made.
     fn statistics(&self) -> Statistics;
 
-    /// One step of `h` s from time `t` (s). Nothing is kept from one call to the next that the state does not carry, but for
-    /// multistep methods, whose history starts anew when `q` and `p` are not those they gave.
+    /// One step of `h` s from time `t` (s). A call does not depend on earlier ones, except
+    /// for multistep methods, whose history starts again when `q` and `p` are not those of the last step.
     ///
     /// # Errors
     /// [`StepError`]; `q` and `p` are then as they were.

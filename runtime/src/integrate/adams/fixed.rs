@@ -1,4 +1,4 @@
-//! Adams methods with steps of one size.
+//! Adams methods with fixed steps.
 
 use super::history::History;
 use super::start::Extrapolation;
@@ -10,7 +10,7 @@ use crate::integrate::StepError;
 use crate::system::{Real, System};
 use crate::Scalar;
 
-/// The explicit Adams method of order `K`: one evaluation of the rates a step (C.19).
+/// The explicit Adams method of order `K`: one evaluation of the rates per step (C.19).
 pub type AdamsBashforth<Y, const K: usize> = Integrator<Y, Adams<Y, K, false>>;
 /// The explicit method of order `K` predicts, the implicit one of the same order corrects once: two evaluations of the
 /// rates a step, at the prediction and at the corrected point (C.20).
@@ -27,14 +27,15 @@ pub type Abm6<Y> = AdamsMoulton<Y, 6>;
 /// Adams-Bashforth-Moulton of order 8: two evaluations a step.
 pub type Abm8<Y> = AdamsMoulton<Y, 8>;
 
-/// Steps whose sizes differ by a smaller part count as equal: the last one before an end differs by rounding of the time.
+/// Steps whose relative difference is smaller than this count as equal; the last step before an end differs by rounding
+/// of the time.
 const SAME: f64 = 1e-6;
 
-/// An Adams method of order `K`, 1 to 12, with steps of one size; with `CORRECT` a predictor and a corrector.
+/// An Adams method of order `K`, 1 to 12, with fixed steps; with `CORRECT` a predictor and a corrector.
 ///
-/// The first `K − 1` steps extrapolate the midpoint rule to order `K` or one more, with `⌈K/2⌉²` evaluations and the one at
-/// the start; so do those after a change of the step, and [`Stepper::step`] after a state that is not the one it gave. A jump
-/// of the joint forces spoils the order for `K` steps: call [`Stepper::begin`] where it matters.
+/// The first `K − 1` steps extrapolate the midpoint rule to order `K` or one more, with `⌈K/2⌉²` evaluations and the
+/// one at the start; so do those after a change of the step, and [`Stepper::step`] after a state that is not the one it
+/// gave. A jump of the joint forces reduces the order for `K` steps; call [`Stepper::begin`] where this matters.
 #[derive(Clone, Debug)]
 pub struct Adams<Y: System, const K: usize, const CORRECT: bool> {
     history: History<Y, K>,

@@ -1,4 +1,4 @@
-//! The rates of past steps, rewritten for every new base of the chart.
+//! The rates of past steps, transformed to every new base of the chart.
 
 use crate::integrate::chart::{Chart, Point};
 use crate::system::{Real, System};
@@ -90,7 +90,7 @@ where
         out.clear();
         let fours = weights.chunks_exact(4);
         for (w, j) in fours.clone().zip((0..).step_by(4)) {
-            // Four at once: less to load and store.
+            // Four terms at once need fewer loads and stores.
             let rates = [0, 1, 2, 3].map(|i| rate(j + i).parts());
             for (part, out) in out.parts_mut().into_iter().enumerate() {
                 let [a, b, c, d] = rates.map(|rate| &rate[part][..out.len()]);

@@ -1,4 +1,4 @@
-//! What Adams methods share: the past rates, and the two parts of a step.
+//! The parts that Adams methods have in common: the past rates, and the two parts of a step.
 
 use super::history::History;
 use crate::integrate::integrator::Attempt;
@@ -29,7 +29,8 @@ where
         self.predict(step, h, weights);
     }
 
-    /// The state has moved to the end of the step. The rate there is evaluated when the next one begins, if it is not known.
+    /// The state has moved to the end of the step. The rate there is evaluated when the next one begins, if it is not
+    /// known.
     pub fn accepted(&mut self, step: &Attempt<Y>, system: &Y, h: Y::Scalar) -> bool {
         if step.end_known {
             self.push(Some((&step.delta, h))).copy_from(&step.end);

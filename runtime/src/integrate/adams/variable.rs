@@ -1,4 +1,4 @@
-//! The Adams method with steps and orders of any size.
+//! The Adams method with variable steps and orders.
 
 use super::history::History;
 use super::weights::{Weights, NODES};
@@ -11,28 +11,29 @@ use crate::Scalar;
 
 /// Highest order of the predictor.
 const HIGHEST: usize = 12;
-/// Share of the tolerance that a step may use up: for the same error a Runge-Kutta method takes an eighth as many steps, and
-/// the errors of all add up.
+/// Share of the tolerance that a step may use up: for the same error a Runge-Kutta method takes an eighth as many
+/// steps, and the errors of all add up.
 const SHARE: f64 = 0.05;
 /// Share of that which the next step aims at.
 const AIM: f64 = 0.1;
-/// A step changes by at most these factors.
+/// Smallest and largest factor by which a step changes.
 const SHRINK: f64 = 0.5;
 const GROW: f64 = 2.0;
 
 /// Adams-Bashforth-Moulton with variable steps and orders: predictor of order 1 to 12, corrector of one more, two
 /// evaluations of the rates a step.
 ///
-/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, some half of those of Verner's
-/// pair of order 9 for the same tolerance, and a restart at every jump. Its own work at order 12 is some 700 multiplications and
-/// 130 for every coordinate a step, so it saves time where the rates cost more than that. With tolerances looser than 1e-3 it may
-/// gain energy without end in violent motion: take a Runge-Kutta method there. Made for error control: with steps of a fixed
-/// size the order rises from one, whose error stays; take [`Adams`](super::Adams) then.
+/// It needs the fewest evaluations of all explicit methods here where the motion is smooth, some half of those of
+/// Verner's pair of order 9 for the same tolerance, and a restart at every jump. Its own work at order 12 is some 700
+/// multiplications and 130 for every coordinate a step, so it saves time where the rates cost more than that. With
+/// tolerances looser than 1e-3 its energy may grow without bound in violent motion; use a Runge-Kutta method there. It
+/// is made for error control. With fixed steps the order rises from one, and the error of the first steps remains; use
+/// [`Adams`](super::Adams) for fixed steps.
 ///
-/// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters 5 to 7:
-/// the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every step from the
-/// places of the past rates, instead of their modified divided differences: the rates are rewritten by rotations
-/// ([`Chart::follow`](crate::integrate::Chart::follow)), which differences would not survive.
+/// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters
+/// 5 to 7: the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every
+/// step from the places of the past rates, instead of their modified divided differences: the rates are rewritten by
+/// rotations ([`Chart::follow`](crate::integrate::Chart::follow)), which differences would not survive.
 pub type VariableAdams<Y> = Integrator<Y, AdamsOfVariableOrder<Y>>;
 
 /// The scheme of [`VariableAdams`].
@@ -145,7 +146,7 @@ where
         };
         self.estimate(step, &weights, h, scale);
         let [lower, error, _] = self.errors;
-        // Not a number is too large as well.
+        // An error that is not a number counts as too large.
         if error > 1.0 || error.is_nan() {
             self.starting = false;
             self.order = if k > 1 && lower <= error { k - 1 } else { k };
