@@ -269,7 +269,7 @@ impl<S: Real> Interpreter<S> {
     /// [`MassMatrixError::Singular`] for the first freedom, outboard first, without inertia.
     pub fn check_rank(&mut self, q: &[S]) -> Result<(), MassMatrixError> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.prepare(q, &inputs!(self), &mut self.work, false);
+        sweeps.factor(q, &inputs!(self), &mut self.work);
         let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| {
             match (node.source, node.elimination.unknown) {
                 (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),

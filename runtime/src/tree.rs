@@ -375,6 +375,13 @@ pub struct Dims {
     pub rows: usize,
 }
 
+impl<S> Tree<S> {
+    /// Whether number `g` of [`Tree::shared`] is a row of one of the constraints.
+    pub fn is_slot(&self, g: usize) -> bool {
+        self.constraints.iter().any(|c| c.slots.contains(&g))
+    }
+}
+
 impl<S: Scalar> Tree<S> {
     /// The same mechanism with penalties in place of multipliers: momenta `σ = α (Φ v + ω φ)` with the weight `α` in kg (of
     /// turns kg m²) and `ω` in 1/s. That is Bayo's method on the level of velocities, without the integral of the positions'

@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::spatial::{ArticulatedInertia, ElementaryTransform, Force, Mat3, Motion, RigidInertia, Vec3};
-use crate::tree::Tree;
+use crate::tree::{Bond, Tree};
 use crate::Scalar;
 
 /// Results of the articulation: variable steps of every joint.
@@ -159,8 +159,11 @@ pub struct Constraints<S> {
     /// Rotation to and position in the innermost common node, along the path to each frame of a constraint as far as it is
     /// done.
     pub reach: Vec<[(Mat3<S>, Vec3<S>); 2]>,
-    /// Wrenches of each constraint's frames on the way inward along their paths.
-    pub hold: Vec<[Force<S>; 2]>,
+    /// For every node the constraints that act through it: number of the constraint with 0 or 1 for a cut whose path to the
+    /// first or second frame has the node, or with the number of a coupling's term.
+    pub through: Vec<Vec<(usize, usize)>>,
+    /// Wrenches at each constraint's frames, carried inward along the paths.
+    pub end_wrenches: Vec<[Force<S>; 2]>,
     /// Relative pose of each constraint's frames.
     pub relative: Vec<Relative<S>>,
     /// Rows.
@@ -169,8 +172,8 @@ pub struct Constraints<S> {
     pub rhs: Vec<S>,
     /// Multipliers, row by row: `σ` or `λ`.
     pub multipliers: Vec<S>,
-    /// Moment and force along the freedoms from within the loops, one for each velocity.
-    pub pull: Vec<S>,
+    /// Joint forces of constraints whose rows turn, one for each velocity.
+    pub forces: Vec<S>,
 }
 
 /// Pose of a frame `A` in a frame `B`.
@@ -304,7 +307,8 @@ impl<S: Scalar> Workspace<S> {
                 later: later(tree),
             },
             constraints: Constraints {
-                hold: vec![[Force::zero(); 2]; tree.constraints.len()],
+                through: (0..n).map(|i| through(tree, i)).collect(),
+                end_wrenches: vec![[Force::zero(); 2]; tree.constraints.len()],
                 reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
                 relative: vec![Relative { turn: [[o; 3]; 3], d: [o; 3] }; tree.constraints.len()],
                 rows: vec![
@@ -313,7 +317,7 @@ impl<S: Scalar> Workspace<S> {
                 ],
                 rhs: vec![o; tree.dims.rows],
                 multipliers: vec![o; tree.dims.rows],
-                pull: vec![o; tree.dims.nv],
+                forces: vec![o; tree.dims.nv],
             },
             velocity: solution.clone(),
             acceleration: solution,
@@ -339,6 +343,18 @@ impl<S: Scalar> Workspace<S> {
             position: vec![[o; 3]; n],
         }
     }
+}
+
+/// The constraints that act through a node, with their parts.
+fn through<S>(tree: &Tree<S>, i: usize) -> Vec<(usize, usize)> {
+    let parts = tree.constraints.iter().enumerate().flat_map(|(index, constraint)| {
+        let parts: Vec<bool> = match &constraint.bond {
+            Bond::Cut(cut) => [&cut.path_a, &cut.path_b].map(|path| path.contains(&i)).into(),
+            Bond::Coupling { terms, .. } => terms.iter().map(|(node, _)| *node == i).collect(),
+        };
+        parts.into_iter().enumerate().filter(|(_, here)| *here).map(move |(part, _)| (index, part))
+    });
+    parts.collect()
 }
 
 /// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it then.

@@ -3,13 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Bond, Source, Tree};
+use mbd_runtime::tree::{Source, Tree};
 
 use super::link::Link;
 use super::main_line::MainLine;
 use super::partition::{assemble, output, partition, Body, Requests};
+use super::pass_state::{OutputSweeps, PassState};
 use super::runs::{find, Run};
-use super::stage::{passes, solves, PassState, SweepDirection};
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
@@ -19,7 +19,7 @@ use crate::trace::{rewrite, sizes, tolerance, SymbolicInputs};
 
 /// Builds the loop form; `None` where no run is long enough.
 pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<OutputProgram<RolledProgram>> {
-    let ways = passes(group, !plan.constraints.is_empty())?;
+    let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
     let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
     let mut tree: Tree<Expr> = plan.tree(&given.params);
@@ -29,9 +29,7 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
         (Output::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
         _ => (plan, tree),
     };
-    if !carried(group, &tree) {
-        return None;
-    }
+    let passes = sweeps.passes(&tree)?;
     let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.rolled).collect();
     let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
@@ -39,13 +37,13 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     }
     let starts: Vec<(usize, usize)> = runs.iter().map(|run| state_of(&tree, run.nodes.start)).collect();
     let graphs: Vec<Graph> = runs.iter().map(|_| Graph::default()).collect();
-    let links = graphs.iter().zip(&runs).map(|(graph, run)| Link::new(graph, group, run, &tree, options.efforts));
-    let mut links: Vec<Link> = links.collect();
+    let link = |(graph, run)| Link::new(graph, group, run, &tree, options.efforts, &passes);
+    let mut links: Vec<Link> = graphs.iter().zip(&runs).map(link).collect::<Option<_>>()?;
     let next_input = given.arrays.iter().map(InputArray::len).sum();
-    let stage = PassState::new(group, &graph, tree, false);
+    let stage = PassState::new(group, &graph, tree, &passes)?;
     let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
-    for (pass, way) in ways.iter().enumerate() {
-        line.pass(pass, *way, &mut links);
+    for (number, pass) in passes.iter().enumerate() {
+        line.pass(number, pass.direction, &mut links);
     }
     let results = line.stage.finish(&line.given);
     let own: Vec<Vec<(Expr, Target)>> = links
@@ -53,16 +51,9 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
         .zip(&starts)
         .map(|(link, start)| results_of_turn(plan, group, options, link, *start))
         .collect();
-    let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, ways, results };
+    let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, results };
     let program = build.program(options);
     Some(OutputProgram { spec: group.spec(), inputs: line.given.arrays, program })
-}
-
-/// Whether loops can carry the constraints where they matter: joints to the ground, whose rows are constants of the last body, so
-/// that nothing pulls at the joints as they turn.
-fn carried(group: Output, tree: &Tree<Expr>) -> bool {
-    let simple = |bond: &Bond<Expr>| matches!(bond, Bond::Cut(cut) if cut.a.node.is_none() && cut.closure.is_joint());
-    !solves(group) || tree.constraints.iter().all(|c| simple(&c.bond) && c.decay.is_none())
 }
 
 /// First coordinate and velocity of a node.
@@ -88,33 +79,39 @@ fn results_of_turn<'g>(
     plan: &Plan,
     group: Output,
     options: &Options,
-    link: &mut Link<'g>,
+    link: &mut Link<'g, '_>,
     start: (usize, usize),
 ) -> Vec<(Expr<'g>, Target)> {
     let sizes = sizes(plan, options, 0);
     let mut offset = 0;
     let mut targets = Vec::new();
+    let mut results = link.finish().into_iter();
     for array in group.spec().results {
         let turn = match array.dims {
             [Dim::Nq] => Some((start.0, link.size.0)),
             [Dim::Nv] => Some((start.1, link.size.1)),
             _ => None,
         };
-        if let Some((first, n)) = turn {
-            targets.extend((0..n).map(|k| Target::ResultOfTurn { first: offset + first + k, stride: n }));
+        let len = array.len(&sizes);
+        match turn {
+            Some((first, n)) => {
+                let target = |k| Target::ResultOfTurn { first: offset + first + k, stride: n };
+                targets.extend(results.by_ref().take(n).zip((0..n).map(target)));
+            }
+            // What belongs to no turn.
+            None => results.by_ref().take(len).for_each(drop),
         }
-        offset += array.len(&sizes);
+        offset += len;
     }
-    link.finish().into_iter().zip(targets).collect()
+    targets
 }
 
 struct Build<'b, 'm, 'g> {
     line: &'b MainLine<'m, 'b>,
     graphs: &'g [Graph],
-    links: &'b [Link<'g>],
+    links: &'b [Link<'g, 'b>],
     starts: &'b [(usize, usize)],
     own: Vec<Vec<(Expr<'g>, Target)>>,
-    ways: &'b [SweepDirection],
     results: Vec<Expr<'m>>,
 }
 
@@ -216,7 +213,7 @@ impl<'m> Build<'_, 'm, '_> {
                     let event = &self.line.events[*event];
                     let Some(b) = bodies[event.run].remove(&Some(event.pass)) else { continue };
                     let carried = self.carried(event, &live, &slots);
-                    let repeat = Some(Repeat { run: event.run, way: Some(self.ways[event.pass]), carried });
+                    let repeat = Some(Repeat { run: event.run, way: Some(event.direction), carried });
                     blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
                 }
             }

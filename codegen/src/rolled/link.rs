@@ -2,13 +2,15 @@
 //! taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
+use mbd_runtime::sweep::pass::Pass;
 use mbd_runtime::tree::{
     Bond, Closure, Constraint, Cut, Dims, Elimination, Kind, Node, Source, Tree, TreeFrame, Unknown,
 };
 use mbd_runtime::Scalar;
 
+use super::pass_state::{read, PassState};
 use super::runs::{map_node, Run, Slot};
-use super::stage::{PassState, SweepDirection};
+use super::SweepDirection;
 use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
@@ -41,22 +43,29 @@ pub struct LinkPass<'g> {
 }
 
 /// One turn of a run on its way through the passes.
-pub struct Link<'g> {
+pub struct Link<'g, 'a> {
     graph: &'g Graph,
-    stage: PassState<'g>,
+    stage: PassState<'g, 'a>,
     given: SymbolicInputs<'g>,
     nodes: usize,
     /// What the graph's inputs are.
     pub inputs: Vec<LinkInput>,
-    /// Passes done.
+    /// Passes done that carry something.
     pub passes: Vec<LinkPass<'g>>,
     /// Coordinates and velocities of one turn.
     pub size: (usize, usize),
 }
 
-impl<'g> Link<'g> {
-    /// Nothing done yet.
-    pub fn new(graph: &'g Graph, group: Output, run: &Run, tree: &Tree<Expr<'_>>, efforts: bool) -> Self {
+impl<'g, 'a> Link<'g, 'a> {
+    /// Nothing done yet; `None` for outputs that are never rolled. The passes are those of the whole tree.
+    pub fn new(
+        graph: &'g Graph,
+        group: Output,
+        run: &Run,
+        tree: &Tree<Expr<'_>>,
+        efforts: bool,
+        passes: &'a [Pass],
+    ) -> Option<Self> {
         let mut inputs = Vec::new();
         let mut symbols = |of: &dyn Fn(usize) -> LinkInput, n: usize| -> Vec<Expr<'g>> {
             let first = inputs.len();
@@ -108,19 +117,19 @@ impl<'g> Link<'g> {
             accelerations: None,
             matrix_depth: 0,
         };
-        let stage = PassState::new(group, graph, tree, true);
-        Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) }
+        let stage = PassState::new(group, graph, tree, passes)?;
+        Some(Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) })
     }
 
-    /// The next pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
-    /// constant of the loop; the rest become symbols.
-    pub fn pass(&mut self, way: SweepDirection, first: &[Expr<'_>]) {
-        let pass = self.passes.len();
+    /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a constant of
+    /// the loop; the rest become symbols.
+    pub fn pass(&mut self, pass: usize, direction: SweepDirection, first: &[Expr<'_>]) {
+        let number = self.passes.len();
         let mut known: Vec<Option<f64>> =
             first.iter().map(|e| if let Expr::Const(x) = e { Some(*x) } else { None }).collect();
         let symbols: Vec<Expr<'g>> = (0..first.len())
             .map(|k| {
-                self.inputs.push(LinkInput::Carried(pass, k));
+                self.inputs.push(LinkInput::Carried(number, k));
                 self.graph.input(self.inputs.len() - 1)
             })
             .collect();
@@ -133,7 +142,7 @@ impl<'g> Link<'g> {
             let incoming: Vec<Expr<'g>> =
                 known.iter().enumerate().map(|(k, known)| known.map_or(symbol(k), Expr::Const)).collect();
             let mut stage = self.stage.clone();
-            let outgoing = self.turn(&mut stage, pass, way, &incoming);
+            let outgoing = self.turn(&mut stage, pass, direction, &incoming);
             let mut settled = true;
             for (known, out) in known.iter_mut().zip(&outgoing) {
                 if known.is_some_and(|x| !matches!(out, Expr::Const(y) if *y == x)) {
@@ -149,6 +158,9 @@ impl<'g> Link<'g> {
             }
             if settled {
                 self.stage = stage;
+                if first.is_empty() {
+                    return;
+                }
                 let outgoing = outgoing.into_iter().zip(&negative).map(|(e, negative)| signed(e, *negative)).collect();
                 self.passes.push(LinkPass { incoming: symbols_of(&incoming), outgoing, negative });
                 return;
@@ -158,34 +170,33 @@ impl<'g> Link<'g> {
 
     fn turn(
         &self,
-        stage: &mut PassState<'g>,
+        stage: &mut PassState<'g, 'a>,
         pass: usize,
-        way: SweepDirection,
+        direction: SweepDirection,
         incoming: &[Expr<'g>],
     ) -> Vec<Expr<'g>> {
-        stage.begin(pass, &self.given);
+        let given = &self.given;
+        stage.begin(pass, given);
         let (inner, outer) = (0, self.nodes);
-        let (local, running) = incoming.split_at(stage.carried(pass, outer).len());
-        for (own, from) in stage.running(pass).into_iter().zip(running) {
-            *own = *from;
+        let mut incoming = incoming.iter();
+        let mut next = || *incoming.next().expect("a pass takes in as much as it hands on");
+        match direction {
+            SweepDirection::TipToBase => stage.carried(pass, outer, given, |e| *e = *e + next()),
+            SweepDirection::BaseToTip => stage.carried(pass, inner, given, |e| *e = next()),
         }
-        let mut out: Vec<Expr<'g>> = match way {
+        stage.running(pass, given, |e| *e = next());
+        let last = match direction {
             SweepDirection::TipToBase => {
-                for (own, from) in stage.carried(pass, outer).into_iter().zip(local) {
-                    *own = *own + *from;
-                }
-                (1..=outer).rev().for_each(|i| stage.node(pass, i, &self.given));
-                stage.carried(pass, inner).into_iter().map(|e| *e).collect()
+                (1..=outer).rev().for_each(|i| stage.node(pass, i, given));
+                inner
             }
             SweepDirection::BaseToTip => {
-                for (own, from) in stage.carried(pass, inner).into_iter().zip(local) {
-                    *own = *from;
-                }
-                (1..=outer).for_each(|i| stage.node(pass, i, &self.given));
-                stage.carried(pass, outer).into_iter().map(|e| *e).collect()
+                (1..=outer).for_each(|i| stage.node(pass, i, given));
+                outer
             }
         };
-        out.extend(stage.running(pass).into_iter().map(|e| *e));
+        let mut out = read(|visit| stage.carried(pass, last, given, visit));
+        out.extend(read(|visit| stage.running(pass, given, visit)));
         out
     }
 

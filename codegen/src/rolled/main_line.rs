@@ -1,8 +1,9 @@
 //! The tree without the turns of its runs, taken through the passes: what is left is straight-line code between loops.
 
 use super::link::Link;
+use super::pass_state::{read, PassState};
 use super::runs::Run;
-use super::stage::{PassState, SweepDirection};
+use super::SweepDirection;
 use crate::symbolic::{Expr, Graph};
 use crate::trace::SymbolicInputs;
 
@@ -12,8 +13,10 @@ pub struct Event<'m> {
     pub at: usize,
     /// Run.
     pub run: usize,
-    /// Pass.
+    /// Number of the pass among those of the link that carry something.
     pub pass: usize,
+    /// Its direction.
+    pub direction: SweepDirection,
     /// What is carried into the first turn.
     pub start: Vec<Expr<'m>>,
     /// What the last turn carries out: symbols or constants.
@@ -25,7 +28,7 @@ pub struct MainLine<'m, 'a> {
     /// Graph of everything outside runs.
     pub graph: &'m Graph,
     /// Its tree.
-    pub stage: PassState<'m>,
+    pub stage: PassState<'m, 'a>,
     /// Its inputs.
     pub given: SymbolicInputs<'m>,
     /// Runs, inner first.
@@ -38,21 +41,21 @@ pub struct MainLine<'m, 'a> {
 
 impl<'m> MainLine<'m, '_> {
     /// One pass over the whole tree.
-    pub fn pass(&mut self, pass: usize, way: SweepDirection, links: &mut [Link<'_>]) {
+    pub fn pass(&mut self, pass: usize, direction: SweepDirection, links: &mut [Link<'_, '_>]) {
         self.stage.begin(pass, &self.given);
         let n = self.stage.tree.nodes.len();
-        match way {
+        match direction {
             SweepDirection::TipToBase => {
                 for run in self.runs {
                     // The first turn adds the body itself.
-                    self.stage.carried(pass, run.last()).into_iter().for_each(|e| *e = Expr::Const(0.0));
+                    self.stage.carried(pass, run.last(), &self.given, |e| *e = Expr::Const(0.0));
                 }
                 let mut runs = self.runs.iter().enumerate().rev().peekable();
                 let mut i = n;
                 while i > 0 {
                     match runs.next_if(|(_, run)| run.nodes.end == i) {
                         Some((k, run)) => {
-                            self.run(k, pass, way, links);
+                            self.run(k, pass, direction, links);
                             i = run.nodes.start;
                         }
                         None => {
@@ -68,7 +71,7 @@ impl<'m> MainLine<'m, '_> {
                 while i < n {
                     match runs.next_if(|(_, run)| run.nodes.start == i) {
                         Some((k, run)) => {
-                            self.run(k, pass, way, links);
+                            self.run(k, pass, direction, links);
                             i = run.nodes.end;
                         }
                         None => {
@@ -82,23 +85,27 @@ impl<'m> MainLine<'m, '_> {
         self.stage.end(pass, &self.given);
     }
 
-    fn run(&mut self, k: usize, pass: usize, way: SweepDirection, links: &mut [Link<'_>]) {
+    fn run(&mut self, k: usize, pass: usize, direction: SweepDirection, links: &mut [Link<'_, '_>]) {
         let run = &self.runs[k];
         let Some(parent) = self.stage.tree.nodes[run.nodes.start].parent else { return };
-        let (from, to) = match way {
+        let (from, to) = match direction {
             SweepDirection::TipToBase => (run.last(), parent),
             SweepDirection::BaseToTip => (parent, run.last()),
         };
-        let mut start: Vec<Expr<'m>> = self.stage.carried(pass, from).into_iter().map(|e| *e).collect();
-        let local = start.len();
-        start.extend(self.stage.running(pass).into_iter().map(|e| *e));
+        let (stage, given) = (&mut self.stage, &self.given);
+        let mut start = read(|visit| stage.carried(pass, from, given, visit));
+        start.extend(read(|visit| stage.running(pass, given, visit)));
         let at = self.graph.len();
-        links[k].pass(way, &start);
-        let negative = &links[k].passes[pass].negative;
+        links[k].pass(pass, direction, &start);
+        if start.is_empty() {
+            return;
+        }
+        let number = links[k].passes.len() - 1;
+        let negative = &links[k].passes[number].negative;
         start.iter_mut().zip(negative).filter(|(_, negative)| **negative).for_each(|(e, _)| *e = -*e);
         let next = &mut self.next_input;
         let graph = self.graph;
-        let end: Vec<Expr<'m>> = links[k].passes[pass]
+        let end: Vec<Expr<'m>> = links[k].passes[number]
             .outgoing
             .iter()
             .map(|out| match *out {
@@ -110,16 +117,13 @@ impl<'m> MainLine<'m, '_> {
             })
             .collect();
         let signed = |(out, negative): (&Expr<'m>, &bool)| if *negative { -*out } else { *out };
-        let out: Vec<Expr<'m>> = end.iter().zip(negative).map(signed).collect();
-        for (place, out) in self.stage.carried(pass, to).into_iter().zip(&out[..local]) {
-            *place = match way {
-                SweepDirection::TipToBase => *place + *out,
-                SweepDirection::BaseToTip => *out,
-            };
+        let mut out = end.iter().zip(negative).map(signed);
+        let mut next = || out.next().expect("a pass hands on as much as it takes in");
+        match direction {
+            SweepDirection::TipToBase => stage.carried(pass, to, given, |e| *e = *e + next()),
+            SweepDirection::BaseToTip => stage.carried(pass, to, given, |e| *e = next()),
         }
-        for (place, out) in self.stage.running(pass).into_iter().zip(&out[local..]) {
-            *place = *out;
-        }
-        self.events.push(Event { at, run: k, pass, start, end });
+        stage.running(pass, given, |e| *e = next());
+        self.events.push(Event { at, run: k, pass: number, direction, start, end });
     }
 }

@@ -11,8 +11,8 @@ mod evaluate;
 mod link;
 mod main_line;
 mod partition;
+mod pass_state;
 mod runs;
-mod stage;
 
 use std::collections::BTreeSet;
 
@@ -22,8 +22,8 @@ use crate::plan::Plan;
 use crate::symbolic::{Counts, Program, ProgramResult};
 
 pub use cost::cost;
+pub use mbd_runtime::sweep::pass::SweepDirection;
 pub use runs::{find, Run};
-pub use stage::SweepDirection;
 
 /// Nodes in the shortest run that becomes a loop where the plan allows one.
 const LEAST: usize = 6;
@@ -188,6 +188,5 @@ pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<OutputPro
         RolledCode::Auto => LEAST,
         RolledCode::Always => LEAST_ALWAYS,
     };
-    stage::passes(group, !plan.constraints.is_empty())?;
     build::build(plan, group, options, least)
 }

@@ -97,7 +97,7 @@ pub fn assemble(
 }
 
 /// Cuts the graph of a turn.
-pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
+pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
     let ranks = ranks(graph, link);
     let passes = link.passes.len();
     let (columns, table) = columns(graph, link, run, live, &ranks);
@@ -169,7 +169,7 @@ pub fn partition(graph: &Graph, link: &Link<'_>, run: &Run, live: &[bool], wante
     Code { bodies, table, row: rows.len() }
 }
 
-fn ranks(graph: &Graph, link: &Link<'_>) -> Vec<Rank> {
+fn ranks(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
     let mut ranks: Vec<Rank> = Vec::with_capacity(graph.len());
     for id in 0..graph.len() as u32 {
         let op = graph.get(id).0;
@@ -189,7 +189,7 @@ fn ranks(graph: &Graph, link: &Link<'_>) -> Vec<Rank> {
 /// the operations the code would have used.
 fn columns(
     graph: &Graph,
-    link: &Link<'_>,
+    link: &Link<'_, '_>,
     run: &Run,
     live: &[bool],
     ranks: &[Rank],
@@ -233,7 +233,7 @@ fn columns(
     (columns, table)
 }
 
-fn value(op: Op, link: &Link<'_>, row: &[f64], values: &BTreeMap<u32, f64>) -> f64 {
+fn value(op: Op, link: &Link<'_, '_>, row: &[f64], values: &BTreeMap<u32, f64>) -> f64 {
     let of = |o: Operand| match o {
         Operand::Const(bits) => f64::from_bits(bits),
         Operand::Node(id) => values[&id],

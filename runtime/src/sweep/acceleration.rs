@@ -1,44 +1,31 @@
 //! Accelerations `(q, v, τ) → v̇`.
 //!
-//! The bodies' wrenches for a reference motion without the accelerations that are sought are the seeds of the linear
-//! problem; its solution is what comes on top. Nothing is imposed on the way: products of velocities, prescribed
-//! accelerations and gravity are all in the reference.
+//! A reference motion has the given velocities and any accelerations. The wrenches that the bodies need for it are the
+//! right-hand side of the linear problem, whose solution is added to the accelerations of the reference. Products of
+//! velocities, prescribed accelerations and gravity are all in the reference, so the linear problem has none of them.
 
-use super::newton::Accelerations;
-use super::solve::Load;
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::pass::{each_node, Sweep};
+use super::{Quantity, Sweeps, Trace};
 use crate::tree::Source;
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Accelerations from velocities: `(q, v, τ) → v̇`.
-    pub fn accelerations(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S]) {
-        self.prepare(q, u, w, true);
-        self.newton(v, Accelerations::Chosen, u, w);
-        self.row_accelerations(v, u, w);
-        self.wrench_loads(u, w);
-        self.newton_wrenches(w);
-        w.generalized.fill(S::zero());
-        for i in 0..self.tree.nodes.len() {
-            self.joint_load_node(i, w);
-        }
-        for (f, tau) in w.generalized.iter_mut().zip(u.tau) {
-            *f = *f + *tau;
-        }
-        w.drive.fill(S::zero());
-        let load = Load::accelerations(&w.generalized, &w.drive, &w.force, &w.constraints.rhs);
-        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.acceleration);
-        self.collect_rates(&w.acceleration, &w.first, a);
-        self.collect_multipliers(&w.acceleration.unknown_rate, &mut w.constraints.multipliers);
-        for i in 0..self.tree.nodes.len() {
-            self.add_reference_node(i, w, a);
-        }
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// Joint forces of the linear problem, but for `τ`.
+    pub(super) const JOINT_LOADS: Self = Sweep {
+        begin: |cx| cx.w.generalized.fill(S::zero()),
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.joint_load_node(i, cx.w))
+    };
 
+    /// The reference accelerations added to the solution.
+    pub(super) const ADD_REFERENCE: Self =
+        each_node!(BaseToTip, |cx, i| cx.sweeps.add_reference_node(i, cx.w, cx.results.v));
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Passive forces of node `i` and what its rotors need for the reference accelerations, added to
     /// [`Workspace::generalized`].
-    pub fn joint_load_node(&self, i: usize, w: &mut Workspace<S>) {
+    fn joint_load_node(&self, i: usize, w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::Load);
@@ -49,7 +36,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Adds the reference accelerations of node `i` to the solution.
-    pub fn add_reference_node(&self, i: usize, w: &Workspace<S>, a: &mut [S]) {
+    fn add_reference_node(&self, i: usize, w: &Workspace<S>, a: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::Acceleration);

@@ -1,21 +1,28 @@
 //! Joint coordinates to joint transforms.
 
+use super::pass::{each_node, Sweep};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{quaternion_matrix, quaternion_rate, Axis, ElementaryTransform, RigidInertia};
 use crate::tree::{quarter_turn, Kind, Source};
 use crate::workspace::{Poses, TurnedBody};
 use crate::Scalar;
 
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// `q̇ = N(q) v` from the velocities among the results.
+    pub(super) const COORDINATE_RATES: Self =
+        each_node!(BaseToTip, |cx, i| cx.sweeps.coordinate_rate_node(i, cx.given.q, cx.results.v, cx.results.qd));
+}
+
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Sets the variable steps of every joint from the coordinates of the state and of the drives.
-    pub fn articulate(&self, q: &[S], drive_q: &[S], w: &mut Poses<S>) {
+    pub(super) fn articulate(&self, q: &[S], drive_q: &[S], w: &mut Poses<S>) {
         for i in 0..self.tree.nodes.len() {
             self.articulate_node(i, q, drive_q, w);
         }
     }
 
     /// [`Sweeps::articulate`] for node `i` alone.
-    pub fn articulate_node(&self, i: usize, q: &[S], drive_q: &[S], w: &mut Poses<S>) {
+    fn articulate_node(&self, i: usize, q: &[S], drive_q: &[S], w: &mut Poses<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Pose);
         let q = match node.source {
@@ -33,7 +40,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             w.coordinates[i].copy_from_slice(&q[..3]);
         }
         match node.kind {
-            Kind::Revolute => self.pin(i, x, w),
+            Kind::Revolute => self.revolute(i, x, w),
             Kind::Prismatic => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
             Kind::Helical { pitch } => w.joint[i].set(&[shift(Axis::Z, node.slide + pitch * x), turn(x)]),
             Kind::Planar => w.joint[i].set(&[shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
@@ -49,14 +56,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Steps of a pin with joint coordinate `x`.
-    fn pin(&self, i: usize, x: S, w: &mut Poses<S>) {
+    /// Elementary transforms of a revolute joint with joint coordinate `x`.
+    fn revolute(&self, i: usize, x: S, w: &mut Poses<S>) {
         let node = &self.tree.nodes[i];
         let shift = |axis: Axis, r: S| ElementaryTransform::Shift { axis, r };
         let (mut angle, mut quarter, mut slide) = (x + node.phase, node.quarter, node.slide);
         let mut placing = [shift(Axis::X, S::zero()), shift(Axis::Y, S::zero())];
-        let swung = self.swung(i);
-        if let Some(p) = node.parent.filter(|_| swung) {
+        let turns = self.placement_turns(i);
+        if let Some(p) = node.parent.filter(|_| turns) {
             let outer = &w.body[p];
             (angle, quarter) = (angle + outer.angle, (quarter + outer.quarter) % 4);
             let at = node.place.iter().fold([S::zero(); 3], |r, step| step.moment(S::one(), r));
@@ -67,7 +74,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (s, c) = quarter_turn(angle.sin_cos(), quarter);
         let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
         let [px, py] = placing;
-        let placed = if swung { 2 } else { 0 };
+        let placed = if turns { 2 } else { 0 };
         let steps = [px, py, shift(Axis::Z, slide), turn];
         let last = if node.elimination.non_rotating { 3 } else { 4 };
         w.joint[i].set_with(placed, &steps[2 - placed..last]);
@@ -85,7 +92,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// [`Sweeps::coordinate_rates`] for node `i` alone.
-    pub fn coordinate_rate_node(&self, i: usize, q: &[S], v: &[S], qd: &mut [S]) {
+    fn coordinate_rate_node(&self, i: usize, q: &[S], v: &[S], qd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { q: at, v: vat } = node.source else { return };
         self.trace.at(Some(i), Quantity::Rate);

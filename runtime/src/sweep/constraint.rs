@@ -1,12 +1,13 @@
-//! Loops, couplings, rolling: multipliers `σ` of the constraints as further unknowns of the sweeps.
+//! Loops, couplings, rolling: the multipliers `σ` of the constraints are further unknowns of the sweeps.
 //!
 //! Momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). A multiplier's column `D^σ` starts as the wrench of its row at the
-//! two bodies that it binds, stays open through the backward sweep like that of a shared coordinate, and is eliminated where
+//! two bodies that it binds, stays open through the sweep from tip to base like that of a shared coordinate, and is eliminated where
 //! its bodies' paths have met: `M v + Φᵀσ = p⁺`, `Φ v = b` is one symmetric system, and this is its elimination in the order of
 //! the tree. Where the paths have met the columns are no longer zero, although the wrenches cancel there: so they cannot
 //! stop there before they are eliminated.
 
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::pass::{each_node, visit_force, Sweep, SweepDirection};
+use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
 use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
@@ -23,8 +24,9 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
-    /// Whether it is a joint to the ground whose rows stand in the axes of the body. Motions that such a joint leaves free are
-    /// a group, so `Ω × E_c` does no work on any of them: it changes `σ` alone, which is gauge, and need not be known.
+    /// Whether it is a joint to the ground whose rows are constants in the axes of the body. The motions that such a joint
+    /// leaves free form a group, so `Ω × E_c` does no work on any of them. It changes nothing but the multiplier `σ`, which is
+    /// a gauge variable, and need not be computed.
     fn gauge(&self) -> bool {
         let held = self.decay.is_none() && self.compliance.is_none();
         matches!(&self.bond, Bond::Cut(cut) if held && cut.a.node.is_none() && cut.closure.is_joint())
@@ -36,6 +38,11 @@ impl<S: Scalar> Constraint<S> {
             Bond::Cut(cut) => cut.closure.holonomic(k),
             Bond::Coupling { .. } => true,
         }
+    }
+
+    /// Whether it binds two frames.
+    fn is_cut(&self) -> bool {
+        matches!(self.bond, Bond::Cut(_))
     }
 
     /// Its rows.
@@ -72,57 +79,72 @@ impl<S: Scalar> Tree<S> {
     }
 }
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Poses, rows of the constraints, articulated inertia.
-    pub(crate) fn prepare(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, all: bool) {
-        self.place_rows(q, u, w, all);
-        self.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
-    }
-
-    /// Poses and rows of the constraints; `b` of each from its decay. Relative poses and residuals are left out where neither
-    /// rows nor `b` ask for them, unless `all` are wanted.
-    pub(super) fn place_rows(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, all: bool) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.reach_begin(w);
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            let Bond::Cut(cut) = &constraint.bond else { continue };
-            if !all && constraint.at_hand() {
-                continue;
-            }
-            self.trace.at(None, Quantity::Constraint);
-            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
-                path.iter().for_each(|&i| self.reach(i, index, side, w));
-            }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// Poses of the frames of cuts along the paths to them, where rows or `b` depend on these (`ALL`: of all cuts).
+    pub(super) const fn paths<const ALL: bool>() -> Self {
+        Sweep {
+            needed: |tree| tree.constraints.iter().any(|c| c.is_cut() && (ALL || !c.at_hand())),
+            begin: |cx| cx.sweeps.reach_begin(cx.w),
+            running: |cx, visit| {
+                let ends = cx.w.constraints.reach.iter_mut().flatten();
+                ends.flat_map(|(rot, pos)| rot.iter_mut().flatten().chain(pos)).for_each(visit);
+            },
+            ..each_node!(BaseToTip, |cx, i| cx.sweeps.reach_node(i, ALL, cx.w))
         }
-        self.set_rows(w, all);
     }
 
+    /// Rows of the constraints, after [`Sweep::paths`]. Visits no node.
+    pub(super) const fn rows<const ALL: bool>() -> Self {
+        Sweep {
+            needed: |tree| !tree.constraints.is_empty(),
+            // Rows that are constants of the body at the end of a chain: nothing pulls at its joints as they turn.
+            rolls: |tree| tree.constraints.iter().all(Constraint::gauge),
+            begin: |cx| cx.sweeps.set_rows(cx.w, ALL),
+            ..Sweep::idle(SweepDirection::TipToBase)
+        }
+    }
+
+    /// Multipliers out of the velocities, and the joint forces of constraints whose rows turn. Visits no node.
+    pub(super) const CONSTRAINT_FORCES: Self = Sweep {
+        needed: |tree| !tree.constraints.is_empty(),
+        end: |cx| cx.sweeps.constraint_forces(cx.w),
+        ..Sweep::idle(SweepDirection::BaseToTip)
+    };
+
+    /// Momenta freed of the multipliers, `p⁺ − Φᵀσ`, after the velocities.
+    pub(super) const FREED_MOMENTA: Self = Sweep {
+        begin: |cx| {
+            cx.results.p.copy_from_slice(cx.given.second);
+            cx.sweeps.freed_begin(cx.w);
+        },
+        running: |cx, visit| cx.w.constraints.end_wrenches.iter_mut().flatten().for_each(|f| visit_force(f, visit)),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.freed_node(i, cx.w, cx.results.p))
+    };
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::reach_node`].
-    pub fn reach_begin(&self, w: &mut Workspace<S>) {
+    fn reach_begin(&self, w: &mut Workspace<S>) {
         let (o, one) = (S::zero(), S::one());
         w.constraints.reach.fill([([[one, o, o], [o, one, o], [o, o, one]], [o; 3]); 2]);
     }
 
-    /// The step from its parent to node `i` in the paths of all cuts that go by it, its parent being done.
-    pub fn reach_node(&self, i: usize, w: &mut Workspace<S>) {
+    /// The steps from its parent to node `i` in the paths of the cuts that go through it, after its parent. Relative
+    /// poses are left out where neither rows nor `b` ask for them, unless `all` are wanted.
+    fn reach_node(&self, i: usize, all: bool, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Constraint);
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            let Bond::Cut(cut) = &constraint.bond else { continue };
-            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
-                if path.contains(&i) {
-                    self.reach(i, index, side, w);
-                }
+        for &(index, side) in &w.constraints.through[i] {
+            let constraint = &self.tree.constraints[index];
+            if constraint.is_cut() && (all || !constraint.at_hand()) {
+                let (rot, pos) = &mut w.constraints.reach[index][side];
+                self.steps(&w.poses, i).for_each(|step| step.pose(rot, pos));
             }
         }
     }
 
-    fn reach(&self, i: usize, index: usize, side: usize, w: &mut Workspace<S>) {
-        let (rot, pos) = &mut w.constraints.reach[index][side];
-        self.steps(&w.poses, i).for_each(|step| step.pose(rot, pos));
-    }
-
-    /// Rows of the constraints, the paths of all cuts being known that are needed (`all`: whatever they are needed for).
-    pub fn set_rows(&self, w: &mut Workspace<S>, all: bool) {
+    /// Rows of the constraints and `b` of each from its decay, the paths of the cuts being known that [`Sweeps::reach_node`]
+    /// has followed.
+    fn set_rows(&self, w: &mut Workspace<S>, all: bool) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
@@ -176,7 +198,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Columns `D^σ` where they begin.
-    pub fn seed_columns(&self, rows: &[crate::workspace::RowState<S>], f: &mut Factor<S>) {
+    pub(super) fn seed_columns(&self, rows: &[crate::workspace::RowState<S>], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         for constraint in &self.tree.constraints {
             let Bond::Cut(cut) = &constraint.bond else { continue };
@@ -190,7 +212,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Ratio with which the freedom of node `i` enters the coupling of shared `g`; zero for all else.
+    /// Ratio with which the freedom of node `i` enters the coupling of unknown `g`; zero for all else.
     pub(super) fn coupled(&self, i: usize, g: usize) -> S {
         let Unknown::Row(r) = self.tree.unknowns[g] else { return S::zero() };
         match &self.tree.constraint_of(r).bond {
@@ -211,10 +233,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sum
     }
 
-    /// Pivot of row `r`, the shared `g`: negative, or zero where what is left of the row's diagonal is too little of what it
-    /// was, or of what those of its constraint are together. The first says that it follows from rows before it, the second
-    /// that its bodies cannot move along it. Where they can move along none of its rows, all of them are rounding, and small
-    /// beside what a body of 1 kg or 1 kg m² would give, for which the one stands.
+    /// Reciprocal pivot of row `r`, the unknown `g`: negative, or zero where the row is redundant. It is redundant if what is
+    /// left of its diagonal is too small a part of the diagonal at first (the row follows from rows before it) or of the
+    /// diagonals of all rows of its constraint (its bodies cannot move along it). Where the bodies can move along none of the
+    /// rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1 kg m² would give.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
@@ -225,7 +247,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// What row `r` gives way by for its multiplier.
     pub(super) fn compliance(&self, r: usize) -> S {
-        // Part of a tree, on which forms of elimination are tried, has rows of constraints that it has not.
+        // Eliminations are tried on parts of a tree, which have rows of constraints that are not their own.
         let own = self.tree.constraints.iter().find(|c| c.range().contains(&r));
         own.and_then(|c| c.compliance).unwrap_or(S::zero())
     }
@@ -241,12 +263,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// its first, is along it.
     fn along_loop(&self, cut: &Cut<S>, ends: (Force<S>, Force<S>), poses: &Poses<S>, mut visit: impl FnMut(usize, S)) {
         for (path, f) in [(&cut.path_a, ends.0), (&cut.path_b, ends.1)] {
-            path.iter().rev().fold(f, |f, &i| self.bear(i, &f, poses, &mut visit));
+            path.iter().rev().fold(f, |f, &i| self.along_joint(i, &f, poses, &mut visit));
         }
     }
 
     /// Calls `visit` with the velocities of node `i` and what a wrench `f` on it is along them; gives `f` on its parent.
-    fn bear(&self, i: usize, f: &Force<S>, poses: &Poses<S>, visit: &mut impl FnMut(usize, S)) -> Force<S> {
+    fn along_joint(&self, i: usize, f: &Force<S>, poses: &Poses<S>, visit: &mut impl FnMut(usize, S)) -> Force<S> {
         let node = &self.tree.nodes[i];
         if let Source::State { v, .. } = node.source {
             (0..node.kind.nv()).for_each(|k| visit(v + k, node.ratio * node.kind.axis(k).dot(f)));
@@ -255,13 +277,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `Eᵀ` of the wrenches that constraints put on the bodies of their loops as their directions turn,
-    /// `E_c° σ = (Ė_c + Ω_C × E_c) σ`, in [`crate::workspace::Constraints::pull`]; after the velocities.
-    pub(super) fn constraint_pull(&self, w: &mut Workspace<S>) {
+    /// `E_c° σ = (Ė_c + Ω_C × E_c) σ`, in [`crate::workspace::Constraints::forces`]; after the velocities.
+    pub(super) fn constraint_forces(&self, w: &mut Workspace<S>) {
         if self.tree.constraints.is_empty() {
             return;
         }
         self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
-        w.constraints.pull.fill(S::zero());
+        w.constraints.forces.fill(S::zero());
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(cut) = &constraint.bond else { continue };
             if constraint.gauge() {
@@ -270,7 +292,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(None, Quantity::Constraint);
             let at = w.constraints.relative[index];
             let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
-            let rates = cut.closure.direction_rates(&at, &less(&b, &at.motion(&a)));
+            let rates = cut.closure.direction_rates(&at, &difference(&b, &at.motion(&a)));
             let mut total = Force::zero();
             let mut own = Force::zero();
             for (k, r) in constraint.range().enumerate() {
@@ -282,8 +304,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 total = total.plus(&b.cross_force(&own));
             }
             let ends = self.at_nodes(cut, &at, &total, &w.poses);
-            let pull = &mut w.constraints.pull;
-            self.along_loop(cut, ends, &w.poses, |v, f| pull[v] = pull[v] + f);
+            let forces = &mut w.constraints.forces;
+            self.along_loop(cut, ends, &w.poses, |v, f| forces[v] = forces[v] + f);
         }
     }
 
@@ -309,9 +331,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.on_body(&w.poses, frame).fold(outer, |m, step| step.motion(&m))
     }
 
-    /// Before the first [`Sweeps::hold_node`], after the velocities: the negative of the multipliers, and what they are at the
+    /// Before the first [`Sweeps::freed_node`], after the velocities: the negative of the multipliers, and what they are at the
     /// ends of cuts.
-    pub fn hold_begin(&self, w: &mut Workspace<S>) {
+    fn freed_begin(&self, w: &mut Workspace<S>) {
         self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
         w.constraints.multipliers.iter_mut().for_each(|x| *x = -*x);
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
@@ -322,54 +344,32 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 let each = constraint.range().map(|r| of(&rows[r]).times(multipliers[r]));
                 each.fold(Force::zero(), |sum, f| sum.plus(&f))
             };
-            w.constraints.hold[index] = [sum(|row| row.at_a), sum(|row| row.at_b)];
+            w.constraints.end_wrenches[index] = [sum(|row| row.at_a), sum(|row| row.at_b)];
         }
     }
 
-    /// What [`Sweeps::hold_begin`] put at the ends of cuts, along the freedoms of node `i`, added to `p`; all nodes behind it
-    /// being done.
-    pub fn hold_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
+    /// `Φᵀ` times the multipliers of [`Sweeps::freed_begin`] along the freedoms of node `i`, added to `p`, after its
+    /// children.
+    fn freed_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
         self.trace.at(Some(i), Quantity::Constraint);
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            let Bond::Cut(cut) = &constraint.bond else { continue };
-            for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
-                if path.contains(&i) {
-                    self.hold(i, index, side, w, p);
-                }
-            }
-        }
-    }
-
-    fn hold(&self, i: usize, index: usize, side: usize, w: &mut Workspace<S>, p: &mut [S]) {
-        let f = &mut w.constraints.hold[index][side];
-        *f = self.bear(i, f, &w.poses, &mut |v, x| p[v] = p[v] + x);
-    }
-
-    /// `Φᵀ` times the multipliers of [`Sweeps::hold_begin`], added to `p`.
-    fn add_multipliers(&self, w: &mut Workspace<S>, p: &mut [S]) {
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            self.trace.at(None, Quantity::Constraint);
+        for &(index, part) in &w.constraints.through[i] {
+            let constraint = &self.tree.constraints[index];
             match &constraint.bond {
-                Bond::Coupling { terms, .. } => {
-                    for (i, ratio) in terms {
-                        if let Source::State { v, .. } = self.tree.nodes[*i].source {
-                            p[v] = p[v] + *ratio * w.constraints.multipliers[constraint.first];
-                        }
-                    }
+                Bond::Cut(_) => {
+                    let f = &mut w.constraints.end_wrenches[index][part];
+                    *f = self.along_joint(i, f, &w.poses, &mut |v, x| p[v] = p[v] + x);
                 }
-                Bond::Cut(cut) => {
-                    for (side, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
-                        path.iter().rev().for_each(|&i| self.hold(i, index, side, w, p));
+                Bond::Coupling { terms, .. } => {
+                    if let Source::State { v, .. } = self.tree.nodes[i].source {
+                        p[v] = p[v] + terms[part].1 * w.constraints.multipliers[constraint.first];
                     }
                 }
             }
         }
     }
 
-    /// Residuals `φ(q)` of the positions and the entries of `Φ`, placed as [`Tree::entry_columns`] says.
-    pub fn constraint_residuals(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>, phi: &mut [S], entries: &mut [S]) {
-        self.place_rows(q, u, w, true);
-        self.residuals(w, phi);
+    /// Entries of `Φ`, placed as [`Tree::entry_columns`] says, after the rows.
+    pub(super) fn row_entries(&self, w: &Workspace<S>, entries: &mut [S]) {
         entries.fill(S::zero());
         let mut first = 0;
         for constraint in &self.tree.constraints {
@@ -401,74 +401,28 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Residuals of the positions.
-    pub fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
+    pub(super) fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
         for (phi, row) in phi.iter_mut().zip(&w.constraints.rows) {
             *phi = row.residual;
         }
     }
 
-    /// Velocities and multipliers `σ` of a state, and momenta freed of them: `M v = p⁺ − Φᵀσ`.
-    pub fn project_momenta(
-        &self,
-        q: &[S],
-        p: &[S],
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-        v: &mut [S],
-        freed: &mut [S],
-        sigma: &mut [S],
-    ) {
-        self.velocities(q, p, u, w, v);
-        self.hold_begin(w);
-        freed.copy_from_slice(p);
-        self.add_multipliers(w, freed);
-        self.settled_multipliers(w, sigma);
-    }
-
-    /// The multipliers `σ` after [`Sweeps::hold_begin`].
-    pub fn settled_multipliers(&self, w: &Workspace<S>, sigma: &mut [S]) {
+    /// The multipliers `σ` after [`Sweeps::freed_begin`].
+    pub(super) fn projected_multipliers(&self, w: &Workspace<S>, sigma: &mut [S]) {
         for (sigma, x) in sigma.iter_mut().zip(&w.constraints.multipliers) {
             *sigma = -*x;
         }
     }
 
-    /// Newton's step onto the closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`, with the residuals
-    /// `φ` and the pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
-    pub fn position_correction(
-        &self,
-        q: &[S],
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-        phi: &mut [S],
-        dq: &mut [S],
-        pivots: &mut [S],
-    ) {
-        self.prepare(q, u, w, true);
-        self.residuals(w, phi);
-        self.aim_at_closed(w);
-        w.generalized.fill(S::zero());
-        w.drive.fill(S::zero());
-        let load = super::Load {
-            p: &w.generalized,
-            drive: &w.drive,
-            seeds: None,
-            rows: &w.constraints.rhs,
-            what: Quantity::Constraint,
-        };
-        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
-        self.collect_rates(&w.velocity, &w.first, dq);
-        self.row_pivots(w, pivots);
-    }
-
     /// Right-hand sides that take the residuals away.
-    pub fn aim_at_closed(&self, w: &mut Workspace<S>) {
+    pub(super) fn aim_at_closed(&self, w: &mut Workspace<S>) {
         for (b, row) in w.constraints.rhs.iter_mut().zip(&w.constraints.rows) {
             *b = -row.residual;
         }
     }
 
     /// Pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
-    pub fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
+    pub(super) fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
         let ng = self.tree.unknowns.len();
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
             // Zero where the pivot was not taken: x · (ρ x).
@@ -479,7 +433,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 }
 
 /// Difference of two motions.
-pub(super) fn less<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
+pub(super) fn difference<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
     let minus = |a: Vec3<S>, b: Vec3<S>| core::array::from_fn(|k| a[k] - b[k]);
     Motion { lin: minus(a.lin, b.lin), ang: minus(a.ang, b.ang) }
 }

@@ -1,27 +1,27 @@
 //! Constraints on accelerations: what their rows ask for beside a reference motion, and the multipliers `λ`.
 
-use super::constraint::less;
+use super::constraint::difference;
+use super::pass::Sweep;
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, Motion, Vec3};
 use crate::tree::{Bond, Constraint, Cut};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Multipliers `λ` at given velocities.
-    pub fn multipliers(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, a: &mut [S], lambda: &mut [S]) {
-        self.accelerations(q, v, u, w, a);
-        lambda.copy_from_slice(&w.constraints.multipliers);
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// What the rows ask for beside a reference motion, after [`Sweep::NEWTON`], from the velocities of all nodes.
+    pub(super) const ROW_ACCELERATIONS: Self = Sweep {
+        needed: |tree| !tree.constraints.is_empty(),
+        rolls: |_| false,
+        end: |cx| cx.sweeps.row_accelerations(&cx.given.inputs, cx.w),
+        ..Self::VELOCITY
+    };
+}
 
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// What the accelerations of a reference motion leave to be done by the rows, in
-    /// [`crate::workspace::Constraints::rhs`]: the negative of `Eᵀ dΩ_rel/dt + ĖᵀΩ_rel`, and Baumgarte's terms. After
-    /// [`Sweeps::newton`].
-    pub(super) fn row_accelerations(&self, v: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        if self.tree.constraints.is_empty() {
-            return;
-        }
-        self.velocity_kinematics(v, u.drive_v, w);
+    /// [`crate::workspace::Constraints::rhs`]: the negative of `Eᵀ dΩ_rel/dt + ĖᵀΩ_rel`, and Baumgarte's terms.
+    fn row_accelerations(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
@@ -61,7 +61,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
             m
         });
-        let rel = less(&vb, &at.motion(&va));
+        let rel = difference(&vb, &at.motion(&va));
         let rates = cut.closure.direction_rates(&at, &rel);
         // Derivatives of the components of Ω_rel, from accelerations of the origins as vectors.
         let (spin, alpha) = (at.turned(va.ang), at.turned(aa.alpha));

@@ -1,25 +1,44 @@
-//! Articulated inertia, leaves to base: every freedom is eliminated by itself, a multi-freedom joint one column after
-//! the other, which is the `LDLᵀ` of its `Mj`.
+//! Articulated inertia, from tip to base. Every freedom is eliminated by itself; eliminating the freedoms of one joint one
+//! after the other is the `LDLᵀ` factorization of its `Mj`.
 
+use super::pass::{each_node, visit_force, visit_inertia, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
 use crate::tree::{Freedom, Source, Unknown};
-use crate::workspace::{Factor, Pivot, Poses, RowState};
+use crate::workspace::{Factor, Pivot, Poses};
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// `M*`, `U`, `Mj`, `M'` of every node (4.48, 4.44).
-    pub fn factor(&self, poses: &Poses<S>, first: &[usize], rows: &[RowState<S>], f: &mut Factor<S>) {
-        self.factor_begin(poses, f);
-        self.seed_columns(rows, f);
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.factor_node(i, poses, first, f);
-        }
-        self.factor_ground(f);
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// `M*`, `U`, `Mj`, `M'` (4.48, 4.44), and the columns of unknowns that are still open.
+    pub(super) const FACTOR: Self = Sweep {
+        waits: false,
+        begin: |cx| {
+            cx.sweeps.factor_begin(&cx.w.poses, &mut cx.w.factor);
+            cx.sweeps.seed_columns(&cx.w.constraints.rows, &mut cx.w.factor);
+        },
+        end: |cx| cx.sweeps.factor_ground(&mut cx.w.factor),
+        carried: |cx, i, visit| {
+            let (tree, f) = (cx.sweeps.tree, &mut cx.w.factor);
+            visit_inertia(&mut f.m[i], visit);
+            let n = tree.nodes.len();
+            (0..tree.unknowns.len())
+                .filter(|&g| tree.is_slot(g))
+                .for_each(|g| visit_force(&mut f.columns[g * n + i], visit));
+        },
+        running: |cx, visit| {
+            let (tree, f) = (cx.sweeps.tree, &mut cx.w.factor);
+            let ng = tree.unknowns.len();
+            (0..ng).filter(|&g| tree.is_slot(g)).for_each(|g| visit(&mut f.whole[g]));
+            let both = |k: usize| tree.is_slot(k / ng) && tree.is_slot(k % ng);
+            (0..ng * ng).filter(|&k| both(k)).for_each(|k| visit(&mut f.gram[k]));
+        },
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.factor_node(i, &cx.w.poses, &cx.w.first, &mut cx.w.factor))
+    };
+}
 
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::factor_node`]: every body by itself.
-    pub fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
+    fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
         for i in 0..self.tree.nodes.len() {
             f.m[i] = self.inertia(poses, i).articulated();
         }
@@ -29,7 +48,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Columns and inertias of what stays open: only where they are read, so that many small loops cost as much as they are.
+    /// Sets the columns and inertias of open unknowns to zero, only where they are read: the work grows with the sizes of the
+    /// loops, not with the square of the number of rows.
     fn clear_open(&self, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
@@ -69,8 +89,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// [`Sweeps::factor`] for node `i` alone, all nodes behind it being done.
-    pub fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
+    /// `M*`, `U`, `Mj`, `M'` of node `i` (4.48, 4.44), after its children. For a plain revolute joint this reads: `U = M* E`,
+    /// `Mj = EᵀU`, `M' = M* − U Mj⁻¹ Uᵀ`, and `XᵀM'X` is added to `M*` of the parent. The rest is for unknowns that are solved
+    /// at another node than their joint's, and for joints that are eliminated in the frame before them.
+    fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
         let mut m = f.m[i]; // M*_i (4.48)
@@ -112,7 +134,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// After the last [`Sweeps::factor_node`]: coordinates solved at the ground.
-    pub fn factor_ground(&self, f: &mut Factor<S>) {
+    fn factor_ground(&self, f: &mut Factor<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
             self.trace.at(None, Quantity::Pivot);
@@ -121,7 +143,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of a shared coordinate.
+    /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of its unknown.
     fn eliminate(&self, i: usize, k: usize, freedom: usize, m: &mut ArticulatedInertia<S>, f: &mut Factor<S>) {
         let node = &self.tree.nodes[i];
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
@@ -166,7 +188,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         f.pivots[freedom] = pivot;
     }
 
-    /// Eliminates shared coordinate or row `g` at node `i` (`None`: the ground), `open` being those that stay open.
+    /// Eliminates unknown `g` at node `i` (`None`: the ground), `open` being those that stay open.
     fn solve_unknown(
         &self,
         g: usize,

@@ -1,34 +1,42 @@
-//! Inverse dynamics `(q, v, v̇) → τ`, bias forces, and the wrenches that joints transmit: Newton and Euler out, wrenches
-//! back.
+//! Inverse dynamics `(q, v, v̇) → τ`, bias forces, and the wrenches that joints transmit: what the bodies need for their
+//! motion (`newton.rs`), summed from tip to base.
 
 use super::newton::Accelerations;
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::pass::{each_node, visit_force, Sweep};
+use super::{Quantity, Sweeps, Trace};
 use crate::tree::Source;
 use crate::workspace::Workspace;
 use crate::Scalar;
 
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// Wrench on every node from its parent, in [`Workspace::force`].
+    pub(super) const TRANSMITTED: Self = Sweep {
+        carried: |cx, i, visit| visit_force(&mut cx.w.force[i], visit),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.transmitted_wrench_node(i, cx.w))
+    };
+
+    /// The same with the wrenches of the constraints, whose multipliers `λ` are known.
+    pub(super) const TRANSMITTED_WITH_CONSTRAINTS: Self =
+        Sweep { begin: |cx| cx.sweeps.add_seeds(cx.w), ..Self::TRANSMITTED };
+}
+
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Joint forces `τ` that give the accelerations `a`: `(q, v, v̇) → τ = M v̇ + h`. The `τ` of the inputs is not read.
-    pub fn inverse_dynamics(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, tau: &mut [S]) {
-        self.newton_euler(q, v, Accelerations::Given(a), u, w);
-        self.joint_forces(Accelerations::Given(a), w, tau);
+    /// Adds the wrench on node `i`, which has those of its children in it, to that of its parent.
+    fn transmitted_wrench_node(&self, i: usize, w: &mut Workspace<S>) {
+        let Some(parent) = self.tree.nodes[i].parent else { return };
+        self.trace.at(Some(i), Quantity::Load);
+        let out = self.force_out(&w.poses, i, &w.force[i]);
+        w.force[parent] = w.force[parent].plus(&out);
     }
 
-    /// Bias forces: the joint forces that keep `v̇` zero, `(q, v) → h` with `M v̇ + h = τ`. What products of velocities,
-    /// prescribed accelerations and gravity need, less what springs, dampers and external wrenches give.
-    pub fn bias(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, h: &mut [S]) {
-        self.newton_euler(q, v, Accelerations::Zero, u, w);
-        self.joint_forces(Accelerations::Zero, w, h);
+    /// Joint forces out of the wrenches that the joints transmit.
+    pub(super) fn joint_forces(&self, a: Accelerations<S>, w: &Workspace<S>, tau: &mut [S]) {
+        tau.fill(S::zero());
+        (0..self.tree.nodes.len()).for_each(|i| self.joint_force_node(i, a, w, tau));
     }
 
-    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, at accelerations `a`
-    /// (4.66), on a tree that was not regrouped. The multipliers `λ` of constraints are those of the last
-    /// [`Sweeps::accelerations`].
-    pub fn reactions(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [[S; 6]]) {
-        self.place_rows(q, u, w, false);
-        self.needed_wrenches(v, Accelerations::Given(a), u, w);
-        self.add_seeds(w);
-        self.wrenches_back(w);
+    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame (4.66).
+    pub(super) fn collect_reactions(&self, w: &Workspace<S>, out: &mut [[S; 6]]) {
         for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
             self.trace.at(Some(i), Quantity::Reaction);
             let f = self.on_body(&w.poses, &self.tree.frames[k]).fold(w.force[i], |f, step| step.force_back(&f));
@@ -36,43 +44,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Wrench on every node from its parent, in [`Workspace::force`].
-    fn newton_euler(&self, q: &[S], v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.needed_wrenches(v, a, u, w);
-        self.wrenches_back(w);
-    }
-
-    /// Wrench that every body needs beside the external ones.
-    fn needed_wrenches(&self, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
-        self.newton(v, a, u, w);
-        self.wrench_loads(u, w);
-        self.newton_wrenches(w);
-    }
-
-    fn wrenches_back(&self, w: &mut Workspace<S>) {
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.wrench_back_node(i, w);
-        }
-    }
-
-    /// Adds the wrench on node `i`, those of its children being in it, to that of its parent.
-    pub fn wrench_back_node(&self, i: usize, w: &mut Workspace<S>) {
-        let Some(parent) = self.tree.nodes[i].parent else { return };
-        self.trace.at(Some(i), Quantity::Load);
-        let out = self.force_out(&w.poses, i, &w.force[i]);
-        w.force[parent] = w.force[parent].plus(&out);
-    }
-
-    fn joint_forces(&self, a: Accelerations<S>, w: &Workspace<S>, tau: &mut [S]) {
-        tau.fill(S::zero());
-        for i in 0..self.tree.nodes.len() {
-            self.joint_force_node(i, a, w, tau);
-        }
-    }
-
     /// `Eᵀ` of the wrench on node `i`, its rotors, less its passive forces; added to `tau`.
-    pub fn joint_force_node(&self, i: usize, a: Accelerations<S>, w: &Workspace<S>, tau: &mut [S]) {
+    fn joint_force_node(&self, i: usize, a: Accelerations<S>, w: &Workspace<S>, tau: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::Effort);

@@ -1,36 +1,16 @@
-//! Jacobians of frames, and what their rates do: the acceleration that is there without `v̇`.
+//! Jacobians of frames, and their bias accelerations, which are what is left of the frames' accelerations at `v̇ = 0`.
 
-use super::newton::{Accelerations, ClassicMotion};
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::newton::ClassicMotion;
+use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{add3, scale3, ElementaryTransform, Mat3, Vec3};
 use crate::tree::{Freedom, Source, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Jacobians of frames, `q → J`: for each of `frames` one block of `out`, `6 × nv`, row by row. `J v` is the frame's
-    /// velocity `[linear; angular]` in its own axes, at its origin, as far as it comes from `v` (prescribed rates add
-    /// theirs).
-    pub fn jacobians<'b>(
-        &self,
-        q: &[S],
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-        frames: impl Iterator<Item = &'b TreeFrame<S>>,
-        out: &mut [S],
-    ) where
-        S: 'b,
-    {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        let size = 6 * self.tree.dims.nv;
-        for (frame, out) in frames.zip(out.chunks_mut(size.max(1))) {
-            self.jacobian(frame, w, out);
-        }
-    }
-
     /// One of [`Sweeps::jacobians`], after the articulation. The frame's pose is carried inward from node to node: only
     /// its ancestors are met, and each turns three axes and one arm.
-    pub fn jacobian(&self, frame: &TreeFrame<S>, w: &Workspace<S>, out: &mut [S]) {
+    pub(super) fn jacobian(&self, frame: &TreeFrame<S>, w: &Workspace<S>, out: &mut [S]) {
         out.fill(S::zero());
         let (o, one) = (S::zero(), S::one());
         self.trace.at(frame.node, Quantity::Jacobian);
@@ -54,32 +34,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// `J̇ v` and its like for each of `frames`: acceleration `[linear; angular]` at `v̇ = 0`, prescribed accelerations
-    /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in ground
-    /// axes the frame accelerates by `R (J v̇ + drift)`.
-    pub fn bias_accelerations<'b>(
-        &self,
-        q: &[S],
-        v: &[S],
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-        frames: impl Iterator<Item = (&'b TreeFrame<S>, &'b mut [S; 6])>,
-    ) where
-        S: 'b,
-    {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.newton(v, Accelerations::Zero, &Inputs { gravity: [S::zero(); 3], ..*u }, w);
-        for (frame, out) in frames {
-            let Some(i) = frame.node else {
-                out.fill(S::zero());
-                continue;
-            };
-            self.trace.at(Some(i), Quantity::Acceleration);
-            let mut m = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
-            self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
-            let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);
-            *out = [ax, ay, az, bx, by, bz];
-        }
+    /// Acceleration `[linear; angular]` of a frame in its own axes, after [`Sweep::NEWTON`](super::pass::Sweep::NEWTON).
+    pub(super) fn frame_acceleration(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> [S; 6] {
+        let Some(i) = frame.node else { return [S::zero(); 6] };
+        self.trace.at(Some(i), Quantity::Acceleration);
+        let mut m = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
+        self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
+        let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);
+        [ax, ay, az, bx, by, bz]
     }
 }
 

@@ -1,5 +1,6 @@
 //! Motions from velocities, and placements.
 
+use super::pass::{each_node, visit_motion, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Mat3, Motion, Vec3};
 use crate::tree::{Source, TreeFrame};
@@ -17,16 +18,20 @@ pub struct FrameState<S> {
     pub velocity: Motion<S>,
 }
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// `Ω_i = X_i Ω_λ + E v` from given velocities.
-    pub(super) fn velocity_kinematics(&self, v: &[S], drive: &[S], w: &mut Workspace<S>) {
-        for i in 0..self.tree.nodes.len() {
-            self.velocity_node(i, v, drive, w);
-        }
-    }
+    pub(super) const VELOCITY: Self = Sweep {
+        carried: |cx, i, visit| visit_motion(&mut cx.w.velocity.omega[i], visit),
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.velocity_node(i, cx.given.second, cx.given.inputs.drive_v, cx.w))
+    };
 
-    /// `Ω` of node `i` from given velocities, its parent being done.
-    pub fn velocity_node(&self, i: usize, v: &[S], drive: &[S], w: &mut Workspace<S>) {
+    /// Poses of all nodes in the ground.
+    pub(super) const PLACEMENT: Self = each_node!(BaseToTip, |cx, i| cx.sweeps.placement_node(i, cx.w));
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// `Ω` of node `i` from given velocities, after its parent.
+    pub(super) fn velocity_node(&self, i: usize, v: &[S], drive: &[S], w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Velocity);
         let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
@@ -46,25 +51,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         name::motion(self.trace, "omega", &omega);
     }
 
-    /// Poses of all nodes in the ground.
-    pub fn placements(&self, w: &mut Workspace<S>) {
+    /// Pose of node `i` in the ground, after its parent.
+    fn placement_node(&self, i: usize, w: &mut Workspace<S>) {
+        self.trace.at(Some(i), Quantity::Placement);
         let (o, one) = (S::zero(), S::one());
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            self.trace.at(Some(i), Quantity::Placement);
-            let (mut rot, mut pos) = match node.parent {
-                Some(p) => (w.rotation[p], w.position[p]),
-                None => ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]),
-            };
-            for step in self.steps(&w.poses, i) {
-                step.pose(&mut rot, &mut pos);
-            }
-            w.rotation[i] = rot;
-            w.position[i] = pos;
-        }
+        let (mut rot, mut pos) = match self.tree.nodes[i].parent {
+            Some(p) => (w.rotation[p], w.position[p]),
+            None => ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]),
+        };
+        self.steps(&w.poses, i).for_each(|step| step.pose(&mut rot, &mut pos));
+        (w.rotation[i], w.position[i]) = (rot, pos);
     }
 
-    /// Pose and velocity of a frame, after [`Sweeps::placements`] and a velocity sweep.
-    pub fn frame(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> FrameState<S> {
+    /// Pose and velocity of a frame, after [`Sweep::VELOCITY`] and [`Sweep::PLACEMENT`].
+    pub(super) fn frame(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> FrameState<S> {
         self.trace.at(frame.node, Quantity::Placement);
         let (o, one) = (S::zero(), S::one());
         let (mut rotation, mut position, mut velocity) = match frame.node {
@@ -76,24 +76,5 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             velocity = step.motion(&velocity);
         }
         FrameState { rotation, position, velocity }
-    }
-
-    /// Poses and velocities of frames: `(q, v)` in, one [`FrameState`] for each of `frames` out.
-    pub fn frame_states<'b>(
-        &self,
-        q: &[S],
-        v: &[S],
-        u: &super::Inputs<S>,
-        w: &mut Workspace<S>,
-        frames: impl Iterator<Item = (&'b TreeFrame<S>, &'b mut FrameState<S>)>,
-    ) where
-        S: 'b,
-    {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.velocity_kinematics(v, u.drive_v, w);
-        self.placements(w);
-        for (frame, out) in frames {
-            *out = self.frame(frame, w);
-        }
     }
 }

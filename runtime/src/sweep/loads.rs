@@ -1,58 +1,71 @@
 //! Gravity by first moments, external wrenches, springs.
 
+use super::pass::{each_node, visit_force, Sweep};
 use super::{name, Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, dot3, Force};
 use crate::tree::{TreeWrench, WrenchAxes};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Everything [`Sweeps::momentum_rates`] needs of gravity and wrenches.
-    pub(super) fn loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
-        self.gravity_moments(w);
-        for i in 0..self.tree.nodes.len() {
-            self.gravity_node(i, u, w);
-        }
-        self.wrench_loads(u, w);
-        if self.tree.wrenches.is_empty() {
-            return;
-        }
-        w.loads.total.copy_from_slice(&w.loads.own);
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.trace.at(Some(i), Quantity::Load);
-            if let Some(p) = self.tree.nodes[i].parent {
-                let out = self.force_out(&w.poses, i, &w.loads.total[i]);
-                w.loads.total[p] = w.loads.total[p].plus(&out); // T*_i (4.22)
-            }
-        }
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// First moment and mass of every subtree: `s_i = m c + Σ (R s_c + m_c r)`.
+    pub(super) const MOMENT: Self = Sweep {
+        waits: false,
+        begin: |cx| cx.sweeps.moment_begin(cx.w),
+        carried: |cx, i, visit| {
+            let loads = &mut cx.w.loads;
+            loads.moment[i].iter_mut().chain([&mut loads.mass[i]]).for_each(visit);
+        },
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.moment_node(i, cx.w))
+    };
 
-    /// Gravity in the axes of node `i`, its parent being done.
-    pub fn gravity_node(&self, i: usize, u: &Inputs<S>, w: &mut Workspace<S>) {
+    /// Gravity in the axes of every node.
+    pub(super) const GRAVITY: Self = Sweep {
+        waits: false,
+        carried: |cx, i, visit| cx.w.loads.gravity[i].iter_mut().for_each(visit),
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.gravity_node(i, &cx.given.inputs, cx.w))
+    };
+
+    /// `T*_i = T_i + Σ Xᵀ T*_c` (4.22) of external wrenches.
+    pub(super) const WRENCHES: Self = Sweep {
+        waits: false,
+        needed: |tree| !tree.wrenches.is_empty(),
+        rolls: |_| false,
+        begin: |cx| {
+            cx.sweeps.wrench_loads(&cx.given.inputs, cx.w);
+            cx.w.loads.total.copy_from_slice(&cx.w.loads.own);
+        },
+        carried: |cx, i, visit| visit_force(&mut cx.w.loads.total[i], visit),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.wrench_node(i, cx.w))
+    };
+
+    /// `V = −g · s` and the springs, after [`Sweep::MOMENT`].
+    pub(super) const POTENTIAL: Self = Sweep {
+        begin: |cx| cx.results.energy[1] = cx.sweeps.weight_potential(&cx.given.inputs, cx.w),
+        running: |cx, visit| visit(&mut cx.results.energy[1]),
+        ..each_node!(BaseToTip, |cx, i| cx.results.energy[1] = cx.sweeps.spring_node(i, cx.w, cx.results.energy[1]))
+    };
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Gravity in the axes of node `i`, after its parent.
+    fn gravity_node(&self, i: usize, u: &Inputs<S>, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let g = self.tree.nodes[i].parent.map_or(u.gravity, |p| w.loads.gravity[p]);
         w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
         name::vector(self.trace, "g", &w.loads.gravity[i]);
     }
 
-    /// First moment and mass of every subtree: `s_i = m c + Σ (R s_c + m_c r)`.
-    pub(super) fn gravity_moments(&self, w: &mut Workspace<S>) {
-        self.moment_begin(w);
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.moment_node(i, w);
-        }
-    }
-
     /// Before the first [`Sweeps::moment_node`]: every body by itself.
-    pub fn moment_begin(&self, w: &mut Workspace<S>) {
+    fn moment_begin(&self, w: &mut Workspace<S>) {
         w.loads.ground_moment = self.tree.ground_moment;
         for (i, node) in self.tree.nodes.iter().enumerate() {
             (w.loads.moment[i], w.loads.mass[i]) = (self.inertia(&w.poses, i).moment, node.inertia.mass);
         }
     }
 
-    /// First moment and mass behind node `i` added to its parent's, all nodes behind it being done.
-    pub fn moment_node(&self, i: usize, w: &mut Workspace<S>) {
+    /// First moment and mass of the subtree of node `i` added to its parent's, after its children.
+    fn moment_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let mass = w.loads.mass[i];
         name::vector(self.trace, "s", &w.loads.moment[i]);
@@ -78,6 +91,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         f
     }
 
+    /// Wrench on the subtree of node `i` added to that on its parent's, after its children.
+    fn wrench_node(&self, i: usize, w: &mut Workspace<S>) {
+        self.trace.at(Some(i), Quantity::Load);
+        if let Some(p) = self.tree.nodes[i].parent {
+            let out = self.force_out(&w.poses, i, &w.loads.total[i]);
+            w.loads.total[p] = w.loads.total[p].plus(&out); // T*_i (4.22)
+        }
+    }
+
     /// External wrenches at the nodes they act on.
     pub(super) fn wrench_loads(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         if self.tree.wrenches.is_empty() {
@@ -93,19 +115,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// `V = −g · s` and the springs.
-    pub(super) fn potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
-        (0..self.tree.nodes.len()).fold(self.weight_potential(u, w), |sum, i| self.spring_node(i, w, sum))
-    }
-
     /// `−g · s`.
-    pub fn weight_potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
+    fn weight_potential(&self, u: &Inputs<S>, w: &Workspace<S>) -> S {
         self.trace.at(None, Quantity::Energy);
         -dot3(u.gravity, w.loads.ground_moment)
     }
 
     /// A potential with that of the springs of node `i` added.
-    pub fn spring_node(&self, i: usize, w: &Workspace<S>, mut potential: S) -> S {
+    fn spring_node(&self, i: usize, w: &Workspace<S>, mut potential: S) -> S {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Energy);
         for k in 0..node.kind.springs() {

@@ -1,8 +1,8 @@
 //! Mass matrix by composite inertias.
 //!
-//! An entry is the product of a column `F = M E`, carried inward, and a screw `E`, which stays where it is. Deep in a tree
-//! most of the work is columns on their way to the ground; so those of nodes from some depth on stop there, and the screws
-//! of the nodes inboard of it come to meet them.
+//! An entry is the product of a column `F = M E`, carried towards the base, and a screw `E` at its node. In a deep tree most
+//! of the work is to carry columns through the inner nodes. So the columns of the outer nodes stop at the depth
+//! [`Tree::matrix_depth`](crate::tree::Tree::matrix_depth), and the screws of the inner nodes are carried outward to them.
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::Force;
@@ -41,7 +41,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Screws of the inner nodes' freedoms at node `i`, down to the first node of those that are not inner.
+    /// Screws of the inner nodes' freedoms at node `i`, if its parent is an inner node.
     fn matrix_screws(&self, i: usize, w: &mut Workspace<S>) {
         let Some(p) = self.tree.nodes[i].parent.filter(|&p| self.tree.inner(p)) else { return };
         self.trace.at(Some(i), Quantity::MassMatrix);
@@ -79,7 +79,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// The rest of a column that is at node `at`, with the screws of all inner nodes.
+    /// The entries that a column at node `at` forms with the screws of all inner nodes, which are known there.
     fn matrix_meeting(
         &self,
         column: (usize, usize, usize),

@@ -6,8 +6,9 @@
 //! A coordinate shared by several joints (a mimic) keeps its column `F = M* E` open while the sweep goes on inward, and
 //! is eliminated where all its joints have met: exact, and still one pass.
 //!
-//! The step of every sweep for one node is a function of its own (`factor_node`, `motion_node` ...): the generator runs one
-//! link of a long chain by itself.
+//! What a sweep does at one node is a function of its own (`factor_node`, `motion_node` ...), beside a [`Sweep`](pass::Sweep)
+//! that says in which direction it goes; `outputs.rs` has the order of the sweeps of every output. The generator runs the same
+//! lists over one link of a long chain.
 
 mod acceleration;
 mod articulate;
@@ -19,22 +20,23 @@ mod factor;
 mod inverse;
 mod jacobian;
 mod kinematics;
+mod level;
 mod loads;
 mod matrix;
 mod momentum;
 mod name;
 mod newton;
+mod outputs;
+pub mod pass;
 mod rates;
 mod solve;
 
 pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
 pub use kinematics::FrameState;
 pub use newton::Accelerations;
-pub use solve::Load;
 
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia};
 use crate::tree::{Tree, TreeFrame};
-use crate::workspace::Workspace;
 use crate::Scalar;
 
 /// What a sweep is about to compute; a symbolic run labels its nodes with it.
@@ -108,7 +110,7 @@ pub struct Inputs<'a, S> {
 }
 
 /// The sweeps over one tree.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub struct Sweeps<'a, S, T = ()> {
     /// The mechanism.
     pub tree: &'a Tree<S>,
@@ -127,14 +129,14 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.steps(w, i).rev().fold(*f, |f, step| step.force(&f))
     }
 
-    /// Whether the parent's frame does not turn, so that the way from it to node `i` does.
-    fn swung(&self, i: usize) -> bool {
+    /// Whether the frame of the parent of node `i` does not turn with its body: then the placement of node `i` in it does.
+    fn placement_turns(&self, i: usize) -> bool {
         self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].elimination.non_rotating)
     }
 
     /// Constant steps from the parent frame to the joint of node `i`.
     fn place(&self, i: usize) -> &[ElementaryTransform<S>] {
-        match self.swung(i) {
+        match self.placement_turns(i) {
             true => &[],
             false => &self.tree.nodes[i].place,
         }
@@ -187,47 +189,5 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         let own: &[ElementaryTransform<S>] =
             if self.tree.nodes[i].elimination.before_joint { w.joint[i].own() } else { &[] };
         own.iter()
-    }
-
-    /// Momenta from velocities, `p = M(q) v`, without forming `M`. `p` has one entry for each velocity.
-    pub fn momenta(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, p: &mut [S]) {
-        self.articulate(q, u.drive_q, &mut w.poses);
-        self.velocity_kinematics(v, u.drive_v, w);
-        self.momentum_sweep(w, p);
-    }
-
-    /// Velocities from momenta.
-    pub fn velocities(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
-        self.prepare(q, u, w, false);
-        self.solve_velocities(p, u, w);
-        self.collect_rates(&w.velocity, &w.first, v);
-    }
-
-    /// Rates of the state: velocities `v`, coordinate rates `q̇`, momentum rates `ṗ`.
-    pub fn rates(
-        &self,
-        q: &[S],
-        p: &[S],
-        u: &Inputs<S>,
-        w: &mut Workspace<S>,
-        v: &mut [S],
-        qd: &mut [S],
-        pd: &mut [S],
-    ) {
-        self.velocities(q, p, u, w, v);
-        self.coordinate_rates(q, v, qd);
-        self.loads(u, w);
-        self.constraint_pull(w);
-        self.accumulate_momenta(p, w);
-        self.momentum_rates(u, w, pd);
-    }
-
-    /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's origin;
-    /// what is welded to the ground does not count.
-    pub fn energy(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) -> (S, S) {
-        self.velocities(q, p, u, w, v);
-        let kinetic = self.kinetic(p, w);
-        self.gravity_moments(w);
-        (kinetic, self.potential(u, w))
     }
 }

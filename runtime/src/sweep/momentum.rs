@@ -1,30 +1,43 @@
 //! Momenta from velocities, and kinetic energy.
 
+use super::pass::{each_node, visit_force, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::tree::{Source, Unknown};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// `P*_i = M_i Ω_i + Σ Xᵀ P*_c`, `p = EᵀP*` and the rotors, after a velocity sweep.
-    pub(super) fn momentum_sweep(&self, w: &mut Workspace<S>, p: &mut [S]) {
-        p.fill(S::zero());
-        self.momentum_begin(w);
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.momentum_node(i, w, p);
-        }
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// `P*_i = M_i Ω_i + Σ Xᵀ P*_c`, and `p = EᵀP*` with the rotors.
+    pub(super) const MOMENTUM: Self = Sweep {
+        begin: |cx| {
+            cx.results.p.fill(S::zero());
+            cx.sweeps.momentum_begin(cx.w);
+        },
+        carried: |cx, i, visit| visit_force(&mut cx.w.force[i], visit),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.momentum_node(i, cx.w, cx.results.p))
+    };
 
+    /// `T = ½ pᵀq̇`, prescribed freedoms with the momentum their joints carry.
+    pub(super) const KINETIC: Self = Sweep {
+        begin: |cx| cx.results.energy[0] = S::zero(),
+        end: |cx| cx.results.energy[0] = cx.sweeps.kinetic_end(cx.given.second, cx.w, cx.results.energy[0]),
+        running: |cx, visit| visit(&mut cx.results.energy[0]),
+        ..each_node!(BaseToTip, |cx, i| cx.results.energy[0] =
+            cx.sweeps.kinetic_node(i, cx.given.second, cx.w, cx.results.energy[0]))
+    };
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::momentum_node`]: `M_i Ω_i` of every body by itself.
-    pub fn momentum_begin(&self, w: &mut Workspace<S>) {
+    fn momentum_begin(&self, w: &mut Workspace<S>) {
         for i in 0..self.tree.nodes.len() {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
     }
 
-    /// `p` of node `i` (added to `p`) and `P*` carried to its parent, all nodes behind it being done.
-    pub fn momentum_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
+    /// `p` of node `i` (added to `p`) and `P*` carried to its parent, after its children.
+    fn momentum_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Momentum);
         let total = w.force[i];
@@ -41,17 +54,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// `T = ½ pᵀq̇`, prescribed freedoms with the momentum their joints carry.
-    pub(super) fn kinetic(&self, p: &[S], w: &Workspace<S>) -> S {
-        let mut twice = S::zero();
-        for i in 0..self.tree.nodes.len() {
-            twice = self.kinetic_node(i, p, w, twice);
-        }
-        self.kinetic_end(p, w, twice)
-    }
-
     /// Kinetic energy from twice the sum of all nodes: shared coordinates, and the half.
-    pub fn kinetic_end(&self, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
+    fn kinetic_end(&self, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
         for (g, shared) in self.tree.unknowns.iter().enumerate() {
             twice = match *shared {
                 Unknown::Velocity(v) => twice + p[v] * w.velocity.unknown_rate[g],
@@ -66,7 +70,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Twice the kinetic energy with the share of node `i` added.
-    pub fn kinetic_node(&self, i: usize, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
+    fn kinetic_node(&self, i: usize, p: &[S], w: &Workspace<S>, mut twice: S) -> S {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Energy);
         let rate = |k: usize| w.velocity.rate[w.first[i] + k];

@@ -1,38 +1,59 @@
-//! Newton and Euler, body by body: motion from the base out with the acceleration of frame origins as a bystander sees
-//! it, wrenches that the bodies then need.
+//! The equations of Newton and Euler, body by body: the motion of every frame from base to tip, and the wrench that its body
+//! needs for that motion.
 //!
-//! No linear velocity is formed: an origin `r` away accelerates by `B r` more, `B = α× + ω×ω×`, and the entries of `B` are
-//! what the bodies' own wrenches are made of.
+//! The acceleration of a frame's origin is the second derivative of its position as a vector, not a spatial acceleration. No
+//! linear velocity is formed: an origin `r` away accelerates by `B r` more, `B = α× + ω×ω×`, and the bodies' own wrenches are
+//! made of the entries of `B`.
 
+use super::pass::{each_node, Sweep};
 use super::{name, Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::{add3, cross, Axis, ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-/// Accelerations of the state's velocities for [`Sweeps::newton_node`].
+/// Accelerations of the state's velocities in a sweep after Newton and Euler.
 #[derive(Clone, Copy, Debug)]
 pub enum Accelerations<'a, S> {
     /// All zero.
     Zero,
     /// These.
     Given(&'a [S]),
-    /// Whatever makes the bodies' accelerations along the freedoms zero, which is the cheapest to go on with; shared
-    /// coordinates zero. Kept in [`Newton::reference`](crate::workspace::Newton::reference).
+    /// For every freedom the value that makes the acceleration of its body along it zero, which leaves the fewest operations;
+    /// zero for coordinates that joints share. Kept in [`Newton::reference`](crate::workspace::Newton::reference).
     Chosen,
 }
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Motion of all nodes: rates `v`, accelerations as stated, a ground that accelerates against gravity.
-    pub(super) fn newton(&self, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
-        for i in 0..self.tree.nodes.len() {
-            self.newton_node(i, v, a, u, w);
-        }
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// Motion of all nodes at given velocities and the accelerations of [`Arguments::accelerations`], on a ground that
+    /// accelerates against gravity.
+    ///
+    /// [`Arguments::accelerations`]: super::pass::Arguments::accelerations
+    pub(super) const NEWTON: Self = Sweep {
+        carried: |cx, i, visit| {
+            let newton = &mut cx.w.newton;
+            newton.spin[i].iter_mut().chain(&mut newton.alpha[i]).chain(&mut newton.accel[i]).for_each(visit);
+        },
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.newton_node(
+            i,
+            cx.given.second,
+            cx.given.accelerations,
+            &cx.given.inputs,
+            cx.w
+        ))
+    };
 
-    /// Angular velocity, angular acceleration and acceleration of the origin of node `i`, in its own axes, its parent
-    /// being done.
-    pub fn newton_node(&self, i: usize, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
+    /// Wrench that every body needs for its motion beside the external ones.
+    pub(super) const NEEDED_WRENCHES: Self = Sweep {
+        begin: |cx| cx.sweeps.wrench_loads(&cx.given.inputs, cx.w),
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.newton_wrench_node(i, cx.w))
+    };
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
+    /// Angular velocity, angular acceleration and acceleration of the origin of node `i`, in its own axes, after its
+    /// parent.
+    fn newton_node(&self, i: usize, v: &[S], a: Accelerations<S>, u: &Inputs<S>, w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Velocity);
         let mut m = self.classic_motion(node.parent, u, w);
@@ -81,7 +102,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Wrench that the body of node `i` needs for its motion, less the external one, in [`Workspace::force`].
-    pub fn newton_wrench_node(&self, i: usize, w: &mut Workspace<S>) {
+    fn newton_wrench_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let motion = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
         let needed = motion.wrench(self.inertia(&w.poses, i));
@@ -90,13 +111,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             true => needed,
             false => needed.minus(&w.loads.own[i]),
         };
-    }
-
-    /// [`Sweeps::newton_wrench_node`] for all nodes, after the external wrenches.
-    pub(super) fn newton_wrenches(&self, w: &mut Workspace<S>) {
-        for i in 0..self.tree.nodes.len() {
-            self.newton_wrench_node(i, w);
-        }
     }
 }
 

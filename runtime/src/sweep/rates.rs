@@ -1,64 +1,66 @@
 //! Momentum rates `ṗ` (4.36).
 
-use super::{Inputs, Quantity, Sweeps, Trace};
+use super::pass::{each_node, Sweep};
+use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force, Motion};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
-impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// `ṗ_i = E_iᵀ (T*_i − Ω_i × P*_i) + τ_i` (4.36), after the velocity solution and the loads. No momentum sweep: `P*`
-    /// is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of it is needed.
-    pub(super) fn momentum_rates(&self, u: &Inputs<S>, w: &Workspace<S>, pd: &mut [S]) {
-        pd.fill(S::zero());
-        for i in 0..self.tree.nodes.len() {
-            self.momentum_rate_node(i, w, pd);
-        }
-        for (pd, tau) in pd.iter_mut().zip(u.tau) {
-            *pd = *pd + *tau;
-        }
-        for (pd, pull) in pd.iter_mut().zip(&w.constraints.pull) {
-            *pd = *pd + *pull;
-        }
-    }
+impl<S: Scalar, T: Trace> Sweep<S, T> {
+    /// `P*` of the nodes whose momentum rates come from it.
+    pub(super) const ACCUMULATED_MOMENTA: Self = Sweep {
+        needed: |tree| tree.nodes.iter().any(|node| node.elimination.accumulates_momentum),
+        begin: |cx| cx.sweeps.accumulate_begin(cx.w),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.accumulate_node(i, cx.given.second, cx.w))
+    };
 
+    /// `ṗ_i = E_iᵀ (T*_i − Ω_i × P*_i)` (4.36), to which `τ_i` comes at the end.
+    pub(super) const MOMENTUM_RATES: Self = Sweep {
+        begin: |cx| cx.results.p.fill(S::zero()),
+        ..each_node!(BaseToTip, |cx, i| cx.sweeps.momentum_rate_node(i, cx.w, cx.results.p))
+    };
+}
+
+impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
     /// node's own axis is known: `EᵀP* = p − armature · rate`, less what couplings hold of `p`.
-    pub fn accumulate_momenta(&self, p: &[S], w: &mut Workspace<S>) {
+    fn accumulate_begin(&self, w: &mut Workspace<S>) {
         for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].elimination.accumulates_momentum) {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
         self.add_seeds(w);
-        for i in (0..self.tree.nodes.len()).rev() {
-            let node = &self.tree.nodes[i];
-            self.trace.at(Some(i), Quantity::Momentum);
-            if node.elimination.accumulates_momentum {
-                w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
-            }
-            let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].elimination.accumulates_momentum) else {
-                continue;
-            };
-            let mut total = match node.elimination.accumulates_momentum {
-                true => w.force[i],
-                false => {
-                    let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
-                    w.factor.m[i].times(&motion).plus(&d)
-                }
-            };
-            if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
-                if node.elimination.unknown.is_none() || node.elimination.deferred {
-                    let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
-                    *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
-                }
-            }
-            let out = self.entering(&w.poses, i).rev().fold(total, |f, step| step.force(&f));
-            w.force[parent] = w.force[parent].plus(&out);
-        }
     }
 
-    /// `momentum_rates` for node `i` alone, without `τ`; added to `pd`.
-    pub fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
+    /// `P*` of node `i` added to that of its parent, after its children.
+    fn accumulate_node(&self, i: usize, p: &[S], w: &mut Workspace<S>) {
+        let node = &self.tree.nodes[i];
+        self.trace.at(Some(i), Quantity::Momentum);
+        if node.elimination.accumulates_momentum {
+            w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
+        }
+        let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].elimination.accumulates_momentum) else { return };
+        let mut total = match node.elimination.accumulates_momentum {
+            true => w.force[i],
+            false => {
+                let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
+                w.factor.m[i].times(&motion).plus(&d)
+            }
+        };
+        if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
+            if node.elimination.unknown.is_none() || node.elimination.deferred {
+                let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
+                *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
+            }
+        }
+        let out = self.entering(&w.poses, i).rev().fold(total, |f, step| step.force(&f));
+        w.force[parent] = w.force[parent].plus(&out);
+    }
+
+    /// `ṗ_i` (4.36) without `τ`, added to `pd`. `P*` is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of it is
+    /// needed.
+    fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::MomentumRate);

@@ -1,86 +1,28 @@
 //! The linear problem behind both levels: momenta to velocities, forces to accelerations.
 //!
-//! With `M'`, `U`, `Mj` known, right-hand sides travel back (`D`, 4.49, 4.45) and motions forth (4.40). On the velocity
-//! level the right-hand side is `p` and nothing else; on the acceleration level it is the joint force, and every body
-//! starts with the wrench it needs for a reference motion (`acceleration.rs`).
+//! With `M'`, `U`, `Mj` known, right-hand sides are carried from tip to base (`D`, 4.49, 4.45) and motions from base to tip
+//! (4.40). `level.rs` says what the right-hand sides are.
 
-use super::{name, Inputs, Quantity, Sweeps, Trace};
+use super::level::Load;
+use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
 use crate::tree::{Freedom, Source, Unknown};
-use crate::workspace::{Factor, Poses, Solution, Workspace};
+use crate::workspace::{Factor, Poses, Solution};
 use crate::Scalar;
 
-/// A right-hand side.
-#[derive(Clone, Copy, Debug)]
-pub struct Load<'a, S> {
-    /// For each velocity index: `p` or joint force.
-    pub p: &'a [S],
-    /// For each prescribed freedom: rate or acceleration.
-    pub drive: &'a [S],
-    /// `D` of every body by itself.
-    pub seeds: Option<&'a [Force<S>]>,
-    /// For each row of the constraints: what their motion is to be.
-    pub rows: &'a [S],
-    /// What the motion is, for the listener.
-    pub what: Quantity,
-}
-
-impl<'a, S: Scalar> Load<'a, S> {
-    /// Velocity level: momenta `p`, prescribed rates, and `b` of the constraints.
-    pub fn velocities(p: &'a [S], u: &Inputs<'a, S>, rows: &'a [S]) -> Self {
-        Load { p, drive: u.drive_v, seeds: None, rows, what: Quantity::Velocity }
-    }
-
-    /// Acceleration level: joint forces `p`, prescribed accelerations, `D` of every body, and what the constraints lack.
-    pub fn accelerations(p: &'a [S], drive: &'a [S], seeds: &'a [Force<S>], rows: &'a [S]) -> Self {
-        Load { p, drive, seeds: Some(seeds), rows, what: Quantity::Acceleration }
-    }
-}
-
-impl<S> Load<'_, S> {
-    /// Letters of `Ω̂`, `Ω` and the rates, or of what takes their place.
-    fn letters(&self) -> [&'static str; 3] {
-        match self.what {
-            Quantity::Velocity => ["hat", "omega", "v"],
-            Quantity::Acceleration => ["hatd", "omegad", "a"],
-            _ => ["hatx", "omegax", "dq"],
-        }
-    }
-}
-
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Solves for rates (or accelerations).
-    pub(super) fn solve(
-        &self,
-        poses: &Poses<S>,
-        first: &[usize],
-        f: &Factor<S>,
-        load: &Load<S>,
-        sol: &mut Solution<S>,
-    ) {
-        self.bias_momentum_begin(load, sol);
-        for i in (0..self.tree.nodes.len()).rev() {
-            self.bias_momentum_node(i, poses, first, f, load, sol);
-        }
-        self.bias_momentum_ground(f, load, sol);
-        self.motion_ground(f, load, sol);
-        for i in 0..self.tree.nodes.len() {
-            self.motion_node(i, poses, first, f, load, sol);
-        }
-    }
-
     /// Before the first [`Sweeps::bias_momentum_node`].
-    pub fn bias_momentum_begin(&self, load: &Load<S>, sol: &mut Solution<S>) {
+    pub(super) fn bias_momentum_begin(&self, load: &Load<S>, sol: &mut Solution<S>) {
         match load.seeds {
             Some(seeds) => sol.d.copy_from_slice(seeds),
             None => sol.d.fill(Force::zero()),
         }
-        // `unknown_rate` holds the momentum remainder of open coordinates until the forward sweep overwrites it.
+        // `unknown_rate` holds the bias momentum of unknowns that are still open, until the sweep of motions overwrites it.
         sol.unknown_rate.fill(S::zero());
     }
 
-    /// `D`, `D'` and `(p − d) / Mj` of node `i`, all nodes behind it being done.
-    pub fn bias_momentum_node(
+    /// `D`, `D'` and `(p − d) / Mj` of node `i`, after its children.
+    pub(super) fn bias_momentum_node(
         &self,
         i: usize,
         poses: &Poses<S>,
@@ -94,14 +36,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         name::force(self.trace, "d", &sol.d[i]);
         let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
         for (k, &g) in node.elimination.solve_before.iter().enumerate() {
-            let e = self.shared_remainder(g, f, load, sol, node.elimination.open_before(k + 1));
+            let e = self.unknown_bias_momentum(g, f, load, sol, node.elimination.open_before(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         for k in 0..node.kind.nv() {
-            self.remainder(i, k, first[i] + k, f, load, sol, &mut d);
+            self.bias_momentum(i, k, first[i] + k, f, load, sol, &mut d);
         }
         for (k, &g) in node.elimination.solve_after.iter().enumerate() {
-            let e = self.shared_remainder(g, f, load, sol, node.elimination.open_after(k + 1));
+            let e = self.unknown_bias_momentum(g, f, load, sol, node.elimination.open_after(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
@@ -113,15 +55,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// After the last [`Sweeps::bias_momentum_node`]: coordinates solved at the ground.
-    pub fn bias_momentum_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+    pub(super) fn bias_momentum_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
-            self.shared_remainder(g, f, load, sol, ground[k + 1..].iter().copied());
+            self.unknown_bias_momentum(g, f, load, sol, ground[k + 1..].iter().copied());
         }
     }
 
-    /// Own freedom `k` of node `i` in the backward sweep.
-    fn remainder(
+    /// Own freedom `k` of node `i` in the sweep from tip to base.
+    fn bias_momentum(
         &self,
         i: usize,
         k: usize,
@@ -159,8 +101,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol.e[freedom] = e;
     }
 
-    /// A shared coordinate in the backward sweep; gives its `(p − d) / Mj`.
-    fn shared_remainder(
+    /// Unknown `g` in the sweep from tip to base; gives its `(p − d) / Mj`.
+    fn unknown_bias_momentum(
         &self,
         g: usize,
         f: &Factor<S>,
@@ -184,16 +126,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Before the first [`Sweeps::motion_node`]: coordinates solved at the ground.
-    pub fn motion_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
+    pub(super) fn motion_ground(&self, f: &Factor<S>, load: &Load<S>, sol: &mut Solution<S>) {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate().rev() {
             self.trace.at(None, load.what);
-            self.shared_motion(g, f, &Motion::zero(), ground[k + 1..].iter().copied(), sol);
+            self.unknown_motion(g, f, &Motion::zero(), ground[k + 1..].iter().copied(), sol);
         }
     }
 
-    /// `Ω̂`, rates and `Ω` of node `i`, its parent being done.
-    pub fn motion_node(
+    /// `Ω̂`, rates and `Ω` of node `i`, after its parent.
+    pub(super) fn motion_node(
         &self,
         i: usize,
         poses: &Poses<S>,
@@ -211,7 +153,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let [hat_letter, letter, rate_letter] = load.letters();
         name::motion(self.trace, hat_letter, &hat);
         for (k, &g) in node.elimination.solve_after.iter().enumerate().rev() {
-            self.shared_motion(g, f, &hat, node.elimination.open_after(k + 1), sol);
+            self.unknown_motion(g, f, &hat, node.elimination.open_after(k + 1), sol);
         }
         let mut omega = hat;
         for k in (0..node.kind.nv()).rev() {
@@ -243,13 +185,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             axis.add_to(&mut omega, rate);
         }
         for (k, &g) in node.elimination.solve_before.iter().enumerate().rev() {
-            self.shared_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
+            self.unknown_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
         }
         sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m)); // Ω_i
         name::motion(self.trace, letter, &sol.omega[i]);
     }
 
-    fn shared_motion(
+    fn unknown_motion(
         &self,
         g: usize,
         f: &Factor<S>,
@@ -265,12 +207,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Unknown::Velocity(_) => open.fold(rate, less),
             Unknown::Row(_) => f.later[g].iter().copied().fold(rate, less),
         };
-    }
-
-    /// Velocity level: `p → Ω, v`.
-    pub(super) fn solve_velocities(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
-        let load = Load::velocities(p, u, &w.constraints.rhs);
-        self.solve(&w.poses, &w.first, &w.factor, &load, &mut w.velocity);
     }
 
     /// Wrench (or momentum) that node `i` receives from its parent, in the node frame: `M'Ω̂ + D'` (4.43).
@@ -300,18 +236,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
     }
 
-    /// Rates of the state's velocities out of the nodes.
-    pub fn collect_rates(&self, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            if let (Source::State { v: at, .. }, None) = (node.source, node.elimination.unknown) {
-                let nv = node.kind.nv();
-                v[at..at + nv].copy_from_slice(&sol.rate[first[i]..first[i] + nv]);
-            }
-        }
-        for (g, shared) in self.tree.unknowns.iter().enumerate() {
-            if let Unknown::Velocity(at) = *shared {
-                v[at] = sol.unknown_rate[g];
-            }
+    /// Rates of the velocities of node `i` out of a solution.
+    pub(super) fn collect_rate_node(&self, i: usize, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
+        let node = &self.tree.nodes[i];
+        let Source::State { v: at, .. } = node.source else { return };
+        match node.elimination.unknown {
+            Some(g) => v[at] = sol.unknown_rate[g],
+            None => v[at..at + node.kind.nv()].copy_from_slice(&sol.rate[first[i]..first[i + 1]]),
         }
     }
 }

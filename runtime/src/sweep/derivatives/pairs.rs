@@ -93,8 +93,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             return;
         }
         d.v.fill(S::zero());
-        self.velocity_kinematics(&d.v, u.drive_v, w);
-        self.momentum_sweep(w, &mut d.list);
+        self.momentum_sweeps(&d.v, u, w, &mut d.list);
     }
 
     /// `Ω̂`, `Ω`, gravity, and `ψ` and `γ × s` of every freedom, base to leaves.

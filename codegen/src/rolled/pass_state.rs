@@ -1,0 +1,180 @@
+//! A tree on its way through the passes of an output, one node at a time: the whole tree or one link alone. The order is
+//! that of the runtime's lists ([`SweepList`]), and so are the operations.
+
+use mbd_runtime::sweep::pass::{Arguments, Context, Pass, Results, Sweep, SweepList};
+use mbd_runtime::sweep::{Accelerations, Sweeps};
+use mbd_runtime::tree::Tree;
+use mbd_runtime::workspace::Workspace;
+use mbd_runtime::Scalar;
+
+use crate::output::Output;
+use crate::symbolic::{Expr, Graph};
+use crate::trace::SymbolicInputs;
+
+/// The sweeps of an output on symbols.
+#[derive(Clone)]
+pub struct OutputSweeps<'g> {
+    sweeps: Vec<Sweep<Expr<'g>, Graph>>,
+    finish: fn(&mut Context<'_, Expr<'g>, Graph>),
+}
+
+impl<'g> OutputSweeps<'g> {
+    /// Those of an output; `None` for outputs that are never rolled.
+    pub fn of(output: Output) -> Option<Self> {
+        match output {
+            Output::Rates => Some(SweepList::RATES.into()),
+            Output::Velocities => Some(SweepList::VELOCITIES.into()),
+            Output::Energy => Some(SweepList::ENERGY.into()),
+            Output::Momenta => Some(SweepList::MOMENTA.into()),
+            Output::InverseDynamics | Output::Bias => Some(SweepList::INVERSE_DYNAMICS.into()),
+            Output::Accelerations => Some(SweepList::ACCELERATIONS.into()),
+            Output::ProjectMomenta => Some(SweepList::PROJECT_MOMENTA.into()),
+            Output::PositionCorrection => Some(SweepList::POSITION_CORRECTION.into()),
+            _ => None,
+        }
+    }
+
+    /// The passes that a tree needs, if links can carry all of its sweeps.
+    pub fn passes(&self, tree: &Tree<Expr<'g>>) -> Option<Vec<Pass>> {
+        let passes = mbd_runtime::sweep::pass::passes(&self.sweeps, tree);
+        passes.iter().flat_map(|pass| &pass.sweeps).all(|&k| (self.sweeps[k].rolls)(tree)).then_some(passes)
+    }
+}
+
+impl<'g, const N: usize> From<SweepList<Expr<'g>, Graph, N>> for OutputSweeps<'g> {
+    fn from(list: SweepList<Expr<'g>, Graph, N>) -> Self {
+        OutputSweeps { sweeps: list.sweeps.into(), finish: list.finish }
+    }
+}
+
+/// A tree on its way through the passes.
+#[derive(Clone)]
+pub struct PassState<'g, 'a> {
+    output: Output,
+    graph: &'g Graph,
+    list: OutputSweeps<'g>,
+    passes: &'a [Pass],
+    /// The mechanism, regrouped.
+    pub tree: Tree<Expr<'g>>,
+    work: Workspace<Expr<'g>>,
+    v: Vec<Expr<'g>>,
+    qd: Vec<Expr<'g>>,
+    p: Vec<Expr<'g>>,
+    rows: Vec<Expr<'g>>,
+    pivots: Vec<Expr<'g>>,
+    energy: [Expr<'g>; 2],
+}
+
+impl<'g, 'a> PassState<'g, 'a> {
+    /// Nothing done yet; `None` for outputs that are never rolled.
+    pub fn new(output: Output, graph: &'g Graph, tree: Tree<Expr<'g>>, passes: &'a [Pass]) -> Option<Self> {
+        let zeros = |n: usize| vec![Expr::zero(); n];
+        let (nq, nv, rows) = (tree.dims.nq, tree.dims.nv, tree.dims.rows);
+        let (v, qd, p, energy) = (zeros(nv), zeros(nq), zeros(nv), [Expr::zero(); 2]);
+        let (list, work) = (OutputSweeps::of(output)?, Workspace::new(&tree));
+        Some(PassState {
+            output,
+            graph,
+            list,
+            passes,
+            work,
+            v,
+            qd,
+            p,
+            rows: zeros(rows),
+            pivots: zeros(rows),
+            energy,
+            tree,
+        })
+    }
+
+    /// Calls `f` with the sweeps of the output and what they work on.
+    fn with(
+        &mut self,
+        given: &SymbolicInputs<'g>,
+        f: impl FnOnce(&OutputSweeps<'g>, &mut Context<'_, Expr<'g>, Graph>),
+    ) {
+        let accelerations = match self.output {
+            Output::InverseDynamics => Accelerations::Given(&given.third),
+            Output::Accelerations => Accelerations::Chosen,
+            _ => Accelerations::Zero,
+        };
+        let inputs = given.inputs();
+        let mut cx = Context {
+            sweeps: &Sweeps { tree: &self.tree, trace: self.graph },
+            given: &Arguments { q: &given.q, second: &given.second, accelerations, inputs },
+            w: &mut self.work,
+            results: Results {
+                v: &mut self.v,
+                qd: &mut self.qd,
+                p: &mut self.p,
+                rows: &mut self.rows,
+                pivots: &mut self.pivots,
+                energy: &mut self.energy,
+                ..Results::none()
+            },
+        };
+        f(&self.list, &mut cx);
+    }
+
+    /// Calls `f` with every sweep of a pass.
+    fn each(
+        &mut self,
+        pass: usize,
+        given: &SymbolicInputs<'g>,
+        mut f: impl FnMut(&Sweep<Expr<'g>, Graph>, &mut Context<'_, Expr<'g>, Graph>),
+    ) {
+        let passes = self.passes;
+        self.with(given, |list, cx| passes[pass].sweeps.iter().for_each(|&k| f(&list.sweeps[k], cx)));
+    }
+
+    /// Before the first node of a pass. Steps of all joints are made ahead of the first one, because screws that are carried
+    /// outward need the joints of the whole tree.
+    pub fn begin(&mut self, pass: usize, given: &SymbolicInputs<'g>) {
+        if pass == 0 {
+            self.with(given, |_, cx| cx.articulate());
+        }
+        self.each(pass, given, |sweep, cx| (sweep.begin)(cx));
+    }
+
+    /// One node of a pass.
+    pub fn node(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>) {
+        self.each(pass, given, |sweep, cx| (sweep.node)(cx, i));
+    }
+
+    /// After the last node of a pass.
+    pub fn end(&mut self, pass: usize, given: &SymbolicInputs<'g>) {
+        self.each(pass, given, |sweep, cx| (sweep.end)(cx));
+    }
+
+    /// Calls `visit` with what a pass carries through node `i`: from tip to base what its children hand to it, from base to
+    /// tip what it hands to its children.
+    pub fn carried(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>, mut visit: impl FnMut(&mut Expr<'g>)) {
+        self.each(pass, given, |sweep, cx| (sweep.carried)(cx, i, &mut visit));
+    }
+
+    /// Calls `visit` with what a pass carries whatever node it is at: sums over all nodes so far, and multipliers.
+    pub fn running(&mut self, pass: usize, given: &SymbolicInputs<'g>, mut visit: impl FnMut(&mut Expr<'g>)) {
+        self.each(pass, given, |sweep, cx| (sweep.running)(cx, &mut visit));
+    }
+
+    /// Results in the order of the generated function, after the last pass.
+    pub fn finish(&mut self, given: &SymbolicInputs<'g>) -> Vec<Expr<'g>> {
+        self.with(given, |list, cx| (list.finish)(cx));
+        match self.output {
+            Output::Rates => [self.qd.as_slice(), &self.p].concat(),
+            Output::ProjectMomenta => [self.v.as_slice(), &self.p, &self.rows].concat(),
+            Output::PositionCorrection => [self.rows.as_slice(), &self.v, &self.pivots].concat(),
+            Output::Momenta | Output::InverseDynamics | Output::Bias => self.p.clone(),
+            Output::Energy => self.energy.to_vec(),
+            _ => self.v.clone(),
+        }
+    }
+}
+
+/// All values that `each` visits.
+pub fn read<'g>(each: impl FnOnce(&mut dyn FnMut(&mut Expr<'g>))) -> Vec<Expr<'g>> {
+    let mut all = Vec::new();
+    each(&mut |e| all.push(*e));
+    all
+}
