@@ -4,16 +4,16 @@
 // Numbers: f64. Joint forces: field `tau`. Right angles taken as exact within 0.000001 rad.
 //
 // State (index into q; index into v, p, tau; joint):
-//   q[0] v[0] pin1: pin, moves link1
-//   q[1] v[1] pin2: pin, moves link2
-//   q[2] v[2] pin3: pin, moves link3
-//   q[3] v[3] pin4: pin, moves link4
-//   q[4] v[4] pin5: pin, moves link5
-//   q[5] v[5] pin6: pin, moves link6
-//   q[6] v[6] pin7: pin, moves link7
-//   q[7] v[7] pin8: pin, moves link8
-//   q[8] v[8] pin9: pin, moves link9
-//   q[9] v[9] pin10: pin, moves link10
+//   q[0] v[0] pin1: revolute, moves link1
+//   q[1] v[1] pin2: revolute, moves link2
+//   q[2] v[2] pin3: revolute, moves link3
+//   q[3] v[3] pin4: revolute, moves link4
+//   q[4] v[4] pin5: revolute, moves link5
+//   q[5] v[5] pin6: revolute, moves link6
+//   q[6] v[6] pin7: revolute, moves link7
+//   q[7] v[7] pin8: revolute, moves link8
+//   q[8] v[8] pin9: revolute, moves link9
+//   q[9] v[9] pin10: revolute, moves link10
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 350 + 447 + 9 = 806; 0, 10

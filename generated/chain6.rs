@@ -4,12 +4,12 @@
 // Numbers: f64. Joint forces: field `tau`. Right angles taken as exact within 0.000001 rad.
 //
 // State (index into q; index into v, p, tau; joint):
-//   q[0] v[0] joint1: pin, moves link1
-//   q[1] v[1] joint2: pin, moves link2
-//   q[2] v[2] joint3: pin, moves link3
-//   q[3] v[3] joint4: pin, moves link4
-//   q[4] v[4] joint5: pin, moves link5
-//   q[5] v[5] joint6: pin, moves link6
+//   q[0] v[0] joint1: revolute, moves link1
+//   q[1] v[1] joint2: revolute, moves link2
+//   q[2] v[2] joint3: revolute, moves link3
+//   q[3] v[3] joint4: revolute, moves link4
+//   q[4] v[4] joint5: revolute, moves link5
+//   q[5] v[5] joint6: revolute, moves link6
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 508 + 616 + 5 = 1129; 0, 6

@@ -4,8 +4,8 @@
 // Numbers: f64. Joint forces: field `tau`. Right angles taken as exact within 0.000001 rad.
 //
 // State (index into q; index into v, p, tau; joint):
-//   q[0] v[0] shoulder: pin, moves upper
-//   q[1] v[1] elbow: pin, moves lower
+//   q[0] v[0] shoulder: revolute, moves upper
+//   q[1] v[1] elbow: revolute, moves lower
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 14 + 17 + 1 = 32; 0, 2

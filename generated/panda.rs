@@ -4,15 +4,15 @@
 // Numbers: f64. Joint forces: field `tau`. Right angles taken as exact within 0.000001 rad.
 //
 // State (index into q; index into v, p, tau; joint):
-//   q[0] v[0] panda_joint1: pin, moves panda_link1
-//   q[1] v[1] panda_joint2: pin, moves panda_link2
-//   q[2] v[2] panda_joint3: pin, moves panda_link3
-//   q[3] v[3] panda_joint4: pin, moves panda_link4
-//   q[4] v[4] panda_joint5: pin, moves panda_link5
-//   q[5] v[5] panda_joint6: pin, moves panda_link6
-//   q[6] v[6] panda_joint7: pin, moves panda_link7
-//   q[7] v[7] panda_finger_joint1: slider, moves panda_leftfinger
-//   panda_finger_joint2: slider, follows another joint, moves panda_rightfinger
+//   q[0] v[0] panda_joint1: revolute, moves panda_link1
+//   q[1] v[1] panda_joint2: revolute, moves panda_link2
+//   q[2] v[2] panda_joint3: revolute, moves panda_link3
+//   q[3] v[3] panda_joint4: revolute, moves panda_link4
+//   q[4] v[4] panda_joint5: revolute, moves panda_link5
+//   q[5] v[5] panda_joint6: revolute, moves panda_link6
+//   q[6] v[6] panda_joint7: revolute, moves panda_link7
+//   q[7] v[7] panda_finger_joint1: prismatic, moves panda_leftfinger
+//   panda_finger_joint2: prismatic, follows another joint, moves panda_rightfinger
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 530 + 553 + 7 = 1090; 0, 6

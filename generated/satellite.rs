@@ -5,8 +5,8 @@
 //
 // State (index into q; index into v, p, tau; joint):
 //   q[0..7] v[0..6] free_flight: floating, moves bus
-//   drive_q[0] drive_v[0] drive_left: pin, prescribed, moves panel_left
-//   drive_q[1] drive_v[1] drive_right: pin, prescribed, moves panel_right
+//   drive_q[0] drive_v[0] drive_left: revolute, prescribed, moves panel_left
+//   drive_q[1] drive_v[1] drive_right: revolute, prescribed, moves panel_right
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 138 + 130 + 3 = 271; 0, 2

@@ -5,18 +5,18 @@
 //
 // State (index into q; index into v, p, tau; joint):
 //   q[0..7] v[0..6] root_joint: floating, moves base_link
-//   q[7] v[6] FL_HAA: pin, moves FL_SHOULDER
-//   q[8] v[7] FL_HFE: pin, moves FL_UPPER_LEG
-//   q[9] v[8] FL_KFE: pin, moves FL_LOWER_LEG
-//   q[10] v[9] FR_HAA: pin, moves FR_SHOULDER
-//   q[11] v[10] FR_HFE: pin, moves FR_UPPER_LEG
-//   q[12] v[11] FR_KFE: pin, moves FR_LOWER_LEG
-//   q[13] v[12] HL_HAA: pin, moves HL_SHOULDER
-//   q[14] v[13] HL_HFE: pin, moves HL_UPPER_LEG
-//   q[15] v[14] HL_KFE: pin, moves HL_LOWER_LEG
-//   q[16] v[15] HR_HAA: pin, moves HR_SHOULDER
-//   q[17] v[16] HR_HFE: pin, moves HR_UPPER_LEG
-//   q[18] v[17] HR_KFE: pin, moves HR_LOWER_LEG
+//   q[7] v[6] FL_HAA: revolute, moves FL_SHOULDER
+//   q[8] v[7] FL_HFE: revolute, moves FL_UPPER_LEG
+//   q[9] v[8] FL_KFE: revolute, moves FL_LOWER_LEG
+//   q[10] v[9] FR_HAA: revolute, moves FR_SHOULDER
+//   q[11] v[10] FR_HFE: revolute, moves FR_UPPER_LEG
+//   q[12] v[11] FR_KFE: revolute, moves FR_LOWER_LEG
+//   q[13] v[12] HL_HAA: revolute, moves HL_SHOULDER
+//   q[14] v[13] HL_HFE: revolute, moves HL_UPPER_LEG
+//   q[15] v[14] HL_KFE: revolute, moves HL_LOWER_LEG
+//   q[16] v[15] HR_HAA: revolute, moves HR_SHOULDER
+//   q[17] v[16] HR_HFE: revolute, moves HR_UPPER_LEG
+//   q[18] v[17] HR_KFE: revolute, moves HR_LOWER_LEG
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 1061 + 1098 + 14 = 2173; 0, 12

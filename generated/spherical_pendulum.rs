@@ -5,7 +5,7 @@
 //
 // State (index into q; index into v, p, tau; joint):
 //   q[0..4] v[0..3] ball: spherical, moves bob
-//   q[4] v[3] hinge: pin, moves tail
+//   q[4] v[3] hinge: revolute, moves tail
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 54 + 75 + 3 = 132; 0, 1

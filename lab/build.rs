@@ -17,9 +17,9 @@ mod generated {
     use std::fmt::Write;
     use std::path::{Path, PathBuf};
 
-    use multibody::codegen::import::{load, ImportOptions};
     use multibody::codegen::model::Model;
     use multibody::codegen::options::PlanOptions;
+    use multibody::codegen::read::{self, ImportOptions};
     use multibody::codegen::{generate, Options, Output, Precision, RolledCode};
 
     use super::scenes;
@@ -82,8 +82,9 @@ mod generated {
         }
         for links in CLOSED {
             let (name, text) = (format!("closed{links}"), scenes::experiments::closed(links, "pin", false));
-            let (model, findings) = load(&format!("{name}.toml"), &text, &ImportOptions::default());
-            let model = model.unwrap_or_else(|| panic!("{findings}"));
+            let model = read::model(&format!("{name}.toml"), &text, &ImportOptions::default())
+                .unwrap_or_else(|findings| panic!("{findings}"))
+                .model;
             module(&mut all, &name, &model, &[Output::Rates], Precision::F64);
         }
         write_file(&directory().join("scenes.rs"), &all);

@@ -7,7 +7,7 @@
 pub use crate::mbd_model;
 
 #[cfg(feature = "codegen")]
-pub use crate::codegen::import::{load, Base, ImportOptions};
+pub use crate::codegen::read::{self, load, Base, ImportOptions};
 #[cfg(feature = "codegen")]
 pub use crate::codegen::{options::PlanOptions, plan::Plan, search};
 

@@ -8,9 +8,9 @@
 use std::fmt::Write as _;
 
 use multibody::codegen::generate::trace;
-use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::Model;
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
+use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
 use multibody::codegen::{Arithmetic, Options, Output};
 use multibody::runtime::sweep::Quantity;
@@ -25,8 +25,7 @@ fn file(name: &str, base: Base, gravity: Option<[f64; 3]>) -> Model {
 }
 
 fn read(name: &str, text: &str, base: Base, gravity: Option<[f64; 3]>) -> Model {
-    let (model, findings) = load(name, text, &ImportOptions { base, gravity });
-    model.unwrap_or_else(|| panic!("{findings}"))
+    read::model(name, text, &ImportOptions { base, gravity }).unwrap_or_else(|findings| panic!("{findings}")).model
 }
 
 /// What is counted.
@@ -80,7 +79,7 @@ fn general(n: usize, parent: impl Fn(usize) -> String, first: &str, gravity: Opt
             text,
             "[[body]]\nname = \"link{i}\"\nmass = {:.3}\ncom = {com}\n\
              inertia = {{ xx = {}, yy = {}, zz = {}, xy = 0.0021, xz = -0.0013, yz = 0.0017 }}\n\
-             [[joint]]\nname = \"joint{i}\"\ntype = \"pin\"\nparent = \"{}\"\nchild = \"link{i}\"\n\
+             [[joint]]\nname = \"joint{i}\"\ntype = \"revolute\"\nparent = \"{}\"\nchild = \"link{i}\"\n\
              xyz = {xyz}\nrpy = {rpy}\naxis = {axis}\n",
             next(0.5, 3.0),
             inertia[0],

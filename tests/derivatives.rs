@@ -1,6 +1,6 @@
 //! Derivatives in use: implicit midpoint steps by Newton's method, over generated code and the interpreter alike.
 
-use multibody::codegen::import::{load, Base, ImportOptions};
+use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::{Differentiable, Interpreter};
 
@@ -82,8 +82,9 @@ fn newton_converges_quadratically_in_implicit_steps() {
     assert!((after - before).abs() < 1e-2 * before.abs().max(1.0), "{before} {after}");
 
     let text = std::fs::read_to_string("models/double_pendulum.toml").expect("the model");
-    let (read, findings) = load("double_pendulum.toml", &text, &ImportOptions { base: Base::Fixed, gravity: None });
-    let plan = search::plan(&read.unwrap_or_else(|| panic!("{findings}")), Default::default());
+    let read = read::model("double_pendulum.toml", &text, &ImportOptions { base: Base::Fixed, gravity: None })
+        .unwrap_or_else(|findings| panic!("{findings}"));
+    let plan = search::plan(&read.model, Default::default());
     let mut interpreter = Interpreter::new(plan.tree::<f64>(&[]), plan.gravity(&[]));
     for _ in 0..200 {
         assert_newton(&midpoint(&mut interpreter, 0.02, &mut q_there, &mut p_there));

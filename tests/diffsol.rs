@@ -1,6 +1,6 @@
 //! The methods of diffsol, feature `diffsol`, against a method of order 9 at tight tolerances.
 
-use multibody::codegen::import::toml::read;
+use multibody::codegen::read;
 use multibody::codegen::search;
 use multibody::diffsol::{Diffsol, Failure, Stiff};
 use multibody::runtime::integrate::{Solver, Statistics, Step, Tolerances, Verner9};
@@ -15,8 +15,8 @@ struct Scene {
 
 impl Scene {
     fn new(text: &str, q: &[f64], v: &[f64], time: f64) -> Scene {
-        let (model, findings) = read("scene.toml", text);
-        let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
+        let read = read::model("scene.toml", text, &Default::default()).unwrap_or_else(|findings| panic!("{findings}"));
+        let plan = search::plan(&read.model, Default::default());
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
         let mut p = i.zero_momenta();
         i.momenta(q, v, &mut p);
@@ -86,14 +86,14 @@ com = [0, 0, -0.5]
 inertia = [0.08, 0.08, 0.001]
 [[joint]]
 name = "mount"
-type = "slider"
+type = "prismatic"
 child = "carriage"
 axis = [1, 0, 0]
 stiffness = 1e8
 damping = 1.5e4
 [[joint]]
 name = "swing"
-type = "pin"
+type = "revolute"
 parent = "carriage"
 child = "bar"
 axis = [0, 1, 0]

@@ -10,9 +10,9 @@ mod generated;
 #[rustfmt::skip]
 mod tour;
 
-use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::{Interpreter, System};
@@ -22,8 +22,9 @@ const STATES: u64 = 20;
 /// A plan and its interpreter, with the default options of the generator.
 fn interpreter(file: &str, base: Base) -> (Plan, Interpreter<f64>) {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-    let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
-    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+    let read = read::model(file, &text, &ImportOptions { base, gravity: None })
+        .unwrap_or_else(|findings| panic!("{findings}"));
+    let plan = search::plan(&read.model, PlanOptions::default());
     let params = plan.default_params();
     let interpreter = Interpreter::new(plan.tree(&params), plan.gravity(&params));
     (plan, interpreter)

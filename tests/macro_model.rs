@@ -1,8 +1,8 @@
 //! Types made by `mbd_model!`: they compile without a warning, and compute what the interpreter computes, bit for bit.
 #![deny(warnings, missing_docs, unused, nonstandard_style, unreachable_pub)]
 
-use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::options::PlanOptions;
+use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::system::Part;
@@ -76,8 +76,9 @@ mod warned {
 
 fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-    let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
-    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+    let read = read::model(file, &text, &ImportOptions { base, gravity: None })
+        .unwrap_or_else(|findings| panic!("{findings}"));
+    let plan = search::plan(&read.model, PlanOptions::default());
     plan.interpreter(&plan.default_params())
 }
 

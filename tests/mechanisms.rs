@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
 use multibody::runtime::integrate::{catalogue, Step, Tolerances};
@@ -47,7 +47,7 @@ fn folder() -> PathBuf {
 fn plan(name: &str) -> Plan {
     let file = format!("{name}.toml");
     let text = std::fs::read_to_string(folder().join(&file)).expect("the file");
-    let (model, findings) = load(&file, &text, &ImportOptions::default());
+    let (model, findings) = read::load(&file, &text, &ImportOptions::default());
     assert!(findings.0.is_empty(), "{findings}");
     search::plan(&model.expect("a model"), PlanOptions::default())
 }

@@ -1,9 +1,9 @@
 //! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames and reactions of nineteen mechanisms (`tests/reference/README.md`).
 
-use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::state_layout;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::sweep::FrameState;
@@ -41,8 +41,9 @@ impl Case {
             _ => Base::Fixed,
         };
         let model_text = std::fs::read_to_string(format!("{root}/{file}")).expect("the model");
-        let (model, findings) = load(file, &model_text, &ImportOptions { base, gravity: None });
-        let mut model = model.unwrap_or_else(|| panic!("{name}: {findings}"));
+        let mut model = read::model(file, &model_text, &ImportOptions { base, gravity: None })
+            .unwrap_or_else(|findings| panic!("{name}: {findings}"))
+            .model;
         for wrench in data["wrenches"].as_array().expect("wrenches") {
             if file.ends_with(".urdf") {
                 let link = wrench["link"].as_str().expect("a link").to_string();

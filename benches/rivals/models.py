@@ -63,7 +63,7 @@ inertia = {{ {inertia} }}
 
 [[joint]]
 name = "joint{k}"
-type = "pin"
+type = "revolute"
 parent = "{parent}"
 child = "link{k}"
 xyz = {show(rng.uniform(-0.4, 0.4, 3))}
@@ -86,7 +86,7 @@ inertia = [0.0021, 0.0021, 0.00005]
 
 [[joint]]
 name = "pin{k}"
-type = "pin"
+type = "revolute"
 parent = "{parent}"
 child = "link{k}"
 xyz = [0, 0, {-0.25 if k > 1 else 0}]

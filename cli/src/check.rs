@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
-use multibody::codegen::emit::joint_word;
 use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::search;
@@ -69,7 +68,7 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
     let d = plan.dims;
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     for joint in &model.joints {
-        *kinds.entry(joint_word(&joint.kind)).or_default() += 1;
+        *kinds.entry(joint.kind.word()).or_default() += 1;
     }
     let kinds: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
     let prescribed = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Model};
+use multibody::codegen::model::{ConstraintKind, Model};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::constrained::{close, complete, Closed, Closing, ConstraintError};
 use multibody::runtime::system::Row;
@@ -151,7 +151,6 @@ fn does_not_close(
         open.extend(worst.filter(|w| w.0 > OPEN).map(|(size, at)| (k, size, at)));
     }
     open.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let text = source::read(path).unwrap_or_default();
     let couplings =
         open.iter().all(|(k, ..)| matches!(plan.model.constraints[*k].kind, ConstraintKind::Coupling { .. }));
     let help = match (free, couplings) {
@@ -160,10 +159,13 @@ fn does_not_close(
         _ => "look at lengths and frames; if they can meet, give joints a `start` nearer to where they do",
     };
     for (k, size, at) in open {
-        let (word, verb) = word(&plan.model, k);
-        let unit = unit(&plan.model, k, at);
-        let name = &plan.model.constraints[k].name;
-        let place = place(path, &text, &plan.model, k);
+        let constraint = &plan.model.constraints[k];
+        let verb = match constraint.kind {
+            ConstraintKind::Loop { .. } => "does not close",
+            ConstraintKind::Coupling { .. } => "cannot be met",
+        };
+        let (place, word, name, unit) =
+            (&constraint.origin, constraint.word(), &constraint.name, unit(&plan.model, k, at));
         note(format_args!(
             "{place}: error: {word} `{name}` {verb}: what is left is {size:.3e} {unit} after {iterations} iterations (rank \
              {rank} of {rows} rows)"
@@ -173,53 +175,32 @@ fn does_not_close(
     Failure::Shown
 }
 
-/// Name of a constraint, and a description of how it is violated.
-fn word(model: &Model, k: usize) -> (&'static str, &'static str) {
-    match model.constraints[k].kind {
-        ConstraintKind::Loop { .. } => ("loop", "does not close"),
-        ConstraintKind::Coupling { .. } => ("coupling", "cannot be met"),
-    }
-}
-
-/// Unit of the row `at` of a constraint.
+/// Unit of the residual of row `at` of a constraint.
 fn unit(model: &Model, k: usize, at: usize) -> &'static str {
-    let first_angle = match &model.constraints[k].kind {
+    match &model.constraints[k].kind {
+        ConstraintKind::Loop { kind, .. } => kind.spec().rows[at].symbol(),
         ConstraintKind::Coupling { terms, .. } => {
-            let slides =
-                terms.iter().filter(|(j, _)| matches!(model.joints[*j].kind, JointKind::Prismatic { .. })).count();
-            return match slides {
-                0 => "rad",
-                n if n == terms.len() => "m",
-                _ => "(rad and m)",
-            };
+            let mut units = terms.iter().map(|(j, _)| model.joints[*j].kind.spec().coordinates[0].unit.symbol());
+            let first = units.next().unwrap_or_default();
+            if units.all(|unit| unit == first) {
+                first
+            } else {
+                "(rad and m)"
+            }
         }
-        ConstraintKind::Loop { kind, .. } => match kind {
-            LoopKind::Planar { .. } => 1,
-            LoopKind::Prismatic { .. } | LoopKind::Cylindrical { .. } => 2,
-            LoopKind::Helical { .. } if at == 4 => return "m",
-            LoopKind::Helical { .. } => 2,
-            _ => 3,
-        },
-    };
-    if at < first_angle {
-        "m"
-    } else {
-        "rad"
     }
 }
 
 /// Notes and warnings: redundant rows, loop by loop, and the mobility.
 pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
-    let text = source::read(path).unwrap_or_default();
     for (k, bond) in assembly.bonds.iter().enumerate().filter(|(_, b)| b.rank < b.rows) {
-        let (word, _) = word(&plan.model, k);
         let Bond { name, rows, rank } = bond;
         let follow = match rows - rank {
             1 => "1 follows".to_string(),
             n => format!("{n} follow"),
         };
         let counted = if *rows == 1 { "1 row".to_string() } else { format!("{rows} rows") };
-        let place = place(path, &text, &plan.model, k);
+        let (place, word) = (&plan.model.constraints[k].origin, plan.model.constraints[k].word());
         note(format_args!("{place}: note: {word} `{name}`: {counted}, rank {rank}: {follow} from the rest"));
     }
     if assembly.mobility == 0 && plan.dims.nv > 0 {
@@ -233,31 +214,7 @@ pub fn tell(path: &Path, plan: &Plan, assembly: &Assembly) {
     }
 }
 
-/// File and line of a constraint's name; the file alone where the constraint is not a table of its own.
-fn place(path: &Path, text: &str, model: &Model, k: usize) -> String {
-    let table = match model.constraints[k].kind {
-        ConstraintKind::Loop { .. } => "[[loop]]",
-        ConstraintKind::Coupling { .. } => "[[coupling]]",
-    };
-    let name = &model.constraints[k].name;
-    let mut inside = false;
-    for (n, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.starts_with('[') {
-            inside = line.split('#').next().is_some_and(|l| l.trim() == table);
-        }
-        let value = line.strip_prefix("name").and_then(|rest| rest.trim_start().strip_prefix('='));
-        let own = value
-            .map(str::trim_start)
-            .is_some_and(|v| ['"', '\''].iter().any(|q| v.starts_with(&format!("{q}{name}{q}"))));
-        if inside && own {
-            return format!("{}:{}", path.display(), n + 1);
-        }
-    }
-    path.display().to_string()
-}
-
-/// Name of the constraint of an error, for the message.
+/// Name of the constraint of an error, for its message.
 pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
     let k = match *error {
         ConstraintError::NotClosed { constraint, .. }
@@ -266,7 +223,7 @@ pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
         _ => return None,
     };
     let constraint = plan.model.constraints.get(k)?;
-    Some(format!("{} `{}`", word(&plan.model, k).0, constraint.name))
+    Some(format!("{} `{}`", constraint.word(), constraint.name))
 }
 
 /// Description of the loops and couplings that a state violates by more than 1e-6.
@@ -294,7 +251,7 @@ pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &
     let scale = v.iter().fold(1.0_f64, |m, v| m.max(v.abs()));
     let mut out = Vec::new();
     for (k, [open, fast]) in worst.into_iter().enumerate() {
-        let (word, name) = (word(&plan.model, k).0, &plan.model.constraints[k].name);
+        let (word, name) = (plan.model.constraints[k].word(), &plan.model.constraints[k].name);
         if open > MOST {
             out.push(format!("`q` leaves {word} `{name}` open by {open:.1e}; nothing closes it here"));
         }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::PathBuf;
 
-use multibody::codegen::model::{JointKind, Value};
+use multibody::codegen::model::{Coordinate, Unit, Value};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search;
@@ -247,12 +247,12 @@ pub fn default_start(plan: &Plan) -> Vec<f64> {
     let mut angle = 0.3;
     for slot in &plan.slots {
         let Some(Source::State { q: at, .. }) = slot.at else { continue };
-        match plan.model.joints[slot.joint].kind {
-            JointKind::Revolute { .. } | JointKind::Helical { .. } => {
+        match plan.model.joints[slot.joint].kind.spec().coordinates {
+            [Coordinate { unit: Unit::Radian, .. }] => {
                 q[at] = angle;
                 angle = -angle;
             }
-            JointKind::Prismatic { .. } => q[at] = 0.05,
+            [_] => q[at] = 0.05,
             _ => {}
         }
     }
@@ -316,18 +316,5 @@ pub fn panels(plan: &Plan, record: &Record) -> Vec<Panel> {
 /// Unit of every coordinate.
 fn units(plan: &Plan) -> Vec<&'static str> {
     let free = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::State { .. })));
-    free.flat_map(|slot| -> &'static [&'static str] {
-        match plan.model.joints[slot.joint].kind {
-            JointKind::Revolute { .. } | JointKind::Helical { .. } => &["rad"],
-            JointKind::Prismatic { .. } => &["m"],
-            JointKind::Cylindrical { .. } => &["m", "rad"],
-            JointKind::Universal { .. } => &["rad", "rad"],
-            JointKind::Planar { .. } => &["m", "m", "rad"],
-            JointKind::Spherical => &["", "", "", ""],
-            JointKind::Floating => &["m", "m", "m", "", "", "", ""],
-            JointKind::Fixed => &[],
-        }
-    })
-    .copied()
-    .collect()
+    free.flat_map(|slot| plan.model.joints[slot.joint].kind.spec().coordinates).map(|c| c.unit.symbol()).collect()
 }

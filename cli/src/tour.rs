@@ -5,9 +5,9 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::codegen::{Options, Output};
 use multibody::runtime::constrained::Stabilisation;
@@ -76,12 +76,11 @@ pub fn run(out: &mut dyn Write) -> Outcome {
 }
 
 fn plan() -> Outcome<Plan> {
-    let (model, findings) = load(FILE, TEXT, &ImportOptions::default());
-    let Some(model) = model else {
+    let read = read::model(FILE, TEXT, &ImportOptions::default()).map_err(|findings| {
         note(format_args!("{findings}"));
-        return Err(Failure::Shown);
-    };
-    Ok(search::plan(&model, PlanOptions::default()))
+        Failure::Shown
+    })?;
+    Ok(search::plan(&read.model, PlanOptions::default()))
 }
 
 fn counts(plan: &Plan, out: &mut dyn Write) -> Outcome {

@@ -25,7 +25,7 @@ fn check_tells_rank_and_mobility() {
         .lines()
         .position(|l| l == "name = \"middle\"")
         .expect("it");
-    let note = format!("strandbeest_leg.toml:{line}: note: loop `middle`: 5 rows, rank 2: 3 follow from the rest");
+    let note = format!("strandbeest_leg.toml:{line}:8: note: loop `middle`: 5 rows, rank 2: 3 follow from the rest");
     assert!(err(&output).contains(&note), "{}", err(&output));
 }
 
@@ -37,7 +37,8 @@ fn loops_that_do_not_close() {
     // From the end of the crank, held at 60 degrees, to the other pivot it is further than the other two bars reach:
     // hypot(0.9 - 0.15 cos 60°, 0.15 sin 60°) - 0.65 = 0.1852.
     write("far.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.9, 0, 0]"));
-    let place = format!("far.toml:{line}: error: loop `closing_pin` does not close: what is left is 1.852e-1 m after ");
+    let place =
+        format!("far.toml:{line}:8: error: loop `closing_pin` does not close: what is left is 1.852e-1 m after ");
     bad(run_in(&folder, &["check", "far.toml"]), &[&place, "rank ", "help: look at lengths"]);
     bad(run_in(&folder, &["simulate", "far.toml"]), &[&place]);
     assert_eq!(command::files(&folder), ["far.toml"]);
@@ -51,7 +52,7 @@ fn gears(couplings: &[(&str, [f64; 2], f64)]) -> String {
     let mut text = String::new();
     for name in ["a", "b"] {
         text += &format!("[[body]]\nname = \"{name}\"\nmass = 1\ninertia = [1, 1, 1]\n");
-        text += &format!("[[joint]]\nname = \"j{name}\"\ntype = \"pin\"\nchild = \"{name}\"\n");
+        text += &format!("[[joint]]\nname = \"j{name}\"\ntype = \"revolute\"\nchild = \"{name}\"\n");
     }
     for (name, ratios, offset) in couplings {
         text += &format!(

@@ -4,12 +4,12 @@
 // Numbers: f64. Joint forces: field `tau`. Right angles taken as exact within 0.000001 rad.
 //
 // State (index into q; index into v, p, tau; joint):
-//   q[0] v[0] shoulder_pan_joint: pin, moves shoulder_link
-//   q[1] v[1] shoulder_lift_joint: pin, moves upper_arm_link
-//   q[2] v[2] elbow_joint: pin, moves forearm_link
-//   q[3] v[3] wrist_1_joint: pin, moves wrist_1_link
-//   q[4] v[4] wrist_2_joint: pin, moves wrist_2_link
-//   q[5] v[5] wrist_3_joint: pin, moves wrist_3_link
+//   q[0] v[0] shoulder_pan_joint: revolute, moves shoulder_link
+//   q[1] v[1] shoulder_lift_joint: revolute, moves upper_arm_link
+//   q[2] v[2] elbow_joint: revolute, moves forearm_link
+//   q[3] v[3] wrist_1_joint: revolute, moves wrist_1_link
+//   q[4] v[4] wrist_2_joint: revolute, moves wrist_2_link
+//   q[5] v[5] wrist_3_joint: revolute, moves wrist_3_link
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
 //   rates: 118 + 141 + 5 = 264; 0, 5

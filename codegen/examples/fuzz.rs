@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use mbd_codegen::import::{load, Base, ImportOptions};
+use mbd_codegen::read::{self, Base, ImportOptions};
 use mutate::Mutator;
 
 const SLOW: Duration = Duration::from_secs(1);
@@ -49,7 +49,7 @@ fn options() -> Result<Options, String> {
 /// What is wrong with how an input was taken, if anything.
 fn problem(file: &str, text: &str, options: &ImportOptions) -> (Option<String>, bool) {
     let start = Instant::now();
-    let caught = catch_unwind(AssertUnwindSafe(|| load(file, text, options)));
+    let caught = catch_unwind(AssertUnwindSafe(|| read::load(file, text, options)));
     let Ok((model, findings)) = caught else { return (Some("panic".into()), false) };
     let problem = if model.is_some() == findings.has_errors() {
         Some("neither or both of model and error".into())
@@ -73,7 +73,7 @@ fn fuzz(format: &str, seconds: f64, options: &Options) -> usize {
         return 0;
     }
     let file = format!("fuzz.{format}");
-    let seeds = mutate::balanced(seeds, |text| load(&file, text, &ImportOptions::default()).0.is_some());
+    let seeds = mutate::balanced(seeds, |text| read::load(&file, text, &ImportOptions::default()).0.is_some());
     let (start, mut last, mut seed) = (Instant::now(), Instant::now(), options.seed);
     let (mut models, mut problems) = (0u64, 0);
     while start.elapsed().as_secs_f64() < seconds {

@@ -4,6 +4,7 @@ use std::fmt;
 
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Severity {
     /// The file cannot be used.
     Error,
@@ -13,8 +14,9 @@ pub enum Severity {
     Notice,
 }
 
-/// One finding: `file:line:column: message`, and a help line. Lines and columns start at 1; line 0 stands for the file as a whole.
+/// One finding, shown as `file:line:column: error: message` and a help line. Lines and columns start at 1; 0 means the file as a whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Diagnostic {
     /// Severity.
     pub severity: Severity,
@@ -48,7 +50,7 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// All findings about one input.
+/// All findings about one input, in the order of its text; the error of a description that cannot be used.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Diagnostics(pub Vec<Diagnostic>);
 

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use mbd_codegen::diag::Severity;
-use mbd_codegen::import::{load, ImportOptions};
+use mbd_codegen::read::{self, ImportOptions};
 
 /// Runs every file in `folder` with this extension against the `.txt` beside it.
 fn run(folder: &str, extension: &str, at_least: usize) {
@@ -19,7 +19,7 @@ fn run(folder: &str, extension: &str, at_least: usize) {
     for path in &files {
         let name = path.file_name().expect("a file name").to_string_lossy().into_owned();
         let text = fs::read_to_string(path).expect("UTF-8");
-        let (model, findings) = load(&name, &text, &ImportOptions::default());
+        let (model, findings) = read::load(&name, &text, &ImportOptions::default());
         assert!(!findings.0.is_empty(), "{name}: nothing was found");
         assert_eq!(model.is_none(), findings.has_errors(), "{name}: a model exactly where there is no error");
         for d in &findings.0 {

@@ -2,14 +2,14 @@
 
 mod mutate;
 
-use mbd_codegen::import::{load, ImportOptions};
+use mbd_codegen::read::{self, ImportOptions};
 use mutate::Mutator;
 
 fn survive(file: &str, seeds: &[String], rounds: u64) {
     let mut with_model = 0;
     for seed in 0..rounds {
         let text = Mutator::new(seed).mutate(seeds);
-        let caught = std::panic::catch_unwind(|| load(file, &text, &ImportOptions::default()));
+        let caught = std::panic::catch_unwind(|| read::load(file, &text, &ImportOptions::default()));
         let Ok((model, findings)) = caught else { panic!("seed {seed} of {file} panics with\n{text}") };
         assert_eq!(model.is_some(), !findings.has_errors(), "seed {seed}: {findings}\n{text}");
         for d in &findings.0 {
@@ -29,7 +29,7 @@ fn seeds(extension: &str) -> Vec<String> {
     let mut seeds = mutate::corpus(&folders, extension);
     // Large files take long and say little more.
     seeds.retain(|s| s.len() < 20_000);
-    mutate::balanced(seeds, |text| load(&file, text, &ImportOptions::default()).0.is_some())
+    mutate::balanced(seeds, |text| read::load(&file, text, &ImportOptions::default()).0.is_some())
 }
 
 #[test]

@@ -1,8 +1,7 @@
 //! Loops, couplings and starts of valid TOML models.
 
-use mbd_codegen::import::raw::LoopType;
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Start, Value};
+use mbd_codegen::read;
 
 const ALL: &str = include_str!("constraints.toml");
 const C: fn(f64) -> Value = Value::Const;
@@ -12,7 +11,7 @@ const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// The model of a text that must give no findings at all.
 fn clean(text: &str) -> Model {
-    let (model, findings) = read("m.toml", text);
+    let (model, findings) = read::load("m.toml", text, &Default::default());
     assert!(findings.0.is_empty(), "{findings}");
     model.expect("a model where nothing was found")
 }
@@ -59,12 +58,19 @@ fn every_type_is_read() {
     }
 }
 
-/// Messages call a type what the file calls it.
+/// The model knows where its constraints and joints are described, which has no say in comparisons.
 #[test]
-fn types_have_their_names() {
-    for (name, kind) in LoopType::ALL {
-        assert_eq!(kind.name(), name);
+fn origins_are_kept() {
+    let m = clean(ALL);
+    let line = |name: &str| 1 + ALL.lines().position(|l| l == format!("name = \"{name}\"")).expect("a line");
+    for constraint in &m.constraints {
+        let place = format!("m.toml:{}:8", line(&constraint.name));
+        assert_eq!(constraint.origin.to_string(), place, "{}", constraint.name);
     }
+    for joint in &m.joints {
+        assert_eq!(joint.origin.line, line(&joint.name), "{}", joint.name);
+    }
+    assert_eq!(m, clean(&format!("# One line further down.\n{ALL}")));
 }
 
 #[test]
@@ -154,7 +160,9 @@ fn starts_need_no_loops() {
 /// Axes of a cross written with seven digits are square.
 #[test]
 fn rounded_axes_are_square() {
-    let with = |axis2: &str| read("m.toml", &ALL.replace("axis2 = [1, 1, 0]", &format!("axis2 = {axis2}"))).1;
+    let with = |axis2: &str| {
+        read::load("m.toml", &ALL.replace("axis2 = [1, 1, 0]", &format!("axis2 = {axis2}")), &Default::default()).1
+    };
     assert_eq!(with("[0.7071068, 0.7071068, 1e-7]").0, []);
     assert!(with("[0.7071, 0.7071, 1e-5]").0[0].message.contains("not at right angles"));
 }
@@ -165,7 +173,7 @@ fn followers_move() {
     let text = "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\n\
         [[body]]\nname = 'b'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'k'\ntype = 'pin'\nparent = 'a'\nchild = 'b'\nmimic = { joint = 'j' }\n\
         [[loop]]\nname = 'l'\ntype = 'spherical'\nbetween = ['a', 'b']\n";
-    let Constraint { name, kind, decay } = clean(text).constraints.remove(0);
+    let Constraint { name, kind, decay, .. } = clean(text).constraints.remove(0);
     assert_eq!((name.as_str(), decay), ("l", C(0.0)));
     let mount = |body| Mount { body: Some(body), placement: Placement::IDENTITY };
     assert_eq!(kind, ConstraintKind::Loop { kind: LoopKind::Spherical, first: mount(0), second: mount(1) });

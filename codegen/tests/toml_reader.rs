@@ -2,22 +2,22 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Gravity, JointKind, JointMotion, Model, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::read;
 
 const EVERYTHING: &str = include_str!("everything.toml");
 const C: fn(f64) -> Value = Value::Const;
 
 /// The model of a text that must give no findings at all.
 fn clean(text: &str) -> Model {
-    let (model, findings) = read("robot arm-2.toml", text);
+    let (model, findings) = read::load("robot arm-2.toml", text, &Default::default());
     assert!(findings.0.is_empty(), "{findings}");
     model.expect("a model where nothing was found")
 }
 
 /// Messages of a text, without file and help.
 fn messages(text: &str) -> Vec<String> {
-    read("m.toml", text).1 .0.into_iter().map(|d| d.message).collect()
+    read::load("m.toml", text, &Default::default()).1 .0.into_iter().map(|d| d.message).collect()
 }
 
 #[test]
@@ -103,10 +103,10 @@ fn defaults() {
 
 #[test]
 fn columns_count_characters() {
-    let (_, findings) = read("m.toml", "# Größe\nname = 'ä' # ü\n'öl' = 3\n'größe' = nan");
+    let (_, findings) = read::load("m.toml", "# Größe\nname = 'ä' # ü\n'öl' = 3\n'größe' = nan", &Default::default());
     let places: Vec<_> = findings.0.iter().map(|d| (d.line, d.column)).collect();
     assert_eq!(places, [(2, 8), (3, 1), (4, 1)], "{findings}");
-    let (_, findings) = read("m.toml", "x = { 'ä' = 'ö', 'ß' = }");
+    let (_, findings) = read::load("m.toml", "x = { 'ä' = 'ö', 'ß' = }", &Default::default());
     assert_eq!((findings.0[0].line, findings.0[0].column), (1, 24), "{findings}");
 }
 
@@ -228,7 +228,7 @@ fn shipped_models_are_clean() {
     let mut count = 0;
     for path in files.filter(|p| p.extension().is_some_and(|e| e == "toml")) {
         let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        let (model, findings) = read(&name, &std::fs::read_to_string(&path).expect("UTF-8"));
+        let (model, findings) = read::load(&name, &std::fs::read_to_string(&path).expect("UTF-8"), &Default::default());
         assert!(model.is_some() && findings.0.is_empty(), "{findings}");
         count += 1;
     }

@@ -1,8 +1,8 @@
 //! Real robots, read by this crate and by `urdf-rs`: both have to say the same, number by number. Both turn the same decimal text into the
 //! nearest `f64`, so the comparison is exact.
 
-use mbd_codegen::import::{urdf, Base, ImportOptions};
 use mbd_codegen::model::{Body, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value};
+use mbd_codegen::read::{self, Base, ImportOptions};
 use std::path::{Path, PathBuf};
 use urdf_rs::JointType;
 
@@ -21,7 +21,7 @@ fn real_robots_are_read_as_urdf_rs_reads_them() {
     for path in &files {
         let text = std::fs::read_to_string(path).expect("a readable file");
         let name = path.to_string_lossy();
-        let (model, findings) = urdf::read(&name, &text, &ImportOptions { base: Base::Floating, ..Default::default() });
+        let (model, findings) = read::load(&name, &text, &ImportOptions { base: Base::Floating, ..Default::default() });
         match (model, urdf_rs::read_from_string(&text)) {
             (Some(model), Ok(robot)) => {
                 compare(&name, &model, &robot);

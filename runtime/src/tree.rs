@@ -34,7 +34,7 @@ pub enum Kind<S> {
     Floating,
 }
 
-impl<S: Scalar> Kind<S> {
+impl<S: Copy> Kind<S> {
     /// Coordinates the node reads.
     pub fn nq(&self) -> usize {
         match self {

@@ -226,9 +226,9 @@ impl Closer<'_> {
         let decay = if decay == 0.0 { Value::ZERO } else { self.value(decay) };
         let name = |n: usize| format!("loop{n}");
         let n = self.model.constraints.len();
-        self.model.constraints.push(Constraint { name: name(n), kind: kind.clone(), decay });
+        self.model.constraints.push(Constraint::new(name(n), kind.clone(), decay));
         if self.rng.chance(self.distribution.twice) {
-            self.model.constraints.push(Constraint { name: name(n + 1), kind, decay });
+            self.model.constraints.push(Constraint::new(name(n + 1), kind, decay));
         }
     }
 
@@ -286,7 +286,8 @@ impl Closer<'_> {
             }
             let free = self.between(ends[0], ends[1]);
             // In a plane at most three rows are independent.
-            let needed = if self.distribution.planar { rows(&kind).min(3) } else { rows(&kind) };
+            let rows = kind.spec().rows.len();
+            let needed = if self.distribution.planar { rows.min(3) } else { rows };
             if free == 0 || (free <= needed && !self.rng.chance(self.distribution.locked)) {
                 continue;
             }
@@ -442,23 +443,5 @@ impl Closer<'_> {
                 (self.any_turn(), along(anywhere, slide))
             }
         }
-    }
-}
-
-/// Number of rows of a kind of loop.
-pub fn rows(kind: &LoopKind) -> usize {
-    match kind {
-        LoopKind::Fixed => 6,
-        LoopKind::Revolute { .. } | LoopKind::Prismatic { .. } | LoopKind::Helical { .. } => 5,
-        LoopKind::Cylindrical { .. } | LoopKind::Universal { .. } => 4,
-        LoopKind::Planar { .. } | LoopKind::Spherical | LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } => {
-            3
-        }
-        LoopKind::PointOnLine { .. } => 2,
-        LoopKind::Distance { .. }
-        | LoopKind::PointOnPlane { .. }
-        | LoopKind::PointOnCylinder { .. }
-        | LoopKind::KnifeEdge { .. }
-        | LoopKind::Pfaffian { .. } => 1,
     }
 }

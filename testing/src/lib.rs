@@ -9,9 +9,7 @@ pub mod random;
 pub mod state;
 pub mod toml;
 
-use mbd_codegen::model::{
-    ConstraintKind, Gravity, JointKind, JointMotion, LoopKind, Model, Placement, Rotation, Value,
-};
+use mbd_codegen::model::{ConstraintKind, Gravity, JointMotion, Model, Placement, Rotation, Value};
 
 /// Value of a number of the model at given parameters.
 pub fn value(v: Value, params: &[f64]) -> f64 {
@@ -47,9 +45,7 @@ pub fn substituted(model: &Model, params: &[f64]) -> Model {
         for list in [&mut joint.damping, &mut joint.stiffness, &mut joint.rest, &mut joint.armature] {
             list.iter_mut().for_each(of);
         }
-        if let JointKind::Helical { pitch, .. } = &mut joint.kind {
-            of(pitch);
-        }
+        joint.kind.pitch_mut().into_iter().for_each(of);
         if let JointMotion::Mimic { ratio, offset, .. } = &mut joint.motion {
             of(ratio);
             of(offset);
@@ -68,15 +64,7 @@ pub fn substituted(model: &Model, params: &[f64]) -> Model {
             ConstraintKind::Loop { kind, first, second } => {
                 placement(&mut first.placement);
                 placement(&mut second.placement);
-                match kind {
-                    LoopKind::Helical { pitch: x, .. }
-                    | LoopKind::Distance { length: x }
-                    | LoopKind::PointOnCylinder { radius: x, .. }
-                    | LoopKind::RollingDisc { radius: x, .. }
-                    | LoopKind::RollingBall { radius: x, .. } => of(x),
-                    LoopKind::Pfaffian { row } => row.iter_mut().for_each(of),
-                    _ => {}
-                }
+                kind.numbers_mut().iter_mut().for_each(of);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Random states and inputs of a plan.
 
-use mbd_codegen::model::JointKind;
+use mbd_codegen::model::{JointKind, Unit};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::sweep::{Derivatives, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Source;
@@ -60,20 +60,11 @@ pub fn random_state(plan: &Plan, seed: u64) -> State {
 }
 
 fn coordinates(rng: &mut Rng, kind: JointKind, q: &mut [f64]) {
-    let turns: &[usize] = match kind {
-        JointKind::Prismatic { .. } => &[],
-        JointKind::Cylindrical { .. } => &[1],
-        JointKind::Planar { .. } => &[2],
-        _ => &[0, 1],
-    };
-    for (k, x) in q.iter_mut().enumerate() {
-        *x = if turns.contains(&k) { rng.around(3.0) } else { rng.around(0.6) };
+    let spec = kind.spec();
+    for (coordinate, x) in spec.coordinates.iter().zip(&mut *q) {
+        *x = if coordinate.unit == Unit::Radian { rng.around(3.0) } else { rng.around(0.6) };
     }
-    let unit = match kind {
-        JointKind::Spherical => 0,
-        JointKind::Floating => 3,
-        _ => return,
-    };
+    let Some(unit) = spec.quaternion() else { return };
     let quaternion = &mut q[unit..];
     loop {
         quaternion.fill_with(|| rng.around(1.0));

@@ -4,7 +4,9 @@ mod constraints;
 
 use std::fmt::Write;
 
-use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value, WrenchAxes};
+use mbd_codegen::model::{
+    Coordinate, Gravity, Joint, JointKind, JointMotion, Model, Placement, Rotation, Unit, Value, WrenchAxes,
+};
 
 /// Order in which joints are written; the reader sorts them depth first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +88,11 @@ fn quoted(text: &str) -> String {
     format!("\"{text}\"")
 }
 
+/// Whether the only coordinate of a joint is an angle.
+fn turns(kind: &JointKind) -> bool {
+    matches!(kind.spec().coordinates, [Coordinate { unit: Unit::Radian, .. }])
+}
+
 struct Writer<'m> {
     model: &'m Model,
 }
@@ -147,36 +154,24 @@ impl Writer<'_> {
     fn joint(&self, out: &mut String, joint: &Joint) {
         out.push_str("\n[[joint]]\n");
         line(out, "name", quoted(&joint.name));
-        let (kind, axis, axis2) = match joint.kind {
-            JointKind::Revolute { axis } => ("pin", Some(axis), None),
-            JointKind::Prismatic { axis } => ("slider", Some(axis), None),
-            JointKind::Cylindrical { axis } => ("cylindrical", Some(axis), None),
-            JointKind::Helical { axis, .. } => ("helical", Some(axis), None),
-            JointKind::Universal { axes } => ("universal", Some(axes[0]), Some(axes[1])),
-            JointKind::Planar { normal } => ("planar", Some(normal), None),
-            JointKind::Spherical => ("spherical", None, None),
-            JointKind::Floating => ("floating", None, None),
-            JointKind::Fixed => ("fixed", None, None),
-        };
-        line(out, "type", quoted(kind));
+        let spec = joint.kind.spec();
+        line(out, "type", quoted(spec.word()));
         if let Some(parent) = joint.parent {
             line(out, "parent", quoted(&self.model.bodies[parent].name));
         }
         line(out, "child", quoted(&self.model.bodies[joint.child].name));
         self.placement(out, &joint.placement);
-        let default = if axis2.is_some() { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] };
-        if let Some(axis) = axis.filter(|a| *a != default) {
-            line(out, "axis", format!("{axis:?}"));
+        for ((key, axis), default) in ["axis", "axis2"].into_iter().zip(joint.kind.axes()).zip(spec.axes) {
+            if axis != default {
+                line(out, key, format!("{axis:?}"));
+            }
         }
-        if let Some(axis2) = axis2.filter(|a| *a != [0.0, 1.0, 0.0]) {
-            line(out, "axis2", format!("{axis2:?}"));
-        }
-        if let JointKind::Helical { pitch, .. } = joint.kind {
-            line(out, "pitch", self.number(pitch, false));
+        if let Some(pitch) = { joint.kind }.pitch_mut() {
+            line(out, "pitch", self.number(*pitch, false));
         }
         self.freedoms(out, "damping", &joint.damping, false);
         self.freedoms(out, "stiffness", &joint.stiffness, false);
-        let turns = matches!(joint.kind, JointKind::Revolute { .. } | JointKind::Helical { .. });
+        let turns = turns(&joint.kind);
         self.freedoms(out, "rest", &joint.rest, turns);
         self.freedoms(out, "armature", &joint.armature, false);
         match joint.motion {

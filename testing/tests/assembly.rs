@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use mbd_codegen::import::{load, ImportOptions};
+use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{generate, Options, Output, Precision};
 
 /// Runs the compiler that built this test, or the first on the path.
@@ -28,7 +28,7 @@ fn rustc(arguments: &[&str], source: &Path, folder: &Path) {
 fn source(model: &str, name: &str, precision: Precision) -> String {
     let file = format!("{}/../models/{model}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(&file).expect("the model");
-    let (model, findings) = load(&file, &text, &ImportOptions::default());
+    let (model, findings) = read::load(&file, &text, &ImportOptions::default());
     let options = Options {
         type_name: "Arm".to_string(),
         runtime: "mbd_runtime".to_string(),

@@ -1,8 +1,8 @@
 //! Integration of interpreted mechanisms with constraints: every stabilisation, minimal coordinates and methods with multipliers
 //! find the same motion.
 
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
+use mbd_codegen::read;
 use mbd_codegen::search;
 use mbd_runtime::constrained::{
     close, complete, Closing, CoordinatePartition, Effort, OpenAndClosed, Projection, RadauIndex2, Rattle, Repartition,
@@ -31,7 +31,7 @@ com = [{}, 0, 0]
 inertia = [0.001, 0.1, 0.1]
 [[joint]]
 name = "{joint}"
-type = "pin"
+type = "revolute"
 parent = "{parent}"
 child = "{name}"
 xyz = [{at}, 0, 0]
@@ -136,8 +136,7 @@ radius = 0.5
 "#;
 
 fn model(text: &str) -> Model {
-    let (model, findings) = read("model.toml", text);
-    model.unwrap_or_else(|| panic!("{findings}"))
+    read::model("model.toml", text, &Default::default()).unwrap_or_else(|findings| panic!("{findings}")).model
 }
 
 fn interpreter(model: &Model) -> Mechanism {
@@ -214,7 +213,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn all_ways_lead_to_the_same_end() {
     let planar = "type = \"point_on_line\"\naxis = [0, 1, 0]";
-    let pin = "type = \"pin\"\naxis = [0, 1, 0]";
+    let pin = "type = \"revolute\"\naxis = [0, 1, 0]";
     for (name, (mut y, start)) in [("planar", crank(planar)), ("redundant", crank(pin)), ("plate", plate())] {
         let end = 1.0;
         let before = energy(&mut y, &start.0, &start.1);
@@ -281,7 +280,7 @@ fn all_ways_lead_to_the_same_end() {
 /// Every method of the catalogue runs with the projection around it, to the accuracy of its order.
 #[test]
 fn every_method_by_its_name() {
-    let (y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let (y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
     let mut y = y.closed;
     let end = 0.2;
     let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
@@ -314,7 +313,7 @@ fn every_method_by_its_name() {
 /// Implicit methods use the derivatives of the constrained rates, settled in between.
 #[test]
 fn implicit_methods() {
-    let (y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let (y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
     let mut y = y.closed;
     let before = energy(&mut y, &start.0, &start.1);
     let method = held(&y, Radau5::new(&y), Stabilisation::Mass);
@@ -403,9 +402,10 @@ fn rolling_for_long() {
 /// multipliers let it, which grow with one over the distance from the singular position unless they are settled.
 #[test]
 fn past_the_change_point() {
-    for (name, pin) in
-        [("planar", "type = \"point_on_line\"\naxis = [0, 1, 0]"), ("redundant", "type = \"pin\"\naxis = [0, 1, 0]")]
-    {
+    for (name, pin) in [
+        ("planar", "type = \"point_on_line\"\naxis = [0, 1, 0]"),
+        ("redundant", "type = \"revolute\"\naxis = [0, 1, 0]"),
+    ] {
         let mut y = split(&four_bar_of([1.0, 2.0, 1.0, 2.0], pin));
         let start = state(&mut y, &[-1.5, 1.5, -1.5], &[6.0, -6.0, 6.0], &[true]);
         let before = energy(&mut y, &start.0, &start.1);
@@ -470,7 +470,7 @@ fn single_precision() {
 #[test]
 fn long_run() {
     let n = std::env::var("STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(50_000_u32);
-    for pin in ["type = \"point_on_line\"\naxis = [0, 1, 0]", "type = \"pin\"\naxis = [0, 1, 0]"] {
+    for pin in ["type = \"point_on_line\"\naxis = [0, 1, 0]", "type = \"revolute\"\naxis = [0, 1, 0]"] {
         // At rest it swings: angles that grow without bound would grow coarse with it.
         let mut y = split(&four_bar(pin));
         let (mut q, mut p) = state(&mut y, &[1.0, 0.5, 1.5], &[0.0; 3], &[true]);
@@ -495,7 +495,7 @@ fn long_run() {
 /// No step allocates, whatever is done at its end.
 #[test]
 fn nothing_is_allocated() {
-    let (mut y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let (mut y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
     fn check<Y, M>(name: &str, y: &mut Y, mut method: M, start: &State)
     where
         Y: System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>,
@@ -531,11 +531,11 @@ fn nothing_is_allocated() {
 #[test]
 #[ignore = "prints a comparison"]
 fn comparison() {
-    let (mut y, start) = crank("type = \"pin\"\naxis = [0, 1, 0]");
+    let (mut y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
     let before = energy(&mut y, &start.0, &start.1);
     let mut best = [(f64::INFINITY, 0.0, 0.0); 11];
     // A tenth of the steps' rate; a weight of a thousand of the masses.
-    let text = four_bar("type = \"pin\"\naxis = [0, 1, 0]\ndecay = 100.0");
+    let text = four_bar("type = \"revolute\"\naxis = [0, 1, 0]\ndecay = 100.0");
     let mut braked = interpreter(&model(&text));
     let mut soft = Interpreter::new(y.closed.tree().penalised(1e4, 100.0), braked.gravity);
     fn timed<Y, M>(y: &mut Y, mut method: M, start: &State) -> (f64, State)

@@ -5,20 +5,6 @@ use std::collections::BTreeMap;
 use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Rotation, Value, WrenchAxes};
 use mbd_testing::random::{random_model, Distribution};
 
-fn kind(k: &JointKind) -> &'static str {
-    match k {
-        JointKind::Revolute { .. } => "pin",
-        JointKind::Prismatic { .. } => "slider",
-        JointKind::Cylindrical { .. } => "cylindrical",
-        JointKind::Helical { .. } => "helical",
-        JointKind::Universal { .. } => "universal",
-        JointKind::Planar { .. } => "planar",
-        JointKind::Spherical => "spherical",
-        JointKind::Floating => "floating",
-        JointKind::Fixed => "fixed",
-    }
-}
-
 /// Joints from one to the ground, itself first.
 fn path<'m>(model: &'m Model, joint: &'m Joint) -> Vec<&'m Joint> {
     let above = |j: &&'m Joint| j.parent.and_then(|p| model.joints.iter().find(|j| j.child == p));
@@ -51,7 +37,7 @@ fn features(model: &Model) -> Vec<&'static str> {
         Rotation::AxisAngle { angle, .. } => is_param(angle),
     };
     for joint in &model.joints {
-        note(true, kind(&joint.kind));
+        note(true, joint.kind.word());
         note(joint.motion == JointMotion::Prescribed && joint.kind.nq() > 1, "prescribed, several coordinates");
         note(joint.motion == JointMotion::Prescribed && joint.kind.nq() == 1, "prescribed");
         note(joint.placement.xyz.iter().any(is_param), "parameter in a displacement");

@@ -2,10 +2,10 @@
 //!
 //! The reference runs the sweep for the rates (another factorisation, other formulas) on `q + ε N(q) e_k` and `p + ε e_k`.
 
-use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::{Model, Value};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
+use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::search;
 use mbd_runtime::sweep::{Derivatives, MomentumDerivatives, Sweeps};
 use mbd_runtime::tree::Kind;
@@ -256,8 +256,9 @@ fn forms_do_not_matter() {
     for file in ["ur5.urdf", "chain10_planar.toml"] {
         let text =
             std::fs::read_to_string(format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-        let (model, findings) = load(file, &text, &ImportOptions { base: Base::Fixed, gravity: None });
-        let model = model.unwrap_or_else(|| panic!("{findings}"));
+        let model = read::model(file, &text, &ImportOptions { base: Base::Fixed, gravity: None })
+            .unwrap_or_else(|findings| panic!("{findings}"))
+            .model;
         for seed in 0..20 {
             let [a, b] = [EliminationStrategy::Fastest, EliminationStrategy::Single]
                 .map(|forms| Case::of_model(&model, seed, forms));

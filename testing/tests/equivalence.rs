@@ -1,9 +1,9 @@
 //! The same mechanism described in two ways moves in one way.
 
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
 use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::read;
 use mbd_codegen::search;
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Source;
@@ -262,12 +262,14 @@ fn snapping_changes_no_more_than_the_angles() {
 fn coupled_pendulums_on_the_ground_feel_gravity() {
     let body =
         |k: usize| format!("[[body]]\nname = \"b{k}\"\nmass = 2\ncom = [0.3, 0, 0]\ninertia = [0.1, 0.2, 0.3]\n");
-    let joint = |k: usize| format!("[[joint]]\nname = \"j{k}\"\ntype = \"pin\"\nchild = \"b{k}\"\naxis = [0, 1, 0]\n");
+    let joint =
+        |k: usize| format!("[[joint]]\nname = \"j{k}\"\ntype = \"revolute\"\nchild = \"b{k}\"\naxis = [0, 1, 0]\n");
     let alone = body(0) + &joint(0);
     let coupled = alone.clone() + &body(1) + &joint(1) + "xyz = [1, 2, 3]\nmimic = { joint = \"j0\" }\n";
     let acceleration = |text: &str| {
-        let (model, findings) = read("pendulum.toml", text);
-        let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), PlanOptions::default());
+        let read =
+            read::model("pendulum.toml", text, &Default::default()).unwrap_or_else(|findings| panic!("{findings}"));
+        let plan = search::plan(&read.model, PlanOptions::default());
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
         let mut a = [0.0];
         i.accelerations(&[0.4], &[0.7], &mut a);

@@ -4,8 +4,8 @@
 //! is rounding alone. A bound: a step rounds each sum once, by half a last place, and adds `h` times what is left of rates that
 //! cancel, some last places of the largest term. Such errors have no sign, so after `n` steps they amount to `√n` times that.
 
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
+use mbd_codegen::read;
 use mbd_codegen::search;
 use mbd_runtime::integrate::{
     Euler, Gauss6, ImplicitMidpoint, Midpoint, Radau5, Rk4, Rodas5P, SemiImplicitEuler, StepDoubling, Stepper, Verner9,
@@ -60,8 +60,8 @@ fn rotor() -> (Interpreter<f64>, Vec<f64>, Vec<f64>) {
         type = "spherical"
         child = "rotor"
     "#;
-    let (model, findings) = read("rotor.toml", text);
-    let plan = search::plan(&model.unwrap_or_else(|| panic!("{findings}")), Default::default());
+    let read = read::model("rotor.toml", text, &Default::default()).unwrap_or_else(|findings| panic!("{findings}"));
+    let plan = search::plan(&read.model, Default::default());
     let mut i: Interpreter<f64> = plan.interpreter(&[]);
     let q = [0.1, -0.5, 0.5, 0.7];
     let length = q.iter().map(|x: &f64| x * x).sum::<f64>().sqrt();

@@ -160,7 +160,7 @@ fn closed_chains() {
         let [first, second] = if seed % 3 == 0 { [ground, tip] } else { [tip, ground] };
         let kind = ConstraintKind::Loop { kind: kinds[seed as usize % 5], first, second };
         let decay = if seed % 4 == 0 { Value::Const(5.0) } else { Value::ZERO };
-        model.constraints.push(Constraint { name: "loop".to_string(), kind, decay });
+        model.constraints.push(Constraint::new("loop", kind, decay));
         let mut options = forced(seed);
         // Frames that do not turn keep their nodes out of loops.
         if options.plan.elimination == EliminationStrategy::Fewest {

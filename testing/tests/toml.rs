@@ -1,10 +1,10 @@
 //! Random models through the TOML reader and back.
 
 use mbd_codegen::diag::Severity;
-use mbd_codegen::import::toml::read;
 use mbd_codegen::model::{
     Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Placement, Start, Value,
 };
+use mbd_codegen::read;
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::toml::{to_toml_in, Order};
 
@@ -14,7 +14,7 @@ fn reader_gives_the_model_that_was_written() {
         let model = random_model(seed, &Distribution::everything(seed, 12));
         for order in [Order::DepthFirst, Order::BreadthFirst] {
             let text = to_toml_in(&model, order);
-            let (read, findings) = read("model.toml", &text);
+            let (read, findings) = read::load("model.toml", &text, &Default::default());
             let errors = findings.0.iter().any(|d| d.severity == Severity::Error);
             assert!(!errors, "seed {seed}: {findings}\n{text}");
             assert_eq!(read.as_ref(), Some(&model), "seed {seed}, {order:?}\n{text}");
@@ -34,7 +34,7 @@ fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
             .map(|t| (singles[(first + t) % singles.len()], value(model, rng, 0.5, 2.0)))
             .collect();
         let offset = Value::Const(rng.pick(&[0.0, 0.3, std::f64::consts::FRAC_PI_2]));
-        return Some(Constraint { name: format!("c{k}"), kind: ConstraintKind::Coupling { terms, offset }, decay });
+        return Some(Constraint::new(format!("c{k}"), ConstraintKind::Coupling { terms, offset }, decay));
     }
     let mut ends: Vec<Mount> = model.frames.iter().map(|f| Mount { body: f.body, placement: f.placement }).collect();
     let bodies = std::iter::once(None).chain((0..model.bodies.len()).map(Some));
@@ -52,7 +52,7 @@ fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
     let kind = loop_kind(model, rng);
     let held = matches!(kind, LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. });
     let decay = if held { Value::ZERO } else { decay };
-    Some(Constraint { name: format!("c{k}"), kind: ConstraintKind::Loop { kind, first, second }, decay })
+    Some(Constraint::new(format!("c{k}"), ConstraintKind::Loop { kind, first, second }, decay))
 }
 
 /// A constant, or a parameter whose default is in the range.
@@ -117,7 +117,7 @@ fn reader_gives_the_constraints_that_were_written() {
         seen[1] += model.starts.len();
         for order in [Order::DepthFirst, Order::BreadthFirst] {
             let text = to_toml_in(&model, order);
-            let (read, findings) = read("model.toml", &text);
+            let (read, findings) = read::load("model.toml", &text, &Default::default());
             assert_eq!(read.as_ref(), Some(&model), "seed {seed}, {order:?}\n{findings}\n{text}");
         }
     }
@@ -133,9 +133,10 @@ fn ends_without_a_frame_are_written_with_one() {
     let xyz = [Value::Const(0.125), Value::ZERO, Value::ZERO];
     let second = Mount { body, placement: Placement { xyz, ..Placement::IDENTITY } };
     let kind = ConstraintKind::Loop { kind: LoopKind::Spherical, first, second };
-    model.constraints = vec![Constraint { name: "socket".into(), kind, decay: Value::ZERO }];
-    let (read, findings) = read("model.toml", &to_toml_in(&model, Order::DepthFirst));
-    let read = read.unwrap_or_else(|| panic!("{findings}"));
+    model.constraints = vec![Constraint::new("socket", kind, Value::ZERO)];
+    let read = read::model("model.toml", &to_toml_in(&model, Order::DepthFirst), &Default::default())
+        .unwrap_or_else(|findings| panic!("{findings}"))
+        .model;
     assert_eq!(read.constraints, model.constraints);
     assert_eq!(read.frames.len(), model.frames.len() + 1);
 }

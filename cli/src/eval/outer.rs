@@ -1,6 +1,6 @@
 //! States as the file has them: another program's order and form.
 
-use multibody::codegen::model::{JointKind, JointMotion};
+use multibody::codegen::model::JointMotion;
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
 use multibody::codegen::plan::state_layout;
 use multibody::codegen::plan::Plan;
@@ -158,11 +158,7 @@ impl Outer {
 fn own(plan: &Plan) -> Layout {
     let parts = plan.slots.iter().filter_map(|slot| {
         let Some(Source::State { q, v }) = slot.at else { return None };
-        let form = match plan.model.joints[slot.joint].kind {
-            JointKind::Spherical => Form::Quaternion,
-            JointKind::Floating => Form::Floating,
-            kind => Form::Same { n: kind.nv() },
-        };
+        let form = plan.model.joints[slot.joint].kind.spec().form();
         Some(Part { form, q: (q, q), v: (v, v) })
     });
     Layout { parts: parts.collect() }

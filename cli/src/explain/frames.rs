@@ -2,11 +2,10 @@
 
 use std::io::Write;
 
-use multibody::codegen::emit::joint_word;
 use multibody::codegen::model::Value;
-use multibody::codegen::plan::{NodeKind, Plan, PlanNode, PoseStep};
+use multibody::codegen::plan::{Plan, PlanNode, PoseStep};
 use multibody::runtime::spatial::Axis;
-use multibody::runtime::tree::Source;
+use multibody::runtime::tree::{Kind, Source};
 
 use crate::Outcome;
 
@@ -43,7 +42,7 @@ pub fn print(plan: &Plan, out: &mut dyn Write) -> Outcome {
 fn one(plan: &Plan, k: usize, node: &PlanNode, out: &mut dyn Write) -> Outcome {
     let joint = &plan.model.joints[node.joint.0];
     let parent = node.parent.map_or("the ground".to_string(), |p| format!("`{}`", plan.nodes[p].name));
-    writeln!(out, "{k} `{}` on {parent}, by {} joint `{}`", node.name, joint_word(&joint.kind), joint.name)?;
+    writeln!(out, "{k} `{}` on {parent}, by {} joint `{}`", node.name, joint.kind.word(), joint.name)?;
     let way: Vec<String> = node.place.iter().map(|s| step(plan, s)).collect();
     writeln!(out, "    way: {}", if way.is_empty() { "none".to_string() } else { way.join("  ") })?;
     writeln!(out, "    joint: {}", motion(plan, node))?;
@@ -80,17 +79,17 @@ fn motion(plan: &Plan, node: &PlanNode) -> String {
     }
     let slide = if node.slide == 0.0 { String::new() } else { format!(", then z {}", node.slide) };
     match node.kind {
-        NodeKind::Revolute => format!("Rz({angle}){slide}"),
-        NodeKind::Prismatic => {
+        Kind::Revolute => format!("Rz({angle}){slide}"),
+        Kind::Prismatic => {
             // The constant part of the angle comes from the placement.
             let turn = angle[coordinate.len()..].trim_start_matches(" + ");
             let turn = if turn.is_empty() { String::new() } else { format!(", Rz({})", turn.trim_start()) };
             format!("z {coordinate}{turn}{slide}")
         }
-        NodeKind::Helical(pitch) => format!("Rz({angle}) with z {} per radian{slide}", value(plan, pitch)),
-        NodeKind::Planar => format!("x {letter}[{at}], y {letter}[{}], Rz({letter}[{}])", at + 1, at + 2),
-        NodeKind::Spherical => format!("turn by the quaternion {letter}[{at}..{}]", at + 4),
-        NodeKind::Floating => {
+        Kind::Helical { pitch } => format!("Rz({angle}) with z {} per radian{slide}", value(plan, pitch)),
+        Kind::Planar => format!("x {letter}[{at}], y {letter}[{}], Rz({letter}[{}])", at + 1, at + 2),
+        Kind::Spherical => format!("turn by the quaternion {letter}[{at}..{}]", at + 4),
+        Kind::Floating => {
             format!("displacement {letter}[{at}..{}], turn by the quaternion {letter}[{}..{}]", at + 3, at + 3, at + 7)
         }
     }

@@ -1,6 +1,6 @@
 //! The shape of a mechanism: lines between the points at which its bodies are connected.
 
-use multibody::codegen::model::{ConstraintKind, JointKind, LoopKind, Mount, Value};
+use multibody::codegen::model::{ConstraintKind, LoopKind, Mount, Unit, Value};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::sweep::FrameState;
 
@@ -77,12 +77,10 @@ impl Shapes {
         let mut parts: Vec<Part> = (0..model.bodies.len()).map(|b| part(Some(b))).collect();
         let mut ground = part(None);
         for joint in &model.joints {
-            let (slides, free) = match joint.kind {
-                JointKind::Floating | JointKind::Planar { .. } => (false, true),
-                JointKind::Prismatic { .. } | JointKind::Cylindrical { .. } => (true, false),
-                _ => (false, false),
-            };
-            if free {
+            let spec = joint.kind.spec();
+            let slides = spec.freedoms.first().is_some_and(|freedom| freedom.unit == Unit::Metre);
+            // A body that moves in a plane or in space is tied to no point.
+            if slides && spec.group.is_some() {
                 continue;
             }
             let at = point(&joint.placement.xyz);
@@ -94,7 +92,7 @@ impl Shapes {
             }
             let child = &mut parts[joint.child];
             child.points.push([0.0; 3]);
-            if !matches!(joint.kind, JointKind::Fixed) && (joint.parent.is_none() || !slides) {
+            if spec.nv() > 0 && (joint.parent.is_none() || !slides) {
                 child.marks.push(([0.0; 3], slides && joint.parent.is_none()));
             }
         }

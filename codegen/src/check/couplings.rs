@@ -1,7 +1,7 @@
 //! Couplings: linear equations between the coordinates of joints.
 
 use super::decay;
-use super::joints::{coordinates, type_name};
+use super::joints::single;
 use super::names::Names;
 use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawCoupling, RawModel, RawMotion, RawNumber};
@@ -21,7 +21,7 @@ pub(super) fn constraint(
     let ratios: Option<Vec<Value>> =
         raw.ratios.as_ref().map(|list| list.value.iter().map(|r| ratio(r, &what, numbers)).collect());
     let offset = numbers.or_zero(&raw.offset, Quantity::Plain, &format!("{what}: `offset`"));
-    let decay = decay(&raw.decay, &what, numbers);
+    let decay = decay(raw.decay.as_ref(), &what, numbers);
     if let (Some(named), Some(list)) = (&raw.joints, &raw.ratios) {
         let (n, m) = (named.value.len(), list.value.len());
         if n != m {
@@ -31,7 +31,8 @@ pub(super) fn constraint(
         }
     }
     let terms = joints?.into_iter().zip(ratios?).collect();
-    Some(Constraint { name: raw.name.value.clone(), kind: ConstraintKind::Coupling { terms, offset }, decay })
+    let kind = ConstraintKind::Coupling { terms, offset };
+    Some(Constraint { name: raw.name.value.clone(), kind, decay, origin: numbers.findings.origin(raw.name.span) })
 }
 
 fn plural(n: usize) -> &'static str {
@@ -77,9 +78,9 @@ fn can_be_coupled(name: &Spanned<String>, joint: usize, model: &RawModel, what: 
     } else if matches!(source.motion, RawMotion::Prescribed(_)) {
         let help = "couple joints that are free, or remove its `motion`: a prescribed joint does not yield";
         (format!("{what}: the motion of joint {shown} is prescribed"), help.into())
-    } else if let Some(kind) = source.kind.as_ref().map(|k| k.value).filter(|k| coordinates(*k).len() != 1) {
-        let help = "only joints of one freedom can be coupled: `pin`, `slider` and `helical`";
-        (format!("{what}: {shown} is a {} joint", type_name(kind)), help.into())
+    } else if let Some(kind) = source.kind.as_ref().map(|k| k.value).filter(|k| k.nv() != 1) {
+        let help = format!("only joints of one freedom can be coupled: {}", single());
+        (format!("{what}: {shown} is a {} joint", kind.word()), help)
     } else {
         return true;
     };

@@ -2,37 +2,19 @@
 
 use super::names::{norm, Names};
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawModel, RawMotion};
-use crate::import::source::{Findings, Span, Spanned};
+use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion};
+use crate::import::source::{Findings, Span};
 use crate::import::words::{list, quote};
-use crate::model::{Joint, JointKind, JointMotion, Value};
+use crate::model::{Joint, JointKind, JointMotion, JointSpec, Value, JOINTS};
 
-/// A type as it is written.
-pub(super) fn type_name(kind: JointType) -> &'static str {
-    match kind {
-        JointType::Revolute => "pin",
-        JointType::Prismatic => "slider",
-        JointType::Cylindrical => "cylindrical",
-        JointType::Helical => "helical",
-        JointType::Universal => "universal",
-        JointType::Planar => "planar",
-        JointType::Spherical => "spherical",
-        JointType::Floating => "floating",
-        JointType::Fixed => "fixed",
-    }
+/// What each coordinate measures.
+pub(super) fn quantities(kind: &JointSpec) -> Vec<Quantity> {
+    kind.coordinates.iter().map(|c| c.unit.into()).collect()
 }
 
-/// What each coordinate measures; empty where coordinates have no axes of their own.
-pub(super) fn coordinates(kind: JointType) -> &'static [Quantity] {
-    use Quantity::{Angle, Length};
-    match kind {
-        JointType::Revolute | JointType::Helical => &[Angle],
-        JointType::Prismatic => &[Length],
-        JointType::Cylindrical => &[Length, Angle],
-        JointType::Universal => &[Angle, Angle],
-        JointType::Planar => &[Length, Length, Angle],
-        JointType::Spherical | JointType::Floating | JointType::Fixed => &[],
-    }
+/// The kinds of one freedom, for messages.
+pub(super) fn single() -> String {
+    list(JOINTS.iter().filter(|kind| kind.nv() == 1).map(JointSpec::word))
 }
 
 /// A joint with everything but its indices, which are filled in when the tree is known.
@@ -48,72 +30,49 @@ pub(super) fn joint(raw: &RawJoint, numbers: &mut Numbers) -> Joint {
         }
         None => JointKind::Fixed,
     };
-    let mut joint = Joint {
-        name: raw.name.value.clone(),
-        kind: joint_kind,
-        parent: None,
-        child: 0,
-        placement,
-        unbounded: raw.unbounded,
-        motion,
-        damping: Vec::new(),
-        stiffness: Vec::new(),
-        rest: Vec::new(),
-        armature: Vec::new(),
-    };
+    let mut joint = Joint::new(&raw.name.value, joint_kind, None, 0, placement);
+    (joint.unbounded, joint.motion) = (raw.unbounded, motion);
+    joint.origin = numbers.findings.origin(raw.name.span);
     // How many freedoms an unknown type has is unknown.
     let Some(kind) = kind else { return joint };
     let plain = vec![Quantity::Plain; joint_kind.nv()];
-    let rest = coordinates(kind);
+    let rest = if kind.has_springs() { quantities(kind) } else { plain.clone() };
     joint.damping = freedoms(&raw.damping, &plain, "damping", kind, &what, numbers);
     joint.stiffness = freedoms(&raw.stiffness, &plain, "stiffness", kind, &what, numbers);
-    joint.rest = freedoms(&raw.rest, if rest.is_empty() { &plain } else { rest }, "rest", kind, &what, numbers);
+    joint.rest = freedoms(&raw.rest, &rest, "rest", kind, &what, numbers);
     joint.armature = freedoms(&raw.armature, &plain, "armature", kind, &what, numbers);
     signs(raw, &joint, &what, numbers);
     joint
 }
 
-fn joint_kind(raw: &RawJoint, kind: JointType, what: &str, numbers: &mut Numbers) -> JointKind {
-    let mut direction = |axis: &Option<Spanned<[f64; 3]>>, key: &str, default: [f64; 3]| match axis {
-        Some(axis) => numbers.direction(axis, &format!("{what}: `{key}`")).unwrap_or(default),
-        None => default,
-    };
-    let z = [0.0, 0.0, 1.0];
-    match kind {
-        JointType::Revolute => JointKind::Revolute { axis: direction(&raw.axis, "axis", z) },
-        JointType::Prismatic => JointKind::Prismatic { axis: direction(&raw.axis, "axis", z) },
-        JointType::Cylindrical => JointKind::Cylindrical { axis: direction(&raw.axis, "axis", z) },
-        JointType::Planar => JointKind::Planar { normal: direction(&raw.axis, "axis", z) },
-        JointType::Spherical => JointKind::Spherical,
-        JointType::Floating => JointKind::Floating,
-        JointType::Fixed => JointKind::Fixed,
-        JointType::Helical => {
-            let axis = direction(&raw.axis, "axis", z);
-            if raw.pitch.is_none() {
-                let message = format!("{what}: a helical joint needs a `pitch`");
-                let help = "add `pitch = ..`, metres along the axis per radian (lead per turn / 2 pi)";
-                numbers.findings.error(raw.name.span, message, help);
-            }
-            let pitch = numbers.or_zero(&raw.pitch, Quantity::Pitch, &format!("{what}: `pitch`"));
-            if let (Some(p), Some(0.0)) = (&raw.pitch, pitch.constant()) {
-                numbers.findings.warning(
-                    p.span,
-                    format!("{what}: a helical joint of pitch 0 is a pin"),
-                    "make it a `pin`",
-                );
-            }
-            JointKind::Helical { axis, pitch }
-        }
-        JointType::Universal => {
-            let axes = [direction(&raw.axis, "axis", [1.0, 0.0, 0.0]), direction(&raw.axis2, "axis2", [0.0, 1.0, 0.0])];
-            let span = raw.axis2.as_ref().or(raw.axis.as_ref()).map_or(raw.name.span, |a| a.span);
-            if parallel(axes[0], axes[1]) {
-                let help = "the second axis has to cross the first: by default they are x and y";
-                numbers.findings.error(span, format!("{what}: the two axes of a universal joint are parallel"), help);
-            }
-            JointKind::Universal { axes }
-        }
+fn joint_kind(raw: &RawJoint, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> JointKind {
+    let mut axes = [[0.0; 3]; 2];
+    for (k, (key, given)) in [("axis", &raw.axis), ("axis2", &raw.axis2)].into_iter().enumerate() {
+        let Some(default) = kind.axes.get(k) else { continue };
+        let given = given.as_ref().and_then(|axis| numbers.direction(axis, &format!("{what}: `{key}`")));
+        axes[k] = given.unwrap_or(*default);
     }
+    if kind.axes.len() == 2 && parallel(axes[0], axes[1]) {
+        let span = raw.axis2.as_ref().or(raw.axis.as_ref()).map_or(raw.name.span, |a| a.span);
+        let message = format!("{what}: the two axes of a {} joint are parallel", kind.word());
+        let help = "the second axis has to cross the first: by default they are x and y";
+        numbers.findings.error(span, message, help);
+    }
+    let pitch = if kind.pitch { pitch(raw, kind.word(), what, numbers) } else { Value::ZERO };
+    (kind.make)(axes, pitch)
+}
+
+fn pitch(raw: &RawJoint, word: &str, what: &str, numbers: &mut Numbers) -> Value {
+    if raw.pitch.is_none() {
+        let help = "add `pitch = ..`, metres along the axis per radian (lead per turn / 2 pi)";
+        numbers.findings.error(raw.name.span, format!("{what}: a {word} joint needs a `pitch`"), help);
+    }
+    let pitch = numbers.or_zero(&raw.pitch, Quantity::Pitch, &format!("{what}: `pitch`"));
+    if let (Some(p), Some(0.0)) = (&raw.pitch, pitch.constant()) {
+        let message = format!("{what}: a {word} joint of pitch 0 is a revolute joint");
+        numbers.findings.warning(p.span, message, "make it `revolute`");
+    }
+    pitch
 }
 
 /// Within a microradian of parallel: the two rates could not be told apart.
@@ -123,15 +82,13 @@ pub(super) fn parallel(a: [f64; 3], b: [f64; 3]) -> bool {
 }
 
 /// Entries that mean nothing on a joint of this type.
-fn superfluous(raw: &RawJoint, kind: JointType, what: &str, findings: &mut Findings) {
+fn superfluous(raw: &RawJoint, kind: &JointSpec, what: &str, findings: &mut Findings) {
     let at = |f: &Option<RawFreedoms>| f.as_ref().map(span_of);
-    let has_axis = !matches!(kind, JointType::Spherical | JointType::Floating | JointType::Fixed);
-    let has_spring = !coordinates(kind).is_empty();
-    let moves = kind != JointType::Fixed;
+    let (has_spring, moves) = (kind.has_springs(), kind.nv() > 0);
     let entries = [
-        ("axis", raw.axis.as_ref().map(|a| a.span), has_axis),
-        ("axis2", raw.axis2.as_ref().map(|a| a.span), kind == JointType::Universal),
-        ("pitch", raw.pitch.as_ref().map(|p| p.span), kind == JointType::Helical),
+        ("axis", raw.axis.as_ref().map(|a| a.span), !kind.axes.is_empty()),
+        ("axis2", raw.axis2.as_ref().map(|a| a.span), kind.axes.len() > 1),
+        ("pitch", raw.pitch.as_ref().map(|p| p.span), kind.pitch),
         ("damping", at(&raw.damping), moves),
         ("stiffness", at(&raw.stiffness), has_spring),
         ("rest", at(&raw.rest), has_spring),
@@ -147,7 +104,7 @@ fn superfluous(raw: &RawJoint, kind: JointType, what: &str, findings: &mut Findi
                 "pitch" => "remove it, or make the joint `helical`",
                 _ => "remove it, or change the type of the joint",
             };
-            findings.error(span, format!("{what}: a {} joint has no `{key}`", type_name(kind)), help);
+            findings.error(span, format!("{what}: a {} joint has no `{key}`", kind.word()), help);
         }
     }
 }
@@ -164,7 +121,7 @@ fn freedoms(
     raw: &Option<RawFreedoms>,
     quantities: &[Quantity],
     key: &str,
-    kind: JointType,
+    kind: &JointSpec,
     what: &str,
     numbers: &mut Numbers,
 ) -> Vec<Value> {
@@ -185,7 +142,7 @@ fn freedoms(
                 // A joint without freedoms is told so already.
                 if n > 0 {
                     let message =
-                        format!("{named} has {} numbers, and a {} joint has {}", values.len(), type_name(kind), of(n));
+                        format!("{named} has {} numbers, and a {} joint has {}", values.len(), kind.word(), of(n));
                     let help =
                         if n == 1 { "write one number".into() } else { format!("write {n} numbers, or one for all") };
                     numbers.findings.error(list.span, message, help);
@@ -222,9 +179,9 @@ fn signs(raw: &RawJoint, joint: &Joint, what: &str, numbers: &mut Numbers) {
     }
 }
 
-fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Numbers) -> JointMotion {
+fn motion(raw: &RawJoint, kind: Option<&JointSpec>, what: &str, numbers: &mut Numbers) -> JointMotion {
     if let RawMotion::Prescribed(span) = raw.motion {
-        if kind == Some(JointType::Fixed) {
+        if kind.is_some_and(|kind| kind.nv() == 0) {
             let message = format!("{what}: a fixed joint has no motion to prescribe");
             numbers.findings.error(span, message, "remove `motion`, or change the type of the joint");
         }
@@ -239,9 +196,9 @@ fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Num
             RawMotion::Prescribed(_) => JointMotion::Prescribed,
         };
     };
-    if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
-        let message = format!("{what}: a {} joint cannot mimic another", type_name(kind));
-        let help = "only joints of one freedom can: `pin`, `slider` and `helical`";
+    if let Some(kind) = kind.filter(|k| k.nv() != 1) {
+        let message = format!("{what}: a {} joint cannot mimic another", kind.word());
+        let help = format!("only joints of one freedom can: {}", single());
         numbers.findings.error(mimic.span, message, help);
     }
     let ratio = mimic.ratio.as_ref().map(|r| numbers.value(r, Quantity::Plain, &format!("{what}: `ratio`")));
@@ -249,7 +206,7 @@ fn motion(raw: &RawJoint, kind: Option<JointType>, what: &str, numbers: &mut Num
         let message = format!("{what}: with a ratio of 0 it never moves");
         numbers.findings.warning(r.span, message, "make it a `fixed` joint, or correct the ratio");
     }
-    let quantity = kind.map_or(&[] as &[_], coordinates).first().copied().unwrap_or(Quantity::Plain);
+    let quantity = kind.and_then(|kind| kind.coordinates.first()).map_or(Quantity::Plain, |c| c.unit.into());
     let offset = numbers.or_zero(&mimic.offset, quantity, &format!("{what}: `offset`"));
     JointMotion::Mimic { leader: 0, ratio: ratio.unwrap_or(Value::ONE), offset }
 }
@@ -262,9 +219,9 @@ pub(super) fn leaders(raw: &RawModel, names: &Names, findings: &mut Findings) ->
         let leader = j.mimic.as_ref().and_then(|m| {
             let leader = names.joint(&m.leader, "leader ", &what, findings)?;
             let kind = raw.joints[leader].kind.as_ref().map(|k| k.value);
-            if let Some(kind) = kind.filter(|k| coordinates(*k).len() != 1) {
-                let message = format!("{what}: leader {} is a {} joint", quote(&m.leader.value), type_name(kind));
-                let help = "only joints of one freedom can lead: `pin`, `slider` and `helical`";
+            if let Some(kind) = kind.filter(|k| k.nv() != 1) {
+                let message = format!("{what}: leader {} is a {} joint", quote(&m.leader.value), kind.word());
+                let help = format!("only joints of one freedom can lead: {}", single());
                 findings.error(m.leader.span, message, help);
             }
             Some(leader)

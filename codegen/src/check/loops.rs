@@ -1,32 +1,18 @@
-//! RolledCode: what they bind and how.
+//! Loops: what they bind and how.
 
 use super::decay;
 use super::names::{norm, End, Names};
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{LoopType, RawConstraint, RawLoop, RawModel, RawNumber};
+use crate::import::raw::{RawConstraint, RawLoop, RawModel, RawNumber};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::quote;
-use crate::model::{Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, Mount, Placement, Value};
+use crate::model::{
+    Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, LoopNumbers, LoopSpec, Mount, Placement,
+    Value, LOOPS,
+};
 
 /// Cosine up to which two axes pass for being at right angles: seven digits.
 const RIGHT_ANGLE: f64 = 1e-6;
-
-/// Keys that a type has beside `name`, `type` and `between`.
-fn keys(kind: LoopType) -> &'static [&'static str] {
-    match kind {
-        LoopType::Revolute | LoopType::Prismatic | LoopType::Cylindrical | LoopType::PointOnLine => &["axis", "decay"],
-        LoopType::Helical => &["axis", "pitch", "decay"],
-        LoopType::Universal => &["axis", "axis2", "decay"],
-        LoopType::Planar | LoopType::PointOnPlane => &["normal", "decay"],
-        LoopType::Spherical | LoopType::Fixed => &["decay"],
-        LoopType::Distance => &["length", "decay"],
-        LoopType::PointOnCylinder => &["axis", "radius", "decay"],
-        LoopType::RollingDisc => &["normal", "axis", "radius", "decay"],
-        LoopType::RollingBall => &["normal", "radius", "decay"],
-        LoopType::KnifeEdge => &["axis"],
-        LoopType::Pfaffian => &["row"],
-    }
-}
 
 /// A loop; `None` where something about it was reported that leaves it without meaning.
 pub(super) fn constraint(
@@ -41,10 +27,11 @@ pub(super) fn constraint(
         entries(raw, kind.value, &what, numbers.findings);
     }
     let kind = raw.kind.as_ref().map(|k| loop_kind(raw, k.value, &what, numbers));
-    let decay = decay(&raw.decay, &what, numbers);
+    let decay = decay(raw.number("decay"), &what, numbers);
     let mounts = raw.between.as_ref().and_then(|ends| mounts(ends, model, names, frames, &what, numbers.findings));
     let (kind, [first, second]) = (kind?, mounts?);
-    Some(Constraint { name: raw.name.value.clone(), kind: ConstraintKind::Loop { kind, first, second }, decay })
+    let kind = ConstraintKind::Loop { kind, first, second };
+    Some(Constraint { name: raw.name.value.clone(), kind, decay, origin: numbers.findings.origin(raw.name.span) })
 }
 
 fn mounts(
@@ -76,47 +63,35 @@ fn mounts(
 }
 
 /// Reports what is superfluous or missing.
-fn entries(raw: &RawLoop, kind: LoopType, what: &str, findings: &mut Findings) {
-    let axis = |a: &Option<Spanned<[f64; 3]>>| a.as_ref().map(|a| a.span);
-    let number = |x: &Option<RawNumber>| x.as_ref().map(|x| x.span);
-    let present = [
-        ("axis", axis(&raw.axis)),
-        ("axis2", axis(&raw.axis2)),
-        ("normal", axis(&raw.normal)),
-        ("pitch", number(&raw.pitch)),
-        ("length", number(&raw.length)),
-        ("radius", number(&raw.radius)),
-        ("row", raw.row.as_ref().map(|r| r.span)),
-        ("decay", number(&raw.decay)),
-    ];
-    let (name, allowed) = (kind.name(), keys(kind));
-    for (key, span) in present {
-        match (span, allowed.contains(&key)) {
-            (Some(span), false) => {
-                findings.error(span, format!("{what}: a {name} loop has no `{key}`"), instead(key, allowed));
-            }
-            (None, true) => {
-                if let Some(example) = example(key) {
-                    let message = format!("{what}: a {name} loop needs a `{key}`");
-                    findings.error(raw.name.span, message, format!("add {example}"));
-                }
-            }
-            _ => {}
+fn entries(raw: &RawLoop, kind: &LoopSpec, what: &str, findings: &mut Findings) {
+    let (name, allowed) = (kind.word(), kind.keys().collect::<Vec<_>>());
+    let directions = raw.directions.iter().map(|(key, direction)| (*key, direction.span));
+    let numbers = raw.numbers.iter().map(|(key, number)| (*key, number.span));
+    let present: Vec<_> = directions.chain(numbers).chain(raw.row.as_ref().map(|row| ("row", row.span))).collect();
+    for (key, span) in &present {
+        if !allowed.contains(key) {
+            findings.error(*span, format!("{what}: a {name} loop has no `{key}`"), instead(key, &allowed));
+        }
+    }
+    for key in allowed.iter().filter(|key| !present.iter().any(|(given, _)| given == *key)) {
+        if let Some(example) = example(key) {
+            let message = format!("{what}: a {name} loop needs a `{key}`");
+            findings.error(raw.name.span, message, format!("add {example}"));
         }
     }
 }
 
 /// What to do about a key that a type does not have.
-fn instead(key: &str, allowed: &[&str]) -> &'static str {
-    match key {
-        "axis" if allowed.contains(&"normal") => "the direction across a plane is called `normal`",
-        "normal" if allowed.contains(&"axis") => "its direction is called `axis`",
-        "axis2" => "remove it, or make the loop `universal`",
-        "pitch" => "remove it, or make the loop `helical`",
-        "length" => "remove it, or make the loop `distance`",
-        "row" => "remove it, or make the loop `pfaffian`",
-        "decay" => "remove it: the loop holds velocities, and there are no positions whose errors could decay",
-        _ => "remove it, or change the type of the loop",
+fn instead(key: &str, allowed: &[&str]) -> String {
+    let mut takers = LOOPS.iter().filter(|spec| spec.keys().any(|k| k == key));
+    match (key, takers.next(), takers.next()) {
+        ("axis", ..) if allowed.contains(&"normal") => "the direction across a plane is called `normal`".into(),
+        ("normal", ..) if allowed.contains(&"axis") => "its direction is called `axis`".into(),
+        ("decay", ..) => {
+            "remove it: the loop holds velocities, and there are no positions whose errors could decay".into()
+        }
+        (_, Some(only), None) => format!("remove it, or make the loop `{}`", only.word()),
+        _ => "remove it, or change the type of the loop".into(),
     }
 }
 
@@ -131,42 +106,28 @@ fn example(key: &str) -> Option<&'static str> {
     }
 }
 
-fn loop_kind(raw: &RawLoop, kind: LoopType, what: &str, numbers: &mut Numbers) -> LoopKind {
-    const Z: [f64; 3] = [0.0, 0.0, 1.0];
-    let mut direction = |axis: &Option<Spanned<[f64; 3]>>, key: &str, default: [f64; 3]| match axis {
-        Some(axis) => numbers.direction(axis, &format!("{what}: `{key}`")).unwrap_or(default),
-        None => default,
+fn loop_kind(raw: &RawLoop, kind: &LoopSpec, what: &str, numbers: &mut Numbers) -> LoopKind {
+    let mut directions = [[0.0; 3]; 2];
+    for (slot, direction) in directions.iter_mut().zip(kind.directions) {
+        let given = raw.direction(direction.key);
+        let given = given.and_then(|d| numbers.direction(d, &format!("{what}: `{}`", direction.key)));
+        *slot = given.unwrap_or(direction.default);
+    }
+    let given = kind.number.and_then(|key| raw.number(key));
+    let number = match kind.number {
+        Some("pitch") => pitch(given, what, numbers),
+        Some("length") => {
+            let help = "the distance in metres, greater than 0; origins that coincide are a `spherical` loop";
+            positive(given, "length", help, what, numbers)
+        }
+        Some("radius") => positive(given, "radius", "a radius in metres, greater than 0", what, numbers),
+        _ => Value::ZERO,
     };
-    let is_universal = kind == LoopType::Universal;
-    let axis = direction(&raw.axis, "axis", if is_universal { [1.0, 0.0, 0.0] } else { Z });
-    let axis2 = direction(&raw.axis2, "axis2", [0.0, 1.0, 0.0]);
-    let normal = direction(&raw.normal, "normal", Z);
-    let radius = positive(&raw.radius, "radius", "a radius in metres, greater than 0", what, numbers);
-    let length = "the distance in metres, greater than 0; origins that coincide are a `spherical` loop";
-    let length = positive(&raw.length, "length", length, what, numbers);
-    let pitch = pitch(&raw.pitch, what, numbers);
-    let row = row(raw, what, numbers);
-    if is_universal {
-        right_angle(raw, [axis, axis2], what, numbers.findings);
+    let kind = (kind.make)(LoopNumbers { directions, number, row: row(raw, what, numbers) });
+    if let LoopKind::Universal { axes } = kind {
+        right_angle(raw, axes, what, numbers.findings);
     }
-    match kind {
-        LoopType::Revolute => LoopKind::Revolute { axis },
-        LoopType::Prismatic => LoopKind::Prismatic { axis },
-        LoopType::Cylindrical => LoopKind::Cylindrical { axis },
-        LoopType::Helical => LoopKind::Helical { axis, pitch },
-        LoopType::Universal => LoopKind::Universal { axes: [axis, axis2] },
-        LoopType::Planar => LoopKind::Planar { normal },
-        LoopType::Spherical => LoopKind::Spherical,
-        LoopType::Fixed => LoopKind::Fixed,
-        LoopType::Distance => LoopKind::Distance { length },
-        LoopType::PointOnLine => LoopKind::PointOnLine { axis },
-        LoopType::PointOnPlane => LoopKind::PointOnPlane { normal },
-        LoopType::PointOnCylinder => LoopKind::PointOnCylinder { axis, radius },
-        LoopType::RollingDisc => LoopKind::RollingDisc { normal, axis, radius },
-        LoopType::RollingBall => LoopKind::RollingBall { normal, radius },
-        LoopType::KnifeEdge => LoopKind::KnifeEdge { axis },
-        LoopType::Pfaffian => LoopKind::Pfaffian { row },
-    }
+    kind
 }
 
 /// Behind a value that only the default of a parameter gives.
@@ -177,7 +138,7 @@ fn by_default(value: Value) -> &'static str {
     }
 }
 
-fn positive(raw: &Option<RawNumber>, key: &str, help: &str, what: &str, numbers: &mut Numbers) -> Value {
+fn positive(raw: Option<&RawNumber>, key: &str, help: &str, what: &str, numbers: &mut Numbers) -> Value {
     let value = numbers.or_zero(raw, Quantity::Length, &format!("{what}: `{key}`"));
     if let (Some(at), true) = (raw, numbers.at_default(value) <= 0.0) {
         let message = format!("{what}: `{key}` is not positive{}", by_default(value));
@@ -186,11 +147,11 @@ fn positive(raw: &Option<RawNumber>, key: &str, help: &str, what: &str, numbers:
     value
 }
 
-fn pitch(raw: &Option<RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
+fn pitch(raw: Option<&RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
     let value = numbers.or_zero(raw, Quantity::Pitch, &format!("{what}: `pitch`"));
     if let (Some(at), true) = (raw, numbers.at_default(value) == 0.0) {
-        let message = format!("{what}: `pitch` is 0{}, and so the loop a pin", by_default(value));
-        numbers.findings.error(at.span, message, "make it a `pin`, or write metres along the axis per radian");
+        let message = format!("{what}: `pitch` is 0{}, and so the loop a revolute one", by_default(value));
+        numbers.findings.error(at.span, message, "make it `revolute`, or write metres along the axis per radian");
     }
     value
 }
@@ -208,7 +169,7 @@ fn row(raw: &RawLoop, what: &str, numbers: &mut Numbers) -> [Value; 6] {
 fn right_angle(raw: &RawLoop, [a, b]: [[f64; 3]; 2], what: &str, findings: &mut Findings) {
     let dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     if dot.abs() > RIGHT_ANGLE * norm(a) * norm(b) {
-        let span = raw.axis2.as_ref().or(raw.axis.as_ref()).map_or(raw.name.span, |a| a.span);
+        let span = raw.direction("axis2").or(raw.direction("axis")).map_or(raw.name.span, |a| a.span);
         let help = "the arms of its cross are square to each other; by default they are x and y";
         findings.error(span, format!("{what}: the two axes of a universal loop are not at right angles"), help);
     }

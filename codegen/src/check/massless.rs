@@ -4,7 +4,7 @@ use super::symmetric::full;
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
-use crate::model::{Body, JointKind, JointMotion, Model, Placement, Rotation, Value};
+use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Placement, Rotation, Unit, Value};
 
 type Mat3 = [[f64; 3]; 3];
 
@@ -74,33 +74,18 @@ fn weak_freedom(model: &Model, k: usize, heavy: bool, moving: bool, inertia: Opt
         return loose.contains(&true).then(|| format!("{body}{all} {verb} neither mass nor inertia"));
     }
     let inertia = inertia.filter(|_| !moving)?;
-    if matches!(joint.kind, JointKind::Universal { axes: [a, b] } if super::joints::parallel(a, b)) {
+    if matches!(joint.kind.axes(), [a, b] if super::joints::parallel(*a, *b)) {
         return None; // reported as that
     }
     let columns = freedoms(&joint.kind, model);
     let armature: Vec<f64> = joint.armature.iter().map(|a| at_default(*a, model)).collect();
     let resists = resistance(&inertia, &columns, &armature);
-    let scale = |turns: bool| if turns { trace(&inertia.about_origin) } else { inertia.mass };
-    let weak = (0..columns.len()).find(|&i| {
-        let turns = columns[i].1 != [0.0; 3];
-        loose[i] && resists[i] <= NOTHING * scale(turns)
-    })?;
-    let way = if columns[weak].1 != [0.0; 3] { "turning" } else { "sliding" };
-    Some(format!("{body} has no inertia against {way}{}", about(&joint.kind, weak)))
-}
-
-fn about(kind: &JointKind, freedom: usize) -> &'static str {
-    match (kind, freedom) {
-        (JointKind::Spherical, k) => [" about x", " about y", " about z"][k.min(2)],
-        (JointKind::Floating, k) if k >= 3 => [" about x", " about y", " about z"][(k - 3).min(2)],
-        (JointKind::Universal { .. }, 0) => " about the first axis",
-        (JointKind::Universal { .. }, _) => " about the second axis",
-        (JointKind::Planar { .. }, _) => " about the normal",
-        (JointKind::Revolute { .. } | JointKind::Cylindrical { .. } | JointKind::Helical { .. }, _) => {
-            " about the axis"
-        }
-        _ => "",
-    }
+    let scale = |unit: Unit| if unit == Unit::Radian { trace(&inertia.about_origin) } else { inertia.mass };
+    let freedoms = joint.kind.spec().freedoms;
+    let weak = (0..columns.len()).find(|&i| loose[i] && resists[i] <= NOTHING * scale(freedoms[i].unit))?;
+    let Freedom { unit, direction, .. } = freedoms[weak];
+    let way = if unit == Unit::Radian { "turning" } else { "sliding" };
+    Some(format!("{body} has no inertia against {way} {direction}"))
 }
 
 /// A body counts as heavy if any part of its inertia is a parameter or not zero.
@@ -151,30 +136,23 @@ fn sum(a: Inertia, b: Inertia) -> Inertia {
     }
 }
 
-/// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates.
+/// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates. Of the directions across an axis any
+/// two will do: the mass is the same along all.
 fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
-    const NONE: [f64; 3] = [0.0; 3];
-    const AXES: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    match kind {
-        JointKind::Revolute { axis } => vec![(NONE, unit(*axis))],
-        JointKind::Prismatic { axis } => vec![(unit(*axis), NONE)],
-        JointKind::Cylindrical { axis } => vec![(unit(*axis), NONE), (NONE, unit(*axis))],
-        JointKind::Helical { axis, pitch } => {
-            let a = unit(*axis);
-            vec![(a.map(|x| x * at_default(*pitch, model)), a)]
-        }
-        JointKind::Universal { axes } => axes.map(|a| (NONE, unit(a))).to_vec(),
-        JointKind::Planar { normal } => {
-            // Any two directions across the normal: the mass is the same along all.
-            let n = unit(*normal);
+    const AXES: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let mut columns = Vec::new();
+    for (element, axis) in kind.elements() {
+        let axes = axis.map_or(AXES, |axis| {
+            let n = unit(axis);
             let k = (0..3).min_by(|i, j| n[*i].abs().total_cmp(&n[*j].abs())).unwrap_or(0);
             let a = unit(cross(n, AXES[k]));
-            vec![(a, NONE), (cross(n, a), NONE), (NONE, n)]
-        }
-        JointKind::Spherical => AXES.map(|a| (NONE, a)).to_vec(),
-        JointKind::Floating => AXES.map(|a| (a, NONE)).into_iter().chain(AXES.map(|a| (NONE, a))).collect(),
-        JointKind::Fixed => Vec::new(),
+            [a, cross(n, a), n]
+        });
+        let element = element.map(&mut |value| at_default(value, model));
+        let outer = |v: [f64; 3]| apply(&transpose(&axes), v);
+        columns.extend((0..element.nv()).map(|k| element.axis(k).motion(1.0)).map(|e| (outer(e.lin), outer(e.ang))));
     }
+    columns
 }
 
 /// What resists each freedom when the ones before it may follow freely: the pivots of the joint's own block of the mass matrix.

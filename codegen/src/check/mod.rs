@@ -16,14 +16,14 @@ use self::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawConstraint, RawGravity, RawModel, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::model::{Constraint, ConstraintKind, Frame, Gravity, Joint, Model, Param, Value, Wrench};
+use crate::model::{Constraint, ConstraintKind, Frame, Gravity, Joint, JointMotion, Model, Param, Value, Wrench};
 
-/// Checks `raw`; a model only where no error was found, neither here nor before. `file` is the path or name of the source, from which the
-/// model takes its name if it states none.
+/// Checks `raw`; a model only where no error was found, neither here nor before. The model takes its name from the file of the findings
+/// if it states none.
 ///
 /// Joints come out depth first from the ground, the children of a body in file order; all else keeps the order of the file.
-pub fn check(raw: &RawModel, file: &str, findings: &mut Findings) -> Option<Model> {
-    let name = names::model_name(raw, file, findings);
+pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
+    let name = names::model_name(raw, findings);
     let names = Names::collect(raw, findings);
     let mut numbers = Numbers::new(raw, findings);
     let gravity = gravity(raw, &mut numbers);
@@ -74,7 +74,7 @@ fn assemble(
         let mut joint = joints[j].clone();
         joint.parent = links[j].parent.unwrap_or(None);
         joint.child = links[j].child.unwrap_or(0);
-        if let (crate::model::JointMotion::Mimic { leader, .. }, Some(l)) = (&mut joint.motion, leaders[j]) {
+        if let (JointMotion::Mimic { leader, .. }, Some(l)) = (&mut joint.motion, leaders[j]) {
             *leader = place[l];
         }
         joint
@@ -117,7 +117,7 @@ fn constraints(raw: &RawModel, names: &Names, frames: &[Frame], numbers: &mut Nu
 }
 
 /// Rate of decay, which only brakes.
-fn decay(raw: &Option<RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
+fn decay(raw: Option<&RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
     let decay = numbers.or_zero(raw, Quantity::Plain, &format!("{what}: `decay`"));
     if let (Some(at), true) = (raw, numbers.at_default(decay) < 0.0) {
         let help = "write how fast they decay, in 1/s: 0, or about a tenth of the number of steps in a second";

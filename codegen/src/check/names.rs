@@ -2,34 +2,13 @@
 
 use std::collections::HashMap;
 
-use crate::emit::names::identifier;
 use crate::import::raw::RawModel;
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::{did_you_mean, list, quote};
+use crate::names::{identifier, rust_name};
 
 /// Name of the fixed world.
 const GROUND: &str = "ground";
-
-/// Words that cannot be identifiers in any edition of Rust up to 2024.
-const KEYWORDS: &[&str] = &[
-    "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn", "else",
-    "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "match", "mod",
-    "move", "mut", "override", "priv", "pub", "ref", "return", "Self", "self", "static", "struct", "super", "trait",
-    "true", "try", "type", "typeof", "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
-];
-
-/// A name of a model as a Rust identifier, its case kept: anything but ASCII letters and digits turns into `_`, a leading digit gets a `_`
-/// in front, a keyword one behind.
-fn rust_name(name: &str) -> String {
-    let mut out: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
-    if out.is_empty() || out.starts_with(|c: char| c.is_ascii_digit()) {
-        out.insert(0, '_');
-    }
-    if KEYWORDS.contains(&out.as_str()) || out == "_" {
-        out.push('_');
-    }
-    out
-}
 
 /// Euclidean length, without overflow on the way.
 pub(super) fn norm(v: [f64; 3]) -> f64 {
@@ -37,9 +16,11 @@ pub(super) fn norm(v: [f64; 3]) -> f64 {
 }
 
 /// Name of the model: as stated, or from the file.
-pub(super) fn model_name(raw: &RawModel, file: &str, findings: &mut Findings) -> String {
+pub(super) fn model_name(raw: &RawModel, findings: &mut Findings) -> String {
     let Some(name) = &raw.name else {
-        let stem = std::path::Path::new(file).file_stem().map_or(String::new(), |s| s.to_string_lossy().into_owned());
+        let stem = std::path::Path::new(findings.file())
+            .file_stem()
+            .map_or(String::new(), |s| s.to_string_lossy().into_owned());
         return if usable(&stem) { rust_name(&stem) } else { "model".into() };
     };
     let fixed = if usable(&name.value) { rust_name(&name.value) } else { "model".into() };
@@ -202,7 +183,7 @@ fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findi
             );
             continue;
         }
-        let line = findings.line(name.span);
+        let line = findings.origin(name.span).line;
         if let Some((other, at)) = exact.insert(&name.value, (kind, line)) {
             let help = match (kind, other) {
                 ("wrench", _) => "give each wrench on the same body a `name` of its own",

@@ -4,7 +4,7 @@ use super::names::norm;
 use crate::import::raw::{RawModel, RawNumber, RawParam, RawPlacement, RawRotation, RawValue, RawVec3};
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::{did_you_mean, quote};
-use crate::model::{Param, Placement, Rotation, Value};
+use crate::model::{Param, Placement, Rotation, Unit, Value};
 use std::collections::HashMap;
 
 /// What a number measures, for suspicions about its unit.
@@ -20,6 +20,16 @@ pub(super) enum Quantity {
     Pitch,
     /// Nothing to suspect.
     Plain,
+}
+
+impl From<Unit> for Quantity {
+    fn from(unit: Unit) -> Quantity {
+        match unit {
+            Unit::Metre => Quantity::Length,
+            Unit::Radian => Quantity::Angle,
+            Unit::One => Quantity::Plain,
+        }
+    }
 }
 
 impl Quantity {
@@ -84,8 +94,13 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
         }
     }
 
-    pub(super) fn or_zero(&mut self, number: &Option<RawNumber>, quantity: Quantity, what: &str) -> Value {
-        number.as_ref().map_or(Value::ZERO, |n| self.value(n, quantity, what))
+    pub(super) fn or_zero<'n>(
+        &mut self,
+        number: impl Into<Option<&'n RawNumber>>,
+        quantity: Quantity,
+        what: &str,
+    ) -> Value {
+        number.into().map_or(Value::ZERO, |n| self.value(n, quantity, what))
     }
 
     pub(super) fn vec3(&mut self, list: &RawVec3, quantity: Quantity, what: &str) -> [Value; 3] {

@@ -1,12 +1,12 @@
 //! Where the closing of loops begins.
 
-use super::joints::{coordinates, span_of, type_name};
+use super::joints::{quantities, span_of};
 use super::names::norm;
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
+use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::model::{Start, Value};
+use crate::model::{JointSpec, Start, Value};
 
 /// What is stated, with joints by their index in the file.
 pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
@@ -24,7 +24,7 @@ pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
         let Some(kind) = joint.kind.as_ref().map(|k| k.value) else { continue };
         let q = match &joint.start {
             Some(start) => coordinates_of(start, kind, &what, numbers),
-            None => neutral(kind),
+            None => kind.neutral(),
         };
         if joint.start.is_some() || held {
             starts.push(Start { joint: index, q, held });
@@ -54,7 +54,7 @@ fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
         } else if matches!(joint.motion, RawMotion::Prescribed(_)) {
             let help = "remove it: the position of a prescribed joint comes with every call";
             (format!("`{key}` on a joint whose motion is prescribed"), help.into())
-        } else if joint.kind.as_ref().is_some_and(|k| k.value == JointType::Fixed) {
+        } else if joint.kind.as_ref().is_some_and(|k| k.value.nv() == 0) {
             (format!("a fixed joint has no `{key}`"), "remove it, or change the type of the joint".into())
         } else {
             continue;
@@ -65,26 +65,7 @@ fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
     found
 }
 
-/// Coordinates at zero: no rotation where they end in a quaternion.
-fn neutral(kind: JointType) -> Vec<f64> {
-    let mut q = vec![0.0; quantities(kind).len()];
-    if let (JointType::Spherical | JointType::Floating, Some(w)) = (kind, q.last_mut()) {
-        *w = 1.0;
-    }
-    q
-}
-
-/// What each coordinate measures.
-fn quantities(kind: JointType) -> &'static [Quantity] {
-    use Quantity::{Length, Plain};
-    match kind {
-        JointType::Spherical => &[Plain; 4],
-        JointType::Floating => &[Length, Length, Length, Plain, Plain, Plain, Plain],
-        other => coordinates(other),
-    }
-}
-
-fn coordinates_of(start: &RawFreedoms, kind: JointType, what: &str, numbers: &mut Numbers) -> Vec<f64> {
+fn coordinates_of(start: &RawFreedoms, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> Vec<f64> {
     let each: &[RawNumber] = match start {
         RawFreedoms::All(x) => std::slice::from_ref(x),
         RawFreedoms::Each(list) => &list.value,
@@ -100,28 +81,27 @@ fn coordinates_of(start: &RawFreedoms, kind: JointType, what: &str, numbers: &mu
         if !wanted.is_empty() {
             length(q.len(), wanted.len(), kind, what, span_of(start), numbers.findings);
         }
-        return neutral(kind);
+        return kind.neutral();
     }
-    if matches!(kind, JointType::Spherical | JointType::Floating) {
-        let first = q.len() - 4;
+    if let Some(first) = kind.quaternion() {
         unit(&mut q[first..], what, span_of(start), numbers.findings);
     }
     q
 }
 
-fn length(got: usize, n: usize, kind: JointType, what: &str, span: Span, findings: &mut Findings) {
+fn length(got: usize, n: usize, kind: &JointSpec, what: &str, span: Span, findings: &mut Findings) {
     let plural = |n: usize| if n == 1 { "" } else { "s" };
     let message = format!(
         "{what}: `start` has {got} number{}, and a {} joint has {n} coordinate{}",
         plural(got),
-        type_name(kind),
+        kind.word(),
         plural(n)
     );
-    let help = match kind {
-        JointType::Spherical => "write the unit quaternion: `[x, y, z, w]`".into(),
-        JointType::Floating => "write the origin, then the unit quaternion: `[x, y, z, qx, qy, qz, qw]`".into(),
-        _ if n == 1 => "write one number".into(),
-        _ => format!("write {n} numbers, in the order of the coordinates"),
+    let help = match kind.quaternion() {
+        Some(0) => "write the unit quaternion: `[x, y, z, w]`".into(),
+        Some(_) => "write the origin, then the unit quaternion: `[x, y, z, qx, qy, qz, qw]`".into(),
+        None if n == 1 => "write one number".into(),
+        None => format!("write {n} numbers, in the order of the coordinates"),
     };
     findings.error(span, message, help);
 }

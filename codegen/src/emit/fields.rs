@@ -5,7 +5,6 @@ use std::fmt::Write;
 use mbd_runtime::tree::Source;
 
 use super::signature::nested;
-use crate::model::JointKind;
 use crate::options::Options;
 use crate::output::{Sizes, FIELDS};
 use crate::plan::Plan;
@@ -42,10 +41,8 @@ pub fn neutral(plan: &Plan, drives: bool) -> String {
     let parts = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })) == drives && s.at.is_some());
     let numbers: Vec<&str> = parts
         .flat_map(|s| {
-            let kind = plan.model.joints[s.joint].kind;
-            let unit = matches!(kind, JointKind::Spherical | JointKind::Floating);
-            let n = kind.nq();
-            (0..n).map(move |k| if unit && k + 1 == n { "1.0" } else { "0.0" })
+            let neutral = plan.model.joints[s.joint].kind.spec().neutral();
+            neutral.into_iter().map(|x| if x == 0.0 { "0.0" } else { "1.0" })
         })
         .collect();
     format!("[{}]", numbers.join(", "))

@@ -4,7 +4,6 @@ use std::fmt::Write;
 
 use mbd_runtime::tree::Source;
 
-use super::names::joint_word;
 use crate::code::Code;
 use crate::model::{ConstraintKind, Gravity, Mount, Value};
 use crate::options::Options;
@@ -62,7 +61,7 @@ fn state(out: &mut String, plan: &Plan) {
     let _ = writeln!(out, "//\n// State (index into q; index into v, p, tau; joint):");
     for slot in &plan.slots {
         let joint = &plan.model.joints[slot.joint];
-        let (nq, nv, word) = (joint.kind.nq(), joint.kind.nv(), joint_word(&joint.kind));
+        let (nq, nv, word) = (joint.kind.nq(), joint.kind.nv(), joint.kind.word());
         let (name, child) = (&joint.name, &plan.model.bodies[joint.child].name);
         let _ = match slot.at {
             Some(Source::State { q, v }) => {

@@ -22,7 +22,7 @@ use crate::plan::Plan;
 use head::Head;
 use signature::Signature;
 
-pub use names::{identifier, joint_word, quantity};
+pub use names::{identifier, quantity};
 
 /// What the source is made from.
 pub struct Input<'a> {

@@ -4,21 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mbd_runtime::sweep::Quantity;
 
-use crate::model::JointKind;
+pub use crate::names::identifier;
+
 use crate::plan::Plan;
 use crate::symbolic::{Entry, Label, Name, Op, Program};
 
-/// A name as a snake-case identifier: what is not a letter or digit becomes `_`.
-pub fn identifier(name: &str) -> String {
-    let mut out: String =
-        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '_' }).collect();
-    if !out.starts_with(|c: char| c.is_ascii_alphabetic()) {
-        out.insert_str(0, "b_");
-    }
-    out
-}
-
-/// The same in upper case, for constants.
+/// A name as an identifier in upper case, for constants.
 pub fn constant(name: &str) -> String {
     identifier(name).to_ascii_uppercase()
 }
@@ -44,21 +35,6 @@ pub fn quantity(q: Quantity) -> &'static str {
         Quantity::Jacobian => "Jacobian",
         Quantity::Derivative => "derivatives of the rates",
         Quantity::Constraint => "loops and couplings",
-    }
-}
-
-/// A joint's kind, as models name it.
-pub fn joint_word(kind: &JointKind) -> &'static str {
-    match kind {
-        JointKind::Revolute { .. } => "pin",
-        JointKind::Prismatic { .. } => "slider",
-        JointKind::Cylindrical { .. } => "cylindrical",
-        JointKind::Helical { .. } => "helical",
-        JointKind::Universal { .. } => "universal",
-        JointKind::Planar { .. } => "planar",
-        JointKind::Spherical => "spherical",
-        JointKind::Floating => "floating",
-        JointKind::Fixed => "fixed",
     }
 }
 

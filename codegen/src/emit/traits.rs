@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use mbd_runtime::tree::Source;
 
 use super::fields::neutral;
-use crate::model::JointKind;
 use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
@@ -72,13 +71,8 @@ impl Writer<'_> {
         let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
         let joints = plan.slots.iter().filter_map(|s| {
             let Some(Source::State { q, v }) = s.at else { return None };
-            let group = match plan.model.joints[s.joint].kind {
-                JointKind::Spherical => "SO3",
-                JointKind::Floating => "SE3",
-                JointKind::Planar { .. } => "SE2",
-                _ => return None,
-            };
-            Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{group}, {q}, {v})"))
+            let group = plan.model.joints[s.joint].kind.spec().group?;
+            Some(format!("{rt}::system::LieJoint::new({rt}::system::LieGroup::{group:?}, {q}, {v})"))
         });
         let joints = joints.collect::<Vec<_>>().join(", ");
         let constraints = match plan.constraint_names() {

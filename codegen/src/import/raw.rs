@@ -1,11 +1,11 @@
 //! What a reader hands to the checks: the model with names instead of indices and the place of everything.
 //!
 //! A reader fills this in and reports what its format forbids (unknown keys, wrong types, numbers that are not finite); everything about
-//! the mechanism itself (names, tree, physics) is judged by [`crate::check::check`], the same for all formats. What a reader has
+//! the mechanism itself (names, tree, physics) is judged by `check`, the same for all formats. What a reader has
 //! reported already stands here as [`RawValue::Invalid`] or `None`, so that nothing is reported twice.
 
 use super::source::{Span, Spanned};
-use crate::model::WrenchAxes;
+use crate::model::{JointSpec, LoopSpec, WrenchAxes};
 
 /// A number of the description.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,29 +71,6 @@ pub struct RawBody {
     pub inertia_axes: Option<RawRotation>,
 }
 
-/// Kind of a joint, without its axes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointType {
-    /// One turn.
-    Revolute,
-    /// One slide.
-    Prismatic,
-    /// A slide and a turn about one axis.
-    Cylindrical,
-    /// A screw.
-    Helical,
-    /// Two turns.
-    Universal,
-    /// Two slides and a turn.
-    Planar,
-    /// Any rotation.
-    Spherical,
-    /// Any motion.
-    Floating,
-    /// None.
-    Fixed,
-}
-
 /// One number for every freedom, or one per freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RawFreedoms {
@@ -131,7 +108,7 @@ pub struct RawJoint {
     /// Name.
     pub name: Spanned<String>,
     /// Kind; `None` where it was reported already.
-    pub kind: Option<Spanned<JointType>>,
+    pub kind: Option<Spanned<&'static JointSpec>>,
     /// Parent body; `None` for the ground. The name `ground` means the ground too.
     pub parent: Option<Spanned<String>>,
     /// Child body; `None` where it was reported already.
@@ -152,7 +129,7 @@ pub struct RawJoint {
     pub rest: Option<RawFreedoms>,
     /// Reflected rotor inertia.
     pub armature: Option<RawFreedoms>,
-    /// A pin without limits that other programs may store as cosine and sine.
+    /// A revolute joint without limits, which other programs may store as cosine and sine.
     pub unbounded: bool,
     /// Source of the coordinates.
     pub motion: RawMotion,
@@ -166,7 +143,11 @@ pub struct RawJoint {
 
 impl RawJoint {
     /// A free joint with nothing but a name, a kind and a child, on the ground.
-    pub fn new(name: Spanned<String>, kind: Option<Spanned<JointType>>, child: Option<Spanned<String>>) -> Self {
+    pub fn new(
+        name: Spanned<String>,
+        kind: Option<Spanned<&'static JointSpec>>,
+        child: Option<Spanned<String>>,
+    ) -> Self {
         RawJoint {
             name,
             kind,
@@ -200,95 +181,34 @@ pub struct RawFrame {
     pub placement: RawPlacement,
 }
 
-/// What a loop holds together, without its numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LoopType {
-    /// As a pin would.
-    Revolute,
-    /// As a slider would.
-    Prismatic,
-    /// A slide and a turn about one axis are left.
-    Cylindrical,
-    /// A screw is left.
-    Helical,
-    /// Two turns are left.
-    Universal,
-    /// Two slides and a turn are left.
-    Planar,
-    /// All rotations are left.
-    Spherical,
-    /// Nothing is left.
-    Fixed,
-    /// A rod with spherical ends.
-    Distance,
-    /// Point on a line.
-    PointOnLine,
-    /// Point in a plane.
-    PointOnPlane,
-    /// Point on a cylinder.
-    PointOnCylinder,
-    /// A thin disc on a plane, without slip.
-    RollingDisc,
-    /// A ball on a plane, without slip.
-    RollingBall,
-    /// No motion across an edge.
-    KnifeEdge,
-    /// Any row that is linear in the velocities.
-    Pfaffian,
-}
-
-impl LoopType {
-    /// Every type and what it is called.
-    pub const ALL: [(&'static str, LoopType); 16] = [
-        ("pin", LoopType::Revolute),
-        ("slider", LoopType::Prismatic),
-        ("cylindrical", LoopType::Cylindrical),
-        ("helical", LoopType::Helical),
-        ("universal", LoopType::Universal),
-        ("planar", LoopType::Planar),
-        ("spherical", LoopType::Spherical),
-        ("fixed", LoopType::Fixed),
-        ("distance", LoopType::Distance),
-        ("point_on_line", LoopType::PointOnLine),
-        ("point_on_plane", LoopType::PointOnPlane),
-        ("point_on_cylinder", LoopType::PointOnCylinder),
-        ("rolling_disc", LoopType::RollingDisc),
-        ("rolling_ball", LoopType::RollingBall),
-        ("knife_edge", LoopType::KnifeEdge),
-        ("pfaffian", LoopType::Pfaffian),
-    ];
-
-    /// What it is called.
-    pub fn name(self) -> &'static str {
-        Self::ALL[self as usize].0
-    }
-}
-
 /// A loop. Entries the type has no use for, and missing ones, are reported by the checks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawLoop {
     /// Name.
     pub name: Spanned<String>,
     /// Type; `None` where it was reported already.
-    pub kind: Option<Spanned<LoopType>>,
+    pub kind: Option<Spanned<&'static LoopSpec>>,
     /// Bodies, frames or `ground`; `None` where it was reported already.
     pub between: Option<[Spanned<String>; 2]>,
-    /// Axis; z, or x for a universal loop, where `None`.
-    pub axis: Option<Spanned<[f64; 3]>>,
-    /// Second axis of a universal loop; y where `None`.
-    pub axis2: Option<Spanned<[f64; 3]>>,
-    /// Normal of a plane; z where `None`.
-    pub normal: Option<Spanned<[f64; 3]>>,
-    /// Pitch, m/rad.
-    pub pitch: Option<RawNumber>,
-    /// Length, m.
-    pub length: Option<RawNumber>,
-    /// Radius, m.
-    pub radius: Option<RawNumber>,
+    /// Directions by their keys; those that are missing have the defaults of the type.
+    pub directions: Vec<(&'static str, Spanned<[f64; 3]>)>,
+    /// Numbers by their keys: a pitch (m/rad), a length or radius (m); the rate at which errors of the positions decay (1/s), 0 where
+    /// there is none.
+    pub numbers: Vec<(&'static str, RawNumber)>,
     /// Coefficients of velocity and angular velocity.
     pub row: Option<Spanned<[RawNumber; 6]>>,
-    /// Rate at which errors of the positions decay, 1/s; 0 where `None`.
-    pub decay: Option<RawNumber>,
+}
+
+impl RawLoop {
+    /// The number under a key.
+    pub fn number(&self, key: &str) -> Option<&RawNumber> {
+        self.numbers.iter().find(|(k, _)| *k == key).map(|(_, number)| number)
+    }
+
+    /// The direction under a key.
+    pub fn direction(&self, key: &str) -> Option<&Spanned<[f64; 3]>> {
+        self.directions.iter().find(|(k, _)| *k == key).map(|(_, direction)| direction)
+    }
 }
 
 /// A linear equation between the coordinates of joints.

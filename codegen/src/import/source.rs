@@ -1,6 +1,9 @@
 //! Places in a source text and the collector of findings that every reader and the checks write to.
 
+use std::sync::Arc;
+
 use crate::diag::{Diagnostic, Diagnostics, Severity};
+use crate::model::Origin;
 
 /// Byte range in the source text; `0..0` stands for the file as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -78,24 +81,23 @@ impl<'a> SourceMap<'a> {
 /// Collects the findings about one file.
 #[derive(Clone, Debug)]
 pub struct Findings<'a> {
-    file: &'a str,
+    file: Arc<str>,
     map: SourceMap<'a>,
     list: Vec<Diagnostic>,
 }
 
 impl<'a> Findings<'a> {
     /// None yet; `file` as the caller named it.
-    pub fn new(file: &'a str, text: &'a str) -> Self {
-        Findings { file, map: SourceMap::new(text), list: Vec::new() }
+    pub fn new(file: &str, text: &'a str) -> Self {
+        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new() }
     }
 
     /// Adds a finding.
     pub fn add(&mut self, severity: Severity, span: Span, message: impl Into<String>, help: impl Into<String>) {
-        let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
-        let file = self.file.to_string();
+        let Origin { file, line, column } = self.origin(span);
         self.list.push(Diagnostic {
             severity,
-            file,
+            file: file.to_string(),
             line,
             column,
             message: one_line(message.into()),
@@ -118,9 +120,15 @@ impl<'a> Findings<'a> {
         self.add(Severity::Notice, span, message, "");
     }
 
-    /// Line of the start of a span, from 1.
-    pub fn line(&self, span: Span) -> usize {
-        self.map.line(span.start)
+    /// The file, as the caller named it.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Place of the start of a span.
+    pub fn origin(&self, span: Span) -> Origin {
+        let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
+        Origin { file: self.file.clone(), line, column }
     }
 
     /// Whether there is an error among them.

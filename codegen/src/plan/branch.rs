@@ -1,6 +1,8 @@
 //! Parts of a mechanism. The cost of an elimination in a branch hardly depends on the other branches.
 
-use super::structure::{NodeKind, Plan, PlanConstraint, PlanNode, PoseStep};
+use std::mem::discriminant;
+
+use super::structure::{Plan, PlanConstraint, PlanNode, PoseStep};
 use crate::model::Value;
 
 impl Plan {
@@ -53,7 +55,7 @@ impl Plan {
         let number = |x: f64| value(&Value::Const(x));
         let mut letters = String::new();
         for node in &self.nodes {
-            letters.push_str(&format!("|{:?} {} {}: ", node.parent, node.kind.letter(), node.quarter));
+            letters.push_str(&format!("|{:?} {:?} {}: ", node.parent, discriminant(&node.kind), node.quarter));
             for step in &node.place {
                 match step {
                     PoseStep::Turn { axis, c, s } => {
@@ -83,18 +85,5 @@ impl Plan {
         letters.extend(self.wrenches.iter().map(|_| 'w'));
         self.constraints.iter().for_each(|c| letters.push_str(&c.letters()));
         letters
-    }
-}
-
-impl NodeKind {
-    fn letter(self) -> char {
-        match self {
-            NodeKind::Revolute => 'P',
-            NodeKind::Prismatic => 'S',
-            NodeKind::Helical(_) => 'H',
-            NodeKind::Planar => 'E',
-            NodeKind::Spherical => 'B',
-            NodeKind::Floating => 'F',
-        }
     }
 }

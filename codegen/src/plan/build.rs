@@ -4,7 +4,7 @@ use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use super::structure::{Plan, PlanFrame, Slot};
 use super::{constraints, elements, frames, shared};
-use crate::model::{self, JointKind, JointMotion, Model};
+use crate::model::{self, JointMotion, Model};
 
 impl Plan {
     /// The plan of a model, with its freedoms eliminated one joint at a time. Angles of placements and directions of
@@ -56,7 +56,7 @@ fn slots(model: &Model) -> (Dims, Vec<Slot>) {
     let mut slots = Vec::new();
     for (k, joint) in model.joints.iter().enumerate() {
         let (nq, nv) = (joint.kind.nq(), joint.kind.nv());
-        if joint.kind == JointKind::Fixed {
+        if nv == 0 {
             continue;
         }
         let at = match joint.motion {

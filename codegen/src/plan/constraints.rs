@@ -6,11 +6,10 @@ use mbd_runtime::spatial::Axis;
 use mbd_runtime::tree::{Source, Unknown};
 
 use super::elements::{Carried, Elements};
-use super::instantiate::closure;
 use super::placement::{constant, direction, placement};
 use super::rigid::Rigid;
 use super::structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PoseStep};
-use crate::model::{ConstraintKind, LoopKind, Model, Mount, Value};
+use crate::model::{ConstraintKind, LoopKind, Model, Mount, Stands, Value};
 
 /// Frames of loops: the element that carries each, and its pose with the axes that the rows need.
 pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carried; 2]>> {
@@ -41,21 +40,21 @@ fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
     let after = |axis: [f64; 3], step: PoseStep| {
         constant(&[PoseStep::Rotate(to(axis).rot), step]).map(|pose| PoseStep::Rotate(pose.rot))
     };
-    match *kind {
-        LoopKind::Revolute { axis }
-        | LoopKind::Prismatic { axis }
-        | LoopKind::Cylindrical { axis }
-        | LoopKind::Helical { axis, .. }
-        | LoopKind::Planar { normal: axis } => [z(axis), z(axis)],
-        LoopKind::Universal { axes: [x, y] } => [after(x, quarter(Axis::Y, -1.0)), after(y, quarter(Axis::X, 1.0))],
-        LoopKind::PointOnLine { axis }
-        | LoopKind::PointOnPlane { normal: axis }
-        | LoopKind::PointOnCylinder { axis, .. }
-        | LoopKind::RollingBall { normal: axis, .. } => [z(axis), None],
-        LoopKind::RollingDisc { normal, axis, .. } => [z(normal), z(axis)],
-        LoopKind::KnifeEdge { axis } => [None, z(axis)],
-        LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => [None, None],
+    let mut turns = [None, None];
+    for (direction, axis) in kind.spec().directions.iter().zip(kind.directions()) {
+        let turn = match direction.along {
+            Axis::X => after(axis, quarter(Axis::Y, -1.0)),
+            Axis::Y => after(axis, quarter(Axis::X, 1.0)),
+            Axis::Z => z(axis),
+        };
+        if direction.stands != Stands::InSecond {
+            turns[0] = turn;
+        }
+        if direction.stands != Stands::InFirst {
+            turns[1] = turn;
+        }
     }
+    turns
 }
 
 /// Puts the model's constraints on the nodes, after [`super::shared::share`]. `frames` are those of [`mounts`].
@@ -65,7 +64,7 @@ pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
         let (bond, members) = match (constraint.kind, frames) {
             (ConstraintKind::Loop { kind, .. }, Some(mut frames)) => {
                 let ground = frames.iter().any(|f| f.node.is_none());
-                match closure::<f64>(&kind, &[]).is_joint() {
+                match kind.closure().is_joint() {
                     true if ground => frames.sort_by_key(|f| f.node.is_some()),
                     false if ground && matches!(kind, LoopKind::Distance { .. }) => {
                         frames.sort_by_key(|f| f.node.is_none())
@@ -94,7 +93,7 @@ pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
             (ConstraintKind::Loop { .. }, None) => continue,
         };
         let count = match &bond {
-            PlanBond::Cut { kind, .. } => closure::<f64>(kind, &[]).rows(),
+            PlanBond::Cut { kind, .. } => kind.closure().rows(),
             PlanBond::Coupling { .. } => 1,
         };
         let first = plan.dims.rows;

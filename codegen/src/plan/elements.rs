@@ -1,8 +1,10 @@
 //! Splits joints into elementary joints, and merges bodies that are connected by fixed joints.
 
+use mbd_runtime::tree::Kind;
+
 use super::placement::{direction, placement, rotation};
-use super::structure::{NodeKind, PoseStep};
-use crate::model::{JointKind, Model};
+use super::structure::PoseStep;
+use crate::model::{Model, Value};
 
 /// An elementary joint. Its *element frame* is the child body's frame, or for the first half of a joint of two halves
 /// that frame at zero coordinates of the second.
@@ -13,7 +15,7 @@ pub struct Element {
     /// Element frame in the parent's element frame, at zero coordinates.
     pub pose: Vec<PoseStep>,
     /// Kind.
-    pub kind: NodeKind,
+    pub kind: Kind<Value>,
     /// Unit axis in the element frame, for joints that have one.
     pub axis: Option<[f64; 3]>,
     /// Model joint and first freedom in it.
@@ -47,21 +49,7 @@ pub fn elements(model: &Model, snap: f64, notices: &mut Vec<String>) -> Elements
         let mut note = |off: f64| worst = worst.max(off);
         let (carrier, mut pose) = joint.parent.map_or((None, Vec::new()), |b| bodies[b].clone());
         pose.extend(placement(&joint.placement, snap, &mut note));
-        let halves: Vec<(NodeKind, Option<[f64; 3]>)> = match joint.kind {
-            JointKind::Fixed => Vec::new(),
-            JointKind::Revolute { axis } => vec![(NodeKind::Revolute, Some(axis))],
-            JointKind::Prismatic { axis } => vec![(NodeKind::Prismatic, Some(axis))],
-            JointKind::Cylindrical { axis } => {
-                vec![(NodeKind::Prismatic, Some(axis)), (NodeKind::Revolute, Some(axis))]
-            }
-            JointKind::Helical { axis, pitch } => vec![(NodeKind::Helical(pitch), Some(axis))],
-            JointKind::Universal { axes } => {
-                vec![(NodeKind::Revolute, Some(axes[0])), (NodeKind::Revolute, Some(axes[1]))]
-            }
-            JointKind::Planar { normal } => vec![(NodeKind::Planar, Some(normal))],
-            JointKind::Spherical => vec![(NodeKind::Spherical, None)],
-            JointKind::Floating => vec![(NodeKind::Floating, None)],
-        };
+        let halves = joint.kind.elements();
         let mut at: Carried = (carrier, pose);
         let count = halves.len();
         for (half, (kind, axis)) in halves.into_iter().enumerate() {

@@ -5,13 +5,13 @@
 //! Denavit, Hartenberg and Khalil. Constants vanish, and the rest of the rotation is added to the joint angle.
 
 use mbd_runtime::spatial::Vec3;
-use mbd_runtime::tree::{Elimination, Source};
+use mbd_runtime::tree::{Elimination, Kind, Source};
 
 use super::elements::{Carried, Elements};
 use super::instantiate::body_inertia;
 use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
-use super::structure::{NodeKind, PlanFrame, PlanNode, PoseStep, Slot};
+use super::structure::{PlanFrame, PlanNode, PoseStep, Slot};
 use crate::model::{JointMotion, Model, Value};
 
 /// Nodes with their frames chosen.
@@ -43,7 +43,7 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
             weights[a].cmp(&weights[b]).then(b.cmp(&a))
         });
         let line = primary.and_then(|c| line_of(elements, c, &align));
-        let turns = matches!(element.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
+        let turns = element.kind.nv() == 1;
         let ((c, s), h) = match (turns, primary) {
             (false, _) => ((1.0, 0.0), 0.0),
             (true, None) => tip(&way, element.kind, centre(model, elements, k, &align)),
@@ -123,11 +123,11 @@ fn centre(model: &Model, elements: &Elements, k: usize, align: &Rigid) -> Option
 
 /// At a tip, the rotation either makes the joint angle the coordinate itself, or points x at the centre of mass. One
 /// more zero in the first moment is worth the addition to the angle.
-fn tip(way: &Screws, kind: NodeKind, centre: Option<Vec3<f64>>) -> (Turn, f64) {
+fn tip(way: &Screws, kind: Kind<Value>, centre: Option<Vec3<f64>>) -> (Turn, f64) {
     let (c, s) = way.turn;
     let undo = (c, -s);
     let turn = match centre {
-        Some([x, y, _]) if kind == NodeKind::Revolute && x.hypot(y) > 0.0 => {
+        Some([x, y, _]) if kind == Kind::Revolute && x.hypot(y) > 0.0 => {
             let ahead = unit(x, y);
             // Against the parent's axes: already zero there?
             let y = c * y + s * x;
@@ -189,8 +189,8 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
     };
     let (source, follow) = source(model, slots, joint, first);
     let mut place = way.steps;
-    let (phase, quarter, slide) = match element.kind {
-        NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_) => {
+    let (phase, quarter, slide) = match element.kind.nv() {
+        1 => {
             let (c0, s0) = way.turn;
             let angle = (s0 * c + c0 * s).atan2(c0 * c - s0 * s);
             let quarters = (angle / std::f64::consts::FRAC_PI_2).round();

@@ -2,12 +2,12 @@
 
 use mbd_runtime::spatial::{add3, ElementaryTransform, Mat3, RigidInertia, Vec3, SYM};
 use mbd_runtime::system::Row;
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+use mbd_runtime::tree::{Bond, Constraint, Cut, Node, Passive, Tree, TreeFrame, TreeWrench};
 use mbd_runtime::{Interpreter, Scalar};
 
 use super::placement::rotation;
-use super::structure::{NodeKind, Plan, PlanBond, PlanConstraint, PlanNode, PoseStep};
-use crate::model::{Gravity, LoopKind, Value};
+use super::structure::{Plan, PlanBond, PlanConstraint, PlanNode, PoseStep};
+use crate::model::{Gravity, Value};
 
 /// A number of the model as a scalar.
 fn value<S: Scalar>(v: Value, params: &[S]) -> S {
@@ -111,14 +111,7 @@ impl Plan {
     }
 
     fn node<S: Scalar>(&self, node: &PlanNode, params: &[S]) -> Node<S> {
-        let kind = match node.kind {
-            NodeKind::Revolute => Kind::Revolute,
-            NodeKind::Prismatic => Kind::Prismatic,
-            NodeKind::Helical(pitch) => Kind::Helical { pitch: value(pitch, params) },
-            NodeKind::Planar => Kind::Planar,
-            NodeKind::Spherical => Kind::Spherical,
-            NodeKind::Floating => Kind::Floating,
-        };
+        let kind = node.kind.map(|v| value(v, params));
         let (mut ratio, mut offset) = (S::one(), S::zero());
         for &(r, o) in &node.follow {
             let r = value(r, params);
@@ -170,40 +163,13 @@ impl Plan {
     }
 }
 
-/// A kind of loop in the form that the sweeps use.
-pub(super) fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
-    let of = |v: Value| match v {
-        Value::Const(x) => S::constant(x),
-        // The number of rows is asked for without parameters.
-        Value::Param(k) => params.get(k).copied().unwrap_or(S::one()),
-    };
-    match *kind {
-        LoopKind::Revolute { .. } => Closure::Revolute,
-        LoopKind::Prismatic { .. } => Closure::Prismatic,
-        LoopKind::Cylindrical { .. } => Closure::Cylindrical,
-        LoopKind::Helical { pitch, .. } => Closure::Helical { pitch: of(pitch) },
-        LoopKind::Universal { .. } => Closure::Universal,
-        LoopKind::Planar { .. } => Closure::Planar,
-        LoopKind::Spherical => Closure::Spherical,
-        LoopKind::Fixed => Closure::Fixed,
-        LoopKind::Distance { length } => Closure::Distance { length: of(length) },
-        LoopKind::PointOnLine { .. } => Closure::PointOnLine,
-        LoopKind::PointOnPlane { .. } => Closure::PointOnPlane,
-        LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius: of(radius) },
-        LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius: of(radius) },
-        LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius: of(radius) },
-        LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
-        LoopKind::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
-    }
-}
-
 impl PlanConstraint {
     /// The constraint over any scalar.
     fn instantiate<S: Scalar>(&self, params: &[S]) -> Constraint<S> {
         let bond = match &self.bond {
             PlanBond::Cut { kind, frames, paths: [path_a, path_b] } => {
                 let [a, b] = frames.each_ref().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) });
-                let closure = closure(kind, params);
+                let closure = kind.closure().map(|v| value(v, params));
                 Bond::Cut(Cut { closure, a, b, path_a: path_a.clone(), path_b: path_b.clone() })
             }
             PlanBond::Coupling { terms, offset } => Bond::Coupling {

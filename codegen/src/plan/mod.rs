@@ -20,4 +20,4 @@ pub use chain::ChainElimination;
 pub use paths::tip_chains;
 pub(crate) use paths::{is_single_but_for_rows, parallel_runs, touches_rolled, unbranched_paths};
 pub use rigid::Rigid;
-pub use structure::{NodeKind, Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, Slot};
+pub use structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, Slot};

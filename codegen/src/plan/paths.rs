@@ -1,8 +1,8 @@
 //! Paths of the tree that are eliminated or rolled together: chains to the tips, unbranched paths, runs of parallel joints.
 
-use mbd_runtime::tree::{Source, Unknown};
+use mbd_runtime::tree::{Kind, Source, Unknown};
 
-use super::structure::{NodeKind, Plan, PlanNode, PoseStep};
+use super::structure::{Plan, PlanNode, PoseStep};
 
 /// Number of children of every node.
 fn children(plan: &Plan) -> Vec<usize> {
@@ -16,7 +16,7 @@ fn children(plan: &Plan) -> Vec<usize> {
 /// Whether a node has one freedom of the state, which is solved by itself.
 fn is_single(node: &PlanNode) -> bool {
     let elimination = &node.elimination;
-    let single = matches!(node.kind, NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_));
+    let single = node.kind.nv() == 1;
     let plain = elimination.unknown.is_none() && elimination.solve_before.is_empty() && elimination.open.is_empty();
     single && plain && matches!(node.source, Source::State { .. })
 }
@@ -65,12 +65,12 @@ pub fn unbranched_paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
 pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     let swings = |i: usize| {
         let node = &plan.nodes[i];
-        node.kind == NodeKind::Revolute && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
+        node.kind == Kind::Revolute && node.place.iter().all(|step| matches!(step, PoseStep::Shift { .. }))
     };
     let mut runs: Vec<Vec<usize>> = Vec::new();
     for (i, node) in plan.nodes.iter().enumerate() {
         let mut children = plan.nodes.iter().enumerate().filter(|(_, n)| n.parent == Some(i)).peekable();
-        if node.kind != NodeKind::Revolute || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
+        if node.kind != Kind::Revolute || children.peek().is_none() || !children.all(|(k, _)| swings(k)) {
             continue;
         }
         match runs.iter_mut().find(|run| node.parent.is_some_and(|p| run.contains(&p)) && swings(i)) {

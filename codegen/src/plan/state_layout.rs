@@ -3,7 +3,6 @@
 use mbd_runtime::layout::{Form, Layout, Part};
 use mbd_runtime::tree::Source;
 
-use crate::model::JointKind;
 use crate::plan::{Plan, Slot};
 
 /// The places of the joints in Pinocchio's model of the same URDF: depth first, the children of a link in the alphabetical
@@ -13,13 +12,9 @@ pub fn pinocchio(plan: &Plan) -> Layout {
     visit(plan, None, &mut order);
     layout(plan, &order, |plan, slot| {
         let joint = &plan.model.joints[slot.joint];
-        match joint.kind {
-            JointKind::Planar { .. } => Form::PlanarCosSin,
-            JointKind::Spherical => Form::Quaternion,
-            JointKind::Floating => Form::Floating,
-            JointKind::Revolute { .. } if joint.unbounded => Form::CosSin,
-            kind => Form::Same { n: kind.nv() },
-        }
+        let spec = joint.kind.spec();
+        let unbounded = spec.pinocchio_unbounded.filter(|_| joint.unbounded);
+        unbounded.or(spec.pinocchio).unwrap_or_else(|| spec.form())
     })
 }
 
@@ -27,10 +22,9 @@ pub fn pinocchio(plan: &Plan) -> Layout {
 /// velocity of a free joint in world axes.
 pub fn mujoco(plan: &Plan) -> Layout {
     let order: Vec<&Slot> = plan.slots.iter().collect();
-    layout(plan, &order, |plan, slot| match plan.model.joints[slot.joint].kind {
-        JointKind::Spherical => Form::QuaternionWxyz,
-        JointKind::Floating => Form::FloatingWorld,
-        kind => Form::Same { n: kind.nv() },
+    layout(plan, &order, |plan, slot| {
+        let spec = plan.model.joints[slot.joint].kind.spec();
+        spec.mujoco.unwrap_or_else(|| spec.form())
     })
 }
 

@@ -1,9 +1,9 @@
 //! The structure of a mechanism: nodes, frames, wrenches, constraints. Numbers stay [`Value`]s.
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Elimination, Source, Unknown, WrenchAxes};
+use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes};
 
-use crate::model::{JointKind, LoopKind, Model, Param, Value};
+use crate::model::{JointSpec, LoopKind, Model, Param, Value};
 
 /// One elementary transform of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,34 +35,6 @@ pub enum PoseStep {
     Rotate(Mat3<f64>),
 }
 
-/// Kind of a node's joint; rotations are about z, and translations along z, of the node frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum NodeKind {
-    /// Rotation about z.
-    Revolute,
-    /// Translation along z.
-    Prismatic,
-    /// Screw motion about z.
-    Helical(Value),
-    /// Two translations and a rotation.
-    Planar,
-    /// Any rotation.
-    Spherical,
-    /// Any motion.
-    Floating,
-}
-
-impl NodeKind {
-    /// Number of velocities.
-    pub fn nv(self) -> usize {
-        match self {
-            NodeKind::Revolute | NodeKind::Prismatic | NodeKind::Helical(_) => 1,
-            NodeKind::Planar | NodeKind::Spherical => 3,
-            NodeKind::Floating => 6,
-        }
-    }
-}
-
 /// A joint of the tree and the bodies that move with it.
 #[derive(Clone, Debug)]
 pub struct PlanNode {
@@ -74,7 +46,7 @@ pub struct PlanNode {
     /// Constant part of the placement in the parent's frame.
     pub place: Vec<PoseStep>,
     /// Joint.
-    pub kind: NodeKind,
+    pub kind: Kind<Value>,
     /// Model joint and index of the node's first freedom in it.
     pub joint: (usize, usize),
     /// Coordinates.
@@ -200,14 +172,7 @@ impl Plan {
 
     /// Names of the coordinates, in state order.
     pub fn coordinate_names(&self) -> Vec<String> {
-        self.state_names(|kind| match kind {
-            JointKind::Planar { .. } => &["x", "y", "angle"],
-            JointKind::Cylindrical { .. } => &["slide", "angle"],
-            JointKind::Universal { .. } => &["angle1", "angle2"],
-            JointKind::Spherical => &["qx", "qy", "qz", "qw"],
-            JointKind::Floating => &["x", "y", "z", "qx", "qy", "qz", "qw"],
-            _ => &[],
-        })
+        self.state_names(|spec| spec.coordinates.iter().map(|c| c.name).collect())
     }
 
     /// Names of the loops and couplings, in the order of the description.
@@ -217,25 +182,18 @@ impl Plan {
 
     /// Names of the velocities (momenta, joint forces), in state order.
     pub fn velocity_names(&self) -> Vec<String> {
-        self.state_names(|kind| match kind {
-            JointKind::Planar { .. } => &["vx", "vy", "wz"],
-            JointKind::Cylindrical { .. } => &["slide", "angle"],
-            JointKind::Universal { .. } => &["angle1", "angle2"],
-            JointKind::Spherical => &["wx", "wy", "wz"],
-            JointKind::Floating => &["vx", "vy", "vz", "wx", "wy", "wz"],
-            _ => &[],
-        })
+        self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
     }
 
-    fn state_names(&self, parts: impl Fn(&JointKind) -> &'static [&'static str]) -> Vec<String> {
+    fn state_names(&self, parts: fn(&JointSpec) -> Vec<&'static str>) -> Vec<String> {
         let free = self.slots.iter().filter(|s| matches!(s.at, Some(Source::State { .. })));
         free.flat_map(|slot| {
             let joint = &self.model.joints[slot.joint];
-            let parts = parts(&joint.kind);
-            match parts.is_empty() {
-                true => vec![joint.name.clone()],
-                false => parts.iter().map(|p| format!("{}.{p}", joint.name)).collect(),
-            }
+            let name = |part: &str| match part {
+                "" => joint.name.clone(),
+                _ => format!("{}.{part}", joint.name),
+            };
+            parts(joint.kind.spec()).into_iter().map(name).collect::<Vec<_>>()
         })
         .collect()
     }
@@ -250,8 +208,8 @@ impl Plan {
             if let Some(stated) = stated {
                 q[at..].iter_mut().zip(&stated.q).for_each(|(q, stated)| *q = *stated);
             }
-            if let JointKind::Spherical | JointKind::Floating = kind {
-                let turn = &mut q[at + kind.nq() - 4..at + kind.nq()];
+            if let Some(first) = kind.spec().quaternion() {
+                let turn = &mut q[at + first..at + first + 4];
                 match turn.iter().fold(0.0_f64, |n, x| n.hypot(*x)) {
                     0.0 => turn[3] = 1.0,
                     norm => turn.iter_mut().for_each(|x| *x /= norm),

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Bond, Elimination, Kind, Node, Source, Tree, Unknown};
+use mbd_runtime::tree::{Bond, Elimination, Node, Source, Tree, Unknown};
 
 use crate::symbolic::Expr;
 
@@ -278,14 +278,6 @@ pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -
         ElementaryTransform::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(&mut *f))),
     });
     let place = place.collect();
-    let kind = match node.kind {
-        Kind::Revolute => Kind::Revolute,
-        Kind::Prismatic => Kind::Prismatic,
-        Kind::Helical { pitch } => Kind::Helical { pitch: f(pitch) },
-        Kind::Planar => Kind::Planar,
-        Kind::Spherical => Kind::Spherical,
-        Kind::Floating => Kind::Floating,
-    };
     let passive = node.passive.iter().map(|p| mbd_runtime::tree::Passive {
         damping: f(p.damping),
         stiffness: f(p.stiffness),
@@ -296,7 +288,7 @@ pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -
     Node {
         parent: node.parent,
         place,
-        kind,
+        kind: node.kind.map(&mut *f),
         source: node.source,
         ratio: f(node.ratio),
         offset: f(node.offset),

@@ -1,9 +1,9 @@
 //! Makes a system at its start from the text of a model.
 
-use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::model::Model;
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::Interpreter;
 
@@ -19,8 +19,9 @@ pub struct Mechanism {
 
 /// Reads a model that this program wrote or contains.
 pub fn read(text: &str) -> Outcome<Mechanism> {
-    let (model, findings) = load("model.toml", text, &ImportOptions::default());
-    let model = model.ok_or_else(|| Failure::new(findings.to_string(), "report this: the model is built in"))?;
+    let built_in = "report this: the model is built in";
+    let read = read::model("model.toml", text, &ImportOptions::default());
+    let model = read.map_err(|findings| Failure::new(findings.to_string(), built_in))?.model;
     let plan = search::plan(&model, PlanOptions::default());
     let params = plan.default_params();
     let gravity = plan.gravity(&params);

@@ -12,8 +12,8 @@ pub use dynamics::Dynamics;
 use std::borrow::Cow;
 
 use multibody::codegen::diag::Diagnostics;
-use multibody::codegen::import::{load, Base, ImportOptions};
 use multibody::codegen::model::{Model, Value};
+use multibody::codegen::read::{self, Base, ImportOptions};
 
 /// Required result of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +112,7 @@ pub fn refused() -> &'static [Refused] {
 impl Refused {
     /// The message of the reader and the checks.
     pub fn read(&self) -> (Option<Model>, Diagnostics) {
-        load(self.file, self.text, &ImportOptions::default())
+        read::load(self.file, self.text, &ImportOptions::default())
     }
 }
 
@@ -124,8 +124,9 @@ impl Entry {
             Source::Undamped(file, text, base) => (file.to_string(), Cow::Borrowed(text), base),
             Source::Made(make) => (format!("{}.toml", self.name), Cow::Owned(make(self.name)), Base::Fixed),
         };
-        let (model, findings) = load(&file, &text, &ImportOptions { base, gravity: None });
-        let mut model = model.unwrap_or_else(|| panic!("scene `{}`: {findings}", self.name));
+        let mut model = read::model(&file, &text, &ImportOptions { base, gravity: None })
+            .unwrap_or_else(|findings| panic!("scene `{}`: {findings}", self.name))
+            .model;
         if matches!(self.model, Source::Undamped(..)) {
             model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
         }

@@ -35,8 +35,10 @@ impl Text {
         // Writing to a string cannot fail.
         let _ =
             write!(self.0, "\n[[body]]\nname = \"{name}\"\nmass = {mass:?}\ncom = {com:?}\ninertia = {inertia:?}\n");
-        let _ =
-            write!(self.0, "\n[[joint]]\nname = \"pin_{name}\"\ntype = \"pin\"\nchild = \"{name}\"\nxyz = {place:?}\n");
+        let _ = write!(
+            self.0,
+            "\n[[joint]]\nname = \"pin_{name}\"\ntype = \"revolute\"\nchild = \"{name}\"\nxyz = {place:?}\n"
+        );
         let _ = writeln!(self.0, "axis = {axis:?}");
         if let Some(parent) = link.parent {
             let _ = writeln!(self.0, "parent = \"{parent}\"");

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use biped::{absolute, relative, Biped, Vector};
 use command::{files, folder, good, out, read, run_in};
-use multibody::codegen::import::{load, ImportOptions};
 use multibody::codegen::options::PlanOptions;
+use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::constrained::CoordinatePartition;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
@@ -20,9 +20,9 @@ const END: f64 = 0.85;
 /// The model as it is shipped, closed.
 fn shipped() -> (Interpreter<f64>, Vec<f64>) {
     let text = read(Path::new(command::ROOT), "models/biped.toml");
-    let (model, findings) = load("biped.toml", &text, &ImportOptions::default());
-    let model = model.unwrap_or_else(|| panic!("{findings}"));
+    let (model, findings) = read::load("biped.toml", &text, &ImportOptions::default());
     assert!(findings.0.is_empty(), "{findings}");
+    let model = model.expect("a model");
     let plan = search::plan(&model, PlanOptions::default());
     let params = plan.default_params();
     let system = Interpreter::new(plan.tree(&params), plan.gravity(&params));

@@ -58,7 +58,7 @@ impl<S: Scalar> Relative<S> {
     }
 }
 
-impl<S: Scalar> Closure<S> {
+impl<S: Copy> Closure<S> {
     /// Number of rows.
     pub fn rows(&self) -> usize {
         match self {
@@ -89,7 +89,9 @@ impl<S: Scalar> Closure<S> {
         use Closure::{Cylindrical, Fixed, Helical, Planar, Prismatic, Revolute, Spherical};
         matches!(self, Revolute | Prismatic | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
     }
+}
 
+impl<S: Scalar> Closure<S> {
     /// Whether the rows are constants.
     pub(super) fn constant(&self) -> bool {
         !matches!(

@@ -50,14 +50,7 @@ impl<S: Scalar> Node<S> {
         Node {
             parent: self.parent,
             place: self.place.iter().map(|s| step(s, of)).collect(),
-            kind: match self.kind {
-                Kind::Revolute => Kind::Revolute,
-                Kind::Prismatic => Kind::Prismatic,
-                Kind::Helical { pitch } => Kind::Helical { pitch: of(pitch) },
-                Kind::Planar => Kind::Planar,
-                Kind::Spherical => Kind::Spherical,
-                Kind::Floating => Kind::Floating,
-            },
+            kind: self.kind.map(of),
             source: self.source,
             ratio: of(self.ratio),
             offset: of(self.offset),
@@ -109,24 +102,38 @@ impl<S: Scalar> Constraint<S> {
     }
 }
 
-impl<S: Scalar> Closure<S> {
+impl<S: Copy> Kind<S> {
     /// The same over other numbers.
-    pub(crate) fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Closure<R> {
+    pub fn map<R>(self, mut of: impl FnMut(S) -> R) -> Kind<R> {
+        match self {
+            Kind::Revolute => Kind::Revolute,
+            Kind::Prismatic => Kind::Prismatic,
+            Kind::Helical { pitch } => Kind::Helical { pitch: of(pitch) },
+            Kind::Planar => Kind::Planar,
+            Kind::Spherical => Kind::Spherical,
+            Kind::Floating => Kind::Floating,
+        }
+    }
+}
+
+impl<S: Copy> Closure<S> {
+    /// The same over other numbers.
+    pub fn map<R>(self, mut of: impl FnMut(S) -> R) -> Closure<R> {
         match self {
             Closure::Revolute => Closure::Revolute,
             Closure::Prismatic => Closure::Prismatic,
             Closure::Cylindrical => Closure::Cylindrical,
-            Closure::Helical { pitch } => Closure::Helical { pitch: of(*pitch) },
+            Closure::Helical { pitch } => Closure::Helical { pitch: of(pitch) },
             Closure::Universal => Closure::Universal,
             Closure::Planar => Closure::Planar,
             Closure::Spherical => Closure::Spherical,
             Closure::Fixed => Closure::Fixed,
-            Closure::Distance { length } => Closure::Distance { length: of(*length) },
+            Closure::Distance { length } => Closure::Distance { length: of(length) },
             Closure::PointOnLine => Closure::PointOnLine,
             Closure::PointOnPlane => Closure::PointOnPlane,
-            Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(*radius) },
-            Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(*radius) },
-            Closure::RollingBall { radius } => Closure::RollingBall { radius: of(*radius) },
+            Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(radius) },
+            Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
+            Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
             Closure::KnifeEdge => Closure::KnifeEdge,
             Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
         }

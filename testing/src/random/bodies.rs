@@ -3,8 +3,8 @@
 use mbd_codegen::model::{Body, Joint, JointKind, Rotation, Value};
 use mbd_runtime::spatial::Mat3;
 
+use super::builder::{Builder, Skeleton};
 use super::joints::sine;
-use super::model::{Builder, Skeleton};
 
 /// How much inertia a body has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

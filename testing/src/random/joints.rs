@@ -1,8 +1,8 @@
 //! Placements, axes and passive elements.
 
-use mbd_codegen::model::{JointKind, Placement, Rotation, Value};
+use mbd_codegen::model::{JointKind, Placement, Rotation, Value, JOINTS};
 
-use super::model::Builder;
+use super::builder::Builder;
 
 const QUARTERS: [f64; 3] = [std::f64::consts::FRAC_PI_2, -std::f64::consts::FRAC_PI_2, std::f64::consts::PI];
 
@@ -73,25 +73,16 @@ impl Builder<'_> {
 
     /// Kind and axes of a joint.
     pub fn kind(&mut self) -> JointKind {
-        match self.rng.weighted(&self.distribution.kinds) {
-            0 => JointKind::Revolute { axis: self.direction() },
-            1 => JointKind::Prismatic { axis: self.direction() },
-            2 => JointKind::Cylindrical { axis: self.direction() },
-            3 => {
-                let (axis, pitch) = (self.direction(), self.rng.around(0.3));
-                JointKind::Helical { axis, pitch: self.value(pitch) }
+        let spec = &JOINTS[self.rng.weighted(&self.distribution.kinds)];
+        let mut axes = [[0.0; 3]; 2];
+        loop {
+            axes[..spec.axes.len()].fill_with(|| self.direction());
+            if spec.axes.len() < 2 || sine(axes[0], axes[1]) > 0.5 {
+                break;
             }
-            4 => loop {
-                let axes = [self.direction(), self.direction()];
-                if sine(axes[0], axes[1]) > 0.5 {
-                    return JointKind::Universal { axes };
-                }
-            },
-            5 => JointKind::Planar { normal: self.direction() },
-            6 => JointKind::Spherical,
-            7 => JointKind::Floating,
-            _ => JointKind::Fixed,
         }
+        let pitch = if spec.pitch { self.rng.around(0.3) } else { 0.0 };
+        (spec.make)(axes, if spec.pitch { self.value(pitch) } else { Value::ZERO })
     }
 
     /// One number for each degree of freedom: all the same, or different, some of them zero.

@@ -1,6 +1,7 @@
 //! Random mechanisms and states.
 
 mod bodies;
+mod builder;
 mod distribution;
 mod joints;
 mod model;

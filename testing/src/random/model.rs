@@ -1,52 +1,17 @@
 //! Random mechanisms: bodies, joints and inputs together.
 
-use mbd_codegen::model::{Frame, Gravity, Joint, JointKind, JointMotion, Model, Param, Value, Wrench, WrenchAxes};
+use mbd_codegen::model::{Frame, Gravity, Joint, JointMotion, Model, Origin, Value, Wrench, WrenchAxes};
 
 use super::bodies::{weights, Weight};
-use super::{Distribution, Rng};
-
-/// State of the construction of a model.
-pub struct Builder<'k> {
-    /// Random numbers.
-    pub rng: Rng,
-    /// Probabilities and ranges.
-    pub distribution: &'k Distribution,
-    /// Parameters so far.
-    params: Vec<Param>,
-}
-
-/// The tree; parents come before their children.
-pub struct Skeleton {
-    /// Parent of each body.
-    pub parent: Vec<Option<usize>>,
-    /// Number of bodies between it and the ground.
-    pub depth: Vec<i32>,
-}
+use super::builder::{Builder, Skeleton};
+use super::distribution::Distribution;
+use super::rng::Rng;
 
 /// Names that could collide with words of generated code; some bodies and joints get them.
 const ODD_NAMES: [&str; 12] =
     ["type", "self", "q", "kept", "tau", "Upper arm", "link-7", "Größe 2", "new", "rates", "kinetic", "7th"];
 
 impl Builder<'_> {
-    /// A constant, or a parameter with this default.
-    pub fn value(&mut self, x: f64) -> Value {
-        if !self.rng.chance(self.distribution.params) {
-            return Value::Const(x);
-        }
-        let k = self.params.len();
-        self.params.push(Param { name: format!("n{k}"), default: x });
-        Value::Param(k)
-    }
-
-    /// The same, except that zero is always a constant.
-    pub fn value_or_zero(&mut self, x: f64) -> Value {
-        if x == 0.0 {
-            Value::ZERO
-        } else {
-            self.value(x)
-        }
-    }
-
     fn names(&mut self, plain: &str, n: usize) -> Vec<String> {
         let shift = self.rng.below(ODD_NAMES.len());
         let mut names: Vec<String> = (0..n).map(|k| format!("{plain}{k}")).collect();
@@ -80,7 +45,7 @@ impl Builder<'_> {
         let kind = self.kind();
         let n = kind.nv();
         let k = self.distribution;
-        let sprung = if matches!(kind, JointKind::Spherical | JointKind::Floating) { 0.0 } else { k.springs };
+        let sprung = if kind.spec().has_springs() { k.springs } else { 0.0 };
         let stiffness = self.per_freedom(n, sprung, 1.0, 30.0);
         let has_spring = stiffness.iter().any(|s| *s != Value::ZERO);
         Joint {
@@ -95,6 +60,7 @@ impl Builder<'_> {
             rest: self.per_freedom(n, if has_spring { 0.7 } else { 0.0 }, -0.5, 0.5),
             stiffness,
             armature: self.per_freedom(n, k.armature, 0.01, 0.2),
+            origin: Origin::default(),
         }
     }
 

@@ -1,8 +1,8 @@
 //! Loops, couplings and starts in the TOML format.
 
-use mbd_codegen::model::{Constraint, ConstraintKind, Joint, JointKind, LoopKind, Mount, Placement, Start, Value};
+use mbd_codegen::model::{Constraint, ConstraintKind, Joint, LoopKind, Mount, Placement, Start, Value};
 
-use super::{line, quoted, Writer};
+use super::{line, quoted, turns, Writer};
 
 impl Writer<'_> {
     /// Writes every constraint, preceded by frames for those ends of loops that are neither bodies nor frames of the model.
@@ -57,7 +57,7 @@ impl Writer<'_> {
                 line(out, "joints", format!("[{}]", names.join(", ")));
                 let ratios: Vec<Value> = terms.iter().map(|(_, ratio)| *ratio).collect();
                 line(out, "ratios", self.list(&ratios, false));
-                let turns = !joints.iter().any(|j| matches!(j.kind, JointKind::Prismatic { .. }));
+                let turns = joints.iter().all(|j| turns(&j.kind));
                 if *offset != Value::ZERO {
                     line(out, "offset", self.number(*offset, turns));
                 }
@@ -67,67 +67,26 @@ impl Writer<'_> {
     }
 
     fn loop_kind(&self, out: &mut String, kind: &LoopKind) {
-        let name = match kind {
-            LoopKind::Revolute { .. } => "pin",
-            LoopKind::Prismatic { .. } => "slider",
-            LoopKind::Cylindrical { .. } => "cylindrical",
-            LoopKind::Helical { .. } => "helical",
-            LoopKind::Universal { .. } => "universal",
-            LoopKind::Planar { .. } => "planar",
-            LoopKind::Spherical => "spherical",
-            LoopKind::Fixed => "fixed",
-            LoopKind::Distance { .. } => "distance",
-            LoopKind::PointOnLine { .. } => "point_on_line",
-            LoopKind::PointOnPlane { .. } => "point_on_plane",
-            LoopKind::PointOnCylinder { .. } => "point_on_cylinder",
-            LoopKind::RollingDisc { .. } => "rolling_disc",
-            LoopKind::RollingBall { .. } => "rolling_ball",
-            LoopKind::KnifeEdge { .. } => "knife_edge",
-            LoopKind::Pfaffian { .. } => "pfaffian",
-        };
-        line(out, "type", quoted(name));
-        let z = [0.0, 0.0, 1.0];
-        let mut direction = |key: &str, v: &[f64; 3], default: [f64; 3]| {
-            if *v != default {
-                line(out, key, format!("{v:?}"));
+        let spec = kind.spec();
+        line(out, "type", quoted(spec.word()));
+        for (direction, value) in spec.directions.iter().zip(kind.directions()) {
+            if value != direction.default {
+                line(out, direction.key, format!("{value:?}"));
             }
-        };
-        match kind {
-            LoopKind::Universal { axes: [first, second] } => {
-                direction("axis", first, [1.0, 0.0, 0.0]);
-                direction("axis2", second, [0.0, 1.0, 0.0]);
-            }
-            LoopKind::Planar { normal } | LoopKind::PointOnPlane { normal } | LoopKind::RollingBall { normal, .. } => {
-                direction("normal", normal, z);
-            }
-            LoopKind::RollingDisc { normal, axis, .. } => {
-                direction("normal", normal, z);
-                direction("axis", axis, z);
-            }
-            LoopKind::Revolute { axis }
-            | LoopKind::Prismatic { axis }
-            | LoopKind::Cylindrical { axis }
-            | LoopKind::Helical { axis, .. }
-            | LoopKind::PointOnLine { axis }
-            | LoopKind::PointOnCylinder { axis, .. }
-            | LoopKind::KnifeEdge { axis } => direction("axis", axis, z),
-            LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => {}
         }
-        match kind {
-            LoopKind::Helical { pitch, .. } => line(out, "pitch", self.number(*pitch, false)),
-            LoopKind::Distance { length } => line(out, "length", self.number(*length, false)),
-            LoopKind::PointOnCylinder { radius, .. }
-            | LoopKind::RollingDisc { radius, .. }
-            | LoopKind::RollingBall { radius, .. } => line(out, "radius", self.number(*radius, false)),
-            LoopKind::Pfaffian { row } => line(out, "row", self.list(row, false)),
-            _ => {}
+        if let Some(key) = spec.number {
+            let value = match { *kind }.numbers_mut() {
+                [single] => self.number(*single, false),
+                row => self.list(row, false),
+            };
+            line(out, key, value);
         }
     }
 
     /// Writes the start of a joint, if it has one.
     pub(super) fn start(&self, out: &mut String, joint: usize) {
         let Some(Start { q, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
-        let turns = matches!(self.model.joints[joint].kind, JointKind::Revolute { .. } | JointKind::Helical { .. });
+        let turns = turns(&self.model.joints[joint].kind);
         match q[..] {
             [x] => line(out, "start", self.number(Value::Const(x), turns)),
             _ => line(out, "start", format!("{q:?}")),

@@ -4,8 +4,8 @@
 //! same in every form, and their own errors are held to an ulp elsewhere; what is compared here are the roundings after them.
 
 use mbd_codegen::generate::OutputProgram;
-use mbd_codegen::import::{load, Base, ImportOptions};
 use mbd_codegen::model::Model;
+use mbd_codegen::read::{self, Base, ImportOptions};
 pub use mbd_codegen::search::Wide;
 use mbd_codegen::symbolic::Program;
 use mbd_runtime::Scalar;
@@ -50,8 +50,9 @@ pub const MODELS: [(&str, Base); 11] = [
 pub fn model(file: &str, base: Base) -> Model {
     let path = format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("the model");
-    let (model, findings) = load(file, &text, &ImportOptions { base, gravity: None });
-    model.unwrap_or_else(|| panic!("{findings}"))
+    read::model(file, &text, &ImportOptions { base, gravity: None })
+        .unwrap_or_else(|findings| panic!("{findings}"))
+        .model
 }
 
 /// Errors of one array of results in many states.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use mbd_codegen::search;
 use mbd_codegen::options::PlanOptions;
-use mbd_codegen::import::{load, Base, ImportOptions};
+use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::plan::state_layout::pinocchio;
 use mbd_codegen::{generate, Output, Options};
 
@@ -34,8 +34,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     println!("cargo:rerun-if-changed={path}");
     let text = std::fs::read_to_string(path).expect("the model");
     let base = if base == "floating" { Base::Floating } else { Base::Fixed };
-    let (model, findings) = load(path, &text, &ImportOptions { base, gravity: None });
-    let mut model = model.unwrap_or_else(|| panic!("{findings}"));
+    let mut model = read::model(path, &text, &ImportOptions { base, gravity: None }).unwrap_or_else(|findings| panic!("{findings}")).model;
     // Pinocchio's forward dynamics knows no dampers.
     for joint in &mut model.joints {
         joint.damping.fill(mbd_codegen::model::Value::Const(0.0));

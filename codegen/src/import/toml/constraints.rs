@@ -2,34 +2,15 @@
 
 use std::collections::HashSet;
 
-use super::super::raw::{
-    JointType, LoopType, RawConstraint, RawCoupling, RawJoint, RawLoop, RawModel, RawNumber, RawValue,
-};
+use super::super::raw::{RawConstraint, RawCoupling, RawJoint, RawLoop, RawModel, RawNumber, RawValue};
 use super::super::source::{Findings, Spanned};
-use super::super::words::{did_you_mean, quote};
-use super::entries::ALIASES;
+use super::super::words::quote;
+use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
+use crate::model::{LoopSpec, Unit as Measures, FLOATING, LOOPS};
 
-const LOOP: &[&str] =
-    &["name", "type", "between", "axis", "axis2", "normal", "pitch", "length", "radius", "row", "decay"];
 const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
-
-/// What loops are called elsewhere, beside the names that joints have.
-const OTHER_NAMES: [(&str, &str); 12] = [
-    ("rod", "distance"),
-    ("bar", "distance"),
-    ("link", "distance"),
-    ("inline", "point_on_line"),
-    ("inplane", "point_on_plane"),
-    ("point_on_surface", "point_on_plane"),
-    ("disc", "rolling_disc"),
-    ("disk", "rolling_disc"),
-    ("rolling_disk", "rolling_disc"),
-    ("wheel", "rolling_disc"),
-    ("skate", "knife_edge"),
-    ("nonholonomic", "pfaffian"),
-];
 
 /// What is written as a coupling.
 const COUPLINGS: [&str; 4] = ["coupling", "gear", "gears", "rack"];
@@ -41,55 +22,51 @@ pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
         let at = table.span.start;
         found.extend(one_loop(&table, findings).map(|l| (at, RawConstraint::Loop(Box::new(l)))));
     }
-    let sliders: HashSet<&str> = raw.joints.iter().filter(|j| slides(j)).map(|j| j.name.value.as_str()).collect();
+    let lengths: HashSet<&str> = raw.joints.iter().filter(|j| slides(j)).map(|j| j.name.value.as_str()).collect();
     for table in top.tables("coupling", findings) {
         let at = table.span.start;
-        found.extend(coupling(&table, &sliders, findings).map(|c| (at, RawConstraint::Coupling(c))));
+        found.extend(coupling(&table, &lengths, findings).map(|c| (at, RawConstraint::Coupling(c))));
     }
     found.sort_by_key(|(at, _)| *at);
     raw.constraints = found.into_iter().map(|(_, c)| c).collect();
 }
 
 fn one_loop(table: &Table, findings: &mut Findings) -> Option<RawLoop> {
-    table.reject_unknown(LOOP, "a loop", findings);
+    let directions = distinct(LOOPS.iter().flat_map(|spec| spec.directions.iter().map(|d| d.key)));
+    let numbers = distinct(LOOPS.iter().filter_map(|spec| spec.number));
+    let keys = [&["name", "type", "between"], &directions[..], &numbers[..], &["decay"]].concat();
+    table.reject_unknown(&keys, "a loop", findings);
     let name = table.required_text("name", findings);
     let kind = loop_type(table, findings);
     let between = between(table, findings);
-    let axis = table.direction("axis", findings);
-    let axis2 = table.direction("axis2", findings);
-    let normal = table.direction("normal", findings);
-    let mut number = |key: &str| table.number(key, Unit::Plain, findings);
-    let (pitch, length, radius, decay) = (number("pitch"), number("length"), number("radius"), number("decay"));
+    let directions = directions.into_iter().filter_map(|key| Some((key, table.direction(key, findings)?))).collect();
     let row = row(table, findings);
-    Some(RawLoop { name: name?, kind, between, axis, axis2, normal, pitch, length, radius, row, decay })
+    let single = numbers.into_iter().filter(|key| *key != "row").chain(["decay"]);
+    let numbers = single.filter_map(|key| Some((key, table.number(key, Unit::Plain, findings)?))).collect();
+    Some(RawLoop { name: name?, kind, between, directions, numbers, row })
 }
 
-fn loop_type(table: &Table, findings: &mut Findings) -> Option<Spanned<LoopType>> {
-    let names = || LoopType::ALL.iter().map(|(name, _)| *name);
-    let all = || names().map(quote).collect::<Vec<_>>();
-    if !table.has("type") {
-        table.missing("type", &format!("`type = \"pin\"`, or one of {}", all()[1..].join(", ")), findings);
-    }
-    let text = table.text("type", findings)?;
-    if let Some((_, kind)) = LoopType::ALL.iter().find(|(name, _)| *name == text.value) {
-        return Some(Spanned::new(*kind, text.span));
-    }
-    let lower = text.value.to_lowercase();
-    let alias = ALIASES.iter().chain(&OTHER_NAMES).find(|(alias, _)| *alias == lower).map(|(_, name)| *name);
-    if alias == Some("floating") || lower == "floating" {
-        let message = format!("{}a floating loop leaves everything free", table.prefix());
-        findings.error(text.span, message, format!("remove the loop, or choose from {}", all().join(", ")));
-        return None;
-    }
-    let help = match alias {
-        Some(name) => format!("it is called `{name}` here"),
-        None if COUPLINGS.contains(&lower.as_str()) => {
-            "joints are geared by a `[[coupling]]` with `joints` and `ratios`".into()
+/// Each key once, in the order of the first.
+fn distinct(keys: impl Iterator<Item = &'static str>) -> Vec<&'static str> {
+    let mut list = Vec::new();
+    for key in keys {
+        if !list.contains(&key) {
+            list.push(key);
         }
-        None => did_you_mean(&text.value, names(), || format!("the types are {}", all().join(", "))),
+    }
+    list
+}
+
+fn loop_type(table: &Table, findings: &mut Findings) -> Option<Spanned<&'static LoopSpec>> {
+    let special = |lower: &str| {
+        if FLOATING.words.mean(lower) {
+            let all = LOOPS.iter().map(|spec| quote(spec.word())).collect::<Vec<_>>().join(", ");
+            return Some(format!("a floating loop would leave everything free: remove it, or choose from {all}"));
+        }
+        let help = "joints are geared by a `[[coupling]]` with `joints` and `ratios`";
+        COUPLINGS.contains(&lower).then(|| help.into())
     };
-    findings.error(text.span, format!("{}unknown type {}", table.prefix(), quote(&text.value)), help);
-    None
+    kind(table, &LOOPS, |spec| &spec.words, special, findings)
 }
 
 fn between(table: &Table, findings: &mut Findings) -> Option<[Spanned<String>; 2]> {
@@ -125,7 +102,7 @@ fn row(table: &Table, findings: &mut Findings) -> Option<Spanned<[RawNumber; 6]>
     Some(Spanned::new(six.unwrap_or_else(invalid), span.clone()))
 }
 
-fn coupling(table: &Table, sliders: &HashSet<&str>, findings: &mut Findings) -> Option<RawCoupling> {
+fn coupling(table: &Table, lengths: &HashSet<&str>, findings: &mut Findings) -> Option<RawCoupling> {
     table.reject_unknown(COUPLING, "a coupling", findings);
     let name = table.required_text("name", findings);
     let examples =
@@ -141,12 +118,14 @@ fn coupling(table: &Table, sliders: &HashSet<&str>, findings: &mut Findings) -> 
         Some(Spanned::new(list, value.span()))
     });
     let mut named = joints.iter().flat_map(|list| &list.value);
-    let unit = if named.any(|name| sliders.contains(name.value.as_str())) { Unit::Plain } else { Unit::Angle };
+    let unit = if named.any(|name| lengths.contains(name.value.as_str())) { Unit::Plain } else { Unit::Angle };
     let offset = table.number("offset", unit, findings);
     let decay = table.number("decay", Unit::Plain, findings);
     Some(RawCoupling { name: name?, joints, ratios, offset, decay })
 }
 
+/// Whether the first coordinate of a joint is a length.
 fn slides(joint: &RawJoint) -> bool {
-    joint.kind.as_ref().is_some_and(|k| k.value == JointType::Prismatic)
+    let first = joint.kind.as_ref().and_then(|kind| kind.value.coordinates.first());
+    first.is_some_and(|coordinate| coordinate.unit == Measures::Metre)
 }

@@ -1,14 +1,14 @@
 //! `[[body]]`, `[[joint]]`, `[[frame]]` and `[[wrench]]`.
 
 use super::super::raw::{
-    JointType, RawBody, RawFrame, RawFreedoms, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement,
-    RawRotation, RawValue, RawWrench,
+    RawBody, RawFrame, RawFreedoms, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation,
+    RawValue, RawWrench,
 };
 use super::super::source::{Findings, Spanned};
-use super::super::words::{did_you_mean, quote};
+use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
-use crate::model::WrenchAxes;
+use crate::model::{JointSpec, WrenchAxes, JOINTS};
 use ::toml::de::DeValue;
 
 const BODY: &[&str] = &["name", "mass", "com", "inertia", "inertia_rpy"];
@@ -107,75 +107,17 @@ fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
     RawPlacement { xyz, rotation: rpy.or(rotate) }
 }
 
-const TYPES: [(&str, JointType); 9] = [
-    ("pin", JointType::Revolute),
-    ("slider", JointType::Prismatic),
-    ("cylindrical", JointType::Cylindrical),
-    ("helical", JointType::Helical),
-    ("universal", JointType::Universal),
-    ("planar", JointType::Planar),
-    ("spherical", JointType::Spherical),
-    ("floating", JointType::Floating),
-    ("fixed", JointType::Fixed),
-];
-
-/// What the types are called elsewhere.
-pub(super) const ALIASES: [(&str, &str); 16] = [
-    ("hinge", "pin"),
-    ("revolute", "pin"),
-    ("continuous", "pin"),
-    ("rotary", "pin"),
-    ("rotational", "pin"),
-    ("prismatic", "slider"),
-    ("slide", "slider"),
-    ("linear", "slider"),
-    ("ball", "spherical"),
-    ("free", "floating"),
-    ("6dof", "floating"),
-    ("weld", "fixed"),
-    ("rigid", "fixed"),
-    ("screw", "helical"),
-    ("cardan", "universal"),
-    ("hooke", "universal"),
-];
-
-fn joint_type(table: &Table, findings: &mut Findings) -> Option<Spanned<JointType>> {
-    let names = || TYPES.iter().map(|(name, _)| *name);
-    if !table.has("type") {
-        let all: Vec<String> = names().map(quote).collect();
-        table.missing("type", &format!("`type = \"pin\"`, or one of {}", all[1..].join(", ")), findings);
-    }
-    let text = table.text("type", findings)?;
-    if let Some((_, kind)) = TYPES.iter().find(|(name, _)| *name == text.value) {
-        return Some(Spanned::new(*kind, text.span));
-    }
-    let lower = text.value.to_lowercase();
-    let help = match ALIASES.iter().find(|(alias, _)| *alias == lower) {
-        Some((_, name)) => format!("it is called `{name}` here"),
-        None => did_you_mean(&text.value, names(), || {
-            format!("the types are {}", names().map(quote).collect::<Vec<_>>().join(", "))
-        }),
-    };
-    findings.error(text.span, format!("{}unknown type {}", table.prefix(), quote(&text.value)), help);
-    None
-}
-
-/// Unit of each coordinate, for degrees in `rest`.
-fn units(kind: Option<JointType>) -> &'static [Unit] {
-    use Unit::{Angle, Plain};
-    match kind {
-        Some(JointType::Prismatic) => &[Plain],
-        Some(JointType::Cylindrical) => &[Plain, Angle],
-        Some(JointType::Planar) => &[Plain, Plain, Angle],
-        // An unknown type is one finding; its units are not another.
-        _ => &[Angle],
-    }
+/// Unit of each coordinate, for degrees.
+fn units(kind: Option<&JointSpec>) -> Vec<Unit> {
+    let known = kind.filter(|spec| spec.has_springs());
+    // An unknown type is one finding; its units are not another.
+    known.map_or(vec![Unit::Angle], |spec| spec.coordinates.iter().map(|c| Unit::of(c.unit)).collect())
 }
 
 /// Coordinates to begin with; `units` are those of the coordinates where they have any.
-fn start(table: &Table, kind: Option<JointType>, units: &[Unit], findings: &mut Findings) -> Option<RawFreedoms> {
+fn start(table: &Table, kind: Option<&JointSpec>, units: &[Unit], findings: &mut Findings) -> Option<RawFreedoms> {
     let value = table.raw("start")?;
-    let quaternion = matches!(kind, Some(JointType::Spherical | JointType::Floating));
+    let quaternion = kind.is_some_and(|spec| spec.quaternion().is_some());
     if quaternion && matches!(value.get_ref(), DeValue::Table(t) if t.contains_key("deg")) {
         let message = format!("{}`start` ends in a quaternion, which has no degrees", table.prefix());
         let help = "write the unit quaternion in the order x, y, z, w: no rotation is `0, 0, 0, 1`";
@@ -189,11 +131,12 @@ fn start(table: &Table, kind: Option<JointType>, units: &[Unit], findings: &mut 
 pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(JOINT, "a joint", findings);
     let name = table.required_text("name", findings);
-    let kind = joint_type(&table, findings);
+    let kind = kind(&table, &JOINTS, |spec| &spec.words, |_| None, findings);
     let child = table.required_text("child", findings);
     // Without its joint a body would look loose.
     raw.incomplete |= child.is_none() || name.is_none();
     let units = units(kind.as_ref().map(|k| k.value));
+    let units = &units[..];
     let mut freedoms = |key: &str, units: &[Unit]| {
         table.raw(key).and_then(|v| numbers::freedoms(v, units, &format!("{}`{key}`", table.prefix()), findings))
     };

@@ -2,6 +2,7 @@
 
 mod constraints;
 mod entries;
+mod kinds;
 mod numbers;
 mod table;
 
@@ -12,32 +13,21 @@ use super::raw::{RawGravity, RawModel, RawParam, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use super::{Base, ImportOptions};
-use crate::check::check;
-use crate::diag::Diagnostics;
-use crate::model::Model;
 
 const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling"];
 
-/// Reads and checks a model. `file` is named in the findings and gives the model its name if the text does not.
-/// All findings of the text come back at once, in its order; a model only if none of them is an error.
-pub fn read(file: &str, text: &str) -> (Option<Model>, Diagnostics) {
-    read_with(file, text, &ImportOptions::default())
-}
-
-/// [`read`] with options: the base has to be the default, gravity replaces that of the file.
-pub fn read_with(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
-    let mut findings = Findings::new(file, text);
+/// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the default,
+/// gravity replaces that of the file.
+pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
     if options.base != Base::default() {
         let help = "leave the option out; in the file the joints to `ground` say how the model is attached";
         findings.error(Span::FILE, "a TOML model states its own base", help);
     }
-    let model = read_raw(text, &mut findings).and_then(|mut raw| {
-        if let Some(g) = options.gravity {
-            raw.gravity = Some(override_gravity(g, &mut findings));
-        }
-        check(&raw, file, &mut findings)
-    });
-    (model, findings.finish())
+    let mut raw = document(text, findings)?;
+    if let Some(g) = options.gravity {
+        raw.gravity = Some(override_gravity(g, findings));
+    }
+    Some(raw)
 }
 
 fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
@@ -47,8 +37,7 @@ fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
     RawGravity::Constant(Spanned::new(g.map(|x| Spanned::new(RawValue::Const(x), Span::FILE)), Span::FILE))
 }
 
-/// Reads without checking the mechanism; `None` where the text is no TOML.
-pub fn read_raw(text: &str, findings: &mut Findings) -> Option<RawModel> {
+fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
     let document = match DeTable::parse(text) {
         Ok(document) => document,
         Err(error) => {

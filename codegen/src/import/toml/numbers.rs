@@ -16,6 +16,16 @@ pub(super) enum Unit {
     Plain,
 }
 
+impl Unit {
+    /// For what measures `unit`.
+    pub(super) fn of(unit: crate::model::Unit) -> Unit {
+        match unit {
+            crate::model::Unit::Radian => Unit::Angle,
+            crate::model::Unit::Metre | crate::model::Unit::One => Unit::Plain,
+        }
+    }
+}
+
 /// A number in one of its three forms. `what` names it, as in ``body `arm`: `mass` ``.
 pub(super) fn number(value: &Toml<DeValue>, unit: Unit, what: &str, findings: &mut Findings) -> RawNumber {
     let span: Span = value.span().into();
@@ -222,5 +232,28 @@ pub(super) fn freedoms(
         let all_angles = !units.is_empty() && units.iter().all(|u| *u == Unit::Angle);
         let unit = if all_angles { Unit::Angle } else { Unit::Plain };
         Some(RawFreedoms::All(number(value, unit, what, findings)))
+    }
+}
+
+/// Numbers under a key.
+impl Table<'_> {
+    /// A number, if the key is there.
+    pub(super) fn number(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawNumber> {
+        let value = self.raw(key)?;
+        Some(number(value, unit, &format!("{}`{key}`", self.prefix()), findings))
+    }
+
+    /// Three numbers, if the key is there; invalid ones where something else is there.
+    pub(super) fn vec3(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawVec3> {
+        let value = self.raw(key)?;
+        let span: Span = value.span().into();
+        let read = vec3(value, unit, &format!("{}`{key}`", self.prefix()), findings);
+        Some(read.unwrap_or_else(|| Spanned::new([0; 3].map(|_| Spanned::new(RawValue::Invalid, span)), span)))
+    }
+
+    /// A direction: three constants.
+    pub(super) fn direction(&self, key: &str, findings: &mut Findings) -> Option<Spanned<[f64; 3]>> {
+        let value = self.raw(key)?;
+        direction(value, &format!("{}`{key}`", self.prefix()), findings)
     }
 }

@@ -2,10 +2,8 @@
 
 use ::toml::de::{DeString, DeTable, DeValue};
 
-use super::super::raw::{RawNumber, RawValue, RawVec3};
 use super::super::source::{Findings, Span, Spanned};
 use super::super::words::{did_you_mean, list, quote};
-use super::numbers::{self, Unit};
 
 /// A table, its place, and how to name it in a message (empty for the document itself).
 pub(super) struct Table<'t> {
@@ -192,26 +190,6 @@ impl<'t> Table<'t> {
             }
         }
         tables
-    }
-
-    /// A number, if the key is there.
-    pub(super) fn number(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawNumber> {
-        let value = self.table.get(key)?;
-        Some(numbers::number(value, unit, &format!("{}`{key}`", self.prefix()), findings))
-    }
-
-    /// Three numbers, if the key is there; invalid ones where something else is there.
-    pub(super) fn vec3(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawVec3> {
-        let value = self.table.get(key)?;
-        let span: Span = value.span().into();
-        let read = numbers::vec3(value, unit, &format!("{}`{key}`", self.prefix()), findings);
-        Some(read.unwrap_or_else(|| Spanned::new([0; 3].map(|_| Spanned::new(RawValue::Invalid, span)), span)))
-    }
-
-    /// A direction: three constants.
-    pub(super) fn direction(&self, key: &str, findings: &mut Findings) -> Option<Spanned<[f64; 3]>> {
-        let value = self.table.get(key)?;
-        numbers::direction(value, &format!("{}`{key}`", self.prefix()), findings)
     }
 
     /// The entry under a key as it stands.

@@ -3,22 +3,11 @@
 use super::link::read_origin;
 use super::xml::{place, Reader};
 use crate::diag::Severity;
-use crate::import::raw::{JointType, RawFreedoms, RawJoint, RawMimic, RawNumber, RawValue};
+use crate::import::raw::{RawFreedoms, RawJoint, RawMimic, RawNumber, RawValue};
 use crate::import::source::{Span, Spanned};
 use crate::import::words::{did_you_mean, quote};
+use crate::model::{JointSpec, JOINTS};
 use roxmltree::Node;
-
-/// Kinds by their names in a file. `spherical` and `ball` are no part of URDF, but some simulators know them.
-const KINDS: [(&str, JointType); 8] = [
-    ("revolute", JointType::Revolute),
-    ("continuous", JointType::Revolute),
-    ("prismatic", JointType::Prismatic),
-    ("planar", JointType::Planar),
-    ("floating", JointType::Floating),
-    ("spherical", JointType::Spherical),
-    ("ball", JointType::Spherical),
-    ("fixed", JointType::Fixed),
-];
 
 /// What may stand in a `joint` and has nothing to do with its free motion.
 const IGNORED: [(&str, &str); 3] = [
@@ -53,18 +42,18 @@ pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawJoint> {
     Some(joint)
 }
 
-fn read_kind(reader: &mut Reader, node: Node, whose: &str) -> Option<Spanned<JointType>> {
-    let names = KINDS.map(|(name, _)| name);
-    let help = || format!("the types are {}", names.map(quote).join(", "));
+fn read_kind(reader: &mut Reader, node: Node, whose: &str) -> Option<Spanned<&'static JointSpec>> {
+    let names = || JOINTS.iter().flat_map(|spec| spec.urdf.iter().copied());
+    let help = || format!("the types are {}", names().map(quote).collect::<Vec<_>>().join(", "));
     let Some(text) = reader.attribute(node, "type") else {
         reader.findings.error(place(node), format!("{whose}no `type`"), help());
         return None;
     };
-    if let Some((_, kind)) = KINDS.iter().find(|(name, _)| *name == text.value) {
-        return Some(Spanned::new(*kind, text.span));
+    if let Some(kind) = JOINTS.iter().find(|spec| spec.urdf.contains(&text.value)) {
+        return Some(Spanned::new(kind, text.span));
     }
     let message = format!("{whose}unknown type {}", quote(text.value));
-    reader.findings.error(text.span, message, did_you_mean(text.value, names, help));
+    reader.findings.error(text.span, message, did_you_mean(text.value, names(), help));
     None
 }
 
@@ -85,10 +74,10 @@ fn read_axis(
     reader: &mut Reader,
     joint: Node,
     axis: Option<Node>,
-    kind: Option<JointType>,
+    kind: Option<&JointSpec>,
     whose: &str,
 ) -> Option<Spanned<[f64; 3]>> {
-    let wanted = !matches!(kind, Some(JointType::Fixed | JointType::Floating | JointType::Spherical));
+    let wanted = kind.is_none_or(|spec| !spec.axes.is_empty());
     let Some(node) = axis else {
         if wanted && kind.is_some() {
             reader.tally.notice(place(joint), "a joint without `axis` turns about or slides along its x axis");
@@ -111,11 +100,11 @@ fn read_axis(
 }
 
 /// Viscous damping; dry friction is reported.
-fn read_dynamics(reader: &mut Reader, node: Node, kind: Option<JointType>, whose: &str) -> Option<RawFreedoms> {
+fn read_dynamics(reader: &mut Reader, node: Node, kind: Option<&JointSpec>, whose: &str) -> Option<RawFreedoms> {
     reader.leaf(node, &["damping", "friction"]);
     let damping = reader.number(node, "damping", whose);
     let friction = reader.number(node, "friction", whose);
-    if kind == Some(JointType::Fixed) {
+    if kind.is_some_and(|spec| spec.nv() == 0) {
         reader.tally.notice(place(node), "`dynamics` of a fixed joint has no meaning");
         return None;
     }
@@ -125,7 +114,8 @@ fn read_dynamics(reader: &mut Reader, node: Node, kind: Option<JointType>, whose
         reader.tally.add(Severity::Warning, "friction", friction.span, message, help);
     }
     let damping = damping?;
-    if matches!(kind, Some(JointType::Planar | JointType::Floating)) {
+    let mixed = |spec: &JointSpec| spec.freedoms.windows(2).any(|pair| pair[0].unit != pair[1].unit);
+    if kind.is_some_and(mixed) {
         if is_not_zero(&damping) {
             let message = format!("{whose}one `damping` for slides and turns together is not used");
             reader.findings.warning(
@@ -143,13 +133,13 @@ fn is_not_zero(number: &RawNumber) -> bool {
     matches!(number.value, RawValue::Const(x) if x != 0.0)
 }
 
-fn read_mimic(reader: &mut Reader, node: Node, kind: Option<JointType>, whose: &str) -> Option<RawMimic> {
+fn read_mimic(reader: &mut Reader, node: Node, kind: Option<&JointSpec>, whose: &str) -> Option<RawMimic> {
     reader.leaf(node, &["joint", "multiplier", "offset"]);
     let leader = reader.required(node, "joint", whose);
     let ratio = reader.number(node, "multiplier", whose);
     let offset = reader.number(node, "offset", whose);
     // Robots with some joints frozen for a task keep the `mimic` of those.
-    if kind == Some(JointType::Fixed) {
+    if kind.is_some_and(|spec| spec.nv() == 0) {
         reader.tally.notice(place(node), "`mimic` of a fixed joint has no meaning");
         return None;
     }

@@ -11,13 +11,11 @@ mod xml;
 #[cfg(test)]
 mod tests;
 
-use super::raw::{JointType, RawBody, RawGravity, RawJoint, RawModel, RawValue};
+use super::raw::{RawBody, RawGravity, RawJoint, RawModel, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::{list, quote};
 use super::{Base, ImportOptions};
-use crate::check::check;
-use crate::diag::Diagnostics;
-use crate::model::Model;
+use crate::model::{FIXED, FLOATING, PLANAR};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use unused::Tally;
@@ -33,30 +31,24 @@ const IGNORED: [(&str, &str); 6] = [
     ("group", "`group` is not used"),
 ];
 
-/// Reads a model from `text`; `file` is how messages call it, and its stem the name of a model that has none.
+/// Reads a model without checking the mechanism; `None` where the text is no robot.
 ///
 /// The root link hangs on the ground by the joint `root_joint`, of the kind `options.base` asks for. Links stay bodies and fixed joints
 /// stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes `ground_link`.
-///
-/// # Errors
-/// No model where a finding is an error; all findings of the file are returned together.
-pub fn read(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
-    let mut findings = Findings::new(file, text);
+pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
     let document = match Document::parse(text) {
         Ok(document) => document,
         Err(error) => {
             let (span, message, help) = syntax_error(&error, text);
             findings.error(span, message, help);
-            return (None, findings.finish());
+            return None;
         }
     };
     let mut reader = Reader { findings, tally: Tally::default() };
     let raw = read_robot(&mut reader, document.root_element(), options);
-    let Reader { mut findings, tally } = reader;
-    tally.report(&mut findings);
-    let model = raw.and_then(|raw| check(&raw, file, &mut findings));
-    let model = model.filter(|_| !findings.has_errors());
-    (model, findings.finish())
+    let Reader { findings, tally } = reader;
+    tally.report(findings);
+    raw
 }
 
 fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Option<RawModel> {
@@ -154,16 +146,16 @@ fn add_base(reader: &mut Reader, raw: &mut RawModel, base: Base) {
     let taken: HashSet<&str> = raw.joints.iter().map(|j| j.name.value.as_str()).collect();
     let name = free_name("root_joint", &taken);
     let kind = match base {
-        Base::Fixed => JointType::Fixed,
-        Base::Floating => JointType::Floating,
-        Base::Planar => JointType::Planar,
+        Base::Fixed => &FIXED,
+        Base::Floating => &FLOATING,
+        Base::Planar => &PLANAR,
     };
     let mut joints = Vec::with_capacity(raw.joints.len() + roots.len());
     for (k, root) in roots.iter().enumerate() {
         let span = root.name.span;
         // Only the first is the base; the others, an error already, hang there so that the rest of the checks can be made.
         let (name, kind) =
-            if k == 0 { (name.clone(), kind) } else { (free_name(&format!("{name}_{k}"), &taken), JointType::Fixed) };
+            if k == 0 { (name.clone(), kind) } else { (free_name(&format!("{name}_{k}"), &taken), &FIXED) };
         joints.push(RawJoint::new(Spanned::new(name, span), Some(Spanned::new(kind, span)), Some(root.name.clone())));
     }
     joints.append(&mut raw.joints);

@@ -1,14 +1,14 @@
-use super::read;
 use crate::diag::{Diagnostics, Severity};
 use crate::import::{Base, ImportOptions};
 use crate::model::{Gravity, JointKind, JointMotion, Model, Rotation, Value};
+use crate::read::load;
 use std::fmt::Write;
 
 const SOLID: &str =
     r#"<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"#;
 
 fn import(text: &str, base: Base) -> (Option<Model>, Diagnostics) {
-    read("robot.urdf", text, &ImportOptions { base, ..ImportOptions::default() })
+    load("robot.urdf", text, &ImportOptions { base, ..ImportOptions::default() })
 }
 
 /// The model of a file without errors, and its findings as text.
@@ -156,7 +156,7 @@ fn a_link_called_ground_is_renamed_and_stays_connected() {
 fn gravity_comes_from_the_options() {
     let text = format!("<robot name='r'>{}</robot>", link("a"));
     let options = ImportOptions { gravity: Some([0.0, -1.62, 0.0]), base: Base::Floating };
-    let (m, _) = read("r.urdf", &text, &options);
+    let (m, _) = load("r.urdf", &text, &options);
     assert_eq!(m.map(|m| m.gravity), Some(Gravity::Constant([0.0, -1.62, 0.0].map(Value::Const))));
 }
 

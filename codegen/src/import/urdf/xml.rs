@@ -8,9 +8,9 @@ use crate::import::words::{did_you_mean, quote};
 use roxmltree::{Error, Node};
 
 /// What is collected while reading.
-pub(super) struct Reader<'a> {
+pub(super) struct Reader<'f, 'a> {
     /// Findings, one by one.
-    pub findings: Findings<'a>,
+    pub findings: &'f mut Findings<'a>,
     /// Findings that come in dozens.
     pub tally: Tally,
 }
@@ -34,7 +34,7 @@ fn is_own(node: Node) -> bool {
     space.is_none() || space == node.document().root_element().tag_name().namespace()
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_, '_> {
     /// Sorts the child elements of `node`: those named in `used` are returned in file order, those in `ignored` are counted with the
     /// message that stands there, all others are warned about, as is text between them.
     pub fn children<'x, 'i>(

@@ -5,7 +5,7 @@ use mbd_runtime::{Interpreter, Scalar};
 
 use super::super::evaluation::options;
 use super::super::wide::Wide;
-use crate::model::{Gravity, JointKind};
+use crate::model::{Coordinate, Gravity, Unit};
 use crate::output::Output;
 use crate::plan::Plan;
 
@@ -31,15 +31,11 @@ impl State {
                 Some(Source::Drive { q: at, .. }) => (&mut drive_q, at),
                 None => continue,
             };
-            let at = match plan.model.joints[slot.joint].kind {
-                JointKind::Spherical => at,
-                JointKind::Floating => at + 3,
-                JointKind::Prismatic { .. } => {
-                    list[at] *= 0.2;
-                    continue;
-                }
-                _ => continue,
-            };
+            let spec = plan.model.joints[slot.joint].kind.spec();
+            if matches!(spec.coordinates, [Coordinate { unit: Unit::Metre, .. }]) {
+                list[at] *= 0.2;
+            }
+            let Some(at) = spec.quaternion().map(|first| at + first) else { continue };
             let norm = list[at..at + 4].iter().map(|x| x * x).sum::<f64>();
             list[at..at + 4].iter_mut().for_each(|x| *x /= Scalar::sqrt(norm));
         }

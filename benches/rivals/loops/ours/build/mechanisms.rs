@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mbd_codegen::import::{load, ImportOptions};
+use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::model::{Constraint, ConstraintKind, JointKind, LoopKind, Model, Value};
 
 use crate::rods::with_rods;
@@ -40,8 +40,7 @@ pub fn all() -> Vec<Mechanism> {
 /// A model without springs and dampers, which Pinocchio's algorithm does not know, and with axes turned round that point
 /// against a coordinate axis, for which it has no fast joint; those coordinates change their sign.
 fn model(path: &str, text: &str) -> Model {
-    let (model, findings) = load(path, text, &ImportOptions::default());
-    let mut model = model.unwrap_or_else(|| panic!("{findings}"));
+    let mut model = read::model(path, text, &ImportOptions::default()).unwrap_or_else(|findings| panic!("{findings}")).model;
     for (k, joint) in model.joints.iter_mut().enumerate() {
         joint.damping.fill(Value::ZERO);
         joint.stiffness.fill(Value::ZERO);
@@ -87,7 +86,7 @@ inertia = [0, {across:?}, {across:?}]
 
 [[joint]]
 name = \"pin{k}\"
-type = \"pin\"
+type = \"revolute\"
 parent = \"{parent}\"
 child = \"link{k}\"
 xyz = [{x}, 0, 0]
@@ -115,7 +114,7 @@ xyz = [{x:?}, {y:?}, 0]
 
 [[loop]]
 name = \"closing\"
-type = \"pin\"
+type = \"revolute\"
 between = [\"tip\", \"end\"]
 axis = [0, 0, 1]
 "

@@ -1,7 +1,7 @@
 //! Massless rods as bodies: Pinocchio's rigid constraints know no distances.
 
 use mbd_codegen::model::{
-    Body, Constraint, ConstraintKind, Joint, JointKind, LoopKind, Model, JointMotion, Mount, Placement, Rotation, Value,
+    Body, Constraint, ConstraintKind, Joint, JointKind, LoopKind, Model, Mount, Placement, Rotation, Value,
 };
 
 /// Mass of a rod of the Delta robot, half of it at either end, kg.
@@ -36,19 +36,13 @@ pub fn with_rods(model: &Model) -> Model {
         let at = out.joints.iter().position(|j| j.child == arm).expect("a joint") + 1;
         out.joints.insert(
             at,
-            Joint {
-                name: format!("{}_joint", constraint.name),
-                kind: JointKind::Universal { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] },
-                parent: Some(arm),
-                child: rod,
-                placement: first.placement,
-                unbounded: false,
-                motion: JointMotion::Free,
-                damping: vec![Value::ZERO; 2],
-                stiffness: vec![Value::ZERO; 2],
-                rest: vec![Value::ZERO; 2],
-                armature: vec![Value::ZERO; 2],
-            },
+            Joint::new(
+                format!("{}_joint", constraint.name),
+                JointKind::Universal { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] },
+                Some(arm),
+                rod,
+                first.placement,
+            ),
         );
         out.starts.iter_mut().filter(|s| s.joint >= at).for_each(|s| s.joint += 1);
         let end = Placement { xyz: [Value::ZERO, Value::ZERO, Value::Const(-length)], ..Placement::IDENTITY };

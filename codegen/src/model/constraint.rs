@@ -1,0 +1,483 @@
+//! Constraints beside the tree, and the one table of the kinds of loops.
+//!
+//! A new kind of loop is a variant of [`LoopKind`] with its [`LoopSpec`] in this file, and its rows in the sweeps
+//! ([`mbd_runtime::tree::Closure`]).
+
+use mbd_runtime::spatial::Axis;
+use mbd_runtime::tree::Closure;
+
+use super::joint::{JointSpec, CYLINDRICAL, FIXED, HELICAL, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, UNIVERSAL};
+use super::{Origin, Placement, Unit, Value, Words};
+
+/// A frame that a constraint acts at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mount {
+    /// Body index, `None` for the ground.
+    pub body: Option<usize>,
+    /// Pose in the body frame.
+    pub placement: Placement,
+}
+
+/// What a loop holds together, first frame and second frame. Axes stand in the axes of both frames, any length but zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LoopKind {
+    /// Leaves one rotation, as a revolute joint would.
+    Revolute {
+        /// Axis of rotation.
+        axis: [f64; 3],
+    },
+    /// Leaves one translation.
+    Prismatic {
+        /// Direction of the translation.
+        axis: [f64; 3],
+    },
+    /// Leaves a translation along and a rotation about one axis.
+    Cylindrical {
+        /// The axis.
+        axis: [f64; 3],
+    },
+    /// Leaves a screw motion.
+    Helical {
+        /// The axis.
+        axis: [f64; 3],
+        /// Metres per radian.
+        pitch: Value,
+    },
+    /// Leaves rotations about `axes[0]`, fixed in the first frame, and `axes[1]`, fixed in the second; at right angles.
+    Universal {
+        /// Both axes.
+        axes: [[f64; 3]; 2],
+    },
+    /// Leaves two translations across a normal and a rotation about it.
+    Planar {
+        /// Normal of the plane.
+        normal: [f64; 3],
+    },
+    /// Leaves all rotations: the origins coincide.
+    Spherical,
+    /// Leaves nothing.
+    Fixed,
+    /// The origins stay at a distance: a massless rod with spherical ends.
+    Distance {
+        /// Length, m.
+        length: Value,
+    },
+    /// The second origin stays on the line through the first along the axis of the first frame.
+    PointOnLine {
+        /// Direction in the first frame.
+        axis: [f64; 3],
+    },
+    /// The second origin stays in the plane through the first, normal to a direction of the first frame.
+    PointOnPlane {
+        /// Direction in the first frame.
+        normal: [f64; 3],
+    },
+    /// The second origin stays on a cylinder about an axis of the first frame.
+    PointOnCylinder {
+        /// Direction in the first frame.
+        axis: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// A thin disc about the second frame's origin rolls on a plane of the first frame without slip.
+    RollingDisc {
+        /// Normal of the plane in the first frame, towards the disc.
+        normal: [f64; 3],
+        /// Axis of the disc in the second frame.
+        axis: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// A ball about the second frame's origin rolls on a plane of the first frame without slip.
+    RollingBall {
+        /// Normal of the plane in the first frame, towards the ball.
+        normal: [f64; 3],
+        /// Radius, m.
+        radius: Value,
+    },
+    /// The second origin does not move along a direction fixed in the second frame.
+    KnifeEdge {
+        /// Direction across the edge.
+        axis: [f64; 3],
+    },
+    /// `row · [velocity; angular velocity] = 0` for the motion of the second frame relative to the first, in the axes and
+    /// at the origin of the second.
+    Pfaffian {
+        /// Coefficients.
+        row: [Value; 6],
+    },
+}
+
+/// The frames of a loop in which a direction stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stands {
+    /// In the first.
+    InFirst,
+    /// In the second.
+    InSecond,
+    /// In both.
+    InBoth,
+}
+
+/// A direction that a kind of loop takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// Key in models.
+    pub key: &'static str,
+    /// Value where a model states none.
+    pub default: [f64; 3],
+    /// Frames that it stands in.
+    pub stands: Stands,
+    /// Axis of those frames along which the rows want it.
+    pub along: Axis,
+}
+
+/// Numbers of a loop, of which each kind takes those it has.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopNumbers {
+    /// Directions, as many as [`LoopSpec::directions`].
+    pub directions: [[f64; 3]; 2],
+    /// Pitch (m/rad), length or radius (m), after [`LoopSpec::number`].
+    pub number: Value,
+    /// Coefficients of velocity and angular velocity.
+    pub row: [Value; 6],
+}
+
+/// All that tells one kind of loop from another.
+#[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
+pub struct LoopSpec {
+    /// What it is called.
+    pub words: Words,
+    /// Directions it takes.
+    pub directions: &'static [Direction],
+    /// Key of the number it takes: `pitch`, `length`, `radius` or, for six of them, `row`.
+    pub number: Option<&'static str>,
+    /// Units of the residuals of its rows.
+    pub rows: &'static [Unit],
+    /// Whether it binds positions, whose errors can be made to decay.
+    pub positions: bool,
+    /// The kind with these numbers.
+    pub make: fn(LoopNumbers) -> LoopKind,
+}
+
+const X: [f64; 3] = [1.0, 0.0, 0.0];
+const Y: [f64; 3] = [0.0, 1.0, 0.0];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
+const M: Unit = Unit::Metre;
+const RAD: Unit = Unit::Radian;
+
+const fn direction(key: &'static str, stands: Stands) -> Direction {
+    Direction { key, default: Z, stands, along: Axis::Z }
+}
+
+const fn axis(stands: Stands) -> Direction {
+    direction("axis", stands)
+}
+
+const fn normal(stands: Stands) -> Direction {
+    direction("normal", stands)
+}
+
+/// What a loop shares with the joint that would hold its frames likewise.
+const fn like(joint: &JointSpec) -> LoopSpec {
+    LoopSpec { words: joint.words, ..PLAIN }
+}
+
+const PLAIN: LoopSpec = LoopSpec {
+    words: FIXED.words,
+    directions: &[],
+    number: None,
+    rows: &[M],
+    positions: true,
+    make: |_| LoopKind::Fixed,
+};
+
+use Stands::{InBoth, InFirst, InSecond};
+
+/// Every kind of loop, in the order of the variants of [`LoopKind`].
+pub static LOOPS: [LoopSpec; 16] = [
+    LoopSpec {
+        directions: &[axis(InBoth)],
+        rows: &[M, M, M, RAD, RAD],
+        make: |n| LoopKind::Revolute { axis: n.directions[0] },
+        ..like(&REVOLUTE)
+    },
+    LoopSpec {
+        directions: &[axis(InBoth)],
+        rows: &[M, M, RAD, RAD, RAD],
+        make: |n| LoopKind::Prismatic { axis: n.directions[0] },
+        ..like(&PRISMATIC)
+    },
+    LoopSpec {
+        directions: &[axis(InBoth)],
+        rows: &[M, M, RAD, RAD],
+        make: |n| LoopKind::Cylindrical { axis: n.directions[0] },
+        ..like(&CYLINDRICAL)
+    },
+    LoopSpec {
+        directions: &[axis(InBoth)],
+        number: Some("pitch"),
+        rows: &[M, M, RAD, RAD, M],
+        make: |n| LoopKind::Helical { axis: n.directions[0], pitch: n.number },
+        ..like(&HELICAL)
+    },
+    LoopSpec {
+        directions: &[
+            Direction { key: "axis", default: X, stands: InFirst, along: Axis::X },
+            Direction { key: "axis2", default: Y, stands: InSecond, along: Axis::Y },
+        ],
+        rows: &[M, M, M, RAD],
+        make: |n| LoopKind::Universal { axes: n.directions },
+        ..like(&UNIVERSAL)
+    },
+    LoopSpec {
+        directions: &[normal(InBoth)],
+        rows: &[M, RAD, RAD],
+        make: |n| LoopKind::Planar { normal: n.directions[0] },
+        ..like(&PLANAR)
+    },
+    LoopSpec { rows: &[M, M, M], make: |_| LoopKind::Spherical, ..like(&SPHERICAL) },
+    LoopSpec { rows: &[M, M, M, RAD, RAD, RAD], make: |_| LoopKind::Fixed, ..like(&FIXED) },
+    LoopSpec {
+        words: Words::new("distance", &[], &["rod", "bar", "link"]),
+        number: Some("length"),
+        make: |n| LoopKind::Distance { length: n.number },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("point_on_line", &[], &["inline"]),
+        directions: &[axis(InFirst)],
+        rows: &[M, M],
+        make: |n| LoopKind::PointOnLine { axis: n.directions[0] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("point_on_plane", &[], &["inplane", "point_on_surface"]),
+        directions: &[normal(InFirst)],
+        make: |n| LoopKind::PointOnPlane { normal: n.directions[0] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("point_on_cylinder", &[], &[]),
+        directions: &[axis(InFirst)],
+        number: Some("radius"),
+        make: |n| LoopKind::PointOnCylinder { axis: n.directions[0], radius: n.number },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_disc", &[], &["disc", "disk", "rolling_disk", "wheel"]),
+        directions: &[normal(InFirst), axis(InSecond)],
+        number: Some("radius"),
+        rows: &[M, M, M],
+        make: |n| LoopKind::RollingDisc { normal: n.directions[0], axis: n.directions[1], radius: n.number },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_ball", &[], &[]),
+        directions: &[normal(InFirst)],
+        number: Some("radius"),
+        rows: &[M, M, M],
+        make: |n| LoopKind::RollingBall { normal: n.directions[0], radius: n.number },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("knife_edge", &[], &["skate"]),
+        directions: &[axis(InSecond)],
+        positions: false,
+        make: |n| LoopKind::KnifeEdge { axis: n.directions[0] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("pfaffian", &[], &["nonholonomic"]),
+        number: Some("row"),
+        positions: false,
+        make: |n| LoopKind::Pfaffian { row: n.row },
+        ..PLAIN
+    },
+];
+
+/// Kinds of loops are told apart by their words.
+impl PartialEq for LoopSpec {
+    fn eq(&self, other: &LoopSpec) -> bool {
+        self.words == other.words
+    }
+}
+
+impl LoopSpec {
+    /// Its word in models, messages and generated code.
+    pub fn word(&self) -> &'static str {
+        self.words.word
+    }
+
+    /// Keys it has in models beside `name`, `type` and `between`.
+    pub fn keys(&self) -> impl Iterator<Item = &'static str> {
+        let decay = self.positions.then_some("decay");
+        self.directions.iter().map(|d| d.key).chain(self.number).chain(decay)
+    }
+}
+
+impl LoopKind {
+    /// What distinguishes its kind.
+    pub fn spec(&self) -> &'static LoopSpec {
+        let index = match self {
+            LoopKind::Revolute { .. } => 0,
+            LoopKind::Prismatic { .. } => 1,
+            LoopKind::Cylindrical { .. } => 2,
+            LoopKind::Helical { .. } => 3,
+            LoopKind::Universal { .. } => 4,
+            LoopKind::Planar { .. } => 5,
+            LoopKind::Spherical => 6,
+            LoopKind::Fixed => 7,
+            LoopKind::Distance { .. } => 8,
+            LoopKind::PointOnLine { .. } => 9,
+            LoopKind::PointOnPlane { .. } => 10,
+            LoopKind::PointOnCylinder { .. } => 11,
+            LoopKind::RollingDisc { .. } => 12,
+            LoopKind::RollingBall { .. } => 13,
+            LoopKind::KnifeEdge { .. } => 14,
+            LoopKind::Pfaffian { .. } => 15,
+        };
+        &LOOPS[index]
+    }
+
+    /// Its word in models and messages.
+    pub fn word(&self) -> &'static str {
+        self.spec().word()
+    }
+
+    /// Its directions, as many as [`LoopSpec::directions`].
+    pub fn directions(&self) -> Vec<[f64; 3]> {
+        match *self {
+            LoopKind::Revolute { axis: a }
+            | LoopKind::Prismatic { axis: a }
+            | LoopKind::Cylindrical { axis: a }
+            | LoopKind::Helical { axis: a, .. }
+            | LoopKind::Planar { normal: a }
+            | LoopKind::PointOnLine { axis: a }
+            | LoopKind::PointOnPlane { normal: a }
+            | LoopKind::PointOnCylinder { axis: a, .. }
+            | LoopKind::RollingBall { normal: a, .. }
+            | LoopKind::KnifeEdge { axis: a } => vec![a],
+            LoopKind::Universal { axes: [a, b] } | LoopKind::RollingDisc { normal: a, axis: b, .. } => vec![a, b],
+            LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => Vec::new(),
+        }
+    }
+
+    /// The number it takes, or the six of a row.
+    pub fn numbers_mut(&mut self) -> &mut [Value] {
+        match self {
+            LoopKind::Helical { pitch: x, .. }
+            | LoopKind::Distance { length: x }
+            | LoopKind::PointOnCylinder { radius: x, .. }
+            | LoopKind::RollingDisc { radius: x, .. }
+            | LoopKind::RollingBall { radius: x, .. } => std::slice::from_mut(x),
+            LoopKind::Pfaffian { row } => row,
+            _ => &mut [],
+        }
+    }
+
+    /// The constraint as the sweeps know it, between frames that are turned as its directions want.
+    pub fn closure(&self) -> Closure<Value> {
+        match *self {
+            LoopKind::Revolute { .. } => Closure::Revolute,
+            LoopKind::Prismatic { .. } => Closure::Prismatic,
+            LoopKind::Cylindrical { .. } => Closure::Cylindrical,
+            LoopKind::Helical { pitch, .. } => Closure::Helical { pitch },
+            LoopKind::Universal { .. } => Closure::Universal,
+            LoopKind::Planar { .. } => Closure::Planar,
+            LoopKind::Spherical => Closure::Spherical,
+            LoopKind::Fixed => Closure::Fixed,
+            LoopKind::Distance { length } => Closure::Distance { length },
+            LoopKind::PointOnLine { .. } => Closure::PointOnLine,
+            LoopKind::PointOnPlane { .. } => Closure::PointOnPlane,
+            LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius },
+            LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius },
+            LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius },
+            LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
+            LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
+        }
+    }
+}
+
+/// What a constraint binds.
+// A model has few of them, and they are read as they stand.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConstraintKind {
+    /// Two bodies.
+    Loop {
+        /// How.
+        kind: LoopKind,
+        /// First frame.
+        first: Mount,
+        /// Second frame.
+        second: Mount,
+    },
+    /// Joints of one freedom: `Σ ratio · q = offset`.
+    Coupling {
+        /// Joint index and ratio; every joint once, free, not a mimic.
+        terms: Vec<(usize, Value)>,
+        /// Offset.
+        offset: Value,
+    },
+}
+
+/// A constraint beside the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constraint {
+    /// Name, unique among the constraints.
+    pub name: String,
+    /// What it binds.
+    pub kind: ConstraintKind,
+    /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s; zero: not at all.
+    pub decay: Value,
+    /// Where it is described.
+    pub origin: Origin,
+}
+
+impl Constraint {
+    /// A constraint that was not read from a text.
+    pub fn new(name: impl Into<String>, kind: ConstraintKind, decay: Value) -> Constraint {
+        Constraint { name: name.into(), kind, decay, origin: Origin::default() }
+    }
+
+    /// What it is called in models and messages: `loop` or `coupling`.
+    pub fn word(&self) -> &'static str {
+        match self.kind {
+            ConstraintKind::Loop { .. } => "loop",
+            ConstraintKind::Coupling { .. } => "coupling",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_is_listed_once_and_agrees_with_the_sweeps() {
+        let numbers = LoopNumbers { directions: [X, Y], number: Value::ONE, row: [Value::ONE; 6] };
+        for spec in &LOOPS {
+            let mut kind = (spec.make)(numbers);
+            assert_eq!(kind.spec(), spec);
+            assert_eq!(kind.directions(), [X, Y][..spec.directions.len()], "{}", spec.word());
+            assert_eq!(kind.numbers_mut().is_empty(), spec.number.is_none(), "{}", spec.word());
+            let closure = kind.closure();
+            assert_eq!(closure.rows(), spec.rows.len(), "{}", spec.word());
+            assert_eq!((0..closure.rows()).any(|k| closure.holonomic(k)), spec.positions, "{}", spec.word());
+        }
+        Words::assert_distinct(LOOPS.iter().map(|spec| &spec.words));
+    }
+
+    #[test]
+    fn the_documents_have_the_same_table() {
+        let document = include_str!("../../../docs/model-format.md");
+        for spec in &LOOPS {
+            let keys: Vec<String> = spec.keys().filter(|key| *key != "decay").map(|key| format!("`{key}`")).collect();
+            let row =
+                format!("| `{}` | {} | {} |", spec.word(), keys.join(", "), spec.rows.len()).replace("|  |", "| |");
+            assert!(document.lines().any(|line| line.starts_with(&row)), "docs/model-format.md has no row\n{row}");
+        }
+    }
+}
