@@ -1,8 +1,8 @@
 //! Choice of the node frames.
 //!
-//! The frame of a revolute joint may be rotated about its axis and displaced along it. Both are chosen so that the
-//! transform to the next joint (the one with the largest subtree) is a screw along x alone, `X(α, a)`, in the manner of
-//! Denavit, Hartenberg and Khalil. Constants vanish, and the rest of the rotation is added to the joint angle.
+//! A pin's frame may be turned about and slid along its axis. Both are used up so that the way to the (largest) next
+//! joint is a screw along x alone, `X(α, a)`, in the manner of Denavit, Hartenberg and Khalil: constants vanish, and
+//! what is left of the turn goes into the joint angle.
 
 use mbd_runtime::spatial::Vec3;
 use mbd_runtime::tree::{Elimination, Source};
@@ -39,7 +39,7 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
         pose.push(PoseStep::Rotate(align.rot));
         let way = factored(&pose);
         let primary = (0..elements.list.len()).filter(|&c| elements.list[c].parent == Some(k)).max_by(|&a, &b| {
-            // Among equals the first one.
+            // The first of equals.
             weights[a].cmp(&weights[b]).then(b.cmp(&a))
         });
         let line = primary.and_then(|c| line_of(elements, c, &align));
@@ -71,7 +71,7 @@ fn weights(elements: &Elements) -> Vec<usize> {
     weights
 }
 
-/// Transform to the axis of an element: constants are factored into screws, parameters are left unchanged.
+/// Way to the axis of an element: constants factored into screws, parameters left as they stand.
 fn factored(pose: &[PoseStep]) -> Screws {
     let lengths = |pose: &[PoseStep]| {
         let shifts = pose.iter().map(|step| if let PoseStep::Shift { r, .. } = step { r.constant() } else { None });
@@ -80,7 +80,7 @@ fn factored(pose: &[PoseStep]) -> Screws {
     if let Some(t) = constant(pose) {
         return screws(&t, lengths(pose));
     }
-    // Each constant part between parameters is factored separately.
+    // Constant stretches between parameters are factored each by itself.
     let mut steps = Vec::new();
     let mut stretch: Vec<PoseStep> = Vec::new();
     for step in pose {
@@ -121,8 +121,8 @@ fn centre(model: &Model, elements: &Elements, k: usize, align: &Rigid) -> Option
     Some(sum)
 }
 
-/// At a tip, the rotation either makes the joint angle the coordinate itself, or points x at the centre of mass. One
-/// more zero in the first moment is worth the addition to the angle.
+/// At a tip, the turn either makes the joint angle the frame's own, or turns x to the mass centre: one zero more in the
+/// first moment is worth the addition to the angle.
 fn tip(way: &Screws, kind: NodeKind, centre: Option<Vec3<f64>>) -> (Turn, f64) {
     let (c, s) = way.turn;
     let undo = (c, -s);
@@ -143,7 +143,7 @@ fn tip(way: &Screws, kind: NodeKind, centre: Option<Vec3<f64>>) -> (Turn, f64) {
     (turn, -way.slide)
 }
 
-/// A direction across the axis. Both signs are possible; the one closer to the present frame is chosen.
+/// A direction across the axis; either sense will do, so the one nearer to where the frame stands.
 fn unit(x: f64, y: f64) -> Turn {
     let n = x.hypot(y);
     let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
@@ -155,7 +155,7 @@ fn unit(x: f64, y: f64) -> Turn {
     }
 }
 
-/// Rotation about and displacement along a joint's own axis that make the transform to the next axis simple.
+/// Turn about and slide along the own axis that make the way to the next one simple.
 fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn, f64) {
     let (c, s) = way.turn;
     let undo = ((c, -s), -way.slide);
@@ -173,7 +173,7 @@ fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn,
     let along = point[0] * ux + point[1] * uy + point[2] * uz;
     let h = (point[2] - along * uz) / (sine * sine);
     if sine < 1e-6 || h.abs() > 20.0 * size {
-        // The axes are nearly parallel: their common normal is too far away to be useful, but its direction is useful.
+        // Nearly parallel: the common normal is too far away to be of use, but its direction is not.
         return (unit(-uy, ux), point[2]);
     }
     (unit(-uy, ux), if h.abs() <= ROUND_OFF * size { 0.0 } else { h })
@@ -227,8 +227,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
     }
 }
 
-/// Coordinates of a joint's freedom; those of a mimic joint are the coordinates of the joint at the end of its chain of
-/// leaders.
+/// Coordinates of a joint's freedom; a mimic's are those of the joint it follows in the end.
 fn source(model: &Model, slots: &[Slot], joint: usize, first: usize) -> (Source, Vec<(Value, Value)>) {
     let mut follow = Vec::new();
     let mut at = joint;
@@ -271,7 +270,7 @@ fn add_inertias(model: &Model, elements: &Elements, inside: &[Rigid], nodes: &mu
     }
 }
 
-/// Restores zeros that rotations have changed to round-off.
+/// Zeros that rotations have smeared into round-off come back.
 fn clean_inertia(x: &mut [f64; 10]) {
     for range in [1..4, 4..10] {
         let size = x[range.clone()].iter().fold(0.0_f64, |m, x| m.max(x.abs()));

@@ -1,4 +1,4 @@
-//! Converts a plan to a tree over any scalar: numbers, symbols, dual numbers.
+//! From the plan to a tree of any scalar: numbers, symbols, duals. The fork is one type parameter.
 
 use mbd_runtime::spatial::{add3, ElementaryTransform, Mat3, RigidInertia, Vec3, SYM};
 use mbd_runtime::system::Row;
@@ -32,7 +32,7 @@ fn steps<S: Scalar>(pose: &[PoseStep], params: &[S]) -> Vec<ElementaryTransform<
 }
 
 /// Inertia of a body at a frame in which it stands at `(rot, pos)`: mass, centre of mass, inertia about it
-/// `[xx, yy, zz, xy, xz, yz]` in axes rotated by `axes` from those of the body.
+/// `[xx, yy, zz, xy, xz, yz]` in axes turned by `axes` from those of the body.
 pub(super) fn body_inertia<S: Scalar>(
     mass: S,
     com: Vec3<S>,
@@ -170,7 +170,7 @@ impl Plan {
     }
 }
 
-/// A kind of loop in the form that the sweeps use.
+/// A kind of loop as the sweeps know it.
 pub(super) fn closure<S: Scalar>(kind: &LoopKind, params: &[S]) -> Closure<S> {
     let of = |v: Value| match v {
         Value::Const(x) => S::constant(x),

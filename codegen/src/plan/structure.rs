@@ -5,10 +5,10 @@ use mbd_runtime::tree::{Dims, Elimination, Source, Unknown, WrenchAxes};
 
 use crate::model::{JointKind, LoopKind, Model, Param, Value};
 
-/// One elementary transform of a pose.
+/// One elementary step of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PoseStep {
-    /// A constant rotation about an axis.
+    /// A constant turn.
     Turn {
         /// Axis.
         axis: Axis,
@@ -17,7 +17,7 @@ pub enum PoseStep {
         /// Sine.
         s: f64,
     },
-    /// A rotation by a number of the model.
+    /// A turn by a number of the model.
     TurnBy {
         /// Axis.
         axis: Axis,
@@ -35,18 +35,18 @@ pub enum PoseStep {
     Rotate(Mat3<f64>),
 }
 
-/// Kind of a node's joint; rotations are about z, and translations along z, of the node frame.
+/// Kind of a node's joint; the turn or slide is about z of the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeKind {
-    /// Rotation about z.
+    /// Turn.
     Revolute,
-    /// Translation along z.
+    /// Slide.
     Prismatic,
-    /// Screw motion about z.
+    /// Turn with a slide.
     Helical(Value),
-    /// Two translations and a rotation.
+    /// Two slides and a turn.
     Planar,
-    /// Any rotation.
+    /// Rotation.
     Spherical,
     /// Any motion.
     Floating,
@@ -66,8 +66,7 @@ impl NodeKind {
 /// A joint of the tree and the bodies that move with it.
 #[derive(Clone, Debug)]
 pub struct PlanNode {
-    /// Name for messages: that of the child body, or that of the joint for the massless body inside a universal or
-    /// cylindrical joint.
+    /// Name for people: the child body; the joint for the massless body inside a universal or cylindrical joint.
     pub name: String,
     /// Parent node.
     pub parent: Option<usize>,
@@ -81,17 +80,17 @@ pub struct PlanNode {
     pub source: Source,
     /// Ratios and offsets of a mimic, leader first.
     pub follow: Vec<(Value, Value)>,
-    /// Constant rotation added to the angle, rad.
+    /// Constant turn added to the angle, rad.
     pub phase: f64,
-    /// Number of right angles added to the angle.
+    /// Further right angles.
     pub quarter: u8,
-    /// Constant displacement along z, m.
+    /// Constant slide along z, m.
     pub slide: f64,
     /// Constant inertia `[m, mcx, mcy, mcz, xx, xy, xz, yy, yz, zz]` at the node frame.
     pub inertia: [f64; 10],
     /// Bodies with parameters in their inertia or pose: body index and pose in the node frame.
     pub variable: Vec<(usize, Vec<PoseStep>)>,
-    /// Elimination of its degrees of freedom.
+    /// How its freedoms are eliminated.
     pub elimination: Elimination,
     /// Whether the generator may make it part of rolled code.
     pub rolled: bool,
@@ -140,15 +139,15 @@ pub struct Plan {
     pub wrenches: Vec<(usize, WrenchAxes)>,
     /// Loops and couplings.
     pub constraints: Vec<PlanConstraint>,
-    /// Notices about changes, such as angles that became right angles.
+    /// What was changed on the way.
     pub notices: Vec<String>,
     /// See [`mbd_runtime::tree::Tree`].
     pub matrix_depth: usize,
-    /// The same plan with another elimination for accelerations, if that is cheaper.
+    /// The same with another choice of what is solved where, for accelerations, if that is cheaper.
     pub accelerations: Option<Box<Plan>>,
 }
 
-/// The nodes that a constraint connects.
+/// What a constraint binds, on nodes.
 #[derive(Clone, Debug)]
 pub enum PlanBond {
     /// Two frames.
@@ -240,7 +239,7 @@ impl Plan {
         .collect()
     }
 
-    /// Initial coordinates: those of the model's `start`s, neutral where it states none.
+    /// Coordinates that the model starts with: those of its `start`s, neutral where it states none.
     pub fn start(&self) -> Vec<f64> {
         let mut q = vec![0.0; self.dims.nq];
         for slot in &self.slots {
@@ -261,7 +260,7 @@ impl Plan {
         q
     }
 
-    /// Which velocities belong to joints that keep their start when loops are closed.
+    /// Velocities of joints that stay where they start when loops are closed.
     pub fn held(&self) -> Vec<bool> {
         let mut held = vec![false; self.dims.nv];
         for start in self.model.starts.iter().filter(|s| s.held) {
@@ -278,7 +277,7 @@ impl Plan {
         std::iter::successors(Some(i), |&i| self.nodes[i].parent).collect()
     }
 
-    /// Removes the columns of some unknowns, which are then not solved for.
+    /// Closes the columns of some unknowns, which are then solved nowhere.
     pub(crate) fn close_columns(&mut self, unknowns: &[usize]) {
         for node in &mut self.nodes {
             node.elimination.retain_columns(|g| !unknowns.contains(&g));
@@ -312,7 +311,7 @@ impl PlanConstraint {
         self.bond.cycle()
     }
 
-    /// The same with new numbers for the nodes, all of which have one.
+    /// With other numbers for the nodes, all of which have one.
     pub(crate) fn renumbered(&self, numbers: &[Option<usize>]) -> PlanConstraint {
         let mut out = self.clone();
         let renumber = |i: &mut usize| *i = numbers[*i].unwrap_or_default();
@@ -326,7 +325,7 @@ impl PlanConstraint {
         out
     }
 
-    /// The part of it that decides which elimination is best.
+    /// What of it decides which form is best.
     pub(crate) fn letters(&self) -> String {
         match &self.bond {
             PlanBond::Cut { kind, frames, paths } => {
