@@ -4181,6 +4181,14 @@ impl ::multibody::runtime::System for Chain100 {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 100], v: &[f64; 100], qd: &mut [f64; 100]) {
         Self::coordinate_rates(self, q, v, qd);
     }

@@ -5251,6 +5251,14 @@ impl ::multibody::runtime::System for Chain10Planar {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 10], v: &[f64; 10], qd: &mut [f64; 10]) {
         Self::coordinate_rates(self, q, v, qd);
     }

@@ -5197,6 +5197,14 @@ impl ::multibody::runtime::System for Chain6 {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 6], v: &[f64; 6], qd: &mut [f64; 6]) {
         Self::coordinate_rates(self, q, v, qd);
     }

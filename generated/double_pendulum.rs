@@ -1321,6 +1321,14 @@ impl ::multibody::runtime::System for DoublePendulum {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
         Self::coordinate_rates(self, q, v, qd);
     }

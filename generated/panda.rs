@@ -5367,6 +5367,14 @@ impl ::multibody::runtime::System for Panda {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 8], v: &[f64; 8], qd: &mut [f64; 8]) {
         Self::coordinate_rates(self, q, v, qd);
     }

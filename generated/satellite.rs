@@ -4320,6 +4320,14 @@ impl ::multibody::runtime::System for Satellite {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 7], v: &[f64; 6], qd: &mut [f64; 7]) {
         Self::coordinate_rates(self, q, v, qd);
     }

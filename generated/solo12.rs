@@ -9993,6 +9993,14 @@ impl ::multibody::runtime::System for Solo12 {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 19], v: &[f64; 18], qd: &mut [f64; 19]) {
         Self::coordinate_rates(self, q, v, qd);
     }

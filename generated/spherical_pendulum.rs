@@ -2285,6 +2285,14 @@ impl ::multibody::runtime::System for SphericalPendulum {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 5], v: &[f64; 4], qd: &mut [f64; 5]) {
         Self::coordinate_rates(self, q, v, qd);
     }
