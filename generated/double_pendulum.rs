@@ -19,9 +19,9 @@
 //   inverse_dynamics: 10 + 14 + 0 = 24; 0, 2
 //   bias: 5 + 10 + 0 = 15; 0, 2
 //   jacobians: 3 + 4 + 0 = 7; 0, 1
-//   drifts: 2 + 4 + 0 = 6; 0, 1
+//   bias_accelerations: 2 + 4 + 0 = 6; 0, 1
 
-/// Dynamics of `double_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, drifts. Set the fields between calls.
+/// Dynamics of `double_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, bias_accelerations. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
 #[rustfmt::skip]
 pub struct DoublePendulum {
@@ -29,7 +29,7 @@ pub struct DoublePendulum {
     pub tau: [f64; 2],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl DoublePendulum {
     /// Number of coordinates.
@@ -64,7 +64,7 @@ impl DoublePendulum {
         DoublePendulum { tau: [0.0; 2] }
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 32 operations: 14 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2]) {
@@ -93,56 +93,56 @@ impl DoublePendulum {
             let tau_0 = given[2][l];
             let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia0 = 0.5 * lower_sin0;
-            let lower_inertia1 = 0.5 * lower_cos0;
-            let lower_inertia2 = lower_inertia1 + lower_inertia1;
-            let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
-            let lower_inertia4 = lower_inertia1 + 1.5;
-            let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
-            let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+            let lower_minus_u_x = 0.5 * lower_sin;
+            let lower_u_y = 0.5 * lower_cos;
+            let lower_t0 = lower_u_y + lower_u_y;
+            let lower_t1 = lower_t0 + 0.33340000000000003;
+            let upper_minus_m_ry_z = lower_u_y + 1.5;
+            let upper_m_rz_rz = lower_t1 + 1.3334000000000001;
+            let lower_t2 = lower_u_y + 0.33340000000000003;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
-            let upper_pivot1 = lower_inertia6 * upper_pivot0;
-            let upper_pivot2 = lower_inertia5 - upper_pivot1;
-            let upper_pivot3 = 1.0 / upper_pivot2;
-            // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = 2.9994001199760048 * p_1;
-            let upper_rest1 = lower_inertia6 * upper_rest0;
-            let upper_rest2 = p_0 - upper_rest1;
-            let upper_rest3 = upper_pivot3 * upper_rest2;
+            let upper_t0 = 2.9994001199760048 * lower_t2;
+            let upper_t1 = lower_t2 * upper_t0;
+            let upper_u_rz = upper_m_rz_rz - upper_t1;
+            let upper_rho = 1.0 / upper_u_rz;
+            // upper: bias momentum D, D' (4.45, 4.49)
+            let upper_t2 = 2.9994001199760048 * p_1;
+            let upper_t3 = lower_t2 * upper_t2;
+            let upper_t4 = p_0 - upper_t3;
+            let upper_e = upper_rho * upper_t4;
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = upper_pivot0 * upper_rest3;
-            let upper_vel1 = upper_rest0 - upper_vel0;
+            let upper_t5 = upper_t0 * upper_e;
+            let lower_v = upper_t2 - upper_t5;
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = upper_rest3 + upper_vel1;
+            let lower_omega_rz = upper_e + lower_v;
             // upper: gravity and wrenches
-            let upper_load0 = 9.81 * upper_cos0;
-            let upper_load1 = 9.81 * upper_sin0;
+            let upper_g_x = 9.81 * upper_cos;
+            let upper_minus_g_y = 9.81 * upper_sin;
             // lower: gravity and wrenches
-            let lower_load0 = lower_cos0 * upper_load1;
-            let lower_load1 = lower_sin0 * upper_load0;
-            let lower_load2 = lower_load0 + lower_load1;
+            let lower_t3 = lower_cos * upper_minus_g_y;
+            let lower_t4 = lower_sin * upper_g_x;
+            let lower_minus_g_y = lower_t3 + lower_t4;
             // upper: momentum rate (4.36)
-            let upper_pdot0 = lower_inertia4 * upper_load1;
-            let upper_pdot1 = lower_inertia0 * upper_load0;
-            let upper_pdot2 = upper_pdot0 + upper_pdot1;
+            let upper_t6 = upper_minus_m_ry_z * upper_minus_g_y;
+            let upper_t7 = lower_minus_u_x * upper_g_x;
+            let upper_t8 = upper_t6 + upper_t7;
             // lower: momentum rate (4.36)
-            let lower_pdot0 = lower_inertia0 * lower_vel0;
-            let lower_pdot1 = upper_rest3 * lower_pdot0;
-            let lower_pdot2 = 0.5 * lower_load2;
-            let lower_pdot3 = lower_pdot1 + lower_pdot2;
-            let lower_pdot4 = tau_0 - upper_pdot2;
-            let lower_pdot5 = tau_1 - lower_pdot3;
-            results[0][l] = upper_rest3;
-            results[1][l] = upper_vel1;
-            results[2][l] = lower_pdot4;
-            results[3][l] = lower_pdot5;
+            let lower_t5 = lower_minus_u_x * lower_omega_rz;
+            let lower_t6 = upper_e * lower_t5;
+            let lower_t7 = 0.5 * lower_minus_g_y;
+            let lower_t8 = lower_t6 + lower_t7;
+            let pd_0 = tau_0 - upper_t8;
+            let pd_1 = tau_1 - lower_t8;
+            results[0][l] = upper_e;
+            results[1][l] = lower_v;
+            results[2][l] = pd_0;
+            results[3][l] = pd_1;
         }
         qd.give(0, &results[0]);
         qd.give(1, &results[1]);
@@ -150,7 +150,7 @@ impl DoublePendulum {
         pd.give(1, &results[3]);
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     /// 15 operations: 7 additions, 7 multiplications, 1 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 2], p: &[f64; 2], v: &mut [f64; 2]) {
@@ -173,28 +173,28 @@ impl DoublePendulum {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
             // lower: sine and cosine, rotation
-            let lower_cos0 = cosines[0][l];
+            let lower_cos = cosines[0][l];
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia0 = 0.5 * lower_cos0;
-            let lower_inertia1 = lower_inertia0 + lower_inertia0;
-            let lower_inertia2 = lower_inertia1 + 0.33340000000000003;
-            let lower_inertia3 = lower_inertia2 + 1.3334000000000001;
-            let lower_inertia4 = lower_inertia0 + 0.33340000000000003;
+            let lower_u_y = 0.5 * lower_cos;
+            let lower_t0 = lower_u_y + lower_u_y;
+            let lower_t1 = lower_t0 + 0.33340000000000003;
+            let upper_m_rz_rz = lower_t1 + 1.3334000000000001;
+            let lower_t2 = lower_u_y + 0.33340000000000003;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 2.9994001199760048 * lower_inertia4;
-            let upper_pivot1 = lower_inertia4 * upper_pivot0;
-            let upper_pivot2 = lower_inertia3 - upper_pivot1;
-            let upper_pivot3 = 1.0 / upper_pivot2;
-            // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = 2.9994001199760048 * p_1;
-            let upper_rest1 = lower_inertia4 * upper_rest0;
-            let upper_rest2 = p_0 - upper_rest1;
-            let upper_rest3 = upper_pivot3 * upper_rest2;
+            let upper_t0 = 2.9994001199760048 * lower_t2;
+            let upper_t1 = lower_t2 * upper_t0;
+            let upper_u_rz = upper_m_rz_rz - upper_t1;
+            let upper_rho = 1.0 / upper_u_rz;
+            // upper: bias momentum D, D' (4.45, 4.49)
+            let upper_t2 = 2.9994001199760048 * p_1;
+            let upper_t3 = lower_t2 * upper_t2;
+            let upper_t4 = p_0 - upper_t3;
+            let upper_e = upper_rho * upper_t4;
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = upper_pivot0 * upper_rest3;
-            let upper_vel1 = upper_rest0 - upper_vel0;
-            results[0][l] = upper_rest3;
-            results[1][l] = upper_vel1;
+            let upper_t5 = upper_t0 * upper_e;
+            let lower_v = upper_t2 - upper_t5;
+            results[0][l] = upper_e;
+            results[1][l] = lower_v;
         }
         v.give(0, &results[0]);
         v.give(1, &results[1]);
@@ -223,22 +223,22 @@ impl DoublePendulum {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
             // lower: sine and cosine, rotation
-            let lower_cos0 = cosines[0][l];
+            let lower_cos = cosines[0][l];
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * lower_cos0;
-            let lower_vel1 = v_0 + v_1;
+            let lower_hat_y = v_0 * lower_cos;
+            let lower_omega_rz = v_0 + v_1;
             // upper: momentum
-            let upper_mom0 = 1.3334000000000001 * v_0;
+            let upper_t0 = 1.3334000000000001 * v_0;
             // lower: momentum
-            let lower_mom0 = 0.33340000000000003 * lower_vel1;
-            let lower_mom1 = 0.5 * lower_vel1;
-            let lower_mom2 = 0.5 * lower_vel0;
-            let lower_mom3 = lower_mom0 + lower_mom2;
-            let lower_mom4 = lower_cos0 * lower_mom1;
-            let lower_mom5 = lower_mom3 + lower_mom4;
-            let lower_mom6 = upper_mom0 + lower_mom5;
-            results[0][l] = lower_mom6;
-            results[1][l] = lower_mom3;
+            let lower_t0 = 0.33340000000000003 * lower_omega_rz;
+            let lower_p_y = 0.5 * lower_omega_rz;
+            let lower_t1 = 0.5 * lower_hat_y;
+            let lower_p_rz = lower_t0 + lower_t1;
+            let lower_t2 = lower_cos * lower_p_y;
+            let lower_t3 = lower_p_rz + lower_t2;
+            let upper_p_rz = upper_t0 + lower_t3;
+            results[0][l] = upper_p_rz;
+            results[1][l] = lower_p_rz;
         }
         p.give(0, &results[0]);
         p.give(1, &results[1]);
@@ -248,13 +248,13 @@ impl DoublePendulum {
     /// 25 operations: 10 additions, 14 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 2], p: &[f64; 2]) -> [f64; 2] {
-        let mut result = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
-        result
+        let mut energy = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        energy
     }
 
     #[inline(always)]
-    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
         for l in 0..LANES {
             let q_0 = q.get(0, l);
@@ -271,52 +271,52 @@ impl DoublePendulum {
             let p_0 = given[0][l];
             let p_1 = given[1][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia0 = 0.5 * lower_sin0;
-            let lower_inertia1 = 0.5 * lower_cos0;
-            let lower_inertia2 = lower_inertia1 + lower_inertia1;
-            let lower_inertia3 = lower_inertia2 + 0.33340000000000003;
-            let lower_inertia4 = lower_inertia1 + 1.5;
-            let lower_inertia5 = lower_inertia3 + 1.3334000000000001;
-            let lower_inertia6 = lower_inertia1 + 0.33340000000000003;
+            let lower_minus_u_x = 0.5 * lower_sin;
+            let lower_u_y = 0.5 * lower_cos;
+            let lower_t0 = lower_u_y + lower_u_y;
+            let lower_t1 = lower_t0 + 0.33340000000000003;
+            let upper_minus_m_ry_z = lower_u_y + 1.5;
+            let upper_m_rz_rz = lower_t1 + 1.3334000000000001;
+            let lower_t2 = lower_u_y + 0.33340000000000003;
             // upper: inertia carried to the parent, M* (4.48)
-            let upper_inertia0 = upper_sin0 * lower_inertia0;
-            let upper_inertia1 = upper_cos0 * lower_inertia4;
-            let upper_inertia2 = upper_inertia0 - upper_inertia1;
+            let upper_t0 = upper_sin * lower_minus_u_x;
+            let upper_t1 = upper_cos * upper_minus_m_ry_z;
+            let upper_minus_mp_rx_z = upper_t0 - upper_t1;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 2.9994001199760048 * lower_inertia6;
-            let upper_pivot1 = lower_inertia6 * upper_pivot0;
-            let upper_pivot2 = lower_inertia5 - upper_pivot1;
-            let upper_pivot3 = 1.0 / upper_pivot2;
-            // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = 2.9994001199760048 * p_1;
-            let upper_rest1 = lower_inertia6 * upper_rest0;
-            let upper_rest2 = p_0 - upper_rest1;
-            let upper_rest3 = upper_pivot3 * upper_rest2;
+            let upper_t2 = 2.9994001199760048 * lower_t2;
+            let upper_t3 = lower_t2 * upper_t2;
+            let upper_u_rz = upper_m_rz_rz - upper_t3;
+            let upper_rho = 1.0 / upper_u_rz;
+            // upper: bias momentum D, D' (4.45, 4.49)
+            let upper_t4 = 2.9994001199760048 * p_1;
+            let upper_t5 = lower_t2 * upper_t4;
+            let upper_t6 = p_0 - upper_t5;
+            let upper_e = upper_rho * upper_t6;
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = upper_pivot0 * upper_rest3;
-            let upper_vel1 = upper_rest0 - upper_vel0;
+            let upper_t7 = upper_t2 * upper_e;
+            let lower_v = upper_t4 - upper_t7;
             // upper: energy
-            let upper_energy0 = p_0 * upper_rest3;
+            let upper_t8 = p_0 * upper_e;
             // lower: energy
-            let lower_energy0 = p_1 * upper_vel1;
-            let lower_energy1 = upper_energy0 + lower_energy0;
-            let lower_energy2 = 0.5 * lower_energy1;
+            let lower_t3 = p_1 * lower_v;
+            let lower_t4 = upper_t8 + lower_t3;
+            let energy_0 = 0.5 * lower_t4;
             // ground: energy
-            let ground_energy0 = 9.81 * upper_inertia2;
-            results[0][l] = lower_energy2;
-            results[1][l] = ground_energy0;
+            let energy_1 = 9.81 * upper_minus_mp_rx_z;
+            results[0][l] = energy_0;
+            results[1][l] = energy_1;
         }
-        result.give(0, &results[0]);
-        result.give(1, &results[1]);
+        energy.give(0, &results[0]);
+        energy.give(1, &results[1]);
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     /// 29 operations: 11 additions, 17 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
@@ -345,59 +345,59 @@ impl DoublePendulum {
             let tau_0 = given[2][l];
             let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia0 = 0.5 * lower_cos0;
+            let lower_u_y = 0.5 * lower_cos;
             // lower: U, Mj, k and the reduced inertia M' (4.44)
-            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
-            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            let lower_k_y = 2.9994001199760048 * lower_u_y;
+            let lower_minus_mp_yy = lower_u_y * lower_k_y;
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
+            let upper_minus_m_rz_rz = lower_minus_mp_yy - 1.3334000000000001;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 1.0 / lower_inertia1;
+            let upper_minus_rho = 1.0 / upper_minus_m_rz_rz;
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = 9.81 * upper_cos0;
-            let upper_vel1 = 9.81 * upper_sin0;
+            let upper_minus_accel_x = 9.81 * upper_cos;
+            let upper_accel_y = 9.81 * upper_sin;
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * v_0;
-            let lower_vel1 = upper_vel0 + lower_vel0;
-            let lower_vel2 = lower_cos0 * upper_vel1;
-            let lower_vel3 = lower_sin0 * lower_vel1;
-            let lower_vel4 = lower_vel2 + lower_vel3;
-            let lower_vel5 = v_0 + v_1;
+            let lower_t0 = v_0 * v_0;
+            let lower_t1 = upper_minus_accel_x + lower_t0;
+            let lower_t2 = lower_cos * upper_accel_y;
+            let lower_t3 = lower_sin * lower_t1;
+            let lower_accel_y = lower_t2 + lower_t3;
+            let lower_spin_z = v_0 + v_1;
             // upper: gravity and wrenches
-            let upper_load0 = 1.5 * upper_vel1;
+            let upper_f_rz = 1.5 * upper_accel_y;
             // lower: gravity and wrenches
-            let lower_load0 = lower_vel5 * lower_vel5;
-            let lower_load1 = 0.5 * lower_load0;
-            let lower_load2 = 0.5 * lower_vel4;
-            // lower: momentum remainder D, D' (4.45, 4.49)
-            let lower_rest0 = lower_sin0 * lower_load1;
-            let lower_rest1 = tau_1 - lower_load2;
-            let lower_rest2 = 2.9994001199760048 * lower_rest1;
-            let lower_rest3 = lower_inertia0 * lower_rest2;
-            let lower_rest4 = lower_rest0 - lower_rest3;
-            let lower_rest5 = tau_1 - lower_rest4;
-            let lower_rest6 = upper_load0 + lower_rest5;
-            // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = tau_0 - lower_rest6;
-            let upper_rest1 = upper_pivot0 * upper_rest0;
+            let lower_t4 = lower_spin_z * lower_spin_z;
+            let lower_minus_f_x = 0.5 * lower_t4;
+            let lower_f_rz = 0.5 * lower_accel_y;
+            // lower: bias momentum D, D' (4.45, 4.49)
+            let lower_t5 = lower_sin * lower_minus_f_x;
+            let lower_t6 = tau_1 - lower_f_rz;
+            let lower_e = 2.9994001199760048 * lower_t6;
+            let lower_t7 = lower_u_y * lower_e;
+            let lower_minus_dp_y = lower_t5 - lower_t7;
+            let lower_t8 = tau_1 - lower_minus_dp_y;
+            let upper_d_rz = upper_f_rz + lower_t8;
+            // upper: bias momentum D, D' (4.45, 4.49)
+            let upper_t0 = tau_0 - upper_d_rz;
+            let upper_minus_e = upper_minus_rho * upper_t0;
             // lower: acceleration
-            let lower_acc0 = lower_pivot0 * upper_rest1;
-            let lower_acc1 = lower_rest2 + lower_acc0;
-            let lower_acc2 = upper_rest1 + lower_acc1;
-            results[0][l] = -upper_rest1;
-            results[1][l] = lower_acc2;
+            let lower_t9 = lower_k_y * upper_minus_e;
+            let lower_omegad_rz = lower_e + lower_t9;
+            let lower_a = upper_minus_e + lower_omegad_rz;
+            results[0][l] = -upper_minus_e;
+            results[1][l] = lower_a;
         }
         a.give(0, &results[0]);
         a.give(1, &results[1]);
     }
 
-    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     /// 59 operations: 27 additions, 31 multiplications, 1 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 2], v: &[f64; 2], reactions: &mut [[f64; 6]; 2]) {
@@ -426,96 +426,96 @@ impl DoublePendulum {
             let tau_0 = given[2][l];
             let tau_1 = given[3][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia0 = 0.5 * lower_cos0;
+            let lower_u_y = 0.5 * lower_cos;
             // lower: U, Mj, k and the reduced inertia M' (4.44)
-            let lower_pivot0 = 2.9994001199760048 * lower_inertia0;
-            let lower_pivot1 = lower_inertia0 * lower_pivot0;
+            let lower_k_y = 2.9994001199760048 * lower_u_y;
+            let lower_minus_mp_yy = lower_u_y * lower_k_y;
             // lower: inertia carried to the parent, M* (4.48)
-            let lower_inertia1 = lower_pivot1 - 1.3334000000000001;
+            let upper_minus_m_rz_rz = lower_minus_mp_yy - 1.3334000000000001;
             // upper: U, Mj, k and the reduced inertia M' (4.44)
-            let upper_pivot0 = 1.0 / lower_inertia1;
+            let upper_minus_rho = 1.0 / upper_minus_m_rz_rz;
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = 9.81 * upper_cos0;
-            let upper_vel1 = 9.81 * upper_sin0;
+            let upper_minus_accel_x = 9.81 * upper_cos;
+            let upper_accel_y = 9.81 * upper_sin;
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * v_0;
-            let lower_vel1 = upper_vel0 + lower_vel0;
-            let lower_vel2 = lower_cos0 * lower_vel1;
-            let lower_vel3 = lower_cos0 * upper_vel1;
-            let lower_vel4 = lower_sin0 * lower_vel1;
-            let lower_vel5 = lower_vel3 + lower_vel4;
-            let lower_vel6 = v_0 + v_1;
+            let lower_t0 = v_0 * v_0;
+            let lower_t1 = upper_minus_accel_x + lower_t0;
+            let lower_t2 = lower_cos * lower_t1;
+            let lower_t3 = lower_cos * upper_accel_y;
+            let lower_t4 = lower_sin * lower_t1;
+            let lower_accel_y = lower_t3 + lower_t4;
+            let lower_spin_z = v_0 + v_1;
             // upper: gravity and wrenches
-            let upper_load0 = 1.5 * upper_vel1;
+            let upper_f_rz = 1.5 * upper_accel_y;
             // lower: gravity and wrenches
-            let lower_load0 = lower_vel6 * lower_vel6;
-            let lower_load1 = 0.5 * lower_load0;
-            let lower_load2 = 0.5 * lower_vel5;
-            // lower: momentum remainder D, D' (4.45, 4.49)
-            let lower_rest0 = lower_sin0 * lower_load1;
-            let lower_rest1 = tau_1 - lower_load2;
-            let lower_rest2 = 2.9994001199760048 * lower_rest1;
-            let lower_rest3 = lower_inertia0 * lower_rest2;
-            let lower_rest4 = lower_rest0 - lower_rest3;
-            let lower_rest5 = tau_1 - lower_rest4;
-            let lower_rest6 = upper_load0 + lower_rest5;
-            // upper: momentum remainder D, D' (4.45, 4.49)
-            let upper_rest0 = tau_0 - lower_rest6;
-            let upper_rest1 = upper_pivot0 * upper_rest0;
+            let lower_t5 = lower_spin_z * lower_spin_z;
+            let lower_minus_f_x = 0.5 * lower_t5;
+            let lower_f_rz = 0.5 * lower_accel_y;
+            // lower: bias momentum D, D' (4.45, 4.49)
+            let lower_t6 = lower_sin * lower_minus_f_x;
+            let lower_t7 = tau_1 - lower_f_rz;
+            let lower_e = 2.9994001199760048 * lower_t7;
+            let lower_t8 = lower_u_y * lower_e;
+            let lower_minus_dp_y = lower_t6 - lower_t8;
+            let lower_t9 = tau_1 - lower_minus_dp_y;
+            let upper_d_rz = upper_f_rz + lower_t9;
+            // upper: bias momentum D, D' (4.45, 4.49)
+            let upper_t0 = tau_0 - upper_d_rz;
+            let upper_minus_e = upper_minus_rho * upper_t0;
             // lower: acceleration
-            let lower_acc0 = lower_pivot0 * upper_rest1;
-            let lower_acc1 = lower_rest2 + lower_acc0;
-            let lower_acc2 = upper_rest1 + lower_acc1;
+            let lower_t10 = lower_k_y * upper_minus_e;
+            let lower_omegad_rz = lower_e + lower_t10;
+            let lower_a = upper_minus_e + lower_omegad_rz;
             // lower: velocity and joint rate (4.40)
-            let lower_vel7 = upper_vel1 - upper_rest1;
-            let lower_vel8 = lower_sin0 * lower_vel7;
-            let lower_vel9 = lower_vel2 - lower_vel8;
-            let lower_vel10 = lower_cos0 * lower_vel7;
-            let lower_vel11 = lower_vel4 + lower_vel10;
+            let lower_t11 = upper_accel_y - upper_minus_e;
+            let lower_t12 = lower_sin * lower_t11;
+            let lower_minus_accel_x = lower_t2 - lower_t12;
+            let lower_t13 = lower_cos * lower_t11;
+            let lower_accel_y_2 = lower_t4 + lower_t13;
             // lower: acceleration
-            let lower_acc3 = upper_rest1 - lower_acc2;
+            let lower_minus_alpha_z = upper_minus_e - lower_a;
             // upper: gravity and wrenches
-            let upper_load1 = 0.5 * lower_vel0;
-            let upper_load2 = upper_vel0 + upper_load1;
-            let upper_load3 = 0.5 * upper_rest1;
-            let upper_load4 = upper_vel1 - upper_load3;
-            let upper_load5 = 0.33340000000000003 * upper_rest1;
-            let upper_load6 = 0.5 * upper_vel1;
-            let upper_load7 = upper_load5 - upper_load6;
+            let upper_t1 = 0.5 * lower_t0;
+            let upper_minus_f_x = upper_minus_accel_x + upper_t1;
+            let upper_t2 = 0.5 * upper_minus_e;
+            let upper_f_y = upper_accel_y - upper_t2;
+            let upper_t3 = 0.33340000000000003 * upper_minus_e;
+            let upper_t4 = 0.5 * upper_accel_y;
+            let upper_minus_f_rz = upper_t3 - upper_t4;
             // lower: gravity and wrenches
-            let lower_load3 = lower_load1 + lower_vel9;
-            let lower_load4 = 0.5 * lower_acc3;
-            let lower_load5 = lower_vel11 - lower_load4;
-            let lower_load6 = 0.33340000000000003 * lower_acc3;
-            let lower_load7 = 0.5 * lower_vel11;
-            let lower_load8 = lower_load6 - lower_load7;
-            let lower_load9 = lower_cos0 * lower_load3;
-            let lower_load10 = lower_sin0 * lower_load5;
-            let lower_load11 = lower_load9 + lower_load10;
-            let lower_load12 = lower_sin0 * lower_load3;
-            let lower_load13 = lower_cos0 * lower_load5;
-            let lower_load14 = lower_load12 - lower_load13;
-            let lower_load15 = lower_load8 + lower_load14;
-            let lower_load16 = upper_load2 + lower_load11;
-            let lower_load17 = lower_load14 - upper_load4;
-            let lower_load18 = upper_load7 + lower_load15;
-            results[0][l] = lower_load17;
+            let lower_minus_f_x_2 = lower_minus_f_x + lower_minus_accel_x;
+            let lower_t14 = 0.5 * lower_minus_alpha_z;
+            let lower_f_y = lower_accel_y_2 - lower_t14;
+            let lower_t15 = 0.33340000000000003 * lower_minus_alpha_z;
+            let lower_t16 = 0.5 * lower_accel_y_2;
+            let lower_minus_f_rz = lower_t15 - lower_t16;
+            let lower_t17 = lower_cos * lower_minus_f_x_2;
+            let lower_t18 = lower_sin * lower_f_y;
+            let lower_t19 = lower_t17 + lower_t18;
+            let lower_t20 = lower_sin * lower_minus_f_x_2;
+            let lower_t21 = lower_cos * lower_f_y;
+            let lower_t22 = lower_t20 - lower_t21;
+            let lower_t23 = lower_minus_f_rz + lower_t22;
+            let reactions_0_2 = upper_minus_f_x + lower_t19;
+            let reactions_0_0 = lower_t22 - upper_f_y;
+            let minus_reactions_0_4 = upper_minus_f_rz + lower_t23;
+            results[0][l] = reactions_0_0;
             results[1][l] = 0.0;
-            results[2][l] = lower_load16;
+            results[2][l] = reactions_0_2;
             results[3][l] = 0.0;
-            results[4][l] = -lower_load18;
+            results[4][l] = -minus_reactions_0_4;
             results[5][l] = 0.0;
-            results[6][l] = -lower_load5;
+            results[6][l] = -lower_f_y;
             results[7][l] = 0.0;
-            results[8][l] = lower_load3;
+            results[8][l] = lower_minus_f_x_2;
             results[9][l] = 0.0;
-            results[10][l] = -lower_load8;
+            results[10][l] = -lower_minus_f_rz;
             results[11][l] = 0.0;
         }
         reactions.give(0, &results[0]);
@@ -550,16 +550,16 @@ impl DoublePendulum {
         let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
         for l in 0..LANES {
             // lower: sine and cosine, rotation
-            let lower_cos0 = cosines[0][l];
+            let lower_cos = cosines[0][l];
             // lower: mass matrix by composite inertias
-            let lower_mass0 = 0.5 * lower_cos0;
-            let lower_mass1 = lower_mass0 + 0.33340000000000003;
-            let lower_mass2 = lower_mass0 + lower_mass0;
-            let lower_mass3 = lower_mass2 + 0.33340000000000003;
-            let lower_mass4 = lower_mass3 + 1.3334000000000001;
-            results[0][l] = lower_mass4;
-            results[1][l] = lower_mass1;
-            results[2][l] = lower_mass1;
+            let lower_t0 = 0.5 * lower_cos;
+            let m_0_1 = lower_t0 + 0.33340000000000003;
+            let lower_t1 = lower_t0 + lower_t0;
+            let lower_t2 = lower_t1 + 0.33340000000000003;
+            let m_0_0 = lower_t2 + 1.3334000000000001;
+            results[0][l] = m_0_0;
+            results[1][l] = m_0_1;
+            results[2][l] = m_0_1;
             results[3][l] = 0.33340000000000003;
         }
         m.give(0, &results[0]);
@@ -568,7 +568,9 @@ impl DoublePendulum {
         m.give(3, &results[3]);
     }
 
-    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    /// Rotation, position and velocity of frames.
+    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
+    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
     /// 12 operations: 6 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 2], v: &[f64; 2], rotation: &mut [[[f64; 3]; 3]; 3], position: &mut [[f64; 3]; 3], velocity: &mut [[f64; 6]; 3]) {
@@ -593,78 +595,78 @@ impl DoublePendulum {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * lower_sin0;
-            let lower_vel1 = v_0 * lower_cos0;
-            let lower_vel2 = v_0 + v_1;
+            let lower_hat_x = v_0 * lower_sin;
+            let lower_hat_y = v_0 * lower_cos;
+            let lower_omega_rz = v_0 + v_1;
             // lower: placement
-            let lower_place0 = upper_sin0 * lower_cos0;
-            let lower_place1 = upper_cos0 * lower_sin0;
-            let lower_place2 = lower_place0 + lower_place1;
-            let lower_place3 = upper_cos0 * lower_cos0;
-            let lower_place4 = upper_sin0 * lower_sin0;
-            let lower_place5 = lower_place3 - lower_place4;
-            let lower_place6 = upper_sin0 + lower_place2;
-            let lower_place7 = upper_cos0 + lower_place5;
-            let lower_place8 = lower_vel1 + lower_vel2;
-            results[0][l] = upper_cos0;
+            let lower_t0 = upper_sin * lower_cos;
+            let lower_t1 = upper_cos * lower_sin;
+            let rotation_3_2 = lower_t0 + lower_t1;
+            let lower_t2 = upper_cos * lower_cos;
+            let lower_t3 = upper_sin * lower_sin;
+            let rotation_3_0 = lower_t2 - lower_t3;
+            let minus_position_2_0 = upper_sin + rotation_3_2;
+            let minus_position_2_2 = upper_cos + rotation_3_0;
+            let minus_velocity_2_0 = lower_hat_y + lower_omega_rz;
+            results[0][l] = upper_cos;
             results[1][l] = 0.0;
-            results[2][l] = upper_sin0;
+            results[2][l] = upper_sin;
             results[3][l] = 0.0;
             results[4][l] = 1.0;
             results[5][l] = 0.0;
-            results[6][l] = -upper_sin0;
+            results[6][l] = -upper_sin;
             results[7][l] = 0.0;
-            results[8][l] = upper_cos0;
-            results[9][l] = lower_place5;
+            results[8][l] = upper_cos;
+            results[9][l] = rotation_3_0;
             results[10][l] = 0.0;
-            results[11][l] = lower_place2;
+            results[11][l] = rotation_3_2;
             results[12][l] = 0.0;
             results[13][l] = 1.0;
             results[14][l] = 0.0;
-            results[15][l] = -lower_place2;
+            results[15][l] = -rotation_3_2;
             results[16][l] = 0.0;
-            results[17][l] = lower_place5;
-            results[18][l] = lower_place5;
+            results[17][l] = rotation_3_0;
+            results[18][l] = rotation_3_0;
             results[19][l] = 0.0;
-            results[20][l] = lower_place2;
+            results[20][l] = rotation_3_2;
             results[21][l] = 0.0;
             results[22][l] = 1.0;
             results[23][l] = 0.0;
-            results[24][l] = -lower_place2;
+            results[24][l] = -rotation_3_2;
             results[25][l] = 0.0;
-            results[26][l] = lower_place5;
+            results[26][l] = rotation_3_0;
             results[27][l] = 0.0;
             results[28][l] = 0.0;
             results[29][l] = 0.0;
-            results[30][l] = -upper_sin0;
+            results[30][l] = -upper_sin;
             results[31][l] = 0.0;
-            results[32][l] = -upper_cos0;
-            results[33][l] = -lower_place6;
+            results[32][l] = -upper_cos;
+            results[33][l] = -minus_position_2_0;
             results[34][l] = 0.0;
-            results[35][l] = -lower_place7;
+            results[35][l] = -minus_position_2_2;
             results[36][l] = 0.0;
             results[37][l] = 0.0;
             results[38][l] = 0.0;
             results[39][l] = 0.0;
             results[40][l] = v_0;
             results[41][l] = 0.0;
-            results[42][l] = -lower_vel1;
+            results[42][l] = -lower_hat_y;
             results[43][l] = 0.0;
-            results[44][l] = -lower_vel0;
+            results[44][l] = -lower_hat_x;
             results[45][l] = 0.0;
-            results[46][l] = lower_vel2;
+            results[46][l] = lower_omega_rz;
             results[47][l] = 0.0;
-            results[48][l] = -lower_place8;
+            results[48][l] = -minus_velocity_2_0;
             results[49][l] = 0.0;
-            results[50][l] = -lower_vel0;
+            results[50][l] = -lower_hat_x;
             results[51][l] = 0.0;
-            results[52][l] = lower_vel2;
+            results[52][l] = lower_omega_rz;
             results[53][l] = 0.0;
         }
         rotation.give(0, &results[0]);
@@ -723,7 +725,8 @@ impl DoublePendulum {
         velocity.give(17, &results[53]);
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     /// 24 operations: 10 additions, 14 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 2], v: &[f64; 2], a: &[f64; 2], tau: &mut [f64; 2]) {
@@ -752,48 +755,49 @@ impl DoublePendulum {
             let a_0 = given[2][l];
             let a_1 = given[3][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = 9.81 * upper_cos0;
-            let upper_vel1 = 9.81 * upper_sin0;
+            let upper_minus_accel_x = 9.81 * upper_cos;
+            let upper_accel_y = 9.81 * upper_sin;
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * v_0;
-            let lower_vel1 = a_0 + upper_vel1;
-            let lower_vel2 = upper_vel0 + lower_vel0;
-            let lower_vel3 = lower_cos0 * lower_vel1;
-            let lower_vel4 = lower_sin0 * lower_vel2;
-            let lower_vel5 = lower_vel3 + lower_vel4;
-            let lower_vel6 = v_0 + v_1;
+            let lower_t0 = v_0 * v_0;
+            let lower_t1 = a_0 + upper_accel_y;
+            let lower_t2 = upper_minus_accel_x + lower_t0;
+            let lower_t3 = lower_cos * lower_t1;
+            let lower_t4 = lower_sin * lower_t2;
+            let lower_accel_y = lower_t3 + lower_t4;
+            let lower_spin_z = v_0 + v_1;
             // lower: acceleration
-            let lower_acc0 = a_0 + a_1;
+            let lower_alpha_z = a_0 + a_1;
             // upper: gravity and wrenches
-            let upper_load0 = 1.3334000000000001 * a_0;
-            let upper_load1 = 1.5 * upper_vel1;
-            let upper_load2 = upper_load0 + upper_load1;
+            let upper_t0 = 1.3334000000000001 * a_0;
+            let upper_t1 = 1.5 * upper_accel_y;
+            let upper_f_rz = upper_t0 + upper_t1;
             // lower: gravity and wrenches
-            let lower_load0 = lower_vel6 * lower_vel6;
-            let lower_load1 = 0.5 * lower_load0;
-            let lower_load2 = 0.5 * lower_acc0;
-            let lower_load3 = 0.33340000000000003 * lower_acc0;
-            let lower_load4 = 0.5 * lower_vel5;
-            let lower_load5 = lower_load3 + lower_load4;
-            let lower_load6 = lower_sin0 * lower_load1;
-            let lower_load7 = lower_cos0 * lower_load2;
-            let lower_load8 = lower_load6 - lower_load7;
-            let lower_load9 = lower_load5 - lower_load8;
-            let lower_load10 = upper_load2 + lower_load9;
-            results[0][l] = lower_load10;
-            results[1][l] = lower_load5;
+            let lower_t5 = lower_spin_z * lower_spin_z;
+            let lower_minus_f_x = 0.5 * lower_t5;
+            let lower_f_y = 0.5 * lower_alpha_z;
+            let lower_t6 = 0.33340000000000003 * lower_alpha_z;
+            let lower_t7 = 0.5 * lower_accel_y;
+            let lower_f_rz = lower_t6 + lower_t7;
+            let lower_t8 = lower_sin * lower_minus_f_x;
+            let lower_t9 = lower_cos * lower_f_y;
+            let lower_t10 = lower_t8 - lower_t9;
+            let lower_t11 = lower_f_rz - lower_t10;
+            let tau_0 = upper_f_rz + lower_t11;
+            results[0][l] = tau_0;
+            results[1][l] = lower_f_rz;
         }
         tau.give(0, &results[0]);
         tau.give(1, &results[1]);
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     /// 15 operations: 5 additions, 10 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 2], v: &[f64; 2], h: &mut [f64; 2]) {
@@ -818,38 +822,39 @@ impl DoublePendulum {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
             // upper: sine and cosine, rotation
-            let upper_sin0 = sines[0][l];
-            let upper_cos0 = cosines[0][l];
+            let upper_sin = sines[0][l];
+            let upper_cos = cosines[0][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[1][l];
-            let lower_cos0 = cosines[1][l];
+            let lower_sin = sines[1][l];
+            let lower_cos = cosines[1][l];
             // upper: velocity and joint rate (4.40)
-            let upper_vel0 = 9.81 * upper_cos0;
-            let upper_vel1 = 9.81 * upper_sin0;
+            let upper_minus_accel_x = 9.81 * upper_cos;
+            let upper_accel_y = 9.81 * upper_sin;
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * v_0;
-            let lower_vel1 = upper_vel0 + lower_vel0;
-            let lower_vel2 = lower_cos0 * upper_vel1;
-            let lower_vel3 = lower_sin0 * lower_vel1;
-            let lower_vel4 = lower_vel2 + lower_vel3;
-            let lower_vel5 = v_0 + v_1;
+            let lower_t0 = v_0 * v_0;
+            let lower_t1 = upper_minus_accel_x + lower_t0;
+            let lower_t2 = lower_cos * upper_accel_y;
+            let lower_t3 = lower_sin * lower_t1;
+            let lower_accel_y = lower_t2 + lower_t3;
+            let lower_spin_z = v_0 + v_1;
             // upper: gravity and wrenches
-            let upper_load0 = 1.5 * upper_vel1;
+            let upper_f_rz = 1.5 * upper_accel_y;
             // lower: gravity and wrenches
-            let lower_load0 = lower_vel5 * lower_vel5;
-            let lower_load1 = 0.5 * lower_load0;
-            let lower_load2 = 0.5 * lower_vel4;
-            let lower_load3 = lower_sin0 * lower_load1;
-            let lower_load4 = lower_load2 - lower_load3;
-            let lower_load5 = upper_load0 + lower_load4;
-            results[0][l] = lower_load5;
-            results[1][l] = lower_load2;
+            let lower_t4 = lower_spin_z * lower_spin_z;
+            let lower_minus_f_x = 0.5 * lower_t4;
+            let lower_f_rz = 0.5 * lower_accel_y;
+            let lower_t5 = lower_sin * lower_minus_f_x;
+            let lower_t6 = lower_f_rz - lower_t5;
+            let h_0 = upper_f_rz + lower_t6;
+            results[0][l] = h_0;
+            results[1][l] = lower_f_rz;
         }
         h.give(0, &results[0]);
         h.give(1, &results[1]);
     }
 
-    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    /// Jacobians `J` of frames.
+    /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     /// 7 operations: 3 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn jacobians(&self, q: &[f64; 2], jacobian: &mut [[[f64; 2]; 6]; 3]) {
@@ -867,17 +872,17 @@ impl DoublePendulum {
         let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[0][l];
-            let lower_cos0 = cosines[0][l];
+            let lower_sin = sines[0][l];
+            let lower_cos = cosines[0][l];
             // lower: Jacobian
-            let lower_jac0 = lower_cos0 + 1.0;
+            let lower_t0 = lower_cos + 1.0;
             // upper: Jacobian
-            let upper_jac0 = lower_cos0 * lower_jac0;
-            let upper_jac1 = lower_sin0 * lower_sin0;
-            let upper_jac2 = upper_jac0 + upper_jac1;
-            let upper_jac3 = lower_sin0 * lower_jac0;
-            let upper_jac4 = lower_sin0 * lower_cos0;
-            let upper_jac5 = upper_jac4 - upper_jac3;
+            let upper_t0 = lower_cos * lower_t0;
+            let upper_t1 = lower_sin * lower_sin;
+            let minus_jacobian_12_0 = upper_t0 + upper_t1;
+            let upper_t2 = lower_sin * lower_t0;
+            let upper_t3 = lower_sin * lower_cos;
+            let jacobian_14_0 = upper_t3 - upper_t2;
             results[0][l] = 0.0;
             results[1][l] = 0.0;
             results[2][l] = 0.0;
@@ -890,11 +895,11 @@ impl DoublePendulum {
             results[9][l] = 0.0;
             results[10][l] = 0.0;
             results[11][l] = 0.0;
-            results[12][l] = -lower_cos0;
+            results[12][l] = -lower_cos;
             results[13][l] = 0.0;
             results[14][l] = 0.0;
             results[15][l] = 0.0;
-            results[16][l] = -lower_sin0;
+            results[16][l] = -lower_sin;
             results[17][l] = 0.0;
             results[18][l] = 0.0;
             results[19][l] = 0.0;
@@ -902,11 +907,11 @@ impl DoublePendulum {
             results[21][l] = 1.0;
             results[22][l] = 0.0;
             results[23][l] = 0.0;
-            results[24][l] = -upper_jac2;
+            results[24][l] = -minus_jacobian_12_0;
             results[25][l] = -1.0;
             results[26][l] = 0.0;
             results[27][l] = 0.0;
-            results[28][l] = upper_jac5;
+            results[28][l] = jacobian_14_0;
             results[29][l] = 0.0;
             results[30][l] = 0.0;
             results[31][l] = 0.0;
@@ -953,15 +958,17 @@ impl DoublePendulum {
         jacobian.give(35, &results[35]);
     }
 
-    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
+    /// frame.
     /// 6 operations: 2 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
-    pub fn bias_accelerations(&self, q: &[f64; 2], v: &[f64; 2], drift: &mut [[f64; 6]; 3]) {
-        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    pub fn bias_accelerations(&self, q: &[f64; 2], v: &[f64; 2], bias: &mut [[f64; 6]; 3]) {
+        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, bias.as_flattened_mut());
     }
 
     #[inline(always)]
-    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
@@ -976,53 +983,53 @@ impl DoublePendulum {
             let v_0 = given[0][l];
             let v_1 = given[1][l];
             // lower: sine and cosine, rotation
-            let lower_sin0 = sines[0][l];
-            let lower_cos0 = cosines[0][l];
+            let lower_sin = sines[0][l];
+            let lower_cos = cosines[0][l];
             // lower: velocity and joint rate (4.40)
-            let lower_vel0 = v_0 * v_0;
-            let lower_vel1 = lower_cos0 * lower_vel0;
-            let lower_vel2 = lower_sin0 * lower_vel0;
-            let lower_vel3 = v_0 + v_1;
+            let lower_t0 = v_0 * v_0;
+            let lower_minus_accel_x = lower_cos * lower_t0;
+            let lower_accel_y = lower_sin * lower_t0;
+            let lower_spin_z = v_0 + v_1;
             // lower: acceleration
-            let lower_acc0 = lower_vel3 * lower_vel3;
-            let lower_acc1 = lower_vel1 + lower_acc0;
+            let lower_t1 = lower_spin_z * lower_spin_z;
+            let bias_2_2 = lower_minus_accel_x + lower_t1;
             results[0][l] = 0.0;
             results[1][l] = 0.0;
             results[2][l] = 0.0;
             results[3][l] = 0.0;
             results[4][l] = 0.0;
             results[5][l] = 0.0;
-            results[6][l] = -lower_vel2;
+            results[6][l] = -lower_accel_y;
             results[7][l] = 0.0;
-            results[8][l] = lower_vel1;
+            results[8][l] = lower_minus_accel_x;
             results[9][l] = 0.0;
             results[10][l] = 0.0;
             results[11][l] = 0.0;
-            results[12][l] = -lower_vel2;
+            results[12][l] = -lower_accel_y;
             results[13][l] = 0.0;
-            results[14][l] = lower_acc1;
+            results[14][l] = bias_2_2;
             results[15][l] = 0.0;
             results[16][l] = 0.0;
             results[17][l] = 0.0;
         }
-        drift.give(0, &results[0]);
-        drift.give(1, &results[1]);
-        drift.give(2, &results[2]);
-        drift.give(3, &results[3]);
-        drift.give(4, &results[4]);
-        drift.give(5, &results[5]);
-        drift.give(6, &results[6]);
-        drift.give(7, &results[7]);
-        drift.give(8, &results[8]);
-        drift.give(9, &results[9]);
-        drift.give(10, &results[10]);
-        drift.give(11, &results[11]);
-        drift.give(12, &results[12]);
-        drift.give(13, &results[13]);
-        drift.give(14, &results[14]);
-        drift.give(15, &results[15]);
-        drift.give(16, &results[16]);
-        drift.give(17, &results[17]);
+        bias.give(0, &results[0]);
+        bias.give(1, &results[1]);
+        bias.give(2, &results[2]);
+        bias.give(3, &results[3]);
+        bias.give(4, &results[4]);
+        bias.give(5, &results[5]);
+        bias.give(6, &results[6]);
+        bias.give(7, &results[7]);
+        bias.give(8, &results[8]);
+        bias.give(9, &results[9]);
+        bias.give(10, &results[10]);
+        bias.give(11, &results[11]);
+        bias.give(12, &results[12]);
+        bias.give(13, &results[13]);
+        bias.give(14, &results[14]);
+        bias.give(15, &results[15]);
+        bias.give(16, &results[16]);
+        bias.give(17, &results[17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1091,8 +1098,8 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 #[rustfmt::skip]
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
     #[inline(always)]
-    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::energy_kernel::<A, LANES>(q, p, result);
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, energy,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, energy);
     }
 }
 
@@ -1155,8 +1162,8 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 #[rustfmt::skip]
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for DoublePendulum {
     #[inline(always)]
-    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::bias_accelerations_kernel::<A, LANES>(q, v, drift);
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, bias,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_accelerations_kernel::<A, LANES>(q, v, bias);
     }
 }
 
@@ -1185,13 +1192,13 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
         DoublePendulum::new().lanes()
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     #[inline]
     pub fn rates(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2], qd: &mut [[f64; LANES]; 2], pd: &mut [[f64; LANES]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     #[inline]
     pub fn velocities(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2], v: &mut [[f64; LANES]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 1, LANES, f64, _>((q, p, v,));
@@ -1206,18 +1213,18 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
     /// Kinetic and potential energy, J.
     #[inline]
     pub fn energy(&self, q: &[[f64; LANES]; 2], p: &[[f64; LANES]; 2]) -> [[f64; LANES]; 2] {
-        let mut result = [[0.0; LANES]; 2];
-        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 3, LANES, f64, _>((q, p, &mut result,));
-        result
+        let mut energy = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 3, LANES, f64, _>((q, p, &mut energy,));
+        energy
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     #[inline]
     pub fn accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], a: &mut [[f64; LANES]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 4, LANES, f64, _>((q, v, &self.tau, a,));
     }
 
-    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     #[inline]
     pub fn reactions(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], reactions: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 5, LANES, f64, _>((q, v, &self.tau, reactions.as_flattened_mut(),));
@@ -1229,34 +1236,41 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
     }
 
-    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    /// Rotation, position and velocity of frames.
+    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
+    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
     #[inline]
     pub fn frames(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], rotation: &mut [[[[f64; LANES]; 3]; 3]; 3], position: &mut [[[f64; LANES]; 3]; 3], velocity: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], a: &[[f64; LANES]; 2], tau: &mut [[f64; LANES]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 8, LANES, f64, _>((q, v, a, tau,));
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     #[inline]
     pub fn bias(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], h: &mut [[f64; LANES]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 9, LANES, f64, _>((q, v, h,));
     }
 
-    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    /// Jacobians `J` of frames.
+    /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     #[inline]
     pub fn jacobians(&self, q: &[[f64; LANES]; 2], jacobian: &mut [[[[f64; LANES]; 2]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 10, LANES, f64, _>((q, jacobian.as_flattened_mut().as_flattened_mut(),));
     }
 
-    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
+    /// frame.
     #[inline]
-    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], drift: &mut [[[f64; LANES]; 6]; 3]) {
-        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
+    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], bias: &mut [[[f64; LANES]; 6]; 3]) {
+        ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 11, LANES, f64, _>((q, v, bias.as_flattened_mut(),));
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1286,10 +1300,12 @@ impl ::multibody::runtime::System for DoublePendulum {
     type Coordinates = [f64; 2];
     type Momenta = [f64; 2];
 
+    #[inline]
     fn neutral(&self) -> [f64; 2] {
         [0.0, 0.0]
     }
 
+    #[inline]
     fn zero_momenta(&self) -> [f64; 2] {
         [0.0; 2]
     }
@@ -1305,6 +1321,14 @@ impl ::multibody::runtime::System for DoublePendulum {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 2], v: &[f64; 2], qd: &mut [f64; 2]) {
         Self::coordinate_rates(self, q, v, qd);
     }
@@ -1312,6 +1336,7 @@ impl ::multibody::runtime::System for DoublePendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for DoublePendulum {
+
     #[inline]
     fn conjugate_momenta(&mut self, q: &[f64; 2], v: &[f64; 2], p: &mut [f64; 2]) {
         Self::momenta(self, q, v, p);
@@ -1320,6 +1345,7 @@ impl ::multibody::runtime::Conjugate for DoublePendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for DoublePendulum {
+
     #[inline]
     fn energies(&mut self, q: &[f64; 2], p: &[f64; 2]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
@@ -1329,6 +1355,7 @@ impl ::multibody::runtime::Energetic for DoublePendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for DoublePendulum {
+
     #[inline]
     fn generalized_accelerations(&mut self, q: &[f64; 2], v: &[f64; 2], a: &mut [f64; 2]) {
         Self::accelerations(self, q, v, a);

@@ -19,9 +19,9 @@
 //   inverse_dynamics: 48 + 64 + 0 = 112; 0, 1
 //   bias: 36 + 56 + 0 = 92; 0, 1
 //   jacobians: 3 + 6 + 0 = 9; 0, 1
-//   drifts: 10 + 25 + 0 = 35; 0, 1
+//   bias_accelerations: 10 + 25 + 0 = 35; 0, 1
 
-/// Dynamics of `spherical_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, drifts. Set the fields between calls.
+/// Dynamics of `spherical_pendulum` in canonical form: rates, velocities, momenta, energy, accelerations, reactions, mass_matrix, frames, inverse_dynamics, bias, jacobians, bias_accelerations. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
 #[rustfmt::skip]
 pub struct SphericalPendulum {
@@ -29,7 +29,7 @@ pub struct SphericalPendulum {
     pub tau: [f64; 4],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl SphericalPendulum {
     /// Number of coordinates.
@@ -62,7 +62,7 @@ impl SphericalPendulum {
         SphericalPendulum { tau: [0.0; 4] }
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 132 operations: 54 additions, 75 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 5], p: &[f64; 4], qd: &mut [f64; 5], pd: &mut [f64; 4]) {
@@ -74,8 +74,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -106,162 +106,162 @@ impl SphericalPendulum {
             let tau_2 = given[10][l];
             let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_1 * bob_pose2;
-            let bob_pose7 = q_3 * bob_pose0;
-            let bob_pose8 = q_3 * bob_pose1;
-            let bob_pose9 = bob_pose5 - bob_pose8;
-            let bob_pose10 = bob_pose6 + bob_pose7;
-            let bob_pose11 = bob_pose3 + bob_pose4;
-            let bob_pose12 = bob_pose11 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_1 * bob_t2;
+            let bob_t7 = q_3 * bob_t0;
+            let bob_t8 = q_3 * bob_t1;
+            let bob_t9 = bob_t5 - bob_t8;
+            let bob_t10 = bob_t6 + bob_t7;
+            let bob_t11 = bob_t3 + bob_t4;
+            let bob_t12 = bob_t11 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia0 = tail_cos0 + tail_cos0;
-            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-            let tail_inertia5 = tail_inertia3 + tail_inertia4;
-            let tail_inertia6 = tail_sin0 * tail_inertia5;
-            let tail_inertia7 = tail_cos0 * tail_inertia5;
-            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            let tail_t1 = tail_cos + tail_cos;
+            let tail_minus_u_x = 0.1004987562112089 * tail_sin;
+            let tail_u_y = 0.1004987562112089 * tail_cos;
+            let tail_t2 = 0.026984158415841585 * tail_sin;
+            let tail_t3 = 0.0003792079207920793 * tail_t1;
+            let tail_t4 = tail_t2 + tail_t3;
+            let tail_minus_mp_ry_ry = tail_sin * tail_t4;
+            let tail_t5 = tail_cos * tail_t4;
+            let tail_minus_mp_rx_ry = tail_t5 - 0.0003792079207920793;
+            let tail_mp_rx_rx = tail_minus_mp_ry_ry - 0.026984158415841585;
             // tail: U, Mj, k and the reduced inertia M' (4.44)
-            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-            let tail_pivot1 = 36.10108303249097 * tail_inertia2;
-            let tail_pivot2 = tail_inertia1 * tail_pivot0;
-            let tail_pivot3 = tail_inertia1 * tail_pivot1;
+            let tail_minus_k_x = 36.10108303249097 * tail_minus_u_x;
+            let tail_k_y = 36.10108303249097 * tail_u_y;
+            let tail_minus_mp_xx = tail_minus_u_x * tail_minus_k_x;
+            let tail_mp_xy = tail_minus_u_x * tail_k_y;
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia10 = 0.8 * tail_pivot2;
-            let tail_inertia11 = 0.8 * tail_inertia2;
-            let tail_inertia12 = tail_inertia8 + tail_inertia11;
-            let tail_inertia13 = tail_inertia1 + tail_inertia1;
-            let tail_inertia14 = 0.8 * tail_inertia13;
-            let tail_inertia15 = tail_inertia9 + tail_inertia14;
-            let tail_inertia16 = 0.8 * tail_inertia10;
-            let tail_inertia17 = tail_inertia1 + 0.88;
-            let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
-            let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
-            let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
+            let tail_t6 = 0.8 * tail_minus_mp_xx;
+            let tail_t7 = 0.8 * tail_u_y;
+            let bob_m_rx_rz = tail_minus_mp_rx_ry + tail_t7;
+            let tail_t8 = tail_minus_u_x + tail_minus_u_x;
+            let tail_t9 = 0.8 * tail_t8;
+            let tail_t10 = tail_mp_rx_rx + tail_t9;
+            let tail_t11 = 0.8 * tail_t6;
+            let bob_m_rx_y = tail_minus_u_x + 0.88;
+            let bob_m_rx_rx = tail_t10 + 0.6101920792079208;
+            let bob_minus_m_ry_ry = tail_t11 - 0.5770000000000001;
+            let bob_minus_m_rz_rz = tail_minus_mp_ry_ry - 0.0401920792079208;
             // bob: U, Mj, k and the reduced inertia M' (4.44)
-            let bob_pivot0 = 1.0 / tail_inertia18;
-            let bob_pivot1 = tail_inertia12 * bob_pivot0;
-            let bob_pivot2 = tail_inertia12 * bob_pivot1;
-            let bob_pivot3 = tail_inertia20 + bob_pivot2;
-            let bob_pivot4 = 1.0 / tail_inertia19;
-            let bob_pivot5 = 1.0 / bob_pivot3;
-            // tail: momentum remainder D, D' (4.45, 4.49)
-            let tail_rest0 = 36.10108303249097 * p_3;
-            let tail_rest1 = tail_inertia1 * tail_rest0;
-            let tail_rest2 = tail_inertia2 * tail_rest0;
-            let tail_rest3 = 0.8 * tail_rest1;
-            let tail_rest4 = p_3 + tail_rest3;
-            // bob: momentum remainder D, D' (4.45, 4.49)
-            let bob_rest0 = p_0 * bob_pivot0;
-            let bob_rest1 = tail_inertia12 * bob_rest0;
-            let bob_rest2 = p_1 - tail_rest4;
-            let bob_rest3 = bob_pivot4 * bob_rest2;
-            let bob_rest4 = p_2 - bob_rest1;
-            let bob_rest5 = bob_pivot5 * bob_rest4;
+            let bob_rho = 1.0 / bob_m_rx_rx;
+            let bob_k_rz = bob_m_rx_rz * bob_rho;
+            let bob_t13 = bob_m_rx_rz * bob_k_rz;
+            let bob_minus_u_rz = bob_minus_m_rz_rz + bob_t13;
+            let bob_minus_rho = 1.0 / bob_minus_m_ry_ry;
+            let bob_minus_rho_2 = 1.0 / bob_minus_u_rz;
+            // tail: bias momentum D, D' (4.45, 4.49)
+            let tail_e = 36.10108303249097 * p_3;
+            let tail_minus_dp_x = tail_minus_u_x * tail_e;
+            let tail_dp_y = tail_u_y * tail_e;
+            let tail_t12 = 0.8 * tail_minus_dp_x;
+            let bob_d_ry = p_3 + tail_t12;
+            // bob: bias momentum D, D' (4.45, 4.49)
+            let bob_e = p_0 * bob_rho;
+            let bob_t14 = bob_m_rx_rz * bob_e;
+            let bob_t15 = p_1 - bob_d_ry;
+            let bob_minus_e = bob_minus_rho * bob_t15;
+            let bob_t16 = p_2 - bob_t14;
+            let bob_minus_e_2 = bob_minus_rho_2 * bob_t16;
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = bob_pivot1 * bob_rest5;
-            let bob_vel1 = bob_rest0 + bob_vel0;
+            let bob_t17 = bob_k_rz * bob_minus_e_2;
+            let bob_v = bob_e + bob_t17;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = 0.8 * bob_rest3;
-            let tail_vel1 = 0.8 * bob_vel1;
-            let tail_vel2 = tail_pivot0 * tail_vel0;
-            let tail_vel3 = tail_rest0 + tail_vel2;
-            let tail_vel4 = bob_rest3 + tail_vel3;
+            let tail_hat_x = 0.8 * bob_minus_e;
+            let tail_hat_z = 0.8 * bob_v;
+            let tail_t13 = tail_minus_k_x * tail_hat_x;
+            let tail_omega_rz = tail_e + tail_t13;
+            let tail_v = bob_minus_e + tail_omega_rz;
             // bob: coordinate rates
-            let bob_rate0 = q_1 * bob_rest5;
-            let bob_rate1 = q_2 * bob_rest3;
-            let bob_rate2 = bob_rate0 - bob_rate1;
-            let bob_rate3 = q_2 * bob_vel1;
-            let bob_rate4 = q_0 * bob_rest5;
-            let bob_rate5 = bob_rate3 + bob_rate4;
-            let bob_rate6 = q_0 * bob_rest3;
-            let bob_rate7 = q_1 * bob_vel1;
-            let bob_rate8 = bob_rate6 + bob_rate7;
-            let bob_rate9 = q_3 * bob_vel1;
-            let bob_rate10 = bob_rate2 - bob_rate9;
-            let bob_rate11 = 0.5 * bob_rate10;
-            let bob_rate12 = q_3 * bob_rest3;
-            let bob_rate13 = bob_rate5 - bob_rate12;
-            let bob_rate14 = 0.5 * bob_rate13;
-            let bob_rate15 = q_3 * bob_rest5;
-            let bob_rate16 = bob_rate8 + bob_rate15;
-            let bob_rate17 = 0.5 * bob_rate16;
-            let bob_rate18 = q_0 * bob_vel1;
-            let bob_rate19 = q_1 * bob_rest3;
-            let bob_rate20 = bob_rate18 - bob_rate19;
-            let bob_rate21 = q_2 * bob_rest5;
-            let bob_rate22 = bob_rate20 - bob_rate21;
-            let bob_rate23 = 0.5 * bob_rate22;
+            let bob_t18 = q_1 * bob_minus_e_2;
+            let bob_t19 = q_2 * bob_minus_e;
+            let bob_t20 = bob_t18 - bob_t19;
+            let bob_t21 = q_2 * bob_v;
+            let bob_t22 = q_0 * bob_minus_e_2;
+            let bob_t23 = bob_t21 + bob_t22;
+            let bob_t24 = q_0 * bob_minus_e;
+            let bob_t25 = q_1 * bob_v;
+            let bob_t26 = bob_t24 + bob_t25;
+            let bob_t27 = q_3 * bob_v;
+            let bob_t28 = bob_t20 - bob_t27;
+            let minus_qd_0 = 0.5 * bob_t28;
+            let bob_t29 = q_3 * bob_minus_e;
+            let bob_t30 = bob_t23 - bob_t29;
+            let qd_1 = 0.5 * bob_t30;
+            let bob_t31 = q_3 * bob_minus_e_2;
+            let bob_t32 = bob_t26 + bob_t31;
+            let minus_qd_2 = 0.5 * bob_t32;
+            let bob_t33 = q_0 * bob_v;
+            let bob_t34 = q_1 * bob_minus_e;
+            let bob_t35 = bob_t33 - bob_t34;
+            let bob_t36 = q_2 * bob_minus_e_2;
+            let bob_t37 = bob_t35 - bob_t36;
+            let minus_qd_3 = 0.5 * bob_t37;
             // bob: gravity and wrenches
-            let bob_load0 = 9.81 * bob_pose9;
-            let bob_load1 = 9.81 * bob_pose10;
-            let bob_load2 = 9.81 * bob_pose12;
+            let bob_minus_g_x = 9.81 * bob_t9;
+            let bob_minus_g_y = 9.81 * bob_t10;
+            let bob_g_z = 9.81 * bob_t12;
             // tail: gravity and wrenches
-            let tail_load0 = tail_cos0 * bob_load2;
-            let tail_load1 = tail_sin0 * bob_load0;
-            let tail_load2 = tail_load0 - tail_load1;
+            let tail_t14 = tail_cos * bob_g_z;
+            let tail_t15 = tail_sin * bob_minus_g_x;
+            let tail_minus_g_y = tail_t14 - tail_t15;
             // bob: momentum rate (4.36)
-            let bob_pdot0 = p_2 * bob_rest3;
-            let bob_pdot1 = p_1 * bob_rest5;
-            let bob_pdot2 = bob_pdot0 - bob_pdot1;
-            let bob_pdot3 = p_0 * bob_rest5;
-            let bob_pdot4 = p_2 * bob_vel1;
-            let bob_pdot5 = bob_pdot3 + bob_pdot4;
-            let bob_pdot6 = p_1 * bob_vel1;
-            let bob_pdot7 = p_0 * bob_rest3;
-            let bob_pdot8 = bob_pdot6 + bob_pdot7;
-            let bob_pdot9 = tail_inertia17 * bob_load1;
-            let bob_pdot10 = tail_inertia17 * bob_load0;
-            let bob_pdot11 = tail_inertia2 * bob_load2;
-            let bob_pdot12 = bob_pdot10 - bob_pdot11;
-            let bob_pdot13 = tail_inertia2 * bob_load1;
-            let bob_pdot14 = bob_pdot2 - bob_pdot9;
-            let bob_pdot15 = bob_pdot5 + bob_pdot12;
-            let bob_pdot16 = bob_pdot8 + bob_pdot13;
+            let bob_t38 = p_2 * bob_minus_e;
+            let bob_t39 = p_1 * bob_minus_e_2;
+            let bob_t40 = bob_t38 - bob_t39;
+            let bob_t41 = p_0 * bob_minus_e_2;
+            let bob_t42 = p_2 * bob_v;
+            let bob_t43 = bob_t41 + bob_t42;
+            let bob_t44 = p_1 * bob_v;
+            let bob_t45 = p_0 * bob_minus_e;
+            let bob_t46 = bob_t44 + bob_t45;
+            let bob_t47 = bob_m_rx_y * bob_minus_g_y;
+            let bob_t48 = bob_m_rx_y * bob_minus_g_x;
+            let bob_t49 = tail_u_y * bob_g_z;
+            let bob_t50 = bob_t48 - bob_t49;
+            let bob_t51 = tail_u_y * bob_minus_g_y;
+            let bob_t52 = bob_t40 - bob_t47;
+            let bob_t53 = bob_t43 + bob_t50;
+            let bob_t54 = bob_t46 + bob_t51;
             // tail: momentum rate (4.36)
-            let tail_pdot0 = tail_inertia6 + tail_inertia9;
-            let tail_pdot1 = tail_pivot3 * tail_vel0;
-            let tail_pdot2 = tail_rest2 + tail_pdot1;
-            let tail_pdot3 = tail_inertia8 * bob_vel1;
-            let tail_pdot4 = bob_rest5 * tail_pdot0;
-            let tail_pdot5 = tail_pdot3 + tail_pdot4;
-            let tail_pdot6 = tail_inertia2 * tail_vel1;
-            let tail_pdot7 = tail_pdot5 + tail_pdot6;
-            let tail_pdot8 = tail_inertia8 * bob_rest5;
-            let tail_pdot9 = tail_inertia1 * tail_vel1;
-            let tail_pdot10 = tail_pdot8 - tail_pdot9;
-            let tail_pdot11 = tail_vel0 * tail_pdot2;
-            let tail_pdot12 = bob_vel1 * tail_pdot7;
-            let tail_pdot13 = tail_pdot11 - tail_pdot12;
-            let tail_pdot14 = bob_rest5 * tail_pdot10;
-            let tail_pdot15 = tail_pdot13 + tail_pdot14;
-            let tail_pdot16 = 0.1004987562112089 * tail_load2;
-            let tail_pdot17 = tail_pdot15 + tail_pdot16;
-            let tail_pdot18 = tau_0 + bob_pdot14;
-            let tail_pdot19 = tau_1 + bob_pdot15;
-            let tail_pdot20 = tau_2 - bob_pdot16;
-            let tail_pdot21 = tau_3 - tail_pdot17;
-            results[0][l] = -bob_rate11;
-            results[1][l] = bob_rate14;
-            results[2][l] = -bob_rate17;
-            results[3][l] = -bob_rate23;
-            results[4][l] = tail_vel4;
-            results[5][l] = tail_pdot18;
-            results[6][l] = tail_pdot19;
-            results[7][l] = tail_pdot20;
-            results[8][l] = tail_pdot21;
+            let tail_t16 = tail_minus_mp_ry_ry + tail_mp_rx_rx;
+            let tail_t17 = tail_mp_xy * tail_hat_x;
+            let tail_t18 = tail_dp_y + tail_t17;
+            let tail_t19 = tail_minus_mp_rx_ry * bob_v;
+            let tail_t20 = bob_minus_e_2 * tail_t16;
+            let tail_t21 = tail_t19 + tail_t20;
+            let tail_t22 = tail_u_y * tail_hat_z;
+            let tail_t23 = tail_t21 + tail_t22;
+            let tail_t24 = tail_minus_mp_rx_ry * bob_minus_e_2;
+            let tail_t25 = tail_minus_u_x * tail_hat_z;
+            let tail_t26 = tail_t24 - tail_t25;
+            let tail_t27 = tail_hat_x * tail_t18;
+            let tail_t28 = bob_v * tail_t23;
+            let tail_t29 = tail_t27 - tail_t28;
+            let tail_t30 = bob_minus_e_2 * tail_t26;
+            let tail_t31 = tail_t29 + tail_t30;
+            let tail_t32 = 0.1004987562112089 * tail_minus_g_y;
+            let tail_t33 = tail_t31 + tail_t32;
+            let pd_0 = tau_0 + bob_t52;
+            let pd_1 = tau_1 + bob_t53;
+            let pd_2 = tau_2 - bob_t54;
+            let pd_3 = tau_3 - tail_t33;
+            results[0][l] = -minus_qd_0;
+            results[1][l] = qd_1;
+            results[2][l] = -minus_qd_2;
+            results[3][l] = -minus_qd_3;
+            results[4][l] = tail_v;
+            results[5][l] = pd_0;
+            results[6][l] = pd_1;
+            results[7][l] = pd_2;
+            results[8][l] = pd_3;
         }
         qd.give(0, &results[0]);
         qd.give(1, &results[1]);
@@ -274,7 +274,7 @@ impl SphericalPendulum {
         pd.give(3, &results[8]);
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     /// 45 operations: 18 additions, 24 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 5], p: &[f64; 4], v: &mut [f64; 4]) {
@@ -286,8 +286,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
@@ -302,64 +302,64 @@ impl SphericalPendulum {
             let p_2 = given[2][l];
             let p_3 = given[3][l];
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia0 = tail_cos0 + tail_cos0;
-            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-            let tail_inertia5 = tail_inertia3 + tail_inertia4;
-            let tail_inertia6 = tail_sin0 * tail_inertia5;
-            let tail_inertia7 = tail_cos0 * tail_inertia5;
-            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            let tail_t1 = tail_cos + tail_cos;
+            let tail_minus_u_x = 0.1004987562112089 * tail_sin;
+            let tail_u_y = 0.1004987562112089 * tail_cos;
+            let tail_t2 = 0.026984158415841585 * tail_sin;
+            let tail_t3 = 0.0003792079207920793 * tail_t1;
+            let tail_t4 = tail_t2 + tail_t3;
+            let tail_minus_mp_ry_ry = tail_sin * tail_t4;
+            let tail_t5 = tail_cos * tail_t4;
+            let tail_minus_mp_rx_ry = tail_t5 - 0.0003792079207920793;
+            let tail_mp_rx_rx = tail_minus_mp_ry_ry - 0.026984158415841585;
             // tail: U, Mj, k and the reduced inertia M' (4.44)
-            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            let tail_minus_k_x = 36.10108303249097 * tail_minus_u_x;
+            let tail_minus_mp_xx = tail_minus_u_x * tail_minus_k_x;
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia10 = 0.8 * tail_pivot1;
-            let tail_inertia11 = 0.8 * tail_inertia2;
-            let tail_inertia12 = tail_inertia8 + tail_inertia11;
-            let tail_inertia13 = tail_inertia1 + tail_inertia1;
-            let tail_inertia14 = 0.8 * tail_inertia13;
-            let tail_inertia15 = tail_inertia9 + tail_inertia14;
-            let tail_inertia16 = 0.8 * tail_inertia10;
-            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            let tail_t6 = 0.8 * tail_minus_mp_xx;
+            let tail_t7 = 0.8 * tail_u_y;
+            let bob_m_rx_rz = tail_minus_mp_rx_ry + tail_t7;
+            let tail_t8 = tail_minus_u_x + tail_minus_u_x;
+            let tail_t9 = 0.8 * tail_t8;
+            let tail_t10 = tail_mp_rx_rx + tail_t9;
+            let tail_t11 = 0.8 * tail_t6;
+            let bob_m_rx_rx = tail_t10 + 0.6101920792079208;
+            let bob_minus_m_ry_ry = tail_t11 - 0.5770000000000001;
+            let bob_minus_m_rz_rz = tail_minus_mp_ry_ry - 0.0401920792079208;
             // bob: U, Mj, k and the reduced inertia M' (4.44)
-            let bob_pivot0 = 1.0 / tail_inertia17;
-            let bob_pivot1 = tail_inertia12 * bob_pivot0;
-            let bob_pivot2 = tail_inertia12 * bob_pivot1;
-            let bob_pivot3 = tail_inertia19 + bob_pivot2;
-            let bob_pivot4 = 1.0 / tail_inertia18;
-            let bob_pivot5 = 1.0 / bob_pivot3;
-            // tail: momentum remainder D, D' (4.45, 4.49)
-            let tail_rest0 = 36.10108303249097 * p_3;
-            let tail_rest1 = tail_inertia1 * tail_rest0;
-            let tail_rest2 = 0.8 * tail_rest1;
-            let tail_rest3 = p_3 + tail_rest2;
-            // bob: momentum remainder D, D' (4.45, 4.49)
-            let bob_rest0 = p_0 * bob_pivot0;
-            let bob_rest1 = tail_inertia12 * bob_rest0;
-            let bob_rest2 = p_1 - tail_rest3;
-            let bob_rest3 = bob_pivot4 * bob_rest2;
-            let bob_rest4 = p_2 - bob_rest1;
-            let bob_rest5 = bob_pivot5 * bob_rest4;
+            let bob_rho = 1.0 / bob_m_rx_rx;
+            let bob_k_rz = bob_m_rx_rz * bob_rho;
+            let bob_t0 = bob_m_rx_rz * bob_k_rz;
+            let bob_minus_u_rz = bob_minus_m_rz_rz + bob_t0;
+            let bob_minus_rho = 1.0 / bob_minus_m_ry_ry;
+            let bob_minus_rho_2 = 1.0 / bob_minus_u_rz;
+            // tail: bias momentum D, D' (4.45, 4.49)
+            let tail_e = 36.10108303249097 * p_3;
+            let tail_minus_dp_x = tail_minus_u_x * tail_e;
+            let tail_t12 = 0.8 * tail_minus_dp_x;
+            let bob_d_ry = p_3 + tail_t12;
+            // bob: bias momentum D, D' (4.45, 4.49)
+            let bob_e = p_0 * bob_rho;
+            let bob_t1 = bob_m_rx_rz * bob_e;
+            let bob_t2 = p_1 - bob_d_ry;
+            let bob_minus_e = bob_minus_rho * bob_t2;
+            let bob_t3 = p_2 - bob_t1;
+            let bob_minus_e_2 = bob_minus_rho_2 * bob_t3;
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = bob_pivot1 * bob_rest5;
-            let bob_vel1 = bob_rest0 + bob_vel0;
+            let bob_t4 = bob_k_rz * bob_minus_e_2;
+            let bob_v = bob_e + bob_t4;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = 0.8 * bob_rest3;
-            let tail_vel1 = tail_pivot0 * tail_vel0;
-            let tail_vel2 = tail_rest0 + tail_vel1;
-            let tail_vel3 = bob_rest3 + tail_vel2;
-            results[0][l] = bob_vel1;
-            results[1][l] = -bob_rest3;
-            results[2][l] = -bob_rest5;
-            results[3][l] = tail_vel3;
+            let tail_hat_x = 0.8 * bob_minus_e;
+            let tail_t13 = tail_minus_k_x * tail_hat_x;
+            let tail_omega_rz = tail_e + tail_t13;
+            let tail_v = bob_minus_e + tail_omega_rz;
+            results[0][l] = bob_v;
+            results[1][l] = -bob_minus_e;
+            results[2][l] = -bob_minus_e_2;
+            results[3][l] = tail_v;
         }
         v.give(0, &results[0]);
         v.give(1, &results[1]);
@@ -379,8 +379,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
@@ -395,53 +395,53 @@ impl SphericalPendulum {
             let v_2 = given[2][l];
             let v_3 = given[3][l];
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = 0.8 * v_1;
-            let tail_vel1 = 0.8 * v_0;
-            let tail_vel2 = tail_sin0 * tail_vel0;
-            let tail_vel3 = v_0 * tail_cos0;
-            let tail_vel4 = v_2 * tail_sin0;
-            let tail_vel5 = tail_vel3 - tail_vel4;
-            let tail_vel6 = v_2 * tail_cos0;
-            let tail_vel7 = v_0 * tail_sin0;
-            let tail_vel8 = tail_vel6 + tail_vel7;
-            let tail_vel9 = v_1 + v_3;
+            let tail_t1 = 0.8 * v_1;
+            let tail_hat_z = 0.8 * v_0;
+            let tail_hat_y = tail_sin * tail_t1;
+            let tail_t2 = v_0 * tail_cos;
+            let tail_t3 = v_2 * tail_sin;
+            let tail_hat_rx = tail_t2 - tail_t3;
+            let tail_t4 = v_2 * tail_cos;
+            let tail_t5 = v_0 * tail_sin;
+            let tail_minus_hat_ry = tail_t4 + tail_t5;
+            let tail_omega_rz = v_1 + v_3;
             // bob: momentum
-            let bob_mom0 = 0.6101920792079208 * v_0;
-            let bob_mom1 = 0.5770000000000001 * v_1;
-            let bob_mom2 = 0.0401920792079208 * v_2;
+            let bob_t0 = 0.6101920792079208 * v_0;
+            let bob_t1 = 0.5770000000000001 * v_1;
+            let bob_t2 = 0.0401920792079208 * v_2;
             // tail: momentum
-            let tail_mom0 = 0.026984158415841585 * tail_vel5;
-            let tail_mom1 = 0.0003792079207920793 * tail_vel8;
-            let tail_mom2 = tail_mom0 - tail_mom1;
-            let tail_mom3 = 0.0003792079207920793 * tail_vel5;
-            let tail_mom4 = 0.027700000000000002 * tail_vel9;
-            let tail_mom5 = 0.1004987562112089 * tail_vel9;
-            let tail_mom6 = 0.1004987562112089 * tail_vel8;
-            let tail_mom7 = 0.1004987562112089 * tail_vel1;
-            let tail_mom8 = 0.1004987562112089 * tail_vel2;
-            let tail_mom9 = tail_mom3 + tail_mom7;
-            let tail_mom10 = tail_mom4 + tail_mom8;
-            let tail_mom11 = tail_sin0 * tail_mom5;
-            let tail_mom12 = tail_cos0 * tail_mom2;
-            let tail_mom13 = tail_sin0 * tail_mom9;
-            let tail_mom14 = tail_mom12 - tail_mom13;
-            let tail_mom15 = tail_sin0 * tail_mom2;
-            let tail_mom16 = tail_cos0 * tail_mom9;
-            let tail_mom17 = tail_mom15 + tail_mom16;
-            let tail_mom18 = 0.8 * tail_mom6;
-            let tail_mom19 = tail_mom14 - tail_mom18;
-            let tail_mom20 = 0.8 * tail_mom11;
-            let tail_mom21 = tail_mom10 + tail_mom20;
-            let tail_mom22 = bob_mom0 - tail_mom19;
-            let tail_mom23 = bob_mom1 + tail_mom21;
-            let tail_mom24 = bob_mom2 + tail_mom17;
-            results[0][l] = tail_mom22;
-            results[1][l] = tail_mom23;
-            results[2][l] = tail_mom24;
-            results[3][l] = tail_mom10;
+            let tail_t6 = 0.026984158415841585 * tail_hat_rx;
+            let tail_t7 = 0.0003792079207920793 * tail_minus_hat_ry;
+            let tail_minus_p_rx = tail_t6 - tail_t7;
+            let tail_t8 = 0.0003792079207920793 * tail_hat_rx;
+            let tail_t9 = 0.027700000000000002 * tail_omega_rz;
+            let tail_p_y = 0.1004987562112089 * tail_omega_rz;
+            let tail_p_z = 0.1004987562112089 * tail_minus_hat_ry;
+            let tail_t10 = 0.1004987562112089 * tail_hat_z;
+            let tail_t11 = 0.1004987562112089 * tail_hat_y;
+            let tail_minus_p_ry = tail_t8 + tail_t10;
+            let tail_p_rz = tail_t9 + tail_t11;
+            let tail_t12 = tail_sin * tail_p_y;
+            let tail_t13 = tail_cos * tail_minus_p_rx;
+            let tail_t14 = tail_sin * tail_minus_p_ry;
+            let tail_t15 = tail_t13 - tail_t14;
+            let tail_t16 = tail_sin * tail_minus_p_rx;
+            let tail_t17 = tail_cos * tail_minus_p_ry;
+            let tail_t18 = tail_t16 + tail_t17;
+            let tail_t19 = 0.8 * tail_p_z;
+            let tail_t20 = tail_t15 - tail_t19;
+            let tail_t21 = 0.8 * tail_t12;
+            let tail_t22 = tail_p_rz + tail_t21;
+            let bob_p_rx = bob_t0 - tail_t20;
+            let bob_p_ry = bob_t1 + tail_t22;
+            let bob_p_rz = bob_t2 + tail_t18;
+            results[0][l] = bob_p_rx;
+            results[1][l] = bob_p_ry;
+            results[2][l] = bob_p_rz;
+            results[3][l] = tail_p_rz;
         }
         p.give(0, &results[0]);
         p.give(1, &results[1]);
@@ -453,18 +453,18 @@ impl SphericalPendulum {
     /// 69 operations: 30 additions, 36 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 5], p: &[f64; 4]) -> [f64; 2] {
-        let mut result = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
-        result
+        let mut energy = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        energy
     }
 
     #[inline(always)]
-    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
@@ -487,97 +487,97 @@ impl SphericalPendulum {
             let p_2 = given[6][l];
             let p_3 = given[7][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_3 * bob_pose1;
-            let bob_pose7 = bob_pose5 - bob_pose6;
-            let bob_pose8 = bob_pose3 + bob_pose4;
-            let bob_pose9 = bob_pose8 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_3 * bob_t1;
+            let bob_t7 = bob_t5 - bob_t6;
+            let bob_t8 = bob_t3 + bob_t4;
+            let bob_t9 = bob_t8 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia0 = tail_cos0 + tail_cos0;
-            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-            let tail_inertia5 = tail_inertia3 + tail_inertia4;
-            let tail_inertia6 = tail_sin0 * tail_inertia5;
-            let tail_inertia7 = tail_cos0 * tail_inertia5;
-            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            let tail_t1 = tail_cos + tail_cos;
+            let tail_minus_u_x = 0.1004987562112089 * tail_sin;
+            let tail_u_y = 0.1004987562112089 * tail_cos;
+            let tail_t2 = 0.026984158415841585 * tail_sin;
+            let tail_t3 = 0.0003792079207920793 * tail_t1;
+            let tail_t4 = tail_t2 + tail_t3;
+            let tail_minus_mp_ry_ry = tail_sin * tail_t4;
+            let tail_t5 = tail_cos * tail_t4;
+            let tail_minus_mp_rx_ry = tail_t5 - 0.0003792079207920793;
+            let tail_mp_rx_rx = tail_minus_mp_ry_ry - 0.026984158415841585;
             // tail: U, Mj, k and the reduced inertia M' (4.44)
-            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            let tail_minus_k_x = 36.10108303249097 * tail_minus_u_x;
+            let tail_minus_mp_xx = tail_minus_u_x * tail_minus_k_x;
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia10 = 0.8 * tail_pivot1;
-            let tail_inertia11 = 0.8 * tail_inertia2;
-            let tail_inertia12 = tail_inertia8 + tail_inertia11;
-            let tail_inertia13 = tail_inertia1 + tail_inertia1;
-            let tail_inertia14 = 0.8 * tail_inertia13;
-            let tail_inertia15 = tail_inertia9 + tail_inertia14;
-            let tail_inertia16 = 0.8 * tail_inertia10;
-            let tail_inertia17 = tail_inertia1 + 0.88;
-            let tail_inertia18 = tail_inertia15 + 0.6101920792079208;
-            let tail_inertia19 = tail_inertia16 - 0.5770000000000001;
-            let tail_inertia20 = tail_inertia6 - 0.0401920792079208;
+            let tail_t6 = 0.8 * tail_minus_mp_xx;
+            let tail_t7 = 0.8 * tail_u_y;
+            let bob_m_rx_rz = tail_minus_mp_rx_ry + tail_t7;
+            let tail_t8 = tail_minus_u_x + tail_minus_u_x;
+            let tail_t9 = 0.8 * tail_t8;
+            let tail_t10 = tail_mp_rx_rx + tail_t9;
+            let tail_t11 = 0.8 * tail_t6;
+            let bob_m_rx_y = tail_minus_u_x + 0.88;
+            let bob_m_rx_rx = tail_t10 + 0.6101920792079208;
+            let bob_minus_m_ry_ry = tail_t11 - 0.5770000000000001;
+            let bob_minus_m_rz_rz = tail_minus_mp_ry_ry - 0.0401920792079208;
             // bob: U, Mj, k and the reduced inertia M' (4.44)
-            let bob_pivot0 = 1.0 / tail_inertia18;
-            let bob_pivot1 = tail_inertia12 * bob_pivot0;
-            let bob_pivot2 = tail_inertia12 * bob_pivot1;
-            let bob_pivot3 = tail_inertia20 + bob_pivot2;
-            let bob_pivot4 = 1.0 / tail_inertia19;
-            let bob_pivot5 = 1.0 / bob_pivot3;
-            // tail: momentum remainder D, D' (4.45, 4.49)
-            let tail_rest0 = 36.10108303249097 * p_3;
-            let tail_rest1 = tail_inertia1 * tail_rest0;
-            let tail_rest2 = 0.8 * tail_rest1;
-            let tail_rest3 = p_3 + tail_rest2;
-            // bob: momentum remainder D, D' (4.45, 4.49)
-            let bob_rest0 = p_0 * bob_pivot0;
-            let bob_rest1 = tail_inertia12 * bob_rest0;
-            let bob_rest2 = p_1 - tail_rest3;
-            let bob_rest3 = bob_pivot4 * bob_rest2;
-            let bob_rest4 = p_2 - bob_rest1;
-            let bob_rest5 = bob_pivot5 * bob_rest4;
+            let bob_rho = 1.0 / bob_m_rx_rx;
+            let bob_k_rz = bob_m_rx_rz * bob_rho;
+            let bob_t10 = bob_m_rx_rz * bob_k_rz;
+            let bob_minus_u_rz = bob_minus_m_rz_rz + bob_t10;
+            let bob_minus_rho = 1.0 / bob_minus_m_ry_ry;
+            let bob_minus_rho_2 = 1.0 / bob_minus_u_rz;
+            // tail: bias momentum D, D' (4.45, 4.49)
+            let tail_e = 36.10108303249097 * p_3;
+            let tail_minus_dp_x = tail_minus_u_x * tail_e;
+            let tail_t12 = 0.8 * tail_minus_dp_x;
+            let bob_d_ry = p_3 + tail_t12;
+            // bob: bias momentum D, D' (4.45, 4.49)
+            let bob_e = p_0 * bob_rho;
+            let bob_t11 = bob_m_rx_rz * bob_e;
+            let bob_t12 = p_1 - bob_d_ry;
+            let bob_minus_e = bob_minus_rho * bob_t12;
+            let bob_t13 = p_2 - bob_t11;
+            let bob_minus_e_2 = bob_minus_rho_2 * bob_t13;
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = bob_pivot1 * bob_rest5;
-            let bob_vel1 = bob_rest0 + bob_vel0;
+            let bob_t14 = bob_k_rz * bob_minus_e_2;
+            let bob_v = bob_e + bob_t14;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = 0.8 * bob_rest3;
-            let tail_vel1 = tail_pivot0 * tail_vel0;
-            let tail_vel2 = tail_rest0 + tail_vel1;
-            let tail_vel3 = bob_rest3 + tail_vel2;
+            let tail_hat_x = 0.8 * bob_minus_e;
+            let tail_t13 = tail_minus_k_x * tail_hat_x;
+            let tail_omega_rz = tail_e + tail_t13;
+            let tail_v = bob_minus_e + tail_omega_rz;
             // bob: energy
-            let bob_energy0 = p_0 * bob_vel1;
-            let bob_energy1 = p_1 * bob_rest3;
-            let bob_energy2 = bob_energy0 - bob_energy1;
-            let bob_energy3 = p_2 * bob_rest5;
-            let bob_energy4 = bob_energy2 - bob_energy3;
+            let bob_t15 = p_0 * bob_v;
+            let bob_t16 = p_1 * bob_minus_e;
+            let bob_t17 = bob_t15 - bob_t16;
+            let bob_t18 = p_2 * bob_minus_e_2;
+            let bob_t19 = bob_t17 - bob_t18;
             // tail: energy
-            let tail_energy0 = p_3 * tail_vel3;
-            let tail_energy1 = bob_energy4 + tail_energy0;
-            let tail_energy2 = 0.5 * tail_energy1;
+            let tail_t14 = p_3 * tail_v;
+            let tail_t15 = bob_t19 + tail_t14;
+            let energy_0 = 0.5 * tail_t15;
             // bob: gravity and wrenches
-            let bob_load0 = bob_pose7 * tail_inertia2;
-            let bob_load1 = bob_pose9 * tail_inertia17;
-            let bob_load2 = bob_load0 + bob_load1;
-            let bob_load3 = bob_load2 + 3.4;
+            let bob_t20 = bob_t7 * tail_u_y;
+            let bob_t21 = bob_t9 * bob_m_rx_y;
+            let bob_t22 = bob_t20 + bob_t21;
+            let bob_t23 = bob_t22 + 3.4;
             // ground: energy
-            let ground_energy0 = 9.81 * bob_load3;
-            results[0][l] = tail_energy2;
-            results[1][l] = ground_energy0;
+            let energy_1 = 9.81 * bob_t23;
+            results[0][l] = energy_0;
+            results[1][l] = energy_1;
         }
-        result.give(0, &results[0]);
-        result.give(1, &results[1]);
+        energy.give(0, &results[0]);
+        energy.give(1, &results[1]);
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     /// 138 operations: 56 additions, 79 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn accelerations(&self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
@@ -589,8 +589,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -621,163 +621,163 @@ impl SphericalPendulum {
             let tau_2 = given[10][l];
             let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_1 * bob_pose2;
-            let bob_pose7 = q_3 * bob_pose0;
-            let bob_pose8 = q_3 * bob_pose1;
-            let bob_pose9 = bob_pose5 - bob_pose8;
-            let bob_pose10 = bob_pose6 + bob_pose7;
-            let bob_pose11 = bob_pose3 + bob_pose4;
-            let bob_pose12 = bob_pose11 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_1 * bob_t2;
+            let bob_t7 = q_3 * bob_t0;
+            let bob_t8 = q_3 * bob_t1;
+            let bob_t9 = bob_t5 - bob_t8;
+            let bob_t10 = bob_t6 + bob_t7;
+            let bob_t11 = bob_t3 + bob_t4;
+            let bob_t12 = bob_t11 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia0 = tail_cos0 + tail_cos0;
-            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-            let tail_inertia5 = tail_inertia3 + tail_inertia4;
-            let tail_inertia6 = tail_sin0 * tail_inertia5;
-            let tail_inertia7 = tail_cos0 * tail_inertia5;
-            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            let tail_t1 = tail_cos + tail_cos;
+            let tail_minus_u_x = 0.1004987562112089 * tail_sin;
+            let tail_u_y = 0.1004987562112089 * tail_cos;
+            let tail_t2 = 0.026984158415841585 * tail_sin;
+            let tail_t3 = 0.0003792079207920793 * tail_t1;
+            let tail_t4 = tail_t2 + tail_t3;
+            let tail_minus_mp_ry_ry = tail_sin * tail_t4;
+            let tail_t5 = tail_cos * tail_t4;
+            let tail_minus_mp_rx_ry = tail_t5 - 0.0003792079207920793;
+            let tail_mp_rx_rx = tail_minus_mp_ry_ry - 0.026984158415841585;
             // tail: U, Mj, k and the reduced inertia M' (4.44)
-            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            let tail_minus_k_x = 36.10108303249097 * tail_minus_u_x;
+            let tail_minus_mp_xx = tail_minus_u_x * tail_minus_k_x;
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia10 = 0.8 * tail_pivot1;
-            let tail_inertia11 = 0.8 * tail_inertia2;
-            let tail_inertia12 = tail_inertia8 + tail_inertia11;
-            let tail_inertia13 = tail_inertia1 + tail_inertia1;
-            let tail_inertia14 = 0.8 * tail_inertia13;
-            let tail_inertia15 = tail_inertia9 + tail_inertia14;
-            let tail_inertia16 = 0.8 * tail_inertia10;
-            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            let tail_t6 = 0.8 * tail_minus_mp_xx;
+            let tail_t7 = 0.8 * tail_u_y;
+            let bob_m_rx_rz = tail_minus_mp_rx_ry + tail_t7;
+            let tail_t8 = tail_minus_u_x + tail_minus_u_x;
+            let tail_t9 = 0.8 * tail_t8;
+            let tail_t10 = tail_mp_rx_rx + tail_t9;
+            let tail_t11 = 0.8 * tail_t6;
+            let bob_m_rx_rx = tail_t10 + 0.6101920792079208;
+            let bob_minus_m_ry_ry = tail_t11 - 0.5770000000000001;
+            let bob_minus_m_rz_rz = tail_minus_mp_ry_ry - 0.0401920792079208;
             // bob: U, Mj, k and the reduced inertia M' (4.44)
-            let bob_pivot0 = 1.0 / tail_inertia17;
-            let bob_pivot1 = tail_inertia12 * bob_pivot0;
-            let bob_pivot2 = tail_inertia12 * bob_pivot1;
-            let bob_pivot3 = tail_inertia19 + bob_pivot2;
-            let bob_pivot4 = 1.0 / tail_inertia18;
-            let bob_pivot5 = 1.0 / bob_pivot3;
+            let bob_rho = 1.0 / bob_m_rx_rx;
+            let bob_k_rz = bob_m_rx_rz * bob_rho;
+            let bob_t13 = bob_m_rx_rz * bob_k_rz;
+            let bob_minus_u_rz = bob_minus_m_rz_rz + bob_t13;
+            let bob_minus_rho = 1.0 / bob_minus_m_ry_ry;
+            let bob_minus_rho_2 = 1.0 / bob_minus_u_rz;
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = 9.81 * bob_pose9;
-            let bob_vel1 = 9.81 * bob_pose10;
-            let bob_vel2 = 9.81 * bob_pose12;
+            let bob_accel_x = 9.81 * bob_t9;
+            let bob_accel_y = 9.81 * bob_t10;
+            let bob_minus_accel_z = 9.81 * bob_t12;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = v_0 * v_2;
-            let tail_vel1 = v_1 * v_2;
-            let tail_vel2 = v_0 * v_0;
-            let tail_vel3 = v_1 * v_1;
-            let tail_vel4 = tail_vel2 + tail_vel3;
-            let tail_vel5 = 0.8 * tail_vel0;
-            let tail_vel6 = bob_vel0 - tail_vel5;
-            let tail_vel7 = 0.8 * tail_vel1;
-            let tail_vel8 = bob_vel1 - tail_vel7;
-            let tail_vel9 = 0.8 * tail_vel4;
-            let tail_vel10 = bob_vel2 - tail_vel9;
-            let tail_vel11 = v_0 * tail_cos0;
-            let tail_vel12 = v_2 * tail_sin0;
-            let tail_vel13 = tail_vel11 - tail_vel12;
-            let tail_vel14 = v_2 * tail_cos0;
-            let tail_vel15 = v_0 * tail_sin0;
-            let tail_vel16 = tail_vel14 + tail_vel15;
-            let tail_vel17 = tail_cos0 * tail_vel10;
-            let tail_vel18 = tail_sin0 * tail_vel6;
-            let tail_vel19 = tail_vel17 - tail_vel18;
-            let tail_vel20 = v_1 + v_3;
+            let tail_t12 = v_0 * v_2;
+            let tail_t13 = v_1 * v_2;
+            let tail_t14 = v_0 * v_0;
+            let tail_t15 = v_1 * v_1;
+            let tail_t16 = tail_t14 + tail_t15;
+            let tail_t17 = 0.8 * tail_t12;
+            let tail_t18 = bob_accel_x - tail_t17;
+            let tail_t19 = 0.8 * tail_t13;
+            let tail_accel_z = bob_accel_y - tail_t19;
+            let tail_t20 = 0.8 * tail_t16;
+            let tail_t21 = bob_minus_accel_z - tail_t20;
+            let tail_t22 = v_0 * tail_cos;
+            let tail_t23 = v_2 * tail_sin;
+            let tail_spin_x = tail_t22 - tail_t23;
+            let tail_t24 = v_2 * tail_cos;
+            let tail_t25 = v_0 * tail_sin;
+            let tail_minus_spin_y = tail_t24 + tail_t25;
+            let tail_t26 = tail_cos * tail_t21;
+            let tail_t27 = tail_sin * tail_t18;
+            let tail_accel_y = tail_t26 - tail_t27;
+            let tail_spin_z = v_1 + v_3;
             // tail: acceleration
-            let tail_acc0 = v_3 * tail_vel16;
-            let tail_acc1 = v_3 * tail_vel13;
-            let tail_acc2 = tail_vel13 * tail_vel20;
-            let tail_acc3 = tail_vel16 * tail_vel20;
-            let tail_acc4 = tail_vel13 * tail_vel13;
-            let tail_acc5 = tail_vel16 * tail_vel16;
+            let tail_minus_alpha_x = v_3 * tail_minus_spin_y;
+            let tail_minus_alpha_y = v_3 * tail_spin_x;
+            let tail_t28 = tail_spin_x * tail_spin_z;
+            let tail_t29 = tail_minus_spin_y * tail_spin_z;
+            let tail_t30 = tail_spin_x * tail_spin_x;
+            let tail_t31 = tail_minus_spin_y * tail_minus_spin_y;
             // bob: gravity and wrenches
-            let bob_load0 = v_0 * v_1;
-            let bob_load1 = 0.5368079207920793 * tail_vel1;
-            let bob_load2 = 0.5700000000000001 * tail_vel0;
-            let bob_load3 = 0.03319207920792078 * bob_load0;
-            let bob_load4 = 0.88 * bob_vel1;
-            let bob_load5 = 0.88 * bob_vel0;
-            let bob_load6 = bob_load1 - bob_load4;
-            let bob_load7 = bob_load2 - bob_load5;
+            let bob_t14 = v_0 * v_1;
+            let bob_t15 = 0.5368079207920793 * tail_t13;
+            let bob_t16 = 0.5700000000000001 * tail_t12;
+            let bob_minus_f_rz = 0.03319207920792078 * bob_t14;
+            let bob_t17 = 0.88 * bob_accel_y;
+            let bob_t18 = 0.88 * bob_accel_x;
+            let bob_minus_f_rx = bob_t15 - bob_t17;
+            let bob_f_ry = bob_t16 - bob_t18;
             // tail: gravity and wrenches
-            let tail_load0 = tail_vel20 * tail_vel20;
-            let tail_load1 = tail_vel13 * tail_vel16;
-            let tail_load2 = tail_acc5 + tail_load0;
-            let tail_load3 = tail_acc1 + tail_acc2;
-            let tail_load4 = tail_acc0 + tail_acc3;
-            let tail_load5 = 0.1004987562112089 * tail_load2;
-            let tail_load6 = 0.1004987562112089 * tail_load1;
-            let tail_load7 = 0.1004987562112089 * tail_load3;
-            let tail_load8 = 0.026984158415841585 * tail_acc0;
-            let tail_load9 = 0.027700000000000002 * tail_acc3;
-            let tail_load10 = tail_load8 - tail_load9;
-            let tail_load11 = 0.0003792079207920793 * tail_load3;
-            let tail_load12 = tail_load10 + tail_load11;
-            let tail_load13 = 0.05468415841584159 * tail_acc2;
-            let tail_load14 = 0.0003792079207920793 * tail_load4;
-            let tail_load15 = tail_load13 - tail_load14;
-            let tail_load16 = 0.026984158415841585 * tail_load1;
-            let tail_load17 = tail_acc4 - tail_acc5;
-            let tail_load18 = 0.0003792079207920793 * tail_load17;
-            let tail_load19 = tail_load16 + tail_load18;
-            let tail_load20 = 0.1004987562112089 * tail_vel8;
-            let tail_load21 = 0.1004987562112089 * tail_vel19;
-            let tail_load22 = tail_load15 + tail_load20;
-            let tail_load23 = tail_load19 - tail_load21;
-            // tail: momentum remainder D, D' (4.45, 4.49)
-            let tail_rest0 = tail_cos0 * tail_load5;
-            let tail_rest1 = tail_sin0 * tail_load6;
-            let tail_rest2 = tail_rest0 - tail_rest1;
-            let tail_rest3 = tail_cos0 * tail_load12;
-            let tail_rest4 = tail_sin0 * tail_load22;
-            let tail_rest5 = tail_rest3 + tail_rest4;
-            let tail_rest6 = tail_sin0 * tail_load12;
-            let tail_rest7 = tail_cos0 * tail_load22;
-            let tail_rest8 = tail_rest6 - tail_rest7;
-            let tail_rest9 = tau_3 + tail_load23;
-            let tail_rest10 = 36.10108303249097 * tail_rest9;
-            let tail_rest11 = tail_inertia1 * tail_rest10;
-            let tail_rest12 = tail_rest2 + tail_rest11;
-            let tail_rest13 = 0.8 * tail_load7;
-            let tail_rest14 = tail_rest5 + tail_rest13;
-            let tail_rest15 = 0.8 * tail_rest12;
-            let tail_rest16 = tau_3 + tail_rest15;
-            let tail_rest17 = bob_load6 - tail_rest14;
-            let tail_rest18 = bob_load7 + tail_rest16;
-            let tail_rest19 = bob_load3 + tail_rest8;
-            // bob: momentum remainder D, D' (4.45, 4.49)
-            let bob_rest0 = tau_0 + tail_rest17;
-            let bob_rest1 = bob_pivot0 * bob_rest0;
-            let bob_rest2 = tail_inertia12 * bob_rest1;
-            let bob_rest3 = tail_rest19 - bob_rest2;
-            let bob_rest4 = tau_1 - tail_rest18;
-            let bob_rest5 = bob_pivot4 * bob_rest4;
-            let bob_rest6 = tau_2 + bob_rest3;
-            let bob_rest7 = bob_pivot5 * bob_rest6;
+            let tail_t32 = tail_spin_z * tail_spin_z;
+            let tail_t33 = tail_spin_x * tail_minus_spin_y;
+            let tail_t34 = tail_t31 + tail_t32;
+            let tail_t35 = tail_minus_alpha_y + tail_t28;
+            let tail_t36 = tail_minus_alpha_x + tail_t29;
+            let tail_minus_f_x = 0.1004987562112089 * tail_t34;
+            let tail_minus_f_y = 0.1004987562112089 * tail_t33;
+            let tail_f_z = 0.1004987562112089 * tail_t35;
+            let tail_t37 = 0.026984158415841585 * tail_minus_alpha_x;
+            let tail_t38 = 0.027700000000000002 * tail_t29;
+            let tail_t39 = tail_t37 - tail_t38;
+            let tail_t40 = 0.0003792079207920793 * tail_t35;
+            let tail_f_rx = tail_t39 + tail_t40;
+            let tail_t41 = 0.05468415841584159 * tail_t28;
+            let tail_t42 = 0.0003792079207920793 * tail_t36;
+            let tail_t43 = tail_t41 - tail_t42;
+            let tail_t44 = 0.026984158415841585 * tail_t33;
+            let tail_t45 = tail_t30 - tail_t31;
+            let tail_t46 = 0.0003792079207920793 * tail_t45;
+            let tail_t47 = tail_t44 + tail_t46;
+            let tail_t48 = 0.1004987562112089 * tail_accel_z;
+            let tail_t49 = 0.1004987562112089 * tail_accel_y;
+            let tail_minus_f_ry = tail_t43 + tail_t48;
+            let tail_minus_f_rz = tail_t47 - tail_t49;
+            // tail: bias momentum D, D' (4.45, 4.49)
+            let tail_t50 = tail_cos * tail_minus_f_x;
+            let tail_t51 = tail_sin * tail_minus_f_y;
+            let tail_t52 = tail_t50 - tail_t51;
+            let tail_t53 = tail_cos * tail_f_rx;
+            let tail_t54 = tail_sin * tail_minus_f_ry;
+            let tail_dp_rx = tail_t53 + tail_t54;
+            let tail_t55 = tail_sin * tail_f_rx;
+            let tail_t56 = tail_cos * tail_minus_f_ry;
+            let tail_dp_ry = tail_t55 - tail_t56;
+            let tail_t57 = tau_3 + tail_minus_f_rz;
+            let tail_e = 36.10108303249097 * tail_t57;
+            let tail_t58 = tail_minus_u_x * tail_e;
+            let tail_minus_dp_x = tail_t52 + tail_t58;
+            let tail_t59 = 0.8 * tail_f_z;
+            let tail_t60 = tail_dp_rx + tail_t59;
+            let tail_t61 = 0.8 * tail_minus_dp_x;
+            let tail_t62 = tau_3 + tail_t61;
+            let bob_minus_d_rx = bob_minus_f_rx - tail_t60;
+            let bob_d_ry = bob_f_ry + tail_t62;
+            let bob_minus_d_rz = bob_minus_f_rz + tail_dp_ry;
+            // bob: bias momentum D, D' (4.45, 4.49)
+            let bob_t19 = tau_0 + bob_minus_d_rx;
+            let bob_e = bob_rho * bob_t19;
+            let bob_t20 = bob_m_rx_rz * bob_e;
+            let bob_t21 = bob_minus_d_rz - bob_t20;
+            let bob_t22 = tau_1 - bob_d_ry;
+            let bob_minus_e = bob_minus_rho * bob_t22;
+            let bob_t23 = tau_2 + bob_t21;
+            let bob_minus_e_2 = bob_minus_rho_2 * bob_t23;
             // bob: acceleration
-            let bob_acc0 = bob_pivot1 * bob_rest7;
-            let bob_acc1 = bob_rest1 + bob_acc0;
+            let bob_t24 = bob_k_rz * bob_minus_e_2;
+            let bob_a = bob_e + bob_t24;
             // tail: acceleration
-            let tail_acc6 = 0.8 * bob_rest5;
-            let tail_acc7 = tail_pivot0 * tail_acc6;
-            let tail_acc8 = tail_rest10 + tail_acc7;
-            let tail_acc9 = bob_rest5 + tail_acc8;
-            results[0][l] = bob_acc1;
-            results[1][l] = -bob_rest5;
-            results[2][l] = -bob_rest7;
-            results[3][l] = tail_acc9;
+            let tail_hatd_x = 0.8 * bob_minus_e;
+            let tail_t63 = tail_minus_k_x * tail_hatd_x;
+            let tail_omegad_rz = tail_e + tail_t63;
+            let tail_a = bob_minus_e + tail_omegad_rz;
+            results[0][l] = bob_a;
+            results[1][l] = -bob_minus_e;
+            results[2][l] = -bob_minus_e_2;
+            results[3][l] = tail_a;
         }
         a.give(0, &results[0]);
         a.give(1, &results[1]);
@@ -785,7 +785,7 @@ impl SphericalPendulum {
         a.give(3, &results[3]);
     }
 
-    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     /// 242 operations: 105 additions, 134 multiplications, 3 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn reactions(&self, q: &[f64; 5], v: &[f64; 4], reactions: &mut [[f64; 6]; 2]) {
@@ -797,8 +797,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -829,280 +829,280 @@ impl SphericalPendulum {
             let tau_2 = given[10][l];
             let tau_3 = given[11][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_1 * bob_pose2;
-            let bob_pose7 = q_3 * bob_pose0;
-            let bob_pose8 = q_3 * bob_pose1;
-            let bob_pose9 = bob_pose5 - bob_pose8;
-            let bob_pose10 = bob_pose6 + bob_pose7;
-            let bob_pose11 = bob_pose3 + bob_pose4;
-            let bob_pose12 = bob_pose11 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_1 * bob_t2;
+            let bob_t7 = q_3 * bob_t0;
+            let bob_t8 = q_3 * bob_t1;
+            let bob_t9 = bob_t5 - bob_t8;
+            let bob_t10 = bob_t6 + bob_t7;
+            let bob_t11 = bob_t3 + bob_t4;
+            let bob_t12 = bob_t11 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia0 = tail_cos0 + tail_cos0;
-            let tail_inertia1 = 0.1004987562112089 * tail_sin0;
-            let tail_inertia2 = 0.1004987562112089 * tail_cos0;
-            let tail_inertia3 = 0.026984158415841585 * tail_sin0;
-            let tail_inertia4 = 0.0003792079207920793 * tail_inertia0;
-            let tail_inertia5 = tail_inertia3 + tail_inertia4;
-            let tail_inertia6 = tail_sin0 * tail_inertia5;
-            let tail_inertia7 = tail_cos0 * tail_inertia5;
-            let tail_inertia8 = tail_inertia7 - 0.0003792079207920793;
-            let tail_inertia9 = tail_inertia6 - 0.026984158415841585;
+            let tail_t1 = tail_cos + tail_cos;
+            let tail_minus_u_x = 0.1004987562112089 * tail_sin;
+            let tail_u_y = 0.1004987562112089 * tail_cos;
+            let tail_t2 = 0.026984158415841585 * tail_sin;
+            let tail_t3 = 0.0003792079207920793 * tail_t1;
+            let tail_t4 = tail_t2 + tail_t3;
+            let tail_minus_mp_ry_ry = tail_sin * tail_t4;
+            let tail_t5 = tail_cos * tail_t4;
+            let tail_minus_mp_rx_ry = tail_t5 - 0.0003792079207920793;
+            let tail_mp_rx_rx = tail_minus_mp_ry_ry - 0.026984158415841585;
             // tail: U, Mj, k and the reduced inertia M' (4.44)
-            let tail_pivot0 = 36.10108303249097 * tail_inertia1;
-            let tail_pivot1 = tail_inertia1 * tail_pivot0;
+            let tail_minus_k_x = 36.10108303249097 * tail_minus_u_x;
+            let tail_minus_mp_xx = tail_minus_u_x * tail_minus_k_x;
             // tail: inertia carried to the parent, M* (4.48)
-            let tail_inertia10 = 0.8 * tail_pivot1;
-            let tail_inertia11 = 0.8 * tail_inertia2;
-            let tail_inertia12 = tail_inertia8 + tail_inertia11;
-            let tail_inertia13 = tail_inertia1 + tail_inertia1;
-            let tail_inertia14 = 0.8 * tail_inertia13;
-            let tail_inertia15 = tail_inertia9 + tail_inertia14;
-            let tail_inertia16 = 0.8 * tail_inertia10;
-            let tail_inertia17 = tail_inertia15 + 0.6101920792079208;
-            let tail_inertia18 = tail_inertia16 - 0.5770000000000001;
-            let tail_inertia19 = tail_inertia6 - 0.0401920792079208;
+            let tail_t6 = 0.8 * tail_minus_mp_xx;
+            let tail_t7 = 0.8 * tail_u_y;
+            let bob_m_rx_rz = tail_minus_mp_rx_ry + tail_t7;
+            let tail_t8 = tail_minus_u_x + tail_minus_u_x;
+            let tail_t9 = 0.8 * tail_t8;
+            let tail_t10 = tail_mp_rx_rx + tail_t9;
+            let tail_t11 = 0.8 * tail_t6;
+            let bob_m_rx_rx = tail_t10 + 0.6101920792079208;
+            let bob_minus_m_ry_ry = tail_t11 - 0.5770000000000001;
+            let bob_minus_m_rz_rz = tail_minus_mp_ry_ry - 0.0401920792079208;
             // bob: U, Mj, k and the reduced inertia M' (4.44)
-            let bob_pivot0 = 1.0 / tail_inertia17;
-            let bob_pivot1 = tail_inertia12 * bob_pivot0;
-            let bob_pivot2 = tail_inertia12 * bob_pivot1;
-            let bob_pivot3 = tail_inertia19 + bob_pivot2;
-            let bob_pivot4 = 1.0 / tail_inertia18;
-            let bob_pivot5 = 1.0 / bob_pivot3;
+            let bob_rho = 1.0 / bob_m_rx_rx;
+            let bob_k_rz = bob_m_rx_rz * bob_rho;
+            let bob_t13 = bob_m_rx_rz * bob_k_rz;
+            let bob_minus_u_rz = bob_minus_m_rz_rz + bob_t13;
+            let bob_minus_rho = 1.0 / bob_minus_m_ry_ry;
+            let bob_minus_rho_2 = 1.0 / bob_minus_u_rz;
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = 9.81 * bob_pose9;
-            let bob_vel1 = 9.81 * bob_pose10;
-            let bob_vel2 = 9.81 * bob_pose12;
+            let bob_accel_x = 9.81 * bob_t9;
+            let bob_accel_y = 9.81 * bob_t10;
+            let bob_minus_accel_z = 9.81 * bob_t12;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = v_0 * v_2;
-            let tail_vel1 = v_1 * v_2;
-            let tail_vel2 = v_0 * v_0;
-            let tail_vel3 = v_1 * v_1;
-            let tail_vel4 = tail_vel2 + tail_vel3;
-            let tail_vel5 = 0.8 * tail_vel0;
-            let tail_vel6 = bob_vel0 - tail_vel5;
-            let tail_vel7 = 0.8 * tail_vel1;
-            let tail_vel8 = bob_vel1 - tail_vel7;
-            let tail_vel9 = 0.8 * tail_vel4;
-            let tail_vel10 = bob_vel2 - tail_vel9;
-            let tail_vel11 = v_0 * tail_cos0;
-            let tail_vel12 = v_2 * tail_sin0;
-            let tail_vel13 = tail_vel11 - tail_vel12;
-            let tail_vel14 = v_2 * tail_cos0;
-            let tail_vel15 = v_0 * tail_sin0;
-            let tail_vel16 = tail_vel14 + tail_vel15;
-            let tail_vel17 = tail_sin0 * tail_vel10;
-            let tail_vel18 = tail_cos0 * tail_vel10;
-            let tail_vel19 = tail_sin0 * tail_vel6;
-            let tail_vel20 = tail_vel18 - tail_vel19;
-            let tail_vel21 = v_1 + v_3;
+            let tail_t12 = v_0 * v_2;
+            let tail_t13 = v_1 * v_2;
+            let tail_t14 = v_0 * v_0;
+            let tail_t15 = v_1 * v_1;
+            let tail_t16 = tail_t14 + tail_t15;
+            let tail_t17 = 0.8 * tail_t12;
+            let tail_t18 = bob_accel_x - tail_t17;
+            let tail_t19 = 0.8 * tail_t13;
+            let tail_accel_z = bob_accel_y - tail_t19;
+            let tail_t20 = 0.8 * tail_t16;
+            let tail_t21 = bob_minus_accel_z - tail_t20;
+            let tail_t22 = v_0 * tail_cos;
+            let tail_t23 = v_2 * tail_sin;
+            let tail_spin_x = tail_t22 - tail_t23;
+            let tail_t24 = v_2 * tail_cos;
+            let tail_t25 = v_0 * tail_sin;
+            let tail_minus_spin_y = tail_t24 + tail_t25;
+            let tail_t26 = tail_sin * tail_t21;
+            let tail_t27 = tail_cos * tail_t21;
+            let tail_t28 = tail_sin * tail_t18;
+            let tail_accel_y = tail_t27 - tail_t28;
+            let tail_spin_z = v_1 + v_3;
             // tail: acceleration
-            let tail_acc0 = v_3 * tail_vel16;
-            let tail_acc1 = v_3 * tail_vel13;
-            let tail_acc2 = tail_vel13 * tail_vel21;
-            let tail_acc3 = tail_vel16 * tail_vel21;
-            let tail_acc4 = tail_vel13 * tail_vel13;
-            let tail_acc5 = tail_vel16 * tail_vel16;
+            let tail_minus_alpha_x = v_3 * tail_minus_spin_y;
+            let tail_minus_alpha_y = v_3 * tail_spin_x;
+            let tail_t29 = tail_spin_x * tail_spin_z;
+            let tail_t30 = tail_minus_spin_y * tail_spin_z;
+            let tail_t31 = tail_spin_x * tail_spin_x;
+            let tail_t32 = tail_minus_spin_y * tail_minus_spin_y;
             // bob: gravity and wrenches
-            let bob_load0 = v_0 * v_1;
-            let bob_load1 = 0.5368079207920793 * tail_vel1;
-            let bob_load2 = 0.5700000000000001 * tail_vel0;
-            let bob_load3 = 0.03319207920792078 * bob_load0;
-            let bob_load4 = 0.88 * bob_vel1;
-            let bob_load5 = 0.88 * bob_vel0;
-            let bob_load6 = bob_load1 - bob_load4;
-            let bob_load7 = bob_load2 - bob_load5;
+            let bob_t14 = v_0 * v_1;
+            let bob_t15 = 0.5368079207920793 * tail_t13;
+            let bob_t16 = 0.5700000000000001 * tail_t12;
+            let bob_minus_f_rz = 0.03319207920792078 * bob_t14;
+            let bob_t17 = 0.88 * bob_accel_y;
+            let bob_t18 = 0.88 * bob_accel_x;
+            let bob_minus_f_rx = bob_t15 - bob_t17;
+            let bob_f_ry = bob_t16 - bob_t18;
             // tail: gravity and wrenches
-            let tail_load0 = tail_vel21 * tail_vel21;
-            let tail_load1 = tail_vel13 * tail_vel16;
-            let tail_load2 = tail_acc5 + tail_load0;
-            let tail_load3 = tail_acc1 + tail_acc2;
-            let tail_load4 = tail_acc0 + tail_acc3;
-            let tail_load5 = 0.1004987562112089 * tail_load2;
-            let tail_load6 = 0.1004987562112089 * tail_load1;
-            let tail_load7 = 0.1004987562112089 * tail_load3;
-            let tail_load8 = 0.026984158415841585 * tail_acc0;
-            let tail_load9 = 0.027700000000000002 * tail_acc3;
-            let tail_load10 = tail_load8 - tail_load9;
-            let tail_load11 = 0.0003792079207920793 * tail_load3;
-            let tail_load12 = tail_load10 + tail_load11;
-            let tail_load13 = 0.05468415841584159 * tail_acc2;
-            let tail_load14 = 0.0003792079207920793 * tail_load4;
-            let tail_load15 = tail_load13 - tail_load14;
-            let tail_load16 = 0.026984158415841585 * tail_load1;
-            let tail_load17 = tail_acc4 - tail_acc5;
-            let tail_load18 = 0.0003792079207920793 * tail_load17;
-            let tail_load19 = tail_load16 + tail_load18;
-            let tail_load20 = 0.1004987562112089 * tail_vel8;
-            let tail_load21 = 0.1004987562112089 * tail_vel20;
-            let tail_load22 = tail_load15 + tail_load20;
-            let tail_load23 = tail_load19 - tail_load21;
-            // tail: momentum remainder D, D' (4.45, 4.49)
-            let tail_rest0 = tail_cos0 * tail_load5;
-            let tail_rest1 = tail_sin0 * tail_load6;
-            let tail_rest2 = tail_rest0 - tail_rest1;
-            let tail_rest3 = tail_cos0 * tail_load12;
-            let tail_rest4 = tail_sin0 * tail_load22;
-            let tail_rest5 = tail_rest3 + tail_rest4;
-            let tail_rest6 = tail_sin0 * tail_load12;
-            let tail_rest7 = tail_cos0 * tail_load22;
-            let tail_rest8 = tail_rest6 - tail_rest7;
-            let tail_rest9 = tau_3 + tail_load23;
-            let tail_rest10 = 36.10108303249097 * tail_rest9;
-            let tail_rest11 = tail_inertia1 * tail_rest10;
-            let tail_rest12 = tail_rest2 + tail_rest11;
-            let tail_rest13 = 0.8 * tail_load7;
-            let tail_rest14 = tail_rest5 + tail_rest13;
-            let tail_rest15 = 0.8 * tail_rest12;
-            let tail_rest16 = tau_3 + tail_rest15;
-            let tail_rest17 = bob_load6 - tail_rest14;
-            let tail_rest18 = bob_load7 + tail_rest16;
-            let tail_rest19 = bob_load3 + tail_rest8;
-            // bob: momentum remainder D, D' (4.45, 4.49)
-            let bob_rest0 = tau_0 + tail_rest17;
-            let bob_rest1 = bob_pivot0 * bob_rest0;
-            let bob_rest2 = tail_inertia12 * bob_rest1;
-            let bob_rest3 = tail_rest19 - bob_rest2;
-            let bob_rest4 = tau_1 - tail_rest18;
-            let bob_rest5 = bob_pivot4 * bob_rest4;
-            let bob_rest6 = tau_2 + bob_rest3;
-            let bob_rest7 = bob_pivot5 * bob_rest6;
+            let tail_t33 = tail_spin_z * tail_spin_z;
+            let tail_t34 = tail_spin_x * tail_minus_spin_y;
+            let tail_t35 = tail_t32 + tail_t33;
+            let tail_t36 = tail_minus_alpha_y + tail_t29;
+            let tail_t37 = tail_minus_alpha_x + tail_t30;
+            let tail_minus_f_x = 0.1004987562112089 * tail_t35;
+            let tail_minus_f_y = 0.1004987562112089 * tail_t34;
+            let tail_f_z = 0.1004987562112089 * tail_t36;
+            let tail_t38 = 0.026984158415841585 * tail_minus_alpha_x;
+            let tail_t39 = 0.027700000000000002 * tail_t30;
+            let tail_t40 = tail_t38 - tail_t39;
+            let tail_t41 = 0.0003792079207920793 * tail_t36;
+            let tail_f_rx = tail_t40 + tail_t41;
+            let tail_t42 = 0.05468415841584159 * tail_t29;
+            let tail_t43 = 0.0003792079207920793 * tail_t37;
+            let tail_t44 = tail_t42 - tail_t43;
+            let tail_t45 = 0.026984158415841585 * tail_t34;
+            let tail_t46 = tail_t31 - tail_t32;
+            let tail_t47 = 0.0003792079207920793 * tail_t46;
+            let tail_t48 = tail_t45 + tail_t47;
+            let tail_t49 = 0.1004987562112089 * tail_accel_z;
+            let tail_t50 = 0.1004987562112089 * tail_accel_y;
+            let tail_minus_f_ry = tail_t44 + tail_t49;
+            let tail_minus_f_rz = tail_t48 - tail_t50;
+            // tail: bias momentum D, D' (4.45, 4.49)
+            let tail_t51 = tail_cos * tail_minus_f_x;
+            let tail_t52 = tail_sin * tail_minus_f_y;
+            let tail_t53 = tail_t51 - tail_t52;
+            let tail_t54 = tail_cos * tail_f_rx;
+            let tail_t55 = tail_sin * tail_minus_f_ry;
+            let tail_dp_rx = tail_t54 + tail_t55;
+            let tail_t56 = tail_sin * tail_f_rx;
+            let tail_t57 = tail_cos * tail_minus_f_ry;
+            let tail_dp_ry = tail_t56 - tail_t57;
+            let tail_t58 = tau_3 + tail_minus_f_rz;
+            let tail_e = 36.10108303249097 * tail_t58;
+            let tail_t59 = tail_minus_u_x * tail_e;
+            let tail_minus_dp_x = tail_t53 + tail_t59;
+            let tail_t60 = 0.8 * tail_f_z;
+            let tail_t61 = tail_dp_rx + tail_t60;
+            let tail_t62 = 0.8 * tail_minus_dp_x;
+            let tail_t63 = tau_3 + tail_t62;
+            let bob_minus_d_rx = bob_minus_f_rx - tail_t61;
+            let bob_d_ry = bob_f_ry + tail_t63;
+            let bob_minus_d_rz = bob_minus_f_rz + tail_dp_ry;
+            // bob: bias momentum D, D' (4.45, 4.49)
+            let bob_t19 = tau_0 + bob_minus_d_rx;
+            let bob_e = bob_rho * bob_t19;
+            let bob_t20 = bob_m_rx_rz * bob_e;
+            let bob_t21 = bob_minus_d_rz - bob_t20;
+            let bob_t22 = tau_1 - bob_d_ry;
+            let bob_minus_e = bob_minus_rho * bob_t22;
+            let bob_t23 = tau_2 + bob_t21;
+            let bob_minus_e_2 = bob_minus_rho_2 * bob_t23;
             // bob: acceleration
-            let bob_acc0 = bob_pivot1 * bob_rest7;
-            let bob_acc1 = bob_rest1 + bob_acc0;
+            let bob_t24 = bob_k_rz * bob_minus_e_2;
+            let bob_a = bob_e + bob_t24;
             // tail: acceleration
-            let tail_acc6 = 0.8 * bob_rest5;
-            let tail_acc7 = tail_pivot0 * tail_acc6;
-            let tail_acc8 = tail_rest10 + tail_acc7;
-            let tail_acc9 = bob_rest5 + tail_acc8;
-            let tail_acc10 = tail_cos0 * bob_acc1;
-            let tail_acc11 = tail_sin0 * bob_rest7;
-            let tail_acc12 = tail_acc10 + tail_acc11;
-            let tail_acc13 = tail_cos0 * bob_rest7;
-            let tail_acc14 = tail_sin0 * bob_acc1;
-            let tail_acc15 = tail_acc13 - tail_acc14;
+            let tail_hatd_x = 0.8 * bob_minus_e;
+            let tail_t64 = tail_minus_k_x * tail_hatd_x;
+            let tail_omegad_rz = tail_e + tail_t64;
+            let tail_a = bob_minus_e + tail_omegad_rz;
+            let tail_t65 = tail_cos * bob_a;
+            let tail_t66 = tail_sin * bob_minus_e_2;
+            let tail_omegad_rx = tail_t65 + tail_t66;
+            let tail_t67 = tail_cos * bob_minus_e_2;
+            let tail_t68 = tail_sin * bob_a;
+            let tail_omegad_ry = tail_t67 - tail_t68;
             // tail: velocity and joint rate (4.40)
-            let tail_vel22 = tail_vel0 - bob_rest5;
-            let tail_vel23 = tail_vel1 - bob_acc1;
-            let tail_vel24 = 0.8 * tail_vel22;
-            let tail_vel25 = bob_vel0 - tail_vel24;
-            let tail_vel26 = 0.8 * tail_vel23;
-            let tail_vel27 = bob_vel1 - tail_vel26;
-            let tail_vel28 = tail_cos0 * tail_vel25;
-            let tail_vel29 = tail_vel17 + tail_vel28;
-            let tail_vel30 = tail_sin0 * tail_vel25;
-            let tail_vel31 = tail_vel18 - tail_vel30;
+            let tail_t69 = tail_t12 - bob_minus_e;
+            let tail_t70 = tail_t13 - bob_a;
+            let tail_t71 = 0.8 * tail_t69;
+            let tail_t72 = bob_accel_x - tail_t71;
+            let tail_t73 = 0.8 * tail_t70;
+            let tail_accel_z_2 = bob_accel_y - tail_t73;
+            let tail_t74 = tail_cos * tail_t72;
+            let tail_accel_x = tail_t26 + tail_t74;
+            let tail_t75 = tail_sin * tail_t72;
+            let tail_accel_y_2 = tail_t27 - tail_t75;
             // tail: acceleration
-            let tail_acc16 = tail_acc0 - tail_acc12;
-            let tail_acc17 = tail_acc1 - tail_acc15;
-            let tail_acc18 = bob_rest5 - tail_acc9;
+            let tail_minus_alpha_x_2 = tail_minus_alpha_x - tail_omegad_rx;
+            let tail_minus_alpha_y_2 = tail_minus_alpha_y - tail_omegad_ry;
+            let tail_minus_alpha_z = bob_minus_e - tail_a;
             // bob: gravity and wrenches
-            let bob_load8 = 1.2 * bob_vel0;
-            let bob_load9 = 0.48 * tail_vel22;
-            let bob_load10 = bob_load8 - bob_load9;
-            let bob_load11 = 1.2 * bob_vel1;
-            let bob_load12 = 0.48 * tail_vel23;
-            let bob_load13 = bob_load11 - bob_load12;
-            let bob_load14 = 1.2 * bob_vel2;
-            let bob_load15 = 0.48 * tail_vel4;
-            let bob_load16 = bob_load14 - bob_load15;
-            let bob_load17 = 0.262 * bob_acc1;
-            let bob_load18 = 0.245 * tail_vel1;
-            let bob_load19 = bob_load17 - bob_load18;
-            let bob_load20 = 0.257 * bob_rest5;
-            let bob_load21 = 0.25 * tail_vel0;
-            let bob_load22 = bob_load20 - bob_load21;
-            let bob_load23 = 0.012 * bob_rest7;
-            let bob_load24 = 0.0050000000000000044 * bob_load0;
-            let bob_load25 = bob_load23 + bob_load24;
-            let bob_load26 = 0.48 * bob_vel1;
-            let bob_load27 = 0.48 * bob_vel0;
-            let bob_load28 = bob_load19 + bob_load26;
-            let bob_load29 = bob_load22 + bob_load27;
+            let bob_t25 = 1.2 * bob_accel_x;
+            let bob_t26 = 0.48 * tail_t69;
+            let bob_f_x = bob_t25 - bob_t26;
+            let bob_t27 = 1.2 * bob_accel_y;
+            let bob_t28 = 0.48 * tail_t70;
+            let bob_f_y = bob_t27 - bob_t28;
+            let bob_t29 = 1.2 * bob_minus_accel_z;
+            let bob_t30 = 0.48 * tail_t16;
+            let bob_minus_f_z = bob_t29 - bob_t30;
+            let bob_t31 = 0.262 * bob_a;
+            let bob_t32 = 0.245 * tail_t13;
+            let bob_t33 = bob_t31 - bob_t32;
+            let bob_t34 = 0.257 * bob_minus_e;
+            let bob_t35 = 0.25 * tail_t12;
+            let bob_t36 = bob_t34 - bob_t35;
+            let bob_t37 = 0.012 * bob_minus_e_2;
+            let bob_t38 = 0.0050000000000000044 * bob_t14;
+            let bob_minus_f_rz_2 = bob_t37 + bob_t38;
+            let bob_t39 = 0.48 * bob_accel_y;
+            let bob_t40 = 0.48 * bob_accel_x;
+            let bob_f_rx = bob_t33 + bob_t39;
+            let bob_minus_f_ry = bob_t36 + bob_t40;
             // tail: gravity and wrenches
-            let tail_load24 = tail_load1 + tail_acc18;
-            let tail_load25 = tail_acc2 + tail_acc17;
-            let tail_load26 = tail_acc3 + tail_acc16;
-            let tail_load27 = 0.5 * tail_vel29;
-            let tail_load28 = tail_load5 - tail_load27;
-            let tail_load29 = 0.5 * tail_vel31;
-            let tail_load30 = 0.1004987562112089 * tail_load24;
-            let tail_load31 = tail_load29 - tail_load30;
-            let tail_load32 = 0.5 * tail_vel27;
-            let tail_load33 = 0.1004987562112089 * tail_load25;
-            let tail_load34 = tail_load32 + tail_load33;
-            let tail_load35 = 0.001207920792079208 * tail_acc16;
-            let tail_load36 = 0.0004920792079207911 * tail_acc3;
-            let tail_load37 = tail_load35 - tail_load36;
-            let tail_load38 = 0.0003792079207920793 * tail_load25;
-            let tail_load39 = tail_load37 - tail_load38;
-            let tail_load40 = 0.028192079207920794 * tail_acc17;
-            let tail_load41 = 0.026492079207920793 * tail_acc2;
-            let tail_load42 = tail_load40 + tail_load41;
-            let tail_load43 = 0.0003792079207920793 * tail_load26;
-            let tail_load44 = tail_load42 - tail_load43;
-            let tail_load45 = 0.027700000000000002 * tail_acc18;
-            let tail_load46 = tail_load16 + tail_load45;
-            let tail_load47 = tail_load18 + tail_load46;
-            let tail_load48 = 0.1004987562112089 * tail_vel27;
-            let tail_load49 = 0.1004987562112089 * tail_vel31;
-            let tail_load50 = tail_load44 + tail_load48;
-            let tail_load51 = tail_load47 - tail_load49;
-            let tail_load52 = tail_cos0 * tail_load28;
-            let tail_load53 = tail_sin0 * tail_load31;
-            let tail_load54 = tail_load52 + tail_load53;
-            let tail_load55 = tail_sin0 * tail_load28;
-            let tail_load56 = tail_cos0 * tail_load31;
-            let tail_load57 = tail_load55 - tail_load56;
-            let tail_load58 = tail_cos0 * tail_load39;
-            let tail_load59 = tail_sin0 * tail_load50;
-            let tail_load60 = tail_load58 - tail_load59;
-            let tail_load61 = tail_sin0 * tail_load39;
-            let tail_load62 = tail_cos0 * tail_load50;
-            let tail_load63 = tail_load61 + tail_load62;
-            let tail_load64 = 0.8 * tail_load34;
-            let tail_load65 = tail_load60 - tail_load64;
-            let tail_load66 = 0.8 * tail_load54;
-            let tail_load67 = tail_load51 - tail_load66;
-            let tail_load68 = bob_load10 - tail_load54;
-            let tail_load69 = bob_load13 + tail_load34;
-            let tail_load70 = tail_load57 - bob_load16;
-            let tail_load71 = bob_load28 - tail_load65;
-            let tail_load72 = bob_load29 + tail_load67;
-            let tail_load73 = tail_load63 - bob_load25;
+            let tail_t76 = tail_t34 + tail_minus_alpha_z;
+            let tail_t77 = tail_t29 + tail_minus_alpha_y_2;
+            let tail_t78 = tail_t30 + tail_minus_alpha_x_2;
+            let tail_t79 = 0.5 * tail_accel_x;
+            let tail_minus_f_x_2 = tail_minus_f_x - tail_t79;
+            let tail_t80 = 0.5 * tail_accel_y_2;
+            let tail_t81 = 0.1004987562112089 * tail_t76;
+            let tail_f_y = tail_t80 - tail_t81;
+            let tail_t82 = 0.5 * tail_accel_z_2;
+            let tail_t83 = 0.1004987562112089 * tail_t77;
+            let tail_f_z_2 = tail_t82 + tail_t83;
+            let tail_t84 = 0.001207920792079208 * tail_minus_alpha_x_2;
+            let tail_t85 = 0.0004920792079207911 * tail_t30;
+            let tail_t86 = tail_t84 - tail_t85;
+            let tail_t87 = 0.0003792079207920793 * tail_t77;
+            let tail_minus_f_rx = tail_t86 - tail_t87;
+            let tail_t88 = 0.028192079207920794 * tail_minus_alpha_y_2;
+            let tail_t89 = 0.026492079207920793 * tail_t29;
+            let tail_t90 = tail_t88 + tail_t89;
+            let tail_t91 = 0.0003792079207920793 * tail_t78;
+            let tail_t92 = tail_t90 - tail_t91;
+            let tail_t93 = 0.027700000000000002 * tail_minus_alpha_z;
+            let tail_t94 = tail_t45 + tail_t93;
+            let tail_t95 = tail_t47 + tail_t94;
+            let tail_t96 = 0.1004987562112089 * tail_accel_z_2;
+            let tail_t97 = 0.1004987562112089 * tail_accel_y_2;
+            let tail_minus_f_ry_2 = tail_t92 + tail_t96;
+            let tail_minus_f_rz_2 = tail_t95 - tail_t97;
+            let tail_t98 = tail_cos * tail_minus_f_x_2;
+            let tail_t99 = tail_sin * tail_f_y;
+            let tail_t100 = tail_t98 + tail_t99;
+            let tail_t101 = tail_sin * tail_minus_f_x_2;
+            let tail_t102 = tail_cos * tail_f_y;
+            let tail_t103 = tail_t101 - tail_t102;
+            let tail_t104 = tail_cos * tail_minus_f_rx;
+            let tail_t105 = tail_sin * tail_minus_f_ry_2;
+            let tail_t106 = tail_t104 - tail_t105;
+            let tail_t107 = tail_sin * tail_minus_f_rx;
+            let tail_t108 = tail_cos * tail_minus_f_ry_2;
+            let tail_t109 = tail_t107 + tail_t108;
+            let tail_t110 = 0.8 * tail_f_z_2;
+            let tail_t111 = tail_t106 - tail_t110;
+            let tail_t112 = 0.8 * tail_t100;
+            let tail_t113 = tail_minus_f_rz_2 - tail_t112;
+            let reactions_0_0 = bob_f_x - tail_t100;
+            let reactions_0_1 = bob_f_y + tail_f_z_2;
+            let reactions_0_2 = tail_t103 - bob_minus_f_z;
+            let reactions_0_3 = bob_f_rx - tail_t111;
+            let minus_reactions_0_4 = bob_minus_f_ry + tail_t113;
+            let reactions_0_5 = tail_t109 - bob_minus_f_rz_2;
             // tail: reaction wrench (4.66)
-            let tail_react0 = 0.09950371902099892 * tail_load28;
-            let tail_react1 = 0.9950371902099892 * tail_load31;
-            let tail_react2 = tail_react0 + tail_react1;
-            let tail_react3 = 0.9950371902099892 * tail_load28;
-            let tail_react4 = 0.09950371902099892 * tail_load31;
-            let tail_react5 = tail_react3 - tail_react4;
-            let tail_react6 = 0.09950371902099892 * tail_load39;
-            let tail_react7 = 0.9950371902099892 * tail_load50;
-            let tail_react8 = tail_react7 - tail_react6;
-            let tail_react9 = 0.9950371902099892 * tail_load39;
-            let tail_react10 = 0.09950371902099892 * tail_load50;
-            let tail_react11 = tail_react9 + tail_react10;
-            results[0][l] = tail_load68;
-            results[1][l] = tail_load69;
-            results[2][l] = tail_load70;
-            results[3][l] = tail_load71;
-            results[4][l] = -tail_load72;
-            results[5][l] = tail_load73;
-            results[6][l] = -tail_react2;
-            results[7][l] = tail_load34;
-            results[8][l] = tail_react5;
-            results[9][l] = tail_react8;
-            results[10][l] = -tail_load51;
-            results[11][l] = tail_react11;
+            let tail_t114 = 0.09950371902099892 * tail_minus_f_x_2;
+            let tail_t115 = 0.9950371902099892 * tail_f_y;
+            let minus_reactions_1_0 = tail_t114 + tail_t115;
+            let tail_t116 = 0.9950371902099892 * tail_minus_f_x_2;
+            let tail_t117 = 0.09950371902099892 * tail_f_y;
+            let reactions_1_2 = tail_t116 - tail_t117;
+            let tail_t118 = 0.09950371902099892 * tail_minus_f_rx;
+            let tail_t119 = 0.9950371902099892 * tail_minus_f_ry_2;
+            let reactions_1_3 = tail_t119 - tail_t118;
+            let tail_t120 = 0.9950371902099892 * tail_minus_f_rx;
+            let tail_t121 = 0.09950371902099892 * tail_minus_f_ry_2;
+            let reactions_1_5 = tail_t120 + tail_t121;
+            results[0][l] = reactions_0_0;
+            results[1][l] = reactions_0_1;
+            results[2][l] = reactions_0_2;
+            results[3][l] = reactions_0_3;
+            results[4][l] = -minus_reactions_0_4;
+            results[5][l] = reactions_0_5;
+            results[6][l] = -minus_reactions_1_0;
+            results[7][l] = tail_f_z_2;
+            results[8][l] = reactions_1_2;
+            results[9][l] = reactions_1_3;
+            results[10][l] = -tail_minus_f_rz_2;
+            results[11][l] = reactions_1_5;
         }
         reactions.give(0, &results[0]);
         reactions.give(1, &results[1]);
@@ -1130,54 +1130,54 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
         for l in 0..LANES {
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: mass matrix by composite inertias
-            let tail_mass0 = 0.1004987562112089 * tail_sin0;
-            let tail_mass1 = 0.1004987562112089 * tail_cos0;
-            let tail_mass2 = 0.8 * tail_mass0;
-            let tail_mass3 = tail_mass2 + 0.027700000000000002;
-            let tail_mass4 = tail_cos0 + tail_cos0;
-            let tail_mass5 = 0.026984158415841585 * tail_sin0;
-            let tail_mass6 = 0.0003792079207920793 * tail_mass4;
-            let tail_mass7 = tail_mass5 + tail_mass6;
-            let tail_mass8 = tail_sin0 * tail_mass7;
-            let tail_mass9 = tail_cos0 * tail_mass7;
-            let tail_mass10 = tail_mass9 - 0.0003792079207920793;
-            let tail_mass11 = tail_mass8 - 0.026984158415841585;
-            let tail_mass12 = tail_mass8 + 0.027700000000000002;
-            let tail_mass13 = tail_mass8 - tail_mass12;
-            let tail_mass14 = tail_mass12 - 0.027700000000000002;
-            let tail_mass15 = 0.8 * tail_mass1;
-            let tail_mass16 = tail_mass10 + tail_mass15;
-            let tail_mass17 = tail_mass0 + tail_mass0;
-            let tail_mass18 = 0.8 * tail_mass17;
-            let tail_mass19 = tail_mass11 + tail_mass18;
-            let tail_mass20 = tail_mass13 - tail_mass18;
-            let tail_mass21 = tail_mass19 + 0.6101920792079208;
-            let tail_mass22 = 0.5770000000000001 - tail_mass20;
-            let tail_mass23 = 0.0401920792079208 - tail_mass14;
-            results[0][l] = tail_mass21;
+            let tail_t1 = 0.1004987562112089 * tail_sin;
+            let tail_t2 = 0.1004987562112089 * tail_cos;
+            let tail_t3 = 0.8 * tail_t1;
+            let m_1_3 = tail_t3 + 0.027700000000000002;
+            let tail_t4 = tail_cos + tail_cos;
+            let tail_t5 = 0.026984158415841585 * tail_sin;
+            let tail_t6 = 0.0003792079207920793 * tail_t4;
+            let tail_t7 = tail_t5 + tail_t6;
+            let tail_t8 = tail_sin * tail_t7;
+            let tail_t9 = tail_cos * tail_t7;
+            let tail_t10 = tail_t9 - 0.0003792079207920793;
+            let tail_t11 = tail_t8 - 0.026984158415841585;
+            let tail_t12 = tail_t8 + 0.027700000000000002;
+            let tail_t13 = tail_t8 - tail_t12;
+            let tail_t14 = tail_t12 - 0.027700000000000002;
+            let tail_t15 = 0.8 * tail_t2;
+            let m_0_2 = tail_t10 + tail_t15;
+            let tail_t16 = tail_t1 + tail_t1;
+            let tail_t17 = 0.8 * tail_t16;
+            let tail_t18 = tail_t11 + tail_t17;
+            let tail_t19 = tail_t13 - tail_t17;
+            let m_0_0 = tail_t18 + 0.6101920792079208;
+            let m_1_1 = 0.5770000000000001 - tail_t19;
+            let m_2_2 = 0.0401920792079208 - tail_t14;
+            results[0][l] = m_0_0;
             results[1][l] = 0.0;
-            results[2][l] = tail_mass16;
+            results[2][l] = m_0_2;
             results[3][l] = 0.0;
             results[4][l] = 0.0;
-            results[5][l] = tail_mass22;
+            results[5][l] = m_1_1;
             results[6][l] = 0.0;
-            results[7][l] = tail_mass3;
-            results[8][l] = tail_mass16;
+            results[7][l] = m_1_3;
+            results[8][l] = m_0_2;
             results[9][l] = 0.0;
-            results[10][l] = tail_mass23;
+            results[10][l] = m_2_2;
             results[11][l] = 0.0;
             results[12][l] = 0.0;
-            results[13][l] = tail_mass3;
+            results[13][l] = m_1_3;
             results[14][l] = 0.0;
             results[15][l] = 0.027700000000000002;
         }
@@ -1199,7 +1199,9 @@ impl SphericalPendulum {
         m.give(15, &results[15]);
     }
 
-    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    /// Rotation, position and velocity of frames.
+    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
+    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
     /// 88 operations: 36 additions, 52 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 5], v: &[f64; 4], rotation: &mut [[[f64; 3]; 3]; 2], position: &mut [[f64; 3]; 2], velocity: &mut [[f64; 6]; 2]) {
@@ -1211,8 +1213,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
@@ -1235,134 +1237,134 @@ impl SphericalPendulum {
             let v_2 = given[6][l];
             let v_3 = given[7][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_2 * bob_pose2;
-            let bob_pose6 = q_0 * bob_pose1;
-            let bob_pose7 = q_0 * bob_pose2;
-            let bob_pose8 = q_1 * bob_pose2;
-            let bob_pose9 = q_3 * bob_pose0;
-            let bob_pose10 = q_3 * bob_pose1;
-            let bob_pose11 = q_3 * bob_pose2;
-            let bob_pose12 = bob_pose4 + bob_pose5;
-            let bob_pose13 = bob_pose12 - 1.0;
-            let bob_pose14 = bob_pose6 - bob_pose11;
-            let bob_pose15 = bob_pose7 + bob_pose10;
-            let bob_pose16 = bob_pose6 + bob_pose11;
-            let bob_pose17 = bob_pose3 + bob_pose5;
-            let bob_pose18 = 1.0 - bob_pose17;
-            let bob_pose19 = bob_pose8 - bob_pose9;
-            let bob_pose20 = bob_pose7 - bob_pose10;
-            let bob_pose21 = bob_pose8 + bob_pose9;
-            let bob_pose22 = bob_pose3 + bob_pose4;
-            let bob_pose23 = bob_pose22 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_2 * bob_t2;
+            let bob_t6 = q_0 * bob_t1;
+            let bob_t7 = q_0 * bob_t2;
+            let bob_t8 = q_1 * bob_t2;
+            let bob_t9 = q_3 * bob_t0;
+            let bob_t10 = q_3 * bob_t1;
+            let bob_t11 = q_3 * bob_t2;
+            let bob_t12 = bob_t4 + bob_t5;
+            let minus_rotation_0_0 = bob_t12 - 1.0;
+            let rotation_0_1 = bob_t6 - bob_t11;
+            let rotation_0_2 = bob_t7 + bob_t10;
+            let rotation_1_0 = bob_t6 + bob_t11;
+            let bob_t13 = bob_t3 + bob_t5;
+            let rotation_1_1 = 1.0 - bob_t13;
+            let rotation_1_2 = bob_t8 - bob_t9;
+            let rotation_2_0 = bob_t7 - bob_t10;
+            let rotation_2_1 = bob_t8 + bob_t9;
+            let bob_t14 = bob_t3 + bob_t4;
+            let minus_rotation_2_2 = bob_t14 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = 0.8 * v_1;
-            let tail_vel1 = 0.8 * v_0;
-            let tail_vel2 = tail_cos0 * tail_vel0;
-            let tail_vel3 = tail_sin0 * tail_vel0;
-            let tail_vel4 = v_0 * tail_cos0;
-            let tail_vel5 = v_2 * tail_sin0;
-            let tail_vel6 = tail_vel4 - tail_vel5;
-            let tail_vel7 = v_2 * tail_cos0;
-            let tail_vel8 = v_0 * tail_sin0;
-            let tail_vel9 = tail_vel7 + tail_vel8;
-            let tail_vel10 = v_1 + v_3;
+            let tail_t1 = 0.8 * v_1;
+            let tail_hat_z = 0.8 * v_0;
+            let tail_minus_hat_x = tail_cos * tail_t1;
+            let tail_hat_y = tail_sin * tail_t1;
+            let tail_t2 = v_0 * tail_cos;
+            let tail_t3 = v_2 * tail_sin;
+            let tail_hat_rx = tail_t2 - tail_t3;
+            let tail_t4 = v_2 * tail_cos;
+            let tail_t5 = v_0 * tail_sin;
+            let tail_minus_hat_ry = tail_t4 + tail_t5;
+            let tail_omega_rz = v_1 + v_3;
             // tail: placement
-            let tail_place0 = 0.8 * bob_pose15;
-            let tail_place1 = 0.8 * bob_pose19;
-            let tail_place2 = 0.8 * bob_pose23;
-            let tail_place3 = tail_place2 + 2.0;
-            let tail_place4 = bob_pose13 * tail_cos0;
-            let tail_place5 = bob_pose15 * tail_sin0;
-            let tail_place6 = tail_place4 + tail_place5;
-            let tail_place7 = bob_pose15 * tail_cos0;
-            let tail_place8 = bob_pose13 * tail_sin0;
-            let tail_place9 = tail_place7 - tail_place8;
-            let tail_place10 = bob_pose16 * tail_cos0;
-            let tail_place11 = bob_pose19 * tail_sin0;
-            let tail_place12 = tail_place10 - tail_place11;
-            let tail_place13 = bob_pose19 * tail_cos0;
-            let tail_place14 = bob_pose16 * tail_sin0;
-            let tail_place15 = tail_place13 + tail_place14;
-            let tail_place16 = bob_pose20 * tail_cos0;
-            let tail_place17 = bob_pose23 * tail_sin0;
-            let tail_place18 = tail_place16 + tail_place17;
-            let tail_place19 = bob_pose23 * tail_cos0;
-            let tail_place20 = bob_pose20 * tail_sin0;
-            let tail_place21 = tail_place19 - tail_place20;
-            let tail_place22 = 0.09950371902099892 * tail_place6;
-            let tail_place23 = 0.9950371902099892 * tail_place9;
-            let tail_place24 = tail_place23 - tail_place22;
-            let tail_place25 = 0.9950371902099892 * tail_place6;
-            let tail_place26 = 0.09950371902099892 * tail_place9;
-            let tail_place27 = tail_place25 + tail_place26;
-            let tail_place28 = 0.09950371902099892 * tail_place12;
-            let tail_place29 = 0.9950371902099892 * tail_place15;
-            let tail_place30 = tail_place28 + tail_place29;
-            let tail_place31 = 0.9950371902099892 * tail_place12;
-            let tail_place32 = 0.09950371902099892 * tail_place15;
-            let tail_place33 = tail_place32 - tail_place31;
-            let tail_place34 = 0.09950371902099892 * tail_place18;
-            let tail_place35 = 0.9950371902099892 * tail_place21;
-            let tail_place36 = tail_place34 - tail_place35;
-            let tail_place37 = 0.9950371902099892 * tail_place18;
-            let tail_place38 = 0.09950371902099892 * tail_place21;
-            let tail_place39 = tail_place37 + tail_place38;
-            let tail_place40 = 0.09950371902099892 * tail_vel2;
-            let tail_place41 = 0.9950371902099892 * tail_vel3;
-            let tail_place42 = tail_place40 + tail_place41;
-            let tail_place43 = 0.9950371902099892 * tail_vel2;
-            let tail_place44 = 0.09950371902099892 * tail_vel3;
-            let tail_place45 = tail_place43 - tail_place44;
-            let tail_place46 = 0.09950371902099892 * tail_vel6;
-            let tail_place47 = 0.9950371902099892 * tail_vel9;
-            let tail_place48 = tail_place46 + tail_place47;
-            let tail_place49 = 0.9950371902099892 * tail_vel6;
-            let tail_place50 = 0.09950371902099892 * tail_vel9;
-            let tail_place51 = tail_place50 - tail_place49;
-            results[0][l] = -bob_pose13;
-            results[1][l] = bob_pose14;
-            results[2][l] = bob_pose15;
-            results[3][l] = bob_pose16;
-            results[4][l] = bob_pose18;
-            results[5][l] = bob_pose19;
-            results[6][l] = bob_pose20;
-            results[7][l] = bob_pose21;
-            results[8][l] = -bob_pose23;
-            results[9][l] = tail_place24;
-            results[10][l] = bob_pose14;
-            results[11][l] = tail_place27;
-            results[12][l] = tail_place30;
-            results[13][l] = bob_pose18;
-            results[14][l] = tail_place33;
-            results[15][l] = tail_place36;
-            results[16][l] = bob_pose21;
-            results[17][l] = -tail_place39;
+            let minus_position_1_0 = 0.8 * rotation_0_2;
+            let minus_position_1_1 = 0.8 * rotation_1_2;
+            let tail_t6 = 0.8 * minus_rotation_2_2;
+            let position_1_2 = tail_t6 + 2.0;
+            let tail_t7 = minus_rotation_0_0 * tail_cos;
+            let tail_t8 = rotation_0_2 * tail_sin;
+            let tail_t9 = tail_t7 + tail_t8;
+            let tail_t10 = rotation_0_2 * tail_cos;
+            let tail_t11 = minus_rotation_0_0 * tail_sin;
+            let tail_t12 = tail_t10 - tail_t11;
+            let tail_t13 = rotation_1_0 * tail_cos;
+            let tail_t14 = rotation_1_2 * tail_sin;
+            let tail_t15 = tail_t13 - tail_t14;
+            let tail_t16 = rotation_1_2 * tail_cos;
+            let tail_t17 = rotation_1_0 * tail_sin;
+            let tail_t18 = tail_t16 + tail_t17;
+            let tail_t19 = rotation_2_0 * tail_cos;
+            let tail_t20 = minus_rotation_2_2 * tail_sin;
+            let tail_t21 = tail_t19 + tail_t20;
+            let tail_t22 = minus_rotation_2_2 * tail_cos;
+            let tail_t23 = rotation_2_0 * tail_sin;
+            let tail_t24 = tail_t22 - tail_t23;
+            let tail_t25 = 0.09950371902099892 * tail_t9;
+            let tail_t26 = 0.9950371902099892 * tail_t12;
+            let rotation_3_0 = tail_t26 - tail_t25;
+            let tail_t27 = 0.9950371902099892 * tail_t9;
+            let tail_t28 = 0.09950371902099892 * tail_t12;
+            let rotation_3_2 = tail_t27 + tail_t28;
+            let tail_t29 = 0.09950371902099892 * tail_t15;
+            let tail_t30 = 0.9950371902099892 * tail_t18;
+            let rotation_4_0 = tail_t29 + tail_t30;
+            let tail_t31 = 0.9950371902099892 * tail_t15;
+            let tail_t32 = 0.09950371902099892 * tail_t18;
+            let rotation_4_2 = tail_t32 - tail_t31;
+            let tail_t33 = 0.09950371902099892 * tail_t21;
+            let tail_t34 = 0.9950371902099892 * tail_t24;
+            let rotation_5_0 = tail_t33 - tail_t34;
+            let tail_t35 = 0.9950371902099892 * tail_t21;
+            let tail_t36 = 0.09950371902099892 * tail_t24;
+            let minus_rotation_5_2 = tail_t35 + tail_t36;
+            let tail_t37 = 0.09950371902099892 * tail_minus_hat_x;
+            let tail_t38 = 0.9950371902099892 * tail_hat_y;
+            let minus_velocity_1_0 = tail_t37 + tail_t38;
+            let tail_t39 = 0.9950371902099892 * tail_minus_hat_x;
+            let tail_t40 = 0.09950371902099892 * tail_hat_y;
+            let velocity_1_2 = tail_t39 - tail_t40;
+            let tail_t41 = 0.09950371902099892 * tail_hat_rx;
+            let tail_t42 = 0.9950371902099892 * tail_minus_hat_ry;
+            let velocity_1_3 = tail_t41 + tail_t42;
+            let tail_t43 = 0.9950371902099892 * tail_hat_rx;
+            let tail_t44 = 0.09950371902099892 * tail_minus_hat_ry;
+            let velocity_1_5 = tail_t44 - tail_t43;
+            results[0][l] = -minus_rotation_0_0;
+            results[1][l] = rotation_0_1;
+            results[2][l] = rotation_0_2;
+            results[3][l] = rotation_1_0;
+            results[4][l] = rotation_1_1;
+            results[5][l] = rotation_1_2;
+            results[6][l] = rotation_2_0;
+            results[7][l] = rotation_2_1;
+            results[8][l] = -minus_rotation_2_2;
+            results[9][l] = rotation_3_0;
+            results[10][l] = rotation_0_1;
+            results[11][l] = rotation_3_2;
+            results[12][l] = rotation_4_0;
+            results[13][l] = rotation_1_1;
+            results[14][l] = rotation_4_2;
+            results[15][l] = rotation_5_0;
+            results[16][l] = rotation_2_1;
+            results[17][l] = -minus_rotation_5_2;
             results[18][l] = 0.0;
             results[19][l] = 0.0;
             results[20][l] = 2.0;
-            results[21][l] = -tail_place0;
-            results[22][l] = -tail_place1;
-            results[23][l] = tail_place3;
+            results[21][l] = -minus_position_1_0;
+            results[22][l] = -minus_position_1_1;
+            results[23][l] = position_1_2;
             results[24][l] = 0.0;
             results[25][l] = 0.0;
             results[26][l] = 0.0;
             results[27][l] = v_0;
             results[28][l] = v_1;
             results[29][l] = v_2;
-            results[30][l] = -tail_place42;
-            results[31][l] = tail_vel1;
-            results[32][l] = tail_place45;
-            results[33][l] = tail_place48;
-            results[34][l] = tail_vel10;
-            results[35][l] = tail_place51;
+            results[30][l] = -minus_velocity_1_0;
+            results[31][l] = tail_hat_z;
+            results[32][l] = velocity_1_2;
+            results[33][l] = velocity_1_3;
+            results[34][l] = tail_omega_rz;
+            results[35][l] = velocity_1_5;
         }
         rotation.give(0, &results[0]);
         rotation.give(1, &results[1]);
@@ -1402,7 +1404,8 @@ impl SphericalPendulum {
         velocity.give(11, &results[35]);
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     /// 112 operations: 48 additions, 64 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 5], v: &[f64; 4], a: &[f64; 4], tau: &mut [f64; 4]) {
@@ -1414,8 +1417,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -1446,129 +1449,129 @@ impl SphericalPendulum {
             let a_2 = given[10][l];
             let a_3 = given[11][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_1 * bob_pose2;
-            let bob_pose7 = q_3 * bob_pose0;
-            let bob_pose8 = q_3 * bob_pose1;
-            let bob_pose9 = bob_pose5 - bob_pose8;
-            let bob_pose10 = bob_pose6 + bob_pose7;
-            let bob_pose11 = bob_pose3 + bob_pose4;
-            let bob_pose12 = bob_pose11 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_1 * bob_t2;
+            let bob_t7 = q_3 * bob_t0;
+            let bob_t8 = q_3 * bob_t1;
+            let bob_t9 = bob_t5 - bob_t8;
+            let bob_t10 = bob_t6 + bob_t7;
+            let bob_t11 = bob_t3 + bob_t4;
+            let bob_t12 = bob_t11 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = 9.81 * bob_pose9;
-            let bob_vel1 = 9.81 * bob_pose10;
-            let bob_vel2 = 9.81 * bob_pose12;
+            let bob_accel_x = 9.81 * bob_t9;
+            let bob_accel_y = 9.81 * bob_t10;
+            let bob_minus_accel_z = 9.81 * bob_t12;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = v_0 * v_2;
-            let tail_vel1 = a_1 + tail_vel0;
-            let tail_vel2 = v_1 * v_2;
-            let tail_vel3 = a_0 - tail_vel2;
-            let tail_vel4 = v_0 * v_0;
-            let tail_vel5 = v_1 * v_1;
-            let tail_vel6 = tail_vel4 + tail_vel5;
-            let tail_vel7 = 0.8 * tail_vel1;
-            let tail_vel8 = bob_vel0 - tail_vel7;
-            let tail_vel9 = 0.8 * tail_vel3;
-            let tail_vel10 = bob_vel1 + tail_vel9;
-            let tail_vel11 = 0.8 * tail_vel6;
-            let tail_vel12 = bob_vel2 - tail_vel11;
-            let tail_vel13 = v_0 * tail_cos0;
-            let tail_vel14 = v_2 * tail_sin0;
-            let tail_vel15 = tail_vel13 - tail_vel14;
-            let tail_vel16 = v_2 * tail_cos0;
-            let tail_vel17 = v_0 * tail_sin0;
-            let tail_vel18 = tail_vel16 + tail_vel17;
-            let tail_vel19 = a_0 * tail_cos0;
-            let tail_vel20 = a_2 * tail_sin0;
-            let tail_vel21 = tail_vel19 - tail_vel20;
-            let tail_vel22 = a_2 * tail_cos0;
-            let tail_vel23 = a_0 * tail_sin0;
-            let tail_vel24 = tail_vel22 + tail_vel23;
-            let tail_vel25 = tail_cos0 * tail_vel12;
-            let tail_vel26 = tail_sin0 * tail_vel8;
-            let tail_vel27 = tail_vel25 - tail_vel26;
-            let tail_vel28 = v_1 + v_3;
+            let tail_t1 = v_0 * v_2;
+            let tail_t2 = a_1 + tail_t1;
+            let tail_t3 = v_1 * v_2;
+            let tail_t4 = a_0 - tail_t3;
+            let tail_t5 = v_0 * v_0;
+            let tail_t6 = v_1 * v_1;
+            let tail_t7 = tail_t5 + tail_t6;
+            let tail_t8 = 0.8 * tail_t2;
+            let tail_t9 = bob_accel_x - tail_t8;
+            let tail_t10 = 0.8 * tail_t4;
+            let tail_accel_z = bob_accel_y + tail_t10;
+            let tail_t11 = 0.8 * tail_t7;
+            let tail_t12 = bob_minus_accel_z - tail_t11;
+            let tail_t13 = v_0 * tail_cos;
+            let tail_t14 = v_2 * tail_sin;
+            let tail_spin_x = tail_t13 - tail_t14;
+            let tail_t15 = v_2 * tail_cos;
+            let tail_t16 = v_0 * tail_sin;
+            let tail_minus_spin_y = tail_t15 + tail_t16;
+            let tail_t17 = a_0 * tail_cos;
+            let tail_t18 = a_2 * tail_sin;
+            let tail_t19 = tail_t17 - tail_t18;
+            let tail_t20 = a_2 * tail_cos;
+            let tail_t21 = a_0 * tail_sin;
+            let tail_t22 = tail_t20 + tail_t21;
+            let tail_t23 = tail_cos * tail_t12;
+            let tail_t24 = tail_sin * tail_t9;
+            let tail_accel_y = tail_t23 - tail_t24;
+            let tail_spin_z = v_1 + v_3;
             // tail: acceleration
-            let tail_acc0 = v_3 * tail_vel18;
-            let tail_acc1 = v_3 * tail_vel15;
-            let tail_acc2 = tail_vel21 - tail_acc0;
-            let tail_acc3 = tail_vel24 + tail_acc1;
-            let tail_acc4 = a_1 + a_3;
-            let tail_acc5 = tail_vel15 * tail_vel28;
-            let tail_acc6 = tail_vel18 * tail_vel28;
-            let tail_acc7 = tail_vel15 * tail_vel15;
-            let tail_acc8 = tail_vel18 * tail_vel18;
+            let tail_t25 = v_3 * tail_minus_spin_y;
+            let tail_t26 = v_3 * tail_spin_x;
+            let tail_alpha_x = tail_t19 - tail_t25;
+            let tail_minus_alpha_y = tail_t22 + tail_t26;
+            let tail_alpha_z = a_1 + a_3;
+            let tail_t27 = tail_spin_x * tail_spin_z;
+            let tail_t28 = tail_minus_spin_y * tail_spin_z;
+            let tail_t29 = tail_spin_x * tail_spin_x;
+            let tail_t30 = tail_minus_spin_y * tail_minus_spin_y;
             // bob: gravity and wrenches
-            let bob_load0 = v_0 * v_1;
-            let bob_load1 = 0.6101920792079208 * a_0;
-            let bob_load2 = 0.5368079207920793 * tail_vel2;
-            let bob_load3 = bob_load1 - bob_load2;
-            let bob_load4 = 0.5770000000000001 * a_1;
-            let bob_load5 = 0.5700000000000001 * tail_vel0;
-            let bob_load6 = bob_load4 + bob_load5;
-            let bob_load7 = 0.0401920792079208 * a_2;
-            let bob_load8 = 0.03319207920792078 * bob_load0;
-            let bob_load9 = bob_load7 - bob_load8;
-            let bob_load10 = 0.88 * bob_vel1;
-            let bob_load11 = 0.88 * bob_vel0;
-            let bob_load12 = bob_load3 + bob_load10;
-            let bob_load13 = bob_load6 - bob_load11;
+            let bob_t13 = v_0 * v_1;
+            let bob_t14 = 0.6101920792079208 * a_0;
+            let bob_t15 = 0.5368079207920793 * tail_t3;
+            let bob_t16 = bob_t14 - bob_t15;
+            let bob_t17 = 0.5770000000000001 * a_1;
+            let bob_t18 = 0.5700000000000001 * tail_t1;
+            let bob_t19 = bob_t17 + bob_t18;
+            let bob_t20 = 0.0401920792079208 * a_2;
+            let bob_t21 = 0.03319207920792078 * bob_t13;
+            let bob_f_rz = bob_t20 - bob_t21;
+            let bob_t22 = 0.88 * bob_accel_y;
+            let bob_t23 = 0.88 * bob_accel_x;
+            let bob_f_rx = bob_t16 + bob_t22;
+            let bob_f_ry = bob_t19 - bob_t23;
             // tail: gravity and wrenches
-            let tail_load0 = tail_vel28 * tail_vel28;
-            let tail_load1 = tail_vel15 * tail_vel18;
-            let tail_load2 = tail_acc8 + tail_load0;
-            let tail_load3 = tail_acc4 - tail_load1;
-            let tail_load4 = tail_acc3 + tail_acc5;
-            let tail_load5 = tail_acc2 - tail_acc6;
-            let tail_load6 = 0.1004987562112089 * tail_load2;
-            let tail_load7 = 0.1004987562112089 * tail_load3;
-            let tail_load8 = 0.1004987562112089 * tail_load4;
-            let tail_load9 = 0.026984158415841585 * tail_acc2;
-            let tail_load10 = 0.027700000000000002 * tail_acc6;
-            let tail_load11 = tail_load9 + tail_load10;
-            let tail_load12 = 0.0003792079207920793 * tail_load4;
-            let tail_load13 = tail_load11 - tail_load12;
-            let tail_load14 = 0.05468415841584159 * tail_acc5;
-            let tail_load15 = 0.0003792079207920793 * tail_load5;
-            let tail_load16 = tail_load14 + tail_load15;
-            let tail_load17 = 0.027700000000000002 * tail_acc4;
-            let tail_load18 = 0.026984158415841585 * tail_load1;
-            let tail_load19 = tail_load17 - tail_load18;
-            let tail_load20 = tail_acc7 - tail_acc8;
-            let tail_load21 = 0.0003792079207920793 * tail_load20;
-            let tail_load22 = tail_load19 - tail_load21;
-            let tail_load23 = 0.1004987562112089 * tail_vel10;
-            let tail_load24 = 0.1004987562112089 * tail_vel27;
-            let tail_load25 = tail_load16 + tail_load23;
-            let tail_load26 = tail_load22 + tail_load24;
-            let tail_load27 = tail_cos0 * tail_load6;
-            let tail_load28 = tail_sin0 * tail_load7;
-            let tail_load29 = tail_load27 + tail_load28;
-            let tail_load30 = tail_cos0 * tail_load13;
-            let tail_load31 = tail_sin0 * tail_load25;
-            let tail_load32 = tail_load30 - tail_load31;
-            let tail_load33 = tail_sin0 * tail_load13;
-            let tail_load34 = tail_cos0 * tail_load25;
-            let tail_load35 = tail_load33 + tail_load34;
-            let tail_load36 = 0.8 * tail_load8;
-            let tail_load37 = tail_load32 - tail_load36;
-            let tail_load38 = 0.8 * tail_load29;
-            let tail_load39 = tail_load26 + tail_load38;
-            let tail_load40 = bob_load12 - tail_load37;
-            let tail_load41 = bob_load13 + tail_load39;
-            let tail_load42 = bob_load9 + tail_load35;
-            results[0][l] = tail_load40;
-            results[1][l] = tail_load41;
-            results[2][l] = tail_load42;
-            results[3][l] = tail_load26;
+            let tail_t31 = tail_spin_z * tail_spin_z;
+            let tail_t32 = tail_spin_x * tail_minus_spin_y;
+            let tail_t33 = tail_t30 + tail_t31;
+            let tail_t34 = tail_alpha_z - tail_t32;
+            let tail_t35 = tail_minus_alpha_y + tail_t27;
+            let tail_t36 = tail_alpha_x - tail_t28;
+            let tail_minus_f_x = 0.1004987562112089 * tail_t33;
+            let tail_f_y = 0.1004987562112089 * tail_t34;
+            let tail_f_z = 0.1004987562112089 * tail_t35;
+            let tail_t37 = 0.026984158415841585 * tail_alpha_x;
+            let tail_t38 = 0.027700000000000002 * tail_t28;
+            let tail_t39 = tail_t37 + tail_t38;
+            let tail_t40 = 0.0003792079207920793 * tail_t35;
+            let tail_minus_f_rx = tail_t39 - tail_t40;
+            let tail_t41 = 0.05468415841584159 * tail_t27;
+            let tail_t42 = 0.0003792079207920793 * tail_t36;
+            let tail_t43 = tail_t41 + tail_t42;
+            let tail_t44 = 0.027700000000000002 * tail_alpha_z;
+            let tail_t45 = 0.026984158415841585 * tail_t32;
+            let tail_t46 = tail_t44 - tail_t45;
+            let tail_t47 = tail_t29 - tail_t30;
+            let tail_t48 = 0.0003792079207920793 * tail_t47;
+            let tail_t49 = tail_t46 - tail_t48;
+            let tail_t50 = 0.1004987562112089 * tail_accel_z;
+            let tail_t51 = 0.1004987562112089 * tail_accel_y;
+            let tail_minus_f_ry = tail_t43 + tail_t50;
+            let tail_f_rz = tail_t49 + tail_t51;
+            let tail_t52 = tail_cos * tail_minus_f_x;
+            let tail_t53 = tail_sin * tail_f_y;
+            let tail_t54 = tail_t52 + tail_t53;
+            let tail_t55 = tail_cos * tail_minus_f_rx;
+            let tail_t56 = tail_sin * tail_minus_f_ry;
+            let tail_t57 = tail_t55 - tail_t56;
+            let tail_t58 = tail_sin * tail_minus_f_rx;
+            let tail_t59 = tail_cos * tail_minus_f_ry;
+            let tail_t60 = tail_t58 + tail_t59;
+            let tail_t61 = 0.8 * tail_f_z;
+            let tail_t62 = tail_t57 - tail_t61;
+            let tail_t63 = 0.8 * tail_t54;
+            let tail_t64 = tail_f_rz + tail_t63;
+            let tau_0 = bob_f_rx - tail_t62;
+            let tau_1 = bob_f_ry + tail_t64;
+            let tau_2 = bob_f_rz + tail_t60;
+            results[0][l] = tau_0;
+            results[1][l] = tau_1;
+            results[2][l] = tau_2;
+            results[3][l] = tail_f_rz;
         }
         tau.give(0, &results[0]);
         tau.give(1, &results[1]);
@@ -1576,7 +1579,8 @@ impl SphericalPendulum {
         tau.give(3, &results[3]);
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     /// 92 operations: 36 additions, 56 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 5], v: &[f64; 4], h: &mut [f64; 4]) {
@@ -1588,8 +1592,8 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
@@ -1612,109 +1616,109 @@ impl SphericalPendulum {
             let v_2 = given[6][l];
             let v_3 = given[7][l];
             // bob: sine and cosine, rotation
-            let bob_pose0 = q_0 + q_0;
-            let bob_pose1 = q_1 + q_1;
-            let bob_pose2 = q_2 + q_2;
-            let bob_pose3 = q_0 * bob_pose0;
-            let bob_pose4 = q_1 * bob_pose1;
-            let bob_pose5 = q_0 * bob_pose2;
-            let bob_pose6 = q_1 * bob_pose2;
-            let bob_pose7 = q_3 * bob_pose0;
-            let bob_pose8 = q_3 * bob_pose1;
-            let bob_pose9 = bob_pose5 - bob_pose8;
-            let bob_pose10 = bob_pose6 + bob_pose7;
-            let bob_pose11 = bob_pose3 + bob_pose4;
-            let bob_pose12 = bob_pose11 - 1.0;
+            let bob_t0 = q_0 + q_0;
+            let bob_t1 = q_1 + q_1;
+            let bob_t2 = q_2 + q_2;
+            let bob_t3 = q_0 * bob_t0;
+            let bob_t4 = q_1 * bob_t1;
+            let bob_t5 = q_0 * bob_t2;
+            let bob_t6 = q_1 * bob_t2;
+            let bob_t7 = q_3 * bob_t0;
+            let bob_t8 = q_3 * bob_t1;
+            let bob_t9 = bob_t5 - bob_t8;
+            let bob_t10 = bob_t6 + bob_t7;
+            let bob_t11 = bob_t3 + bob_t4;
+            let bob_t12 = bob_t11 - 1.0;
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // bob: velocity and joint rate (4.40)
-            let bob_vel0 = 9.81 * bob_pose9;
-            let bob_vel1 = 9.81 * bob_pose10;
-            let bob_vel2 = 9.81 * bob_pose12;
+            let bob_accel_x = 9.81 * bob_t9;
+            let bob_accel_y = 9.81 * bob_t10;
+            let bob_minus_accel_z = 9.81 * bob_t12;
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = v_0 * v_2;
-            let tail_vel1 = v_1 * v_2;
-            let tail_vel2 = v_0 * v_0;
-            let tail_vel3 = v_1 * v_1;
-            let tail_vel4 = tail_vel2 + tail_vel3;
-            let tail_vel5 = 0.8 * tail_vel0;
-            let tail_vel6 = bob_vel0 - tail_vel5;
-            let tail_vel7 = 0.8 * tail_vel1;
-            let tail_vel8 = bob_vel1 - tail_vel7;
-            let tail_vel9 = 0.8 * tail_vel4;
-            let tail_vel10 = bob_vel2 - tail_vel9;
-            let tail_vel11 = v_0 * tail_cos0;
-            let tail_vel12 = v_2 * tail_sin0;
-            let tail_vel13 = tail_vel11 - tail_vel12;
-            let tail_vel14 = v_2 * tail_cos0;
-            let tail_vel15 = v_0 * tail_sin0;
-            let tail_vel16 = tail_vel14 + tail_vel15;
-            let tail_vel17 = tail_cos0 * tail_vel10;
-            let tail_vel18 = tail_sin0 * tail_vel6;
-            let tail_vel19 = tail_vel17 - tail_vel18;
-            let tail_vel20 = v_1 + v_3;
+            let tail_t1 = v_0 * v_2;
+            let tail_t2 = v_1 * v_2;
+            let tail_t3 = v_0 * v_0;
+            let tail_t4 = v_1 * v_1;
+            let tail_t5 = tail_t3 + tail_t4;
+            let tail_t6 = 0.8 * tail_t1;
+            let tail_t7 = bob_accel_x - tail_t6;
+            let tail_t8 = 0.8 * tail_t2;
+            let tail_accel_z = bob_accel_y - tail_t8;
+            let tail_t9 = 0.8 * tail_t5;
+            let tail_t10 = bob_minus_accel_z - tail_t9;
+            let tail_t11 = v_0 * tail_cos;
+            let tail_t12 = v_2 * tail_sin;
+            let tail_spin_x = tail_t11 - tail_t12;
+            let tail_t13 = v_2 * tail_cos;
+            let tail_t14 = v_0 * tail_sin;
+            let tail_minus_spin_y = tail_t13 + tail_t14;
+            let tail_t15 = tail_cos * tail_t10;
+            let tail_t16 = tail_sin * tail_t7;
+            let tail_accel_y = tail_t15 - tail_t16;
+            let tail_spin_z = v_1 + v_3;
             // tail: acceleration
-            let tail_acc0 = v_3 * tail_vel16;
-            let tail_acc1 = v_3 * tail_vel13;
-            let tail_acc2 = tail_vel13 * tail_vel20;
-            let tail_acc3 = tail_vel16 * tail_vel20;
-            let tail_acc4 = tail_vel13 * tail_vel13;
-            let tail_acc5 = tail_vel16 * tail_vel16;
+            let tail_minus_alpha_x = v_3 * tail_minus_spin_y;
+            let tail_minus_alpha_y = v_3 * tail_spin_x;
+            let tail_t17 = tail_spin_x * tail_spin_z;
+            let tail_t18 = tail_minus_spin_y * tail_spin_z;
+            let tail_t19 = tail_spin_x * tail_spin_x;
+            let tail_t20 = tail_minus_spin_y * tail_minus_spin_y;
             // bob: gravity and wrenches
-            let bob_load0 = v_0 * v_1;
-            let bob_load1 = 0.5368079207920793 * tail_vel1;
-            let bob_load2 = 0.5700000000000001 * tail_vel0;
-            let bob_load3 = 0.03319207920792078 * bob_load0;
-            let bob_load4 = 0.88 * bob_vel1;
-            let bob_load5 = 0.88 * bob_vel0;
-            let bob_load6 = bob_load1 - bob_load4;
-            let bob_load7 = bob_load2 - bob_load5;
+            let bob_t13 = v_0 * v_1;
+            let bob_t14 = 0.5368079207920793 * tail_t2;
+            let bob_t15 = 0.5700000000000001 * tail_t1;
+            let bob_minus_f_rz = 0.03319207920792078 * bob_t13;
+            let bob_t16 = 0.88 * bob_accel_y;
+            let bob_t17 = 0.88 * bob_accel_x;
+            let bob_minus_f_rx = bob_t14 - bob_t16;
+            let bob_f_ry = bob_t15 - bob_t17;
             // tail: gravity and wrenches
-            let tail_load0 = tail_vel20 * tail_vel20;
-            let tail_load1 = tail_vel13 * tail_vel16;
-            let tail_load2 = tail_acc5 + tail_load0;
-            let tail_load3 = tail_acc1 + tail_acc2;
-            let tail_load4 = tail_acc0 + tail_acc3;
-            let tail_load5 = 0.1004987562112089 * tail_load2;
-            let tail_load6 = 0.1004987562112089 * tail_load1;
-            let tail_load7 = 0.1004987562112089 * tail_load3;
-            let tail_load8 = 0.026984158415841585 * tail_acc0;
-            let tail_load9 = 0.027700000000000002 * tail_acc3;
-            let tail_load10 = tail_load8 - tail_load9;
-            let tail_load11 = 0.0003792079207920793 * tail_load3;
-            let tail_load12 = tail_load10 + tail_load11;
-            let tail_load13 = 0.05468415841584159 * tail_acc2;
-            let tail_load14 = 0.0003792079207920793 * tail_load4;
-            let tail_load15 = tail_load13 - tail_load14;
-            let tail_load16 = 0.026984158415841585 * tail_load1;
-            let tail_load17 = tail_acc4 - tail_acc5;
-            let tail_load18 = 0.0003792079207920793 * tail_load17;
-            let tail_load19 = tail_load16 + tail_load18;
-            let tail_load20 = 0.1004987562112089 * tail_vel8;
-            let tail_load21 = 0.1004987562112089 * tail_vel19;
-            let tail_load22 = tail_load15 + tail_load20;
-            let tail_load23 = tail_load19 - tail_load21;
-            let tail_load24 = tail_cos0 * tail_load5;
-            let tail_load25 = tail_sin0 * tail_load6;
-            let tail_load26 = tail_load24 - tail_load25;
-            let tail_load27 = tail_cos0 * tail_load12;
-            let tail_load28 = tail_sin0 * tail_load22;
-            let tail_load29 = tail_load27 + tail_load28;
-            let tail_load30 = tail_sin0 * tail_load12;
-            let tail_load31 = tail_cos0 * tail_load22;
-            let tail_load32 = tail_load30 - tail_load31;
-            let tail_load33 = 0.8 * tail_load7;
-            let tail_load34 = tail_load29 + tail_load33;
-            let tail_load35 = 0.8 * tail_load26;
-            let tail_load36 = tail_load23 - tail_load35;
-            let tail_load37 = tail_load34 - bob_load6;
-            let tail_load38 = bob_load7 - tail_load36;
-            let tail_load39 = bob_load3 + tail_load32;
-            results[0][l] = tail_load37;
-            results[1][l] = tail_load38;
-            results[2][l] = -tail_load39;
-            results[3][l] = -tail_load23;
+            let tail_t21 = tail_spin_z * tail_spin_z;
+            let tail_t22 = tail_spin_x * tail_minus_spin_y;
+            let tail_t23 = tail_t20 + tail_t21;
+            let tail_t24 = tail_minus_alpha_y + tail_t17;
+            let tail_t25 = tail_minus_alpha_x + tail_t18;
+            let tail_minus_f_x = 0.1004987562112089 * tail_t23;
+            let tail_minus_f_y = 0.1004987562112089 * tail_t22;
+            let tail_f_z = 0.1004987562112089 * tail_t24;
+            let tail_t26 = 0.026984158415841585 * tail_minus_alpha_x;
+            let tail_t27 = 0.027700000000000002 * tail_t18;
+            let tail_t28 = tail_t26 - tail_t27;
+            let tail_t29 = 0.0003792079207920793 * tail_t24;
+            let tail_f_rx = tail_t28 + tail_t29;
+            let tail_t30 = 0.05468415841584159 * tail_t17;
+            let tail_t31 = 0.0003792079207920793 * tail_t25;
+            let tail_t32 = tail_t30 - tail_t31;
+            let tail_t33 = 0.026984158415841585 * tail_t22;
+            let tail_t34 = tail_t19 - tail_t20;
+            let tail_t35 = 0.0003792079207920793 * tail_t34;
+            let tail_t36 = tail_t33 + tail_t35;
+            let tail_t37 = 0.1004987562112089 * tail_accel_z;
+            let tail_t38 = 0.1004987562112089 * tail_accel_y;
+            let tail_minus_f_ry = tail_t32 + tail_t37;
+            let tail_minus_f_rz = tail_t36 - tail_t38;
+            let tail_t39 = tail_cos * tail_minus_f_x;
+            let tail_t40 = tail_sin * tail_minus_f_y;
+            let tail_t41 = tail_t39 - tail_t40;
+            let tail_t42 = tail_cos * tail_f_rx;
+            let tail_t43 = tail_sin * tail_minus_f_ry;
+            let tail_t44 = tail_t42 + tail_t43;
+            let tail_t45 = tail_sin * tail_f_rx;
+            let tail_t46 = tail_cos * tail_minus_f_ry;
+            let tail_t47 = tail_t45 - tail_t46;
+            let tail_t48 = 0.8 * tail_f_z;
+            let tail_t49 = tail_t44 + tail_t48;
+            let tail_t50 = 0.8 * tail_t41;
+            let tail_t51 = tail_minus_f_rz - tail_t50;
+            let h_0 = tail_t49 - bob_minus_f_rx;
+            let h_1 = bob_f_ry - tail_t51;
+            let minus_h_2 = bob_minus_f_rz + tail_t47;
+            results[0][l] = h_0;
+            results[1][l] = h_1;
+            results[2][l] = -minus_h_2;
+            results[3][l] = -tail_minus_f_rz;
         }
         h.give(0, &results[0]);
         h.give(1, &results[1]);
@@ -1722,7 +1726,8 @@ impl SphericalPendulum {
         h.give(3, &results[3]);
     }
 
-    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    /// Jacobians `J` of frames.
+    /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     /// 9 operations: 3 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn jacobians(&self, q: &[f64; 5], jacobian: &mut [[[f64; 4]; 6]; 2]) {
@@ -1734,25 +1739,25 @@ impl SphericalPendulum {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 48]);
         for l in 0..LANES {
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: Jacobian
-            let tail_jac0 = 0.09950371902099892 * tail_cos0;
-            let tail_jac1 = 0.9950371902099892 * tail_sin0;
-            let tail_jac2 = tail_jac0 + tail_jac1;
-            let tail_jac3 = 0.09950371902099892 * tail_sin0;
-            let tail_jac4 = 0.9950371902099892 * tail_cos0;
-            let tail_jac5 = tail_jac3 - tail_jac4;
+            let tail_t1 = 0.09950371902099892 * tail_cos;
+            let tail_t2 = 0.9950371902099892 * tail_sin;
+            let jacobian_9_0 = tail_t1 + tail_t2;
+            let tail_t3 = 0.09950371902099892 * tail_sin;
+            let tail_t4 = 0.9950371902099892 * tail_cos;
+            let minus_jacobian_9_2 = tail_t3 - tail_t4;
             // bob: Jacobian
-            let bob_jac0 = 0.8 * tail_jac2;
-            let bob_jac1 = 0.8 * tail_jac5;
+            let minus_jacobian_6_1 = 0.8 * jacobian_9_0;
+            let minus_jacobian_8_1 = 0.8 * minus_jacobian_9_2;
             results[0][l] = 0.0;
             results[1][l] = 0.0;
             results[2][l] = 0.0;
@@ -1778,7 +1783,7 @@ impl SphericalPendulum {
             results[22][l] = 1.0;
             results[23][l] = 0.0;
             results[24][l] = 0.0;
-            results[25][l] = -bob_jac0;
+            results[25][l] = -minus_jacobian_6_1;
             results[26][l] = 0.0;
             results[27][l] = 0.0;
             results[28][l] = 0.8;
@@ -1786,20 +1791,20 @@ impl SphericalPendulum {
             results[30][l] = 0.0;
             results[31][l] = 0.0;
             results[32][l] = 0.0;
-            results[33][l] = -bob_jac1;
+            results[33][l] = -minus_jacobian_8_1;
             results[34][l] = 0.0;
             results[35][l] = 0.0;
-            results[36][l] = tail_jac2;
+            results[36][l] = jacobian_9_0;
             results[37][l] = 0.0;
-            results[38][l] = -tail_jac5;
+            results[38][l] = -minus_jacobian_9_2;
             results[39][l] = 0.0;
             results[40][l] = 0.0;
             results[41][l] = 1.0;
             results[42][l] = 0.0;
             results[43][l] = 1.0;
-            results[44][l] = tail_jac5;
+            results[44][l] = minus_jacobian_9_2;
             results[45][l] = 0.0;
-            results[46][l] = tail_jac2;
+            results[46][l] = jacobian_9_0;
             results[47][l] = 0.0;
         }
         jacobian.give(0, &results[0]);
@@ -1852,20 +1857,22 @@ impl SphericalPendulum {
         jacobian.give(47, &results[47]);
     }
 
-    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
+    /// frame.
     /// 35 operations: 10 additions, 25 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
-    pub fn bias_accelerations(&self, q: &[f64; 5], v: &[f64; 4], drift: &mut [[f64; 6]; 2]) {
-        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, drift.as_flattened_mut());
+    pub fn bias_accelerations(&self, q: &[f64; 5], v: &[f64; 4], bias: &mut [[f64; 6]; 2]) {
+        Self::bias_accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, bias.as_flattened_mut());
     }
 
     #[inline(always)]
-    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drift: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
         for l in 0..LANES {
             let q_4 = q.get(4, l);
-            let tail_pose0 = q_4 + 1.4711276743037347;
-            angles[0][l] = tail_pose0;
+            let tail_t0 = q_4 + 1.4711276743037347;
+            angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
@@ -1880,69 +1887,69 @@ impl SphericalPendulum {
             let v_2 = given[2][l];
             let v_3 = given[3][l];
             // tail: sine and cosine, rotation
-            let tail_sin0 = sines[0][l];
-            let tail_cos0 = cosines[0][l];
+            let tail_sin = sines[0][l];
+            let tail_cos = cosines[0][l];
             // tail: velocity and joint rate (4.40)
-            let tail_vel0 = v_0 * v_2;
-            let tail_vel1 = v_1 * v_2;
-            let tail_vel2 = v_0 * v_0;
-            let tail_vel3 = v_1 * v_1;
-            let tail_vel4 = tail_vel2 + tail_vel3;
-            let tail_vel5 = 0.8 * tail_vel0;
-            let tail_vel6 = 0.8 * tail_vel1;
-            let tail_vel7 = 0.8 * tail_vel4;
-            let tail_vel8 = v_0 * tail_cos0;
-            let tail_vel9 = v_2 * tail_sin0;
-            let tail_vel10 = tail_vel8 - tail_vel9;
-            let tail_vel11 = v_2 * tail_cos0;
-            let tail_vel12 = v_0 * tail_sin0;
-            let tail_vel13 = tail_vel11 + tail_vel12;
-            let tail_vel14 = tail_cos0 * tail_vel5;
-            let tail_vel15 = tail_sin0 * tail_vel7;
-            let tail_vel16 = tail_vel14 + tail_vel15;
-            let tail_vel17 = tail_cos0 * tail_vel7;
-            let tail_vel18 = tail_sin0 * tail_vel5;
-            let tail_vel19 = tail_vel17 - tail_vel18;
+            let tail_t1 = v_0 * v_2;
+            let tail_t2 = v_1 * v_2;
+            let tail_t3 = v_0 * v_0;
+            let tail_t4 = v_1 * v_1;
+            let tail_t5 = tail_t3 + tail_t4;
+            let tail_t6 = 0.8 * tail_t1;
+            let tail_minus_accel_z = 0.8 * tail_t2;
+            let tail_t7 = 0.8 * tail_t5;
+            let tail_t8 = v_0 * tail_cos;
+            let tail_t9 = v_2 * tail_sin;
+            let tail_spin_x = tail_t8 - tail_t9;
+            let tail_t10 = v_2 * tail_cos;
+            let tail_t11 = v_0 * tail_sin;
+            let tail_minus_spin_y = tail_t10 + tail_t11;
+            let tail_t12 = tail_cos * tail_t6;
+            let tail_t13 = tail_sin * tail_t7;
+            let tail_minus_accel_x = tail_t12 + tail_t13;
+            let tail_t14 = tail_cos * tail_t7;
+            let tail_t15 = tail_sin * tail_t6;
+            let tail_minus_accel_y = tail_t14 - tail_t15;
             // tail: acceleration
-            let tail_acc0 = v_3 * tail_vel13;
-            let tail_acc1 = v_3 * tail_vel10;
-            let tail_acc2 = 0.09950371902099892 * tail_acc0;
-            let tail_acc3 = 0.9950371902099892 * tail_acc1;
-            let tail_acc4 = tail_acc3 - tail_acc2;
-            let tail_acc5 = 0.9950371902099892 * tail_acc0;
-            let tail_acc6 = 0.09950371902099892 * tail_acc1;
-            let tail_acc7 = tail_acc5 + tail_acc6;
-            let tail_acc8 = 0.09950371902099892 * tail_vel16;
-            let tail_acc9 = 0.9950371902099892 * tail_vel19;
-            let tail_acc10 = tail_acc9 - tail_acc8;
-            let tail_acc11 = 0.9950371902099892 * tail_vel16;
-            let tail_acc12 = 0.09950371902099892 * tail_vel19;
-            let tail_acc13 = tail_acc11 + tail_acc12;
+            let tail_minus_alpha_x = v_3 * tail_minus_spin_y;
+            let tail_minus_alpha_y = v_3 * tail_spin_x;
+            let tail_t16 = 0.09950371902099892 * tail_minus_alpha_x;
+            let tail_t17 = 0.9950371902099892 * tail_minus_alpha_y;
+            let bias_1_3 = tail_t17 - tail_t16;
+            let tail_t18 = 0.9950371902099892 * tail_minus_alpha_x;
+            let tail_t19 = 0.09950371902099892 * tail_minus_alpha_y;
+            let bias_1_5 = tail_t18 + tail_t19;
+            let tail_t20 = 0.09950371902099892 * tail_minus_accel_x;
+            let tail_t21 = 0.9950371902099892 * tail_minus_accel_y;
+            let bias_1_0 = tail_t21 - tail_t20;
+            let tail_t22 = 0.9950371902099892 * tail_minus_accel_x;
+            let tail_t23 = 0.09950371902099892 * tail_minus_accel_y;
+            let bias_1_2 = tail_t22 + tail_t23;
             results[0][l] = 0.0;
             results[1][l] = 0.0;
             results[2][l] = 0.0;
             results[3][l] = 0.0;
             results[4][l] = 0.0;
             results[5][l] = 0.0;
-            results[6][l] = tail_acc10;
-            results[7][l] = -tail_vel6;
-            results[8][l] = tail_acc13;
-            results[9][l] = tail_acc4;
+            results[6][l] = bias_1_0;
+            results[7][l] = -tail_minus_accel_z;
+            results[8][l] = bias_1_2;
+            results[9][l] = bias_1_3;
             results[10][l] = 0.0;
-            results[11][l] = tail_acc7;
+            results[11][l] = bias_1_5;
         }
-        drift.give(0, &results[0]);
-        drift.give(1, &results[1]);
-        drift.give(2, &results[2]);
-        drift.give(3, &results[3]);
-        drift.give(4, &results[4]);
-        drift.give(5, &results[5]);
-        drift.give(6, &results[6]);
-        drift.give(7, &results[7]);
-        drift.give(8, &results[8]);
-        drift.give(9, &results[9]);
-        drift.give(10, &results[10]);
-        drift.give(11, &results[11]);
+        bias.give(0, &results[0]);
+        bias.give(1, &results[1]);
+        bias.give(2, &results[2]);
+        bias.give(3, &results[3]);
+        bias.give(4, &results[4]);
+        bias.give(5, &results[5]);
+        bias.give(6, &results[6]);
+        bias.give(7, &results[7]);
+        bias.give(8, &results[8]);
+        bias.give(9, &results[9]);
+        bias.give(10, &results[10]);
+        bias.give(11, &results[11]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1974,34 +1981,34 @@ impl SphericalPendulum {
             let v_2 = given[6][l];
             let v_3 = given[7][l];
             // bob: coordinate rates
-            let bob_rate0 = q_1 * v_2;
-            let bob_rate1 = q_2 * v_1;
-            let bob_rate2 = bob_rate0 - bob_rate1;
-            let bob_rate3 = q_2 * v_0;
-            let bob_rate4 = q_0 * v_2;
-            let bob_rate5 = bob_rate3 - bob_rate4;
-            let bob_rate6 = q_0 * v_1;
-            let bob_rate7 = q_1 * v_0;
-            let bob_rate8 = bob_rate6 - bob_rate7;
-            let bob_rate9 = q_3 * v_0;
-            let bob_rate10 = bob_rate2 + bob_rate9;
-            let bob_rate11 = 0.5 * bob_rate10;
-            let bob_rate12 = q_3 * v_1;
-            let bob_rate13 = bob_rate5 + bob_rate12;
-            let bob_rate14 = 0.5 * bob_rate13;
-            let bob_rate15 = q_3 * v_2;
-            let bob_rate16 = bob_rate8 + bob_rate15;
-            let bob_rate17 = 0.5 * bob_rate16;
-            let bob_rate18 = q_0 * v_0;
-            let bob_rate19 = q_1 * v_1;
-            let bob_rate20 = bob_rate18 + bob_rate19;
-            let bob_rate21 = q_2 * v_2;
-            let bob_rate22 = bob_rate20 + bob_rate21;
-            let bob_rate23 = 0.5 * bob_rate22;
-            results[0][l] = bob_rate11;
-            results[1][l] = bob_rate14;
-            results[2][l] = bob_rate17;
-            results[3][l] = -bob_rate23;
+            let bob_t0 = q_1 * v_2;
+            let bob_t1 = q_2 * v_1;
+            let bob_t2 = bob_t0 - bob_t1;
+            let bob_t3 = q_2 * v_0;
+            let bob_t4 = q_0 * v_2;
+            let bob_t5 = bob_t3 - bob_t4;
+            let bob_t6 = q_0 * v_1;
+            let bob_t7 = q_1 * v_0;
+            let bob_t8 = bob_t6 - bob_t7;
+            let bob_t9 = q_3 * v_0;
+            let bob_t10 = bob_t2 + bob_t9;
+            let bob_t11 = 0.5 * bob_t10;
+            let bob_t12 = q_3 * v_1;
+            let bob_t13 = bob_t5 + bob_t12;
+            let bob_t14 = 0.5 * bob_t13;
+            let bob_t15 = q_3 * v_2;
+            let bob_t16 = bob_t8 + bob_t15;
+            let bob_t17 = 0.5 * bob_t16;
+            let bob_t18 = q_0 * v_0;
+            let bob_t19 = q_1 * v_1;
+            let bob_t20 = bob_t18 + bob_t19;
+            let bob_t21 = q_2 * v_2;
+            let bob_t22 = bob_t20 + bob_t21;
+            let bob_t23 = 0.5 * bob_t22;
+            results[0][l] = bob_t11;
+            results[1][l] = bob_t14;
+            results[2][l] = bob_t17;
+            results[3][l] = -bob_t23;
             results[4][l] = v_3;
         }
         qd.give(0, &results[0]);
@@ -2055,8 +2062,8 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 #[rustfmt::skip]
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
     #[inline(always)]
-    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::energy_kernel::<A, LANES>(q, p, result);
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, energy,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, energy);
     }
 }
 
@@ -2119,8 +2126,8 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 #[rustfmt::skip]
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<11, LANES, (&'a P0, &'a P1, &'a mut P2,)> for SphericalPendulum {
     #[inline(always)]
-    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, drift,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::bias_accelerations_kernel::<A, LANES>(q, v, drift);
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, v, bias,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::bias_accelerations_kernel::<A, LANES>(q, v, bias);
     }
 }
 
@@ -2149,13 +2156,13 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
         SphericalPendulum::new().lanes()
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     #[inline]
     pub fn rates(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4], qd: &mut [[f64; LANES]; 5], pd: &mut [[f64; LANES]; 4]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     #[inline]
     pub fn velocities(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4], v: &mut [[f64; LANES]; 4]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 1, LANES, f64, _>((q, p, v,));
@@ -2170,18 +2177,18 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
     /// Kinetic and potential energy, J.
     #[inline]
     pub fn energy(&self, q: &[[f64; LANES]; 5], p: &[[f64; LANES]; 4]) -> [[f64; LANES]; 2] {
-        let mut result = [[0.0; LANES]; 2];
-        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 3, LANES, f64, _>((q, p, &mut result,));
-        result
+        let mut energy = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 3, LANES, f64, _>((q, p, &mut energy,));
+        energy
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     #[inline]
     pub fn accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], a: &mut [[f64; LANES]; 4]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 4, LANES, f64, _>((q, v, &self.tau, a,));
     }
 
-    /// Wrench `[force; moment]` each joint transmits to its child, in the child's body frame.
+    /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     #[inline]
     pub fn reactions(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], reactions: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 5, LANES, f64, _>((q, v, &self.tau, reactions.as_flattened_mut(),));
@@ -2193,34 +2200,41 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
     }
 
-    /// Frames: rotation to ground axes, origin in the ground (m), velocity `[linear; angular]` in the frame's axes.
+    /// Rotation, position and velocity of frames.
+    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
+    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
     #[inline]
     pub fn frames(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], rotation: &mut [[[[f64; LANES]; 3]; 3]; 2], position: &mut [[[f64; LANES]; 3]; 2], velocity: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], a: &[[f64; LANES]; 4], tau: &mut [[f64; LANES]; 4]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 8, LANES, f64, _>((q, v, a, tau,));
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     #[inline]
     pub fn bias(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], h: &mut [[f64; LANES]; 4]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 9, LANES, f64, _>((q, v, h,));
     }
 
-    /// Jacobians: `J v` is a frame's velocity `[linear; angular]` in its own axes, at its origin.
+    /// Jacobians `J` of frames.
+    /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     #[inline]
     pub fn jacobians(&self, q: &[[f64; LANES]; 5], jacobian: &mut [[[[f64; LANES]; 4]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 10, LANES, f64, _>((q, jacobian.as_flattened_mut().as_flattened_mut(),));
     }
 
-    /// Accelerations `[linear; angular]` of frames at `v̇ = 0`, linear that of the origin seen from the ground, in the frame's axes: `J v̇ + drift` is the acceleration.
+    /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
+    /// frame.
     #[inline]
-    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], drift: &mut [[[f64; LANES]; 6]; 2]) {
-        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 11, LANES, f64, _>((q, v, drift.as_flattened_mut(),));
+    pub fn bias_accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], bias: &mut [[[f64; LANES]; 6]; 2]) {
+        ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 11, LANES, f64, _>((q, v, bias.as_flattened_mut(),));
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -2250,10 +2264,12 @@ impl ::multibody::runtime::System for SphericalPendulum {
     type Coordinates = [f64; 5];
     type Momenta = [f64; 4];
 
+    #[inline]
     fn neutral(&self) -> [f64; 5] {
         [0.0, 0.0, 0.0, 1.0, 0.0]
     }
 
+    #[inline]
     fn zero_momenta(&self) -> [f64; 4] {
         [0.0; 4]
     }
@@ -2269,6 +2285,14 @@ impl ::multibody::runtime::System for SphericalPendulum {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 5], v: &[f64; 4], qd: &mut [f64; 5]) {
         Self::coordinate_rates(self, q, v, qd);
     }
@@ -2276,6 +2300,7 @@ impl ::multibody::runtime::System for SphericalPendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for SphericalPendulum {
+
     #[inline]
     fn conjugate_momenta(&mut self, q: &[f64; 5], v: &[f64; 4], p: &mut [f64; 4]) {
         Self::momenta(self, q, v, p);
@@ -2284,6 +2309,7 @@ impl ::multibody::runtime::Conjugate for SphericalPendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for SphericalPendulum {
+
     #[inline]
     fn energies(&mut self, q: &[f64; 5], p: &[f64; 4]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
@@ -2293,6 +2319,7 @@ impl ::multibody::runtime::Energetic for SphericalPendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for SphericalPendulum {
+
     #[inline]
     fn generalized_accelerations(&mut self, q: &[f64; 5], v: &[f64; 4], a: &mut [f64; 4]) {
         Self::accelerations(self, q, v, a);

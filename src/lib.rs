@@ -59,15 +59,20 @@ pub use mbd_runtime as runtime;
 /// | `path = "models/arm.urdf"` | the description, a `.toml` or `.urdf` file; relative to the folder of `Cargo.toml` | |
 /// | `toml = r#"..."#`, `urdf = r#"..."#` | instead of `path`: the description itself | |
 /// | `name = Arm` | the type; attributes and a narrower visibility may stand before it: `pub(crate) Arm` | `pub` |
-/// | `outputs = [rates, energy]` | of `rates`, `velocities`, `momenta`, `energy`, `accelerations`, `reactions`, `mass_matrix`, `frames`, `inverse_dynamics`, `bias`, `jacobians`, `bias_accelerations`, `derivatives`, `momentum_derivatives`, `parameter_derivatives`; of models with loops or couplings also `constraint_residuals`, `project_momenta`, `position_correction`, `multipliers` | `[rates, momenta, energy]`, and those four where there are loops or couplings |
+/// | `outputs = [rates, energy]` | what to compute, of the outputs below | `[rates, momenta, energy]`, and what only mechanisms with loops or couplings have where there are some |
 /// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |
 /// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `fast` |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |
 /// | `gravity = [0.0, 0.0, -1.62]` | in ground axes, m/s², instead of that of the file | the file's; of URDF `[0, 0, -9.81]` |
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |
-/// | `frames = [tool0, "left-foot"]` | frames and bodies of the outputs `frames`, `jacobians`, `bias_accelerations`; asks for the first where none of them is named | all |
+/// | `frames = [tool0, "left-foot"]` | frames and bodies of the outputs that have a result for each frame; asks for `frames` where none of them is named | all |
 /// | `snap = 0.0` | angles this close to right angles become exact, rad | `1e-6` |
 /// | `runtime = path::to::mbd_runtime` | the runtime crate | that of this crate |
+///
+/// # Outputs
+/// Each output is a function of the type, `arm.rates(&q, &p, &mut qd, &mut pd)`: its arguments first, then its results.
+///
+#[doc = include_str!("../docs/outputs.md")]
 ///
 /// # What is made
 /// A type `Arm` with `new()`, a function for each output, the constants `NQ` and `NV` (numbers of coordinates and of

@@ -290,3 +290,10 @@ check!(
     inputs: [tau],
     outputs: [rates, velocities, momenta, energy, accelerations]
 );
+
+#[test]
+fn the_documented_table_of_outputs_is_that_of_the_code() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/outputs.md");
+    let (documented, table) = (std::fs::read_to_string(path).expect("the table"), multibody::codegen::output::table());
+    assert!(documented == table, "docs/outputs.md should be\n{table}");
+}

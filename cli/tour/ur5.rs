@@ -29,7 +29,7 @@ pub struct Ur5 {
     pub tau: [f64; 6],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Ur5 {
     /// Number of coordinates.
@@ -70,7 +70,7 @@ impl Ur5 {
         Ur5 { tau: [0.0; 6] }
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 264 operations: 118 additions, 141 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
@@ -86,13 +86,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -123,328 +123,328 @@ impl Ur5 {
             let tau_4 = given[10][l];
             let tau_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 4.4329225 * upper_arm_link_cos;
+            let upper_arm_link_t1 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t2 = upper_arm_link_sin * upper_arm_link_t1;
+            let upper_arm_link_t3 = upper_arm_link_cos * upper_arm_link_t1;
+            let upper_arm_link_t4 = 0.408499208875 * upper_arm_link_cos;
+            let upper_arm_link_t5 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = forearm_link_cos * forearm_link_t5;
+            let forearm_link_t8 = 0.07714261911624999 * forearm_link_cos;
+            let forearm_link_t9 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
+            let wrist_1_link_t4 = forearm_link_t2 + wrist_1_link_t2;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            let wrist_3_link_t0 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            let wrist_3_link_minus_mp_rx_ry = wrist_3_link_cos * wrist_3_link_t0;
+            let wrist_3_link_mp_rx_rx = wrist_3_link_minus_mp_ry_ry - 0.016685526854599998;
+            let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
+            let wrist_2_link_minus_m_rz_rz = wrist_3_link_minus_mp_ry_ry - 0.253242;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            let wrist_2_link_t0 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_t0;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_2_link_t0;
+            let wrist_2_link_t3 = wrist_2_link_m_rx_rx - wrist_2_link_t1;
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
+            let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
+            let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
+            let wrist_2_link_minus_k_ry = wrist_2_link_u_ry * wrist_2_link_minus_rho;
+            let wrist_2_link_t4 = wrist_2_link_u_rx * wrist_2_link_minus_k_rx;
+            let wrist_2_link_mp_rx_rx = wrist_2_link_t3 + wrist_2_link_t4;
+            let wrist_2_link_t5 = wrist_2_link_u_rx * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_rx_ry = wrist_2_link_t2 + wrist_2_link_t5;
+            let wrist_2_link_t6 = wrist_2_link_u_ry * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_ry_ry = wrist_2_link_t1 + wrist_2_link_t6;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
+            let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
+            let wrist_1_link_t5 = wrist_1_link_sin * wrist_1_link_m_rx_rx;
+            let wrist_1_link_mp_ry_ry = wrist_1_link_sin * wrist_1_link_t5;
+            let wrist_1_link_t6 = wrist_1_link_sin * wrist_2_link_mp_rx_ry;
+            let wrist_1_link_t7 = 0.10915 * wrist_1_link_minus_u_x;
+            let wrist_1_link_minus_u_ry = wrist_1_link_t6 + wrist_1_link_t7;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            let wrist_1_link_t8 = wrist_1_link_t2 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t9 = wrist_1_link_t1 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t10 = wrist_1_link_t8 - wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_m_rz_rz + wrist_1_link_t10;
+            let wrist_1_link_t12 = wrist_1_link_t4 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t13 = wrist_1_link_t3 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t14 = wrist_1_link_t12 - wrist_1_link_t13;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t14;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-            let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
-            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            let wrist_1_link_t16 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
+            let wrist_1_link_t17 = wrist_1_link_t2 * wrist_1_link_t16;
+            let wrist_1_link_t18 = wrist_1_link_m_rz_rz + wrist_1_link_t17;
+            let wrist_1_link_t19 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
+            let wrist_1_link_t20 = wrist_1_link_t1 * wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_1_link_mp_ry_ry - wrist_1_link_t20;
+            let wrist_1_link_t22 = wrist_1_link_t18 - wrist_1_link_t20;
+            let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
+            let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
+            let forearm_link_minus_m_ry_ry = forearm_link_t6 - wrist_1_link_t21;
+            let forearm_link_minus_m_ry_rz = forearm_link_t9 + wrist_1_link_minus_u_ry;
+            let forearm_link_m_rz_rz = wrist_1_link_t22 + 0.59565195167475;
             // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            let forearm_link_t10 = forearm_link_t2 * forearm_link_m_rx_z;
+            let forearm_link_t11 = forearm_link_t1 * forearm_link_minus_m_ry_z;
+            let forearm_link_t12 = forearm_link_t10 + forearm_link_t11;
+            let forearm_link_t13 = forearm_link_m_rz_rz + forearm_link_t12;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-            let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia17;
-            let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
-            let forearm_link_inertia9 = upper_arm_link_pose5 + wrist_1_link_inertia19;
-            let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
+            let forearm_link_t14 = forearm_link_m_rx_z + forearm_link_m_rx_z;
+            let forearm_link_t15 = forearm_link_t2 * forearm_link_t14;
+            let forearm_link_t16 = forearm_link_m_rz_rz + forearm_link_t15;
+            let forearm_link_t17 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t18 = forearm_link_t1 * forearm_link_t17;
+            let forearm_link_t19 = forearm_link_minus_m_ry_ry - forearm_link_t18;
+            let forearm_link_t20 = forearm_link_t16 + forearm_link_t18;
+            let upper_arm_link_minus_m_ry_z = upper_arm_link_t0 + forearm_link_minus_m_ry_z;
+            let upper_arm_link_minus_m_ry_ry = upper_arm_link_t2 + forearm_link_t19;
+            let upper_arm_link_minus_m_ry_rz = upper_arm_link_t5 + forearm_link_minus_m_ry_rz;
+            let upper_arm_link_m_rz_rz = forearm_link_t20 + 1.7701269384099998;
             // upper_arm_link: inertia carried to the parent, M* (4.48)
-            let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
-            let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
-            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            let upper_arm_link_t6 = upper_arm_link_minus_m_ry_ry + upper_arm_link_m_rz_rz;
+            let upper_arm_link_t7 = upper_arm_link_m_rz_rz - upper_arm_link_t6;
+            let shoulder_link_m_rz_rz = upper_arm_link_t7 + 2.7644263025275;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-            let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
-            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-            let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
-            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-            let ground_pivot16 = 1.0 / ground_pivot3;
-            let ground_pivot17 = ground_pivot6 * ground_pivot16;
-            let ground_pivot18 = ground_pivot6 * ground_pivot17;
-            let ground_pivot19 = ground_pivot11 - ground_pivot18;
-            let ground_pivot20 = ground_pivot9 * ground_pivot16;
-            let ground_pivot21 = ground_pivot6 * ground_pivot20;
-            let ground_pivot22 = ground_pivot13 - ground_pivot21;
-            let ground_pivot23 = ground_pivot9 * ground_pivot20;
-            let ground_pivot24 = ground_pivot15 - ground_pivot23;
-            let ground_pivot25 = 1.0 / ground_pivot19;
-            let ground_pivot26 = ground_pivot22 * ground_pivot25;
-            let ground_pivot27 = ground_pivot22 * ground_pivot26;
-            let ground_pivot28 = ground_pivot24 - ground_pivot27;
-            let ground_pivot29 = 1.0 / ground_pivot28;
-            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_1_link_rest0 = p_4 * wrist_1_link_sin0;
-            let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_2_link_rest4;
-            let wrist_1_link_rest2 = p_4 * wrist_1_link_cos0;
-            let wrist_1_link_rest3 = wrist_1_link_rest1 + wrist_1_link_rest2;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-            let shoulder_link_rest7 = wrist_1_link_rest3 - shoulder_link_rest6;
-            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            let ground_t0 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t1 = wrist_1_link_t11 * ground_t0;
+            let ground_t2 = wrist_1_link_t11 * ground_t1;
+            let ground_t3 = forearm_link_m_rz_rz - ground_t2;
+            let ground_t4 = wrist_1_link_t15 * ground_t0;
+            let ground_t5 = wrist_1_link_t11 * ground_t4;
+            let ground_t6 = forearm_link_t13 - ground_t5;
+            let ground_t7 = wrist_1_link_minus_u_ry * ground_t0;
+            let ground_t8 = wrist_1_link_t11 * ground_t7;
+            let ground_t9 = forearm_link_minus_m_ry_rz - ground_t8;
+            let ground_t10 = wrist_1_link_t15 * ground_t4;
+            let ground_t11 = upper_arm_link_m_rz_rz - ground_t10;
+            let ground_t12 = wrist_1_link_t15 * ground_t7;
+            let ground_t13 = upper_arm_link_minus_m_ry_rz - ground_t12;
+            let ground_t14 = wrist_1_link_minus_u_ry * ground_t7;
+            let ground_t15 = shoulder_link_m_rz_rz - ground_t14;
+            let ground_t16 = 1.0 / ground_t3;
+            let ground_t17 = ground_t6 * ground_t16;
+            let ground_t18 = ground_t6 * ground_t17;
+            let ground_t19 = ground_t11 - ground_t18;
+            let ground_t20 = ground_t9 * ground_t16;
+            let ground_t21 = ground_t6 * ground_t20;
+            let ground_t22 = ground_t13 - ground_t21;
+            let ground_t23 = ground_t9 * ground_t20;
+            let ground_t24 = ground_t15 - ground_t23;
+            let ground_t25 = 1.0 / ground_t19;
+            let ground_t26 = ground_t22 * ground_t25;
+            let ground_t27 = ground_t22 * ground_t26;
+            let ground_t28 = ground_t24 - ground_t27;
+            let ground_t29 = 1.0 / ground_t28;
+            // wrist_3_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_3_link_e = 58.355064750790525 * p_5;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t7 = p_5 * wrist_2_link_sin;
+            let wrist_2_link_t8 = p_5 * wrist_2_link_cos;
+            let wrist_2_link_minus_e = p_4 * wrist_2_link_minus_rho;
+            let wrist_2_link_t9 = wrist_2_link_u_rx * wrist_2_link_minus_e;
+            let wrist_2_link_minus_dp_rx = wrist_2_link_t7 + wrist_2_link_t9;
+            let wrist_2_link_t10 = wrist_2_link_u_ry * wrist_2_link_minus_e;
+            let wrist_2_link_dp_ry = wrist_2_link_t8 - wrist_2_link_t10;
+            // wrist_1_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_1_link_t23 = p_4 * wrist_1_link_sin;
+            let wrist_1_link_t24 = wrist_1_link_sin * wrist_2_link_minus_dp_rx;
+            let wrist_1_link_t25 = p_4 * wrist_1_link_cos;
+            let wrist_1_link_dp_ry = wrist_1_link_t24 + wrist_1_link_t25;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t0 = p_3 - wrist_2_link_dp_ry;
+            let shoulder_link_t1 = ground_t0 * shoulder_link_t0;
+            let shoulder_link_t2 = wrist_1_link_t11 * shoulder_link_t1;
+            let shoulder_link_t3 = wrist_2_link_dp_ry + shoulder_link_t2;
+            let shoulder_link_t4 = wrist_1_link_t15 * shoulder_link_t1;
+            let shoulder_link_t5 = wrist_2_link_dp_ry + shoulder_link_t4;
+            let shoulder_link_t6 = wrist_1_link_minus_u_ry * shoulder_link_t1;
+            let shoulder_link_t7 = wrist_1_link_dp_ry - shoulder_link_t6;
+            let shoulder_link_t8 = p_2 - shoulder_link_t3;
+            let shoulder_link_t9 = ground_t16 * shoulder_link_t8;
+            let shoulder_link_t10 = ground_t6 * shoulder_link_t9;
+            let shoulder_link_t11 = shoulder_link_t5 + shoulder_link_t10;
+            let shoulder_link_t12 = ground_t9 * shoulder_link_t9;
+            let shoulder_link_t13 = shoulder_link_t7 - shoulder_link_t12;
+            let shoulder_link_t14 = p_1 - shoulder_link_t11;
+            let shoulder_link_t15 = ground_t25 * shoulder_link_t14;
+            let shoulder_link_t16 = ground_t22 * shoulder_link_t15;
+            let shoulder_link_t17 = shoulder_link_t13 - shoulder_link_t16;
+            let shoulder_link_t18 = p_0 + shoulder_link_t17;
+            let shoulder_link_v = ground_t29 * shoulder_link_t18;
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-            let ground_vel2 = ground_pivot17 * ground_vel1;
-            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-            let ground_vel5 = ground_vel3 - ground_vel4;
-            let ground_vel6 = ground_pivot1 * ground_vel5;
-            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-            let ground_vel8 = ground_pivot4 * ground_vel1;
-            let ground_vel9 = ground_vel7 - ground_vel8;
-            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_t30 = ground_t26 * shoulder_link_v;
+            let upper_arm_link_v = shoulder_link_t15 - ground_t30;
+            let ground_t31 = ground_t17 * upper_arm_link_v;
+            let ground_t32 = shoulder_link_t9 - ground_t31;
+            let ground_t33 = ground_t20 * shoulder_link_v;
+            let forearm_link_v = ground_t32 - ground_t33;
+            let ground_t34 = ground_t1 * forearm_link_v;
+            let ground_t35 = shoulder_link_t1 - ground_t34;
+            let ground_t36 = ground_t4 * upper_arm_link_v;
+            let ground_t37 = ground_t35 - ground_t36;
+            let ground_t38 = ground_t7 * shoulder_link_v;
+            let wrist_1_link_v = ground_t37 - ground_t38;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = forearm_link_pose1 * ground_vel1;
-            let forearm_link_vel1 = forearm_link_pose1 * shoulder_link_rest19;
-            let forearm_link_vel2 = forearm_link_pose2 * ground_vel1;
-            let forearm_link_vel3 = ground_vel1 + ground_vel5;
+            let forearm_link_hat_y = forearm_link_t1 * upper_arm_link_v;
+            let forearm_link_hat_z = forearm_link_t1 * shoulder_link_v;
+            let forearm_link_minus_hat_x = forearm_link_t2 * upper_arm_link_v;
+            let forearm_link_omega_rz = upper_arm_link_v + forearm_link_v;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
-            let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
-            let wrist_1_link_vel2 = wrist_1_link_pose1 * shoulder_link_rest19;
-            let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
-            let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
-            let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
-            let wrist_1_link_vel6 = ground_vel11 + forearm_link_vel3;
-            let wrist_1_link_vel7 = wrist_1_link_sin0 * shoulder_link_rest19;
-            let wrist_1_link_vel8 = wrist_1_link_cos0 * shoulder_link_rest19;
+            let wrist_1_link_t26 = wrist_1_link_t1 * forearm_link_omega_rz;
+            let wrist_1_link_hat_y = forearm_link_hat_y + wrist_1_link_t26;
+            let wrist_1_link_t27 = wrist_1_link_t1 * shoulder_link_v;
+            let wrist_1_link_hat_z = forearm_link_hat_z + wrist_1_link_t27;
+            let wrist_1_link_t28 = wrist_1_link_t2 * forearm_link_omega_rz;
+            let wrist_1_link_minus_hat_x = forearm_link_minus_hat_x + wrist_1_link_t28;
+            let wrist_1_link_omega_rz = wrist_1_link_v + forearm_link_omega_rz;
+            let wrist_1_link_omega_rx = wrist_1_link_sin * shoulder_link_v;
+            let wrist_1_link_omega_ry = wrist_1_link_cos * shoulder_link_v;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel7;
-            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel6;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-            let wrist_2_link_vel4 = wrist_1_link_vel8 - wrist_2_link_vel3;
-            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel7;
-            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel6;
-            let wrist_2_link_vel7 = wrist_2_link_vel5 + wrist_2_link_vel6;
-            let wrist_2_link_vel8 = wrist_2_link_cos0 * wrist_1_link_vel6;
-            let wrist_2_link_vel9 = wrist_2_link_sin0 * wrist_1_link_vel7;
-            let wrist_2_link_vel10 = wrist_2_link_vel8 - wrist_2_link_vel9;
+            let wrist_2_link_t11 = wrist_2_link_minus_k_rx * wrist_1_link_omega_rx;
+            let wrist_2_link_t12 = wrist_2_link_minus_k_ry * wrist_1_link_omega_rz;
+            let wrist_2_link_t13 = wrist_2_link_t11 + wrist_2_link_t12;
+            let wrist_2_link_minus_omega_rz = wrist_2_link_minus_e - wrist_2_link_t13;
+            let wrist_2_link_v = wrist_1_link_omega_ry - wrist_2_link_minus_omega_rz;
+            let wrist_2_link_t14 = wrist_2_link_cos * wrist_1_link_omega_rx;
+            let wrist_2_link_t15 = wrist_2_link_sin * wrist_1_link_omega_rz;
+            let wrist_2_link_omega_rx = wrist_2_link_t14 + wrist_2_link_t15;
+            let wrist_2_link_t16 = wrist_2_link_cos * wrist_1_link_omega_rz;
+            let wrist_2_link_t17 = wrist_2_link_sin * wrist_1_link_omega_rx;
+            let wrist_2_link_omega_ry = wrist_2_link_t16 - wrist_2_link_t17;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel10;
+            let wrist_3_link_v = wrist_3_link_e - wrist_2_link_omega_ry;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load0 = 9.81 * wrist_1_link_sin0;
+            let wrist_1_link_minus_g_x = 9.81 * wrist_1_link_sin;
             // upper_arm_link: momentum
-            let upper_arm_link_mom0 = upper_arm_link_pose3 * shoulder_link_rest19;
-            let upper_arm_link_mom1 = upper_arm_link_pose4 * ground_vel1;
-            let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
+            let upper_arm_link_t8 = upper_arm_link_t3 * shoulder_link_v;
+            let upper_arm_link_t9 = upper_arm_link_t4 * upper_arm_link_v;
+            let upper_arm_link_t10 = upper_arm_link_t8 - upper_arm_link_t9;
             // forearm_link: momentum
-            let forearm_link_mom0 = forearm_link_pose7 * shoulder_link_rest19;
-            let forearm_link_mom1 = forearm_link_pose8 * forearm_link_vel3;
-            let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
-            let forearm_link_mom3 = forearm_link_pose3 * forearm_link_vel3;
-            let forearm_link_mom4 = forearm_link_pose4 * forearm_link_vel3;
-            let forearm_link_mom5 = forearm_link_pose4 * shoulder_link_rest19;
-            let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel1;
-            let forearm_link_mom7 = forearm_link_mom2 + forearm_link_mom6;
+            let forearm_link_t21 = forearm_link_t7 * shoulder_link_v;
+            let forearm_link_t22 = forearm_link_t8 * forearm_link_omega_rz;
+            let forearm_link_t23 = forearm_link_t21 - forearm_link_t22;
+            let forearm_link_t24 = forearm_link_t3 * forearm_link_omega_rz;
+            let forearm_link_t25 = forearm_link_t4 * forearm_link_omega_rz;
+            let forearm_link_t26 = forearm_link_t4 * shoulder_link_v;
+            let forearm_link_t27 = forearm_link_t3 * forearm_link_hat_z;
+            let forearm_link_t28 = forearm_link_t23 + forearm_link_t27;
             // wrist_1_link: momentum
-            let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel7;
-            let wrist_1_link_mom1 = 0.01778473500000001 * wrist_1_link_vel6;
-            let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel7;
-            let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel3;
-            let wrist_1_link_mom4 = wrist_1_link_mom0 - wrist_1_link_mom3;
+            let wrist_1_link_t29 = 0.004608836229749974 * wrist_1_link_omega_rx;
+            let wrist_1_link_t30 = 0.01778473500000001 * wrist_1_link_omega_rz;
+            let wrist_1_link_t31 = 0.01778473500000001 * wrist_1_link_omega_rx;
+            let wrist_1_link_t32 = 0.01778473500000001 * wrist_1_link_hat_z;
+            let wrist_1_link_t33 = wrist_1_link_t29 - wrist_1_link_t32;
             // wrist_2_link: momentum
-            let wrist_2_link_mom0 = wrist_2_link_pivot4 * wrist_1_link_vel7;
-            let wrist_2_link_mom1 = wrist_2_link_pivot6 * wrist_1_link_vel6;
-            let wrist_2_link_mom2 = wrist_2_link_mom0 + wrist_2_link_mom1;
-            let wrist_2_link_mom3 = wrist_2_link_pivot6 * wrist_1_link_vel7;
-            let wrist_2_link_mom4 = wrist_2_link_rest4 - wrist_2_link_mom2;
-            let wrist_2_link_mom5 = wrist_1_link_mom4 - wrist_2_link_mom4;
+            let wrist_2_link_t18 = wrist_2_link_mp_rx_rx * wrist_1_link_omega_rx;
+            let wrist_2_link_t19 = wrist_2_link_mp_rx_ry * wrist_1_link_omega_rz;
+            let wrist_2_link_t20 = wrist_2_link_t18 + wrist_2_link_t19;
+            let wrist_2_link_t21 = wrist_2_link_mp_rx_ry * wrist_1_link_omega_rx;
+            let wrist_2_link_t22 = wrist_2_link_minus_dp_rx - wrist_2_link_t20;
+            let wrist_2_link_t23 = wrist_1_link_t33 - wrist_2_link_t22;
             // wrist_1_link: momentum
-            let wrist_1_link_mom5 = wrist_1_link_cos0 * wrist_1_link_mom1;
-            let wrist_1_link_mom6 = wrist_1_link_sin0 * wrist_1_link_mom1;
-            let wrist_1_link_mom7 = wrist_1_link_cos0 * wrist_2_link_mom5;
-            let wrist_1_link_mom8 = wrist_1_link_rest0 + wrist_1_link_mom7;
-            let wrist_1_link_mom9 = 0.10915 * wrist_1_link_mom6;
-            let wrist_1_link_mom10 = wrist_1_link_mom8 - wrist_1_link_mom9;
-            let wrist_1_link_mom11 = wrist_1_link_pose2 * wrist_1_link_mom2;
-            let wrist_1_link_mom12 = wrist_1_link_mom10 + wrist_1_link_mom11;
-            let wrist_1_link_mom13 = forearm_link_mom3 + wrist_1_link_mom5;
-            let wrist_1_link_mom14 = forearm_link_mom4 - wrist_1_link_mom6;
-            let wrist_1_link_mom15 = forearm_link_mom5 - wrist_1_link_mom2;
-            let wrist_1_link_mom16 = forearm_link_mom7 - wrist_1_link_mom12;
+            let wrist_1_link_t34 = wrist_1_link_cos * wrist_1_link_t30;
+            let wrist_1_link_t35 = wrist_1_link_sin * wrist_1_link_t30;
+            let wrist_1_link_t36 = wrist_1_link_cos * wrist_2_link_t23;
+            let wrist_1_link_t37 = wrist_1_link_t23 + wrist_1_link_t36;
+            let wrist_1_link_t38 = 0.10915 * wrist_1_link_t35;
+            let wrist_1_link_t39 = wrist_1_link_t37 - wrist_1_link_t38;
+            let wrist_1_link_t40 = wrist_1_link_t2 * wrist_1_link_t31;
+            let wrist_1_link_t41 = wrist_1_link_t39 + wrist_1_link_t40;
+            let wrist_1_link_t42 = forearm_link_t24 + wrist_1_link_t34;
+            let wrist_1_link_t43 = forearm_link_t25 - wrist_1_link_t35;
+            let wrist_1_link_t44 = forearm_link_t26 - wrist_1_link_t31;
+            let wrist_1_link_t45 = forearm_link_t28 - wrist_1_link_t41;
             // forearm_link: momentum
-            let forearm_link_mom8 = forearm_link_pose2 * wrist_1_link_mom15;
-            let forearm_link_mom9 = wrist_1_link_mom16 + forearm_link_mom8;
-            let forearm_link_mom10 = upper_arm_link_mom2 + forearm_link_mom9;
+            let forearm_link_t29 = forearm_link_t2 * wrist_1_link_t44;
+            let forearm_link_t30 = wrist_1_link_t45 + forearm_link_t29;
+            let forearm_link_t31 = upper_arm_link_t10 + forearm_link_t30;
             // shoulder_link: momentum rate (4.36)
-            let shoulder_link_pdot0 = 9.81 * forearm_link_inertia7;
+            let shoulder_link_t19 = 9.81 * upper_arm_link_minus_m_ry_z;
             // upper_arm_link: momentum rate (4.36)
-            let upper_arm_link_pdot0 = shoulder_link_rest19 * forearm_link_mom10;
-            let upper_arm_link_pdot1 = shoulder_link_pdot0 - upper_arm_link_pdot0;
+            let upper_arm_link_t11 = shoulder_link_v * forearm_link_t31;
+            let upper_arm_link_t12 = shoulder_link_t19 - upper_arm_link_t11;
             // forearm_link: momentum rate (4.36)
-            let forearm_link_pdot0 = 9.81 * wrist_1_link_inertia17;
-            let forearm_link_pdot1 = forearm_link_vel2 * wrist_1_link_mom14;
-            let forearm_link_pdot2 = forearm_link_vel0 * wrist_1_link_mom13;
-            let forearm_link_pdot3 = forearm_link_pdot1 - forearm_link_pdot2;
-            let forearm_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom16;
-            let forearm_link_pdot5 = forearm_link_pdot3 - forearm_link_pdot4;
-            let forearm_link_pdot6 = forearm_link_pdot0 + forearm_link_pdot5;
+            let forearm_link_t32 = 9.81 * forearm_link_minus_m_ry_z;
+            let forearm_link_t33 = forearm_link_minus_hat_x * wrist_1_link_t43;
+            let forearm_link_t34 = forearm_link_hat_y * wrist_1_link_t42;
+            let forearm_link_t35 = forearm_link_t33 - forearm_link_t34;
+            let forearm_link_t36 = shoulder_link_v * wrist_1_link_t45;
+            let forearm_link_t37 = forearm_link_t35 - forearm_link_t36;
+            let forearm_link_t38 = forearm_link_t32 + forearm_link_t37;
             // wrist_1_link: momentum rate (4.36)
-            let wrist_1_link_pdot0 = 0.01778473500000001 * wrist_1_link_load0;
-            let wrist_1_link_pdot1 = wrist_1_link_vel5 * wrist_1_link_mom6;
-            let wrist_1_link_pdot2 = wrist_1_link_vel1 * wrist_1_link_mom5;
-            let wrist_1_link_pdot3 = wrist_1_link_pdot1 + wrist_1_link_pdot2;
-            let wrist_1_link_pdot4 = shoulder_link_rest19 * wrist_1_link_mom10;
-            let wrist_1_link_pdot5 = wrist_1_link_pdot3 - wrist_1_link_pdot4;
-            let wrist_1_link_pdot6 = wrist_1_link_pdot0 + wrist_1_link_pdot5;
+            let wrist_1_link_t46 = 0.01778473500000001 * wrist_1_link_minus_g_x;
+            let wrist_1_link_t47 = wrist_1_link_minus_hat_x * wrist_1_link_t35;
+            let wrist_1_link_t48 = wrist_1_link_hat_y * wrist_1_link_t34;
+            let wrist_1_link_t49 = wrist_1_link_t47 + wrist_1_link_t48;
+            let wrist_1_link_t50 = shoulder_link_v * wrist_1_link_t39;
+            let wrist_1_link_t51 = wrist_1_link_t49 - wrist_1_link_t50;
+            let wrist_1_link_t52 = wrist_1_link_t46 + wrist_1_link_t51;
             // wrist_2_link: momentum rate (4.36)
-            let wrist_2_link_pdot0 = wrist_2_link_pivot4 - wrist_2_link_pivot8;
-            let wrist_2_link_pdot1 = wrist_1_link_vel6 * wrist_2_link_pdot0;
-            let wrist_2_link_pdot2 = wrist_2_link_mom3 - wrist_2_link_pdot1;
-            let wrist_2_link_pdot3 = wrist_2_link_rest6 + wrist_2_link_pdot2;
-            let wrist_2_link_pdot4 = wrist_2_link_rest4 - wrist_2_link_mom1;
-            let wrist_2_link_pdot5 = wrist_1_link_vel7 * wrist_2_link_pdot3;
-            let wrist_2_link_pdot6 = wrist_1_link_vel6 * wrist_2_link_pdot4;
-            let wrist_2_link_pdot7 = wrist_2_link_pdot5 + wrist_2_link_pdot6;
+            let wrist_2_link_t24 = wrist_2_link_mp_rx_rx - wrist_2_link_mp_ry_ry;
+            let wrist_2_link_t25 = wrist_1_link_omega_rz * wrist_2_link_t24;
+            let wrist_2_link_t26 = wrist_2_link_t21 - wrist_2_link_t25;
+            let wrist_2_link_t27 = wrist_2_link_dp_ry + wrist_2_link_t26;
+            let wrist_2_link_t28 = wrist_2_link_minus_dp_rx - wrist_2_link_t19;
+            let wrist_2_link_t29 = wrist_1_link_omega_rx * wrist_2_link_t27;
+            let wrist_2_link_t30 = wrist_1_link_omega_rz * wrist_2_link_t28;
+            let wrist_2_link_t31 = wrist_2_link_t29 + wrist_2_link_t30;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot0 = wrist_3_link_inertia1 + wrist_3_link_inertia3;
-            let wrist_3_link_pdot1 = wrist_3_link_inertia2 * wrist_2_link_vel7;
-            let wrist_3_link_pdot2 = wrist_2_link_vel3 * wrist_3_link_pdot0;
-            let wrist_3_link_pdot3 = wrist_3_link_pdot1 + wrist_3_link_pdot2;
-            let wrist_3_link_pdot4 = wrist_3_link_inertia2 * wrist_2_link_vel3;
-            let wrist_3_link_pdot5 = wrist_2_link_vel7 * wrist_3_link_pdot3;
-            let wrist_3_link_pdot6 = wrist_2_link_vel3 * wrist_3_link_pdot4;
-            let wrist_3_link_pdot7 = wrist_3_link_pdot5 - wrist_3_link_pdot6;
-            let wrist_3_link_pdot8 = tau_1 + upper_arm_link_pdot1;
-            let wrist_3_link_pdot9 = tau_2 + forearm_link_pdot6;
-            let wrist_3_link_pdot10 = tau_3 - wrist_1_link_pdot6;
-            let wrist_3_link_pdot11 = tau_4 - wrist_2_link_pdot7;
-            let wrist_3_link_pdot12 = tau_5 + wrist_3_link_pdot7;
-            results[0][l] = shoulder_link_rest19;
-            results[1][l] = ground_vel1;
-            results[2][l] = ground_vel5;
-            results[3][l] = ground_vel11;
-            results[4][l] = wrist_2_link_vel4;
-            results[5][l] = wrist_3_link_vel0;
+            let wrist_3_link_t1 = wrist_3_link_minus_mp_ry_ry + wrist_3_link_mp_rx_rx;
+            let wrist_3_link_t2 = wrist_3_link_minus_mp_rx_ry * wrist_2_link_omega_rx;
+            let wrist_3_link_t3 = wrist_2_link_minus_omega_rz * wrist_3_link_t1;
+            let wrist_3_link_t4 = wrist_3_link_t2 + wrist_3_link_t3;
+            let wrist_3_link_t5 = wrist_3_link_minus_mp_rx_ry * wrist_2_link_minus_omega_rz;
+            let wrist_3_link_t6 = wrist_2_link_omega_rx * wrist_3_link_t4;
+            let wrist_3_link_t7 = wrist_2_link_minus_omega_rz * wrist_3_link_t5;
+            let wrist_3_link_t8 = wrist_3_link_t6 - wrist_3_link_t7;
+            let pd_1 = tau_1 + upper_arm_link_t12;
+            let pd_2 = tau_2 + forearm_link_t38;
+            let pd_3 = tau_3 - wrist_1_link_t52;
+            let pd_4 = tau_4 - wrist_2_link_t31;
+            let pd_5 = tau_5 + wrist_3_link_t8;
+            results[0][l] = shoulder_link_v;
+            results[1][l] = upper_arm_link_v;
+            results[2][l] = forearm_link_v;
+            results[3][l] = wrist_1_link_v;
+            results[4][l] = wrist_2_link_v;
+            results[5][l] = wrist_3_link_v;
             results[6][l] = tau_0;
-            results[7][l] = wrist_3_link_pdot8;
-            results[8][l] = wrist_3_link_pdot9;
-            results[9][l] = wrist_3_link_pdot10;
-            results[10][l] = wrist_3_link_pdot11;
-            results[11][l] = wrist_3_link_pdot12;
+            results[7][l] = pd_1;
+            results[8][l] = pd_2;
+            results[9][l] = pd_3;
+            results[10][l] = pd_4;
+            results[11][l] = pd_5;
         }
         qd.give(0, &results[0]);
         qd.give(1, &results[1]);
@@ -460,7 +460,7 @@ impl Ur5 {
         pd.give(5, &results[11]);
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     /// 169 operations: 77 additions, 87 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn velocities(&self, q: &[f64; 6], p: &[f64; 6], v: &mut [f64; 6]) {
@@ -476,13 +476,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
@@ -501,214 +501,214 @@ impl Ur5 {
             let p_4 = given[4][l];
             let p_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t1 = upper_arm_link_sin * upper_arm_link_t0;
+            let upper_arm_link_t2 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
+            let wrist_1_link_t4 = forearm_link_t2 + wrist_1_link_t2;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            let wrist_3_link_t0 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            let wrist_3_link_minus_mp_rx_ry = wrist_3_link_cos * wrist_3_link_t0;
+            let wrist_3_link_mp_rx_rx = wrist_3_link_minus_mp_ry_ry - 0.016685526854599998;
+            let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
+            let wrist_2_link_minus_m_rz_rz = wrist_3_link_minus_mp_ry_ry - 0.253242;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            let wrist_2_link_t0 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_t0;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_2_link_t0;
+            let wrist_2_link_t3 = wrist_2_link_m_rx_rx - wrist_2_link_t1;
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
+            let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
+            let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
+            let wrist_2_link_minus_k_ry = wrist_2_link_u_ry * wrist_2_link_minus_rho;
+            let wrist_2_link_t4 = wrist_2_link_u_rx * wrist_2_link_minus_k_rx;
+            let wrist_2_link_mp_rx_rx = wrist_2_link_t3 + wrist_2_link_t4;
+            let wrist_2_link_t5 = wrist_2_link_u_rx * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_rx_ry = wrist_2_link_t2 + wrist_2_link_t5;
+            let wrist_2_link_t6 = wrist_2_link_u_ry * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_ry_ry = wrist_2_link_t1 + wrist_2_link_t6;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
+            let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
+            let wrist_1_link_t5 = wrist_1_link_sin * wrist_1_link_m_rx_rx;
+            let wrist_1_link_mp_ry_ry = wrist_1_link_sin * wrist_1_link_t5;
+            let wrist_1_link_t6 = wrist_1_link_sin * wrist_2_link_mp_rx_ry;
+            let wrist_1_link_t7 = 0.10915 * wrist_1_link_minus_u_x;
+            let wrist_1_link_minus_u_ry = wrist_1_link_t6 + wrist_1_link_t7;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            let wrist_1_link_t8 = wrist_1_link_t2 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t9 = wrist_1_link_t1 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t10 = wrist_1_link_t8 - wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_m_rz_rz + wrist_1_link_t10;
+            let wrist_1_link_t12 = wrist_1_link_t4 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t13 = wrist_1_link_t3 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t14 = wrist_1_link_t12 - wrist_1_link_t13;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t14;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-            let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
-            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            let wrist_1_link_t16 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
+            let wrist_1_link_t17 = wrist_1_link_t2 * wrist_1_link_t16;
+            let wrist_1_link_t18 = wrist_1_link_m_rz_rz + wrist_1_link_t17;
+            let wrist_1_link_t19 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
+            let wrist_1_link_t20 = wrist_1_link_t1 * wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_1_link_mp_ry_ry - wrist_1_link_t20;
+            let wrist_1_link_t22 = wrist_1_link_t18 - wrist_1_link_t20;
+            let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
+            let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
+            let forearm_link_minus_m_ry_ry = forearm_link_t6 - wrist_1_link_t21;
+            let forearm_link_minus_m_ry_rz = forearm_link_t7 + wrist_1_link_minus_u_ry;
+            let forearm_link_m_rz_rz = wrist_1_link_t22 + 0.59565195167475;
             // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            let forearm_link_t8 = forearm_link_t2 * forearm_link_m_rx_z;
+            let forearm_link_t9 = forearm_link_t1 * forearm_link_minus_m_ry_z;
+            let forearm_link_t10 = forearm_link_t8 + forearm_link_t9;
+            let forearm_link_t11 = forearm_link_m_rz_rz + forearm_link_t10;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-            let forearm_link_inertia7 = upper_arm_link_pose1 + forearm_link_inertia5;
-            let forearm_link_inertia8 = upper_arm_link_pose2 + wrist_1_link_inertia19;
-            let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
+            let forearm_link_t12 = forearm_link_m_rx_z + forearm_link_m_rx_z;
+            let forearm_link_t13 = forearm_link_t2 * forearm_link_t12;
+            let forearm_link_t14 = forearm_link_m_rz_rz + forearm_link_t13;
+            let forearm_link_t15 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t16 = forearm_link_t1 * forearm_link_t15;
+            let forearm_link_t17 = forearm_link_minus_m_ry_ry - forearm_link_t16;
+            let forearm_link_t18 = forearm_link_t14 + forearm_link_t16;
+            let upper_arm_link_minus_m_ry_ry = upper_arm_link_t1 + forearm_link_t17;
+            let upper_arm_link_minus_m_ry_rz = upper_arm_link_t2 + forearm_link_minus_m_ry_rz;
+            let upper_arm_link_m_rz_rz = forearm_link_t18 + 1.7701269384099998;
             // upper_arm_link: inertia carried to the parent, M* (4.48)
-            let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
-            let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
-            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            let upper_arm_link_t3 = upper_arm_link_minus_m_ry_ry + upper_arm_link_m_rz_rz;
+            let upper_arm_link_t4 = upper_arm_link_m_rz_rz - upper_arm_link_t3;
+            let shoulder_link_m_rz_rz = upper_arm_link_t4 + 2.7644263025275;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-            let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
-            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-            let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
-            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-            let ground_pivot16 = 1.0 / ground_pivot3;
-            let ground_pivot17 = ground_pivot6 * ground_pivot16;
-            let ground_pivot18 = ground_pivot6 * ground_pivot17;
-            let ground_pivot19 = ground_pivot11 - ground_pivot18;
-            let ground_pivot20 = ground_pivot9 * ground_pivot16;
-            let ground_pivot21 = ground_pivot6 * ground_pivot20;
-            let ground_pivot22 = ground_pivot13 - ground_pivot21;
-            let ground_pivot23 = ground_pivot9 * ground_pivot20;
-            let ground_pivot24 = ground_pivot15 - ground_pivot23;
-            let ground_pivot25 = 1.0 / ground_pivot19;
-            let ground_pivot26 = ground_pivot22 * ground_pivot25;
-            let ground_pivot27 = ground_pivot22 * ground_pivot26;
-            let ground_pivot28 = ground_pivot24 - ground_pivot27;
-            let ground_pivot29 = 1.0 / ground_pivot28;
-            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
-            let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
-            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-            let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            let ground_t0 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t1 = wrist_1_link_t11 * ground_t0;
+            let ground_t2 = wrist_1_link_t11 * ground_t1;
+            let ground_t3 = forearm_link_m_rz_rz - ground_t2;
+            let ground_t4 = wrist_1_link_t15 * ground_t0;
+            let ground_t5 = wrist_1_link_t11 * ground_t4;
+            let ground_t6 = forearm_link_t11 - ground_t5;
+            let ground_t7 = wrist_1_link_minus_u_ry * ground_t0;
+            let ground_t8 = wrist_1_link_t11 * ground_t7;
+            let ground_t9 = forearm_link_minus_m_ry_rz - ground_t8;
+            let ground_t10 = wrist_1_link_t15 * ground_t4;
+            let ground_t11 = upper_arm_link_m_rz_rz - ground_t10;
+            let ground_t12 = wrist_1_link_t15 * ground_t7;
+            let ground_t13 = upper_arm_link_minus_m_ry_rz - ground_t12;
+            let ground_t14 = wrist_1_link_minus_u_ry * ground_t7;
+            let ground_t15 = shoulder_link_m_rz_rz - ground_t14;
+            let ground_t16 = 1.0 / ground_t3;
+            let ground_t17 = ground_t6 * ground_t16;
+            let ground_t18 = ground_t6 * ground_t17;
+            let ground_t19 = ground_t11 - ground_t18;
+            let ground_t20 = ground_t9 * ground_t16;
+            let ground_t21 = ground_t6 * ground_t20;
+            let ground_t22 = ground_t13 - ground_t21;
+            let ground_t23 = ground_t9 * ground_t20;
+            let ground_t24 = ground_t15 - ground_t23;
+            let ground_t25 = 1.0 / ground_t19;
+            let ground_t26 = ground_t22 * ground_t25;
+            let ground_t27 = ground_t22 * ground_t26;
+            let ground_t28 = ground_t24 - ground_t27;
+            let ground_t29 = 1.0 / ground_t28;
+            // wrist_3_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_3_link_e = 58.355064750790525 * p_5;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t7 = p_5 * wrist_2_link_sin;
+            let wrist_2_link_t8 = p_5 * wrist_2_link_cos;
+            let wrist_2_link_minus_e = p_4 * wrist_2_link_minus_rho;
+            let wrist_2_link_t9 = wrist_2_link_u_rx * wrist_2_link_minus_e;
+            let wrist_2_link_minus_dp_rx = wrist_2_link_t7 + wrist_2_link_t9;
+            let wrist_2_link_t10 = wrist_2_link_u_ry * wrist_2_link_minus_e;
+            let wrist_2_link_dp_ry = wrist_2_link_t8 - wrist_2_link_t10;
+            // wrist_1_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_1_link_t23 = wrist_1_link_sin * wrist_2_link_minus_dp_rx;
+            let wrist_1_link_t24 = p_4 * wrist_1_link_cos;
+            let wrist_1_link_dp_ry = wrist_1_link_t23 + wrist_1_link_t24;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t0 = p_3 - wrist_2_link_dp_ry;
+            let shoulder_link_t1 = ground_t0 * shoulder_link_t0;
+            let shoulder_link_t2 = wrist_1_link_t11 * shoulder_link_t1;
+            let shoulder_link_t3 = wrist_2_link_dp_ry + shoulder_link_t2;
+            let shoulder_link_t4 = wrist_1_link_t15 * shoulder_link_t1;
+            let shoulder_link_t5 = wrist_2_link_dp_ry + shoulder_link_t4;
+            let shoulder_link_t6 = wrist_1_link_minus_u_ry * shoulder_link_t1;
+            let shoulder_link_t7 = wrist_1_link_dp_ry - shoulder_link_t6;
+            let shoulder_link_t8 = p_2 - shoulder_link_t3;
+            let shoulder_link_t9 = ground_t16 * shoulder_link_t8;
+            let shoulder_link_t10 = ground_t6 * shoulder_link_t9;
+            let shoulder_link_t11 = shoulder_link_t5 + shoulder_link_t10;
+            let shoulder_link_t12 = ground_t9 * shoulder_link_t9;
+            let shoulder_link_t13 = shoulder_link_t7 - shoulder_link_t12;
+            let shoulder_link_t14 = p_1 - shoulder_link_t11;
+            let shoulder_link_t15 = ground_t25 * shoulder_link_t14;
+            let shoulder_link_t16 = ground_t22 * shoulder_link_t15;
+            let shoulder_link_t17 = shoulder_link_t13 - shoulder_link_t16;
+            let shoulder_link_t18 = p_0 + shoulder_link_t17;
+            let shoulder_link_v = ground_t29 * shoulder_link_t18;
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-            let ground_vel2 = ground_pivot17 * ground_vel1;
-            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-            let ground_vel5 = ground_vel3 - ground_vel4;
-            let ground_vel6 = ground_pivot1 * ground_vel5;
-            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-            let ground_vel8 = ground_pivot4 * ground_vel1;
-            let ground_vel9 = ground_vel7 - ground_vel8;
-            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_t30 = ground_t26 * shoulder_link_v;
+            let upper_arm_link_v = shoulder_link_t15 - ground_t30;
+            let ground_t31 = ground_t17 * upper_arm_link_v;
+            let ground_t32 = shoulder_link_t9 - ground_t31;
+            let ground_t33 = ground_t20 * shoulder_link_v;
+            let forearm_link_v = ground_t32 - ground_t33;
+            let ground_t34 = ground_t1 * forearm_link_v;
+            let ground_t35 = shoulder_link_t1 - ground_t34;
+            let ground_t36 = ground_t4 * upper_arm_link_v;
+            let ground_t37 = ground_t35 - ground_t36;
+            let ground_t38 = ground_t7 * shoulder_link_v;
+            let wrist_1_link_v = ground_t37 - ground_t38;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = ground_vel1 + ground_vel5;
+            let forearm_link_omega_rz = upper_arm_link_v + forearm_link_v;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
-            let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
-            let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
+            let wrist_1_link_omega_rz = wrist_1_link_v + forearm_link_omega_rz;
+            let wrist_1_link_omega_rx = wrist_1_link_sin * shoulder_link_v;
+            let wrist_1_link_omega_ry = wrist_1_link_cos * shoulder_link_v;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
-            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-            let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
-            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
-            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
-            let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
+            let wrist_2_link_t11 = wrist_2_link_minus_k_rx * wrist_1_link_omega_rx;
+            let wrist_2_link_t12 = wrist_2_link_minus_k_ry * wrist_1_link_omega_rz;
+            let wrist_2_link_t13 = wrist_2_link_t11 + wrist_2_link_t12;
+            let wrist_2_link_minus_omega_rz = wrist_2_link_minus_e - wrist_2_link_t13;
+            let wrist_2_link_v = wrist_1_link_omega_ry - wrist_2_link_minus_omega_rz;
+            let wrist_2_link_t14 = wrist_2_link_cos * wrist_1_link_omega_rz;
+            let wrist_2_link_t15 = wrist_2_link_sin * wrist_1_link_omega_rx;
+            let wrist_2_link_omega_ry = wrist_2_link_t14 - wrist_2_link_t15;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
-            results[0][l] = shoulder_link_rest19;
-            results[1][l] = ground_vel1;
-            results[2][l] = ground_vel5;
-            results[3][l] = ground_vel11;
-            results[4][l] = wrist_2_link_vel4;
-            results[5][l] = wrist_3_link_vel0;
+            let wrist_3_link_v = wrist_3_link_e - wrist_2_link_omega_ry;
+            results[0][l] = shoulder_link_v;
+            results[1][l] = upper_arm_link_v;
+            results[2][l] = forearm_link_v;
+            results[3][l] = wrist_1_link_v;
+            results[4][l] = wrist_2_link_v;
+            results[5][l] = wrist_3_link_v;
         }
         v.give(0, &results[0]);
         v.give(1, &results[1]);
@@ -734,13 +734,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
@@ -759,154 +759,154 @@ impl Ur5 {
             let v_4 = given[4][l];
             let v_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t1 = upper_arm_link_sin * upper_arm_link_t0;
+            let upper_arm_link_t2 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = v_1 * forearm_link_pose1;
-            let forearm_link_vel1 = v_0 * forearm_link_pose1;
-            let forearm_link_vel2 = v_1 * forearm_link_pose2;
-            let forearm_link_vel3 = v_1 + v_2;
+            let forearm_link_hat_y = v_1 * forearm_link_t1;
+            let forearm_link_hat_z = v_0 * forearm_link_t1;
+            let forearm_link_minus_hat_x = v_1 * forearm_link_t2;
+            let forearm_link_omega_rz = v_1 + v_2;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = wrist_1_link_pose1 * forearm_link_vel3;
-            let wrist_1_link_vel1 = forearm_link_vel0 + wrist_1_link_vel0;
-            let wrist_1_link_vel2 = v_0 * wrist_1_link_pose1;
-            let wrist_1_link_vel3 = forearm_link_vel1 + wrist_1_link_vel2;
-            let wrist_1_link_vel4 = wrist_1_link_pose2 * forearm_link_vel3;
-            let wrist_1_link_vel5 = forearm_link_vel2 + wrist_1_link_vel4;
-            let wrist_1_link_vel6 = 0.10915 * v_0;
-            let wrist_1_link_vel7 = wrist_1_link_vel5 + wrist_1_link_vel6;
-            let wrist_1_link_vel8 = wrist_1_link_cos0 * wrist_1_link_vel7;
-            let wrist_1_link_vel9 = wrist_1_link_sin0 * wrist_1_link_vel1;
-            let wrist_1_link_vel10 = wrist_1_link_vel8 - wrist_1_link_vel9;
-            let wrist_1_link_vel11 = v_0 * wrist_1_link_sin0;
-            let wrist_1_link_vel12 = v_0 * wrist_1_link_cos0;
-            let wrist_1_link_vel13 = v_3 + forearm_link_vel3;
+            let wrist_1_link_t3 = wrist_1_link_t1 * forearm_link_omega_rz;
+            let wrist_1_link_t4 = forearm_link_hat_y + wrist_1_link_t3;
+            let wrist_1_link_t5 = v_0 * wrist_1_link_t1;
+            let wrist_1_link_hat_z = forearm_link_hat_z + wrist_1_link_t5;
+            let wrist_1_link_t6 = wrist_1_link_t2 * forearm_link_omega_rz;
+            let wrist_1_link_t7 = forearm_link_minus_hat_x + wrist_1_link_t6;
+            let wrist_1_link_t8 = 0.10915 * v_0;
+            let wrist_1_link_t9 = wrist_1_link_t7 + wrist_1_link_t8;
+            let wrist_1_link_t10 = wrist_1_link_cos * wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_sin * wrist_1_link_t4;
+            let wrist_1_link_hat_x = wrist_1_link_t10 - wrist_1_link_t11;
+            let wrist_1_link_hat_rx = v_0 * wrist_1_link_sin;
+            let wrist_1_link_hat_ry = v_0 * wrist_1_link_cos;
+            let wrist_1_link_omega_rz = v_3 + forearm_link_omega_rz;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel11;
-            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel13;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel13;
-            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel11;
-            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-            let wrist_2_link_vel6 = v_4 - wrist_1_link_vel12;
+            let wrist_2_link_t0 = wrist_2_link_cos * wrist_1_link_hat_rx;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_1_link_omega_rz;
+            let wrist_2_link_hat_rx = wrist_2_link_t0 + wrist_2_link_t1;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_1_link_omega_rz;
+            let wrist_2_link_t3 = wrist_2_link_sin * wrist_1_link_hat_rx;
+            let wrist_2_link_hat_ry = wrist_2_link_t2 - wrist_2_link_t3;
+            let wrist_2_link_omega_rz = v_4 - wrist_1_link_hat_ry;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel6;
-            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-            let wrist_3_link_vel3 = v_5 + wrist_2_link_vel5;
+            let wrist_3_link_t0 = wrist_3_link_cos * wrist_2_link_hat_rx;
+            let wrist_3_link_t1 = wrist_3_link_sin * wrist_2_link_omega_rz;
+            let wrist_3_link_hat_rx = wrist_3_link_t0 - wrist_3_link_t1;
+            let wrist_3_link_omega_rz = v_5 + wrist_2_link_hat_ry;
             // shoulder_link: momentum
-            let shoulder_link_mom0 = 2.7644263025275 * v_0;
+            let shoulder_link_t0 = 2.7644263025275 * v_0;
             // upper_arm_link: momentum
-            let upper_arm_link_mom0 = v_0 * upper_arm_link_pose1;
-            let upper_arm_link_mom1 = v_1 * upper_arm_link_pose2;
-            let upper_arm_link_mom2 = upper_arm_link_mom0 - upper_arm_link_mom1;
-            let upper_arm_link_mom3 = v_0 * upper_arm_link_pose2;
-            let upper_arm_link_mom4 = 1.7701269384099998 * v_1;
-            let upper_arm_link_mom5 = upper_arm_link_mom3 + upper_arm_link_mom4;
+            let upper_arm_link_t3 = v_0 * upper_arm_link_t1;
+            let upper_arm_link_t4 = v_1 * upper_arm_link_t2;
+            let upper_arm_link_t5 = upper_arm_link_t3 - upper_arm_link_t4;
+            let upper_arm_link_t6 = v_0 * upper_arm_link_t2;
+            let upper_arm_link_t7 = 1.7701269384099998 * v_1;
+            let upper_arm_link_t8 = upper_arm_link_t6 + upper_arm_link_t7;
             // forearm_link: momentum
-            let forearm_link_mom0 = v_0 * forearm_link_pose6;
-            let forearm_link_mom1 = forearm_link_pose7 * forearm_link_vel3;
-            let forearm_link_mom2 = forearm_link_mom0 - forearm_link_mom1;
-            let forearm_link_mom3 = v_0 * forearm_link_pose7;
-            let forearm_link_mom4 = 0.59565195167475 * forearm_link_vel3;
-            let forearm_link_mom5 = forearm_link_mom3 + forearm_link_mom4;
-            let forearm_link_mom6 = forearm_link_pose3 * forearm_link_vel3;
-            let forearm_link_mom7 = forearm_link_pose4 * forearm_link_vel3;
-            let forearm_link_mom8 = v_0 * forearm_link_pose4;
-            let forearm_link_mom9 = forearm_link_pose4 * forearm_link_vel1;
-            let forearm_link_mom10 = forearm_link_pose4 * forearm_link_vel0;
-            let forearm_link_mom11 = forearm_link_pose3 * forearm_link_vel2;
-            let forearm_link_mom12 = forearm_link_mom10 + forearm_link_mom11;
-            let forearm_link_mom13 = forearm_link_mom2 - forearm_link_mom9;
-            let forearm_link_mom14 = forearm_link_mom5 + forearm_link_mom12;
+            let forearm_link_t8 = v_0 * forearm_link_t6;
+            let forearm_link_t9 = forearm_link_t7 * forearm_link_omega_rz;
+            let forearm_link_t10 = forearm_link_t8 - forearm_link_t9;
+            let forearm_link_t11 = v_0 * forearm_link_t7;
+            let forearm_link_t12 = 0.59565195167475 * forearm_link_omega_rz;
+            let forearm_link_t13 = forearm_link_t11 + forearm_link_t12;
+            let forearm_link_t14 = forearm_link_t3 * forearm_link_omega_rz;
+            let forearm_link_t15 = forearm_link_t4 * forearm_link_omega_rz;
+            let forearm_link_t16 = v_0 * forearm_link_t4;
+            let forearm_link_t17 = forearm_link_t4 * forearm_link_hat_z;
+            let forearm_link_t18 = forearm_link_t4 * forearm_link_hat_y;
+            let forearm_link_t19 = forearm_link_t3 * forearm_link_minus_hat_x;
+            let forearm_link_t20 = forearm_link_t18 + forearm_link_t19;
+            let forearm_link_t21 = forearm_link_t10 - forearm_link_t17;
+            let forearm_link_t22 = forearm_link_t13 + forearm_link_t20;
             // wrist_1_link: momentum
-            let wrist_1_link_mom0 = 0.004608836229749974 * wrist_1_link_vel11;
-            let wrist_1_link_mom1 = 0.22402883622975 * wrist_1_link_vel13;
-            let wrist_1_link_mom2 = 0.01778473500000001 * wrist_1_link_vel13;
-            let wrist_1_link_mom3 = 0.01778473500000001 * wrist_1_link_vel11;
-            let wrist_1_link_mom4 = 0.01778473500000001 * wrist_1_link_vel3;
-            let wrist_1_link_mom5 = 0.01778473500000001 * wrist_1_link_vel10;
-            let wrist_1_link_mom6 = wrist_1_link_mom0 - wrist_1_link_mom4;
-            let wrist_1_link_mom7 = wrist_1_link_mom1 + wrist_1_link_mom5;
+            let wrist_1_link_t12 = 0.004608836229749974 * wrist_1_link_hat_rx;
+            let wrist_1_link_t13 = 0.22402883622975 * wrist_1_link_omega_rz;
+            let wrist_1_link_p_x = 0.01778473500000001 * wrist_1_link_omega_rz;
+            let wrist_1_link_minus_p_z = 0.01778473500000001 * wrist_1_link_hat_rx;
+            let wrist_1_link_t14 = 0.01778473500000001 * wrist_1_link_hat_z;
+            let wrist_1_link_t15 = 0.01778473500000001 * wrist_1_link_hat_x;
+            let wrist_1_link_t16 = wrist_1_link_t12 - wrist_1_link_t14;
+            let wrist_1_link_t17 = wrist_1_link_t13 + wrist_1_link_t15;
             // wrist_2_link: momentum
-            let wrist_2_link_mom0 = 0.033822000000000005 * wrist_2_link_vel2;
-            let wrist_2_link_mom1 = 0.253242 * wrist_2_link_vel6;
+            let wrist_2_link_t4 = 0.033822000000000005 * wrist_2_link_hat_rx;
+            let wrist_2_link_t5 = 0.253242 * wrist_2_link_omega_rz;
             // wrist_3_link: momentum
-            let wrist_3_link_mom0 = 0.016685526854599998 * wrist_3_link_vel2;
-            let wrist_3_link_mom1 = 0.0171364731454 * wrist_3_link_vel3;
-            let wrist_3_link_mom2 = wrist_3_link_cos0 * wrist_3_link_mom0;
-            let wrist_3_link_mom3 = wrist_3_link_sin0 * wrist_3_link_mom0;
-            let wrist_3_link_mom4 = wrist_2_link_mom0 - wrist_3_link_mom2;
-            let wrist_3_link_mom5 = wrist_2_link_mom1 + wrist_3_link_mom3;
+            let wrist_3_link_minus_p_rx = 0.016685526854599998 * wrist_3_link_hat_rx;
+            let wrist_3_link_p_rz = 0.0171364731454 * wrist_3_link_omega_rz;
+            let wrist_3_link_t2 = wrist_3_link_cos * wrist_3_link_minus_p_rx;
+            let wrist_3_link_t3 = wrist_3_link_sin * wrist_3_link_minus_p_rx;
+            let wrist_2_link_p_rx = wrist_2_link_t4 - wrist_3_link_t2;
+            let wrist_2_link_p_rz = wrist_2_link_t5 + wrist_3_link_t3;
             // wrist_2_link: momentum
-            let wrist_2_link_mom2 = wrist_2_link_cos0 * wrist_3_link_mom4;
-            let wrist_2_link_mom3 = wrist_2_link_sin0 * wrist_3_link_mom1;
-            let wrist_2_link_mom4 = wrist_2_link_mom2 - wrist_2_link_mom3;
-            let wrist_2_link_mom5 = wrist_2_link_sin0 * wrist_3_link_mom4;
-            let wrist_2_link_mom6 = wrist_2_link_cos0 * wrist_3_link_mom1;
-            let wrist_2_link_mom7 = wrist_2_link_mom5 + wrist_2_link_mom6;
-            let wrist_2_link_mom8 = wrist_1_link_mom6 + wrist_2_link_mom4;
-            let wrist_2_link_mom9 = wrist_1_link_mom7 + wrist_2_link_mom7;
+            let wrist_2_link_t6 = wrist_2_link_cos * wrist_2_link_p_rx;
+            let wrist_2_link_t7 = wrist_2_link_sin * wrist_3_link_p_rz;
+            let wrist_2_link_t8 = wrist_2_link_t6 - wrist_2_link_t7;
+            let wrist_2_link_t9 = wrist_2_link_sin * wrist_2_link_p_rx;
+            let wrist_2_link_t10 = wrist_2_link_cos * wrist_3_link_p_rz;
+            let wrist_2_link_t11 = wrist_2_link_t9 + wrist_2_link_t10;
+            let wrist_1_link_p_rx = wrist_1_link_t16 + wrist_2_link_t8;
+            let wrist_1_link_p_rz = wrist_1_link_t17 + wrist_2_link_t11;
             // wrist_1_link: momentum
-            let wrist_1_link_mom8 = wrist_1_link_cos0 * wrist_1_link_mom2;
-            let wrist_1_link_mom9 = wrist_1_link_sin0 * wrist_1_link_mom2;
-            let wrist_1_link_mom10 = wrist_1_link_sin0 * wrist_2_link_mom8;
-            let wrist_1_link_mom11 = wrist_1_link_cos0 * wrist_3_link_mom5;
-            let wrist_1_link_mom12 = wrist_1_link_mom10 - wrist_1_link_mom11;
-            let wrist_1_link_mom13 = 0.10915 * wrist_1_link_mom8;
-            let wrist_1_link_mom14 = wrist_1_link_mom12 + wrist_1_link_mom13;
-            let wrist_1_link_mom15 = wrist_1_link_pose2 * wrist_1_link_mom8;
-            let wrist_1_link_mom16 = wrist_2_link_mom9 + wrist_1_link_mom15;
-            let wrist_1_link_mom17 = wrist_1_link_pose1 * wrist_1_link_mom3;
-            let wrist_1_link_mom18 = wrist_1_link_mom14 - wrist_1_link_mom17;
-            let wrist_1_link_mom19 = wrist_1_link_pose1 * wrist_1_link_mom9;
-            let wrist_1_link_mom20 = wrist_1_link_mom16 - wrist_1_link_mom19;
-            let wrist_1_link_mom21 = forearm_link_mom6 + wrist_1_link_mom8;
-            let wrist_1_link_mom22 = forearm_link_mom7 - wrist_1_link_mom9;
-            let wrist_1_link_mom23 = forearm_link_mom8 - wrist_1_link_mom3;
-            let wrist_1_link_mom24 = forearm_link_mom13 - wrist_1_link_mom18;
-            let wrist_1_link_mom25 = forearm_link_mom14 + wrist_1_link_mom20;
+            let wrist_1_link_t18 = wrist_1_link_cos * wrist_1_link_p_x;
+            let wrist_1_link_t19 = wrist_1_link_sin * wrist_1_link_p_x;
+            let wrist_1_link_t20 = wrist_1_link_sin * wrist_1_link_p_rx;
+            let wrist_1_link_t21 = wrist_1_link_cos * wrist_2_link_p_rz;
+            let wrist_1_link_t22 = wrist_1_link_t20 - wrist_1_link_t21;
+            let wrist_1_link_t23 = 0.10915 * wrist_1_link_t18;
+            let wrist_1_link_t24 = wrist_1_link_t22 + wrist_1_link_t23;
+            let wrist_1_link_t25 = wrist_1_link_t2 * wrist_1_link_t18;
+            let wrist_1_link_t26 = wrist_1_link_p_rz + wrist_1_link_t25;
+            let wrist_1_link_t27 = wrist_1_link_t1 * wrist_1_link_minus_p_z;
+            let wrist_1_link_t28 = wrist_1_link_t24 - wrist_1_link_t27;
+            let wrist_1_link_t29 = wrist_1_link_t1 * wrist_1_link_t19;
+            let wrist_1_link_t30 = wrist_1_link_t26 - wrist_1_link_t29;
+            let forearm_link_minus_p_x = forearm_link_t14 + wrist_1_link_t18;
+            let forearm_link_p_y = forearm_link_t15 - wrist_1_link_t19;
+            let forearm_link_p_z = forearm_link_t16 - wrist_1_link_minus_p_z;
+            let forearm_link_p_ry = forearm_link_t21 - wrist_1_link_t28;
+            let forearm_link_p_rz = forearm_link_t22 + wrist_1_link_t30;
             // forearm_link: momentum
-            let forearm_link_mom15 = forearm_link_pose2 * wrist_1_link_mom21;
-            let forearm_link_mom16 = wrist_1_link_mom25 + forearm_link_mom15;
-            let forearm_link_mom17 = forearm_link_pose1 * wrist_1_link_mom23;
-            let forearm_link_mom18 = wrist_1_link_mom24 - forearm_link_mom17;
-            let forearm_link_mom19 = forearm_link_pose1 * wrist_1_link_mom22;
-            let forearm_link_mom20 = forearm_link_mom16 + forearm_link_mom19;
-            let forearm_link_mom21 = upper_arm_link_mom2 + forearm_link_mom18;
-            let forearm_link_mom22 = upper_arm_link_mom5 + forearm_link_mom20;
+            let forearm_link_t23 = forearm_link_t2 * forearm_link_minus_p_x;
+            let forearm_link_t24 = forearm_link_p_rz + forearm_link_t23;
+            let forearm_link_t25 = forearm_link_t1 * forearm_link_p_z;
+            let forearm_link_t26 = forearm_link_p_ry - forearm_link_t25;
+            let forearm_link_t27 = forearm_link_t1 * forearm_link_p_y;
+            let forearm_link_t28 = forearm_link_t24 + forearm_link_t27;
+            let upper_arm_link_p_ry = upper_arm_link_t5 + forearm_link_t26;
+            let upper_arm_link_p_rz = upper_arm_link_t8 + forearm_link_t28;
             // upper_arm_link: momentum
-            let upper_arm_link_mom6 = shoulder_link_mom0 - forearm_link_mom21;
-            results[0][l] = upper_arm_link_mom6;
-            results[1][l] = forearm_link_mom22;
-            results[2][l] = wrist_1_link_mom25;
-            results[3][l] = wrist_2_link_mom9;
-            results[4][l] = wrist_3_link_mom5;
-            results[5][l] = wrist_3_link_mom1;
+            let shoulder_link_p_rz = shoulder_link_t0 - upper_arm_link_p_ry;
+            results[0][l] = shoulder_link_p_rz;
+            results[1][l] = upper_arm_link_p_rz;
+            results[2][l] = forearm_link_p_rz;
+            results[3][l] = wrist_1_link_p_rz;
+            results[4][l] = wrist_2_link_p_rz;
+            results[5][l] = wrist_3_link_p_rz;
         }
         p.give(0, &results[0]);
         p.give(1, &results[1]);
@@ -920,13 +920,13 @@ impl Ur5 {
     /// 185 operations: 84 additions, 96 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
-        let mut result = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut result);
-        result
+        let mut energy = [0.0; 2];
+        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        energy
     }
 
     #[inline(always)]
-    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), result: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
+    fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
         for l in 0..LANES {
             let q_1 = q.get(1, l);
@@ -934,13 +934,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
@@ -959,236 +959,236 @@ impl Ur5 {
             let p_4 = given[4][l];
             let p_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_sin0;
-            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-            let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 4.4329225 * upper_arm_link_sin;
+            let upper_arm_link_t1 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t2 = upper_arm_link_sin * upper_arm_link_t1;
+            let upper_arm_link_t3 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
+            let wrist_1_link_t4 = forearm_link_t2 + wrist_1_link_t2;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            let wrist_3_link_t0 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            let wrist_3_link_minus_mp_rx_ry = wrist_3_link_cos * wrist_3_link_t0;
+            let wrist_3_link_mp_rx_rx = wrist_3_link_minus_mp_ry_ry - 0.016685526854599998;
+            let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
+            let wrist_2_link_minus_m_rz_rz = wrist_3_link_minus_mp_ry_ry - 0.253242;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            let wrist_2_link_t0 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_t0;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_2_link_t0;
+            let wrist_2_link_t3 = wrist_2_link_m_rx_rx - wrist_2_link_t1;
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
+            let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
+            let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
+            let wrist_2_link_minus_k_ry = wrist_2_link_u_ry * wrist_2_link_minus_rho;
+            let wrist_2_link_t4 = wrist_2_link_u_rx * wrist_2_link_minus_k_rx;
+            let wrist_2_link_mp_rx_rx = wrist_2_link_t3 + wrist_2_link_t4;
+            let wrist_2_link_t5 = wrist_2_link_u_rx * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_rx_ry = wrist_2_link_t2 + wrist_2_link_t5;
+            let wrist_2_link_t6 = wrist_2_link_u_ry * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_ry_ry = wrist_2_link_t1 + wrist_2_link_t6;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
+            let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
+            let wrist_1_link_t5 = wrist_1_link_sin * wrist_1_link_m_rx_rx;
+            let wrist_1_link_mp_ry_ry = wrist_1_link_sin * wrist_1_link_t5;
+            let wrist_1_link_t6 = wrist_1_link_sin * wrist_2_link_mp_rx_ry;
+            let wrist_1_link_t7 = 0.10915 * wrist_1_link_minus_u_x;
+            let wrist_1_link_minus_u_ry = wrist_1_link_t6 + wrist_1_link_t7;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            let wrist_1_link_t8 = wrist_1_link_t2 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t9 = wrist_1_link_t1 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t10 = wrist_1_link_t8 - wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_m_rz_rz + wrist_1_link_t10;
+            let wrist_1_link_t12 = wrist_1_link_t4 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t13 = wrist_1_link_t3 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t14 = wrist_1_link_t12 - wrist_1_link_t13;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t14;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-            let wrist_1_link_inertia19 = forearm_link_pose7 + wrist_1_link_inertia8;
-            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            let wrist_1_link_t16 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
+            let wrist_1_link_t17 = wrist_1_link_t2 * wrist_1_link_t16;
+            let wrist_1_link_t18 = wrist_1_link_m_rz_rz + wrist_1_link_t17;
+            let wrist_1_link_t19 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
+            let wrist_1_link_t20 = wrist_1_link_t1 * wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_1_link_mp_ry_ry - wrist_1_link_t20;
+            let wrist_1_link_t22 = wrist_1_link_t18 - wrist_1_link_t20;
+            let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
+            let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
+            let forearm_link_minus_m_ry_ry = forearm_link_t6 - wrist_1_link_t21;
+            let forearm_link_minus_m_ry_rz = forearm_link_t7 + wrist_1_link_minus_u_ry;
+            let forearm_link_m_rz_rz = wrist_1_link_t22 + 0.59565195167475;
             // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            let forearm_link_t8 = forearm_link_t2 * forearm_link_m_rx_z;
+            let forearm_link_t9 = forearm_link_t1 * forearm_link_minus_m_ry_z;
+            let forearm_link_t10 = forearm_link_t8 + forearm_link_t9;
+            let forearm_link_t11 = forearm_link_m_rz_rz + forearm_link_t10;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-            let forearm_link_inertia7 = upper_arm_link_pose0 + wrist_1_link_inertia16;
-            let forearm_link_inertia8 = upper_arm_link_pose2 + forearm_link_inertia5;
-            let forearm_link_inertia9 = upper_arm_link_pose3 + wrist_1_link_inertia19;
-            let forearm_link_inertia10 = forearm_link_inertia6 + 1.7701269384099998;
+            let forearm_link_t12 = forearm_link_m_rx_z + forearm_link_m_rx_z;
+            let forearm_link_t13 = forearm_link_t2 * forearm_link_t12;
+            let forearm_link_t14 = forearm_link_m_rz_rz + forearm_link_t13;
+            let forearm_link_t15 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t16 = forearm_link_t1 * forearm_link_t15;
+            let forearm_link_t17 = forearm_link_minus_m_ry_ry - forearm_link_t16;
+            let forearm_link_t18 = forearm_link_t14 + forearm_link_t16;
+            let upper_arm_link_m_rx_z = upper_arm_link_t0 + forearm_link_m_rx_z;
+            let upper_arm_link_minus_m_ry_ry = upper_arm_link_t2 + forearm_link_t17;
+            let upper_arm_link_minus_m_ry_rz = upper_arm_link_t3 + forearm_link_minus_m_ry_rz;
+            let upper_arm_link_m_rz_rz = forearm_link_t18 + 1.7701269384099998;
             // upper_arm_link: inertia carried to the parent, M* (4.48)
-            let upper_arm_link_inertia0 = forearm_link_inertia8 + forearm_link_inertia10;
-            let upper_arm_link_inertia1 = forearm_link_inertia10 - upper_arm_link_inertia0;
-            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            let upper_arm_link_t4 = upper_arm_link_minus_m_ry_ry + upper_arm_link_m_rz_rz;
+            let upper_arm_link_t5 = upper_arm_link_m_rz_rz - upper_arm_link_t4;
+            let shoulder_link_m_rz_rz = upper_arm_link_t5 + 2.7644263025275;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-            let ground_pivot11 = forearm_link_inertia10 - ground_pivot10;
-            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-            let ground_pivot13 = forearm_link_inertia9 - ground_pivot12;
-            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-            let ground_pivot16 = 1.0 / ground_pivot3;
-            let ground_pivot17 = ground_pivot6 * ground_pivot16;
-            let ground_pivot18 = ground_pivot6 * ground_pivot17;
-            let ground_pivot19 = ground_pivot11 - ground_pivot18;
-            let ground_pivot20 = ground_pivot9 * ground_pivot16;
-            let ground_pivot21 = ground_pivot6 * ground_pivot20;
-            let ground_pivot22 = ground_pivot13 - ground_pivot21;
-            let ground_pivot23 = ground_pivot9 * ground_pivot20;
-            let ground_pivot24 = ground_pivot15 - ground_pivot23;
-            let ground_pivot25 = 1.0 / ground_pivot19;
-            let ground_pivot26 = ground_pivot22 * ground_pivot25;
-            let ground_pivot27 = ground_pivot22 * ground_pivot26;
-            let ground_pivot28 = ground_pivot24 - ground_pivot27;
-            let ground_pivot29 = 1.0 / ground_pivot28;
-            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_3_link_rest0 = 58.355064750790525 * p_5;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest0 = p_5 * wrist_2_link_sin0;
-            let wrist_2_link_rest1 = p_5 * wrist_2_link_cos0;
-            let wrist_2_link_rest2 = p_4 * wrist_2_link_pivot0;
-            let wrist_2_link_rest3 = wrist_2_link_inertia4 * wrist_2_link_rest2;
-            let wrist_2_link_rest4 = wrist_2_link_rest0 + wrist_2_link_rest3;
-            let wrist_2_link_rest5 = wrist_2_link_inertia5 * wrist_2_link_rest2;
-            let wrist_2_link_rest6 = wrist_2_link_rest1 - wrist_2_link_rest5;
-            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_1_link_rest0 = wrist_1_link_sin0 * wrist_2_link_rest4;
-            let wrist_1_link_rest1 = p_4 * wrist_1_link_cos0;
-            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest0 = p_3 - wrist_2_link_rest6;
-            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-            let shoulder_link_rest3 = wrist_2_link_rest6 + shoulder_link_rest2;
-            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-            let shoulder_link_rest5 = wrist_2_link_rest6 + shoulder_link_rest4;
-            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-            let shoulder_link_rest7 = wrist_1_link_rest2 - shoulder_link_rest6;
-            let shoulder_link_rest8 = p_2 - shoulder_link_rest3;
-            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-            let shoulder_link_rest14 = p_1 - shoulder_link_rest11;
-            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-            let shoulder_link_rest18 = p_0 + shoulder_link_rest17;
-            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            let ground_t0 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t1 = wrist_1_link_t11 * ground_t0;
+            let ground_t2 = wrist_1_link_t11 * ground_t1;
+            let ground_t3 = forearm_link_m_rz_rz - ground_t2;
+            let ground_t4 = wrist_1_link_t15 * ground_t0;
+            let ground_t5 = wrist_1_link_t11 * ground_t4;
+            let ground_t6 = forearm_link_t11 - ground_t5;
+            let ground_t7 = wrist_1_link_minus_u_ry * ground_t0;
+            let ground_t8 = wrist_1_link_t11 * ground_t7;
+            let ground_t9 = forearm_link_minus_m_ry_rz - ground_t8;
+            let ground_t10 = wrist_1_link_t15 * ground_t4;
+            let ground_t11 = upper_arm_link_m_rz_rz - ground_t10;
+            let ground_t12 = wrist_1_link_t15 * ground_t7;
+            let ground_t13 = upper_arm_link_minus_m_ry_rz - ground_t12;
+            let ground_t14 = wrist_1_link_minus_u_ry * ground_t7;
+            let ground_t15 = shoulder_link_m_rz_rz - ground_t14;
+            let ground_t16 = 1.0 / ground_t3;
+            let ground_t17 = ground_t6 * ground_t16;
+            let ground_t18 = ground_t6 * ground_t17;
+            let ground_t19 = ground_t11 - ground_t18;
+            let ground_t20 = ground_t9 * ground_t16;
+            let ground_t21 = ground_t6 * ground_t20;
+            let ground_t22 = ground_t13 - ground_t21;
+            let ground_t23 = ground_t9 * ground_t20;
+            let ground_t24 = ground_t15 - ground_t23;
+            let ground_t25 = 1.0 / ground_t19;
+            let ground_t26 = ground_t22 * ground_t25;
+            let ground_t27 = ground_t22 * ground_t26;
+            let ground_t28 = ground_t24 - ground_t27;
+            let ground_t29 = 1.0 / ground_t28;
+            // wrist_3_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_3_link_e = 58.355064750790525 * p_5;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t7 = p_5 * wrist_2_link_sin;
+            let wrist_2_link_t8 = p_5 * wrist_2_link_cos;
+            let wrist_2_link_minus_e = p_4 * wrist_2_link_minus_rho;
+            let wrist_2_link_t9 = wrist_2_link_u_rx * wrist_2_link_minus_e;
+            let wrist_2_link_minus_dp_rx = wrist_2_link_t7 + wrist_2_link_t9;
+            let wrist_2_link_t10 = wrist_2_link_u_ry * wrist_2_link_minus_e;
+            let wrist_2_link_dp_ry = wrist_2_link_t8 - wrist_2_link_t10;
+            // wrist_1_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_1_link_t23 = wrist_1_link_sin * wrist_2_link_minus_dp_rx;
+            let wrist_1_link_t24 = p_4 * wrist_1_link_cos;
+            let wrist_1_link_dp_ry = wrist_1_link_t23 + wrist_1_link_t24;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t0 = p_3 - wrist_2_link_dp_ry;
+            let shoulder_link_t1 = ground_t0 * shoulder_link_t0;
+            let shoulder_link_t2 = wrist_1_link_t11 * shoulder_link_t1;
+            let shoulder_link_t3 = wrist_2_link_dp_ry + shoulder_link_t2;
+            let shoulder_link_t4 = wrist_1_link_t15 * shoulder_link_t1;
+            let shoulder_link_t5 = wrist_2_link_dp_ry + shoulder_link_t4;
+            let shoulder_link_t6 = wrist_1_link_minus_u_ry * shoulder_link_t1;
+            let shoulder_link_t7 = wrist_1_link_dp_ry - shoulder_link_t6;
+            let shoulder_link_t8 = p_2 - shoulder_link_t3;
+            let shoulder_link_t9 = ground_t16 * shoulder_link_t8;
+            let shoulder_link_t10 = ground_t6 * shoulder_link_t9;
+            let shoulder_link_t11 = shoulder_link_t5 + shoulder_link_t10;
+            let shoulder_link_t12 = ground_t9 * shoulder_link_t9;
+            let shoulder_link_t13 = shoulder_link_t7 - shoulder_link_t12;
+            let shoulder_link_t14 = p_1 - shoulder_link_t11;
+            let shoulder_link_t15 = ground_t25 * shoulder_link_t14;
+            let shoulder_link_t16 = ground_t22 * shoulder_link_t15;
+            let shoulder_link_t17 = shoulder_link_t13 - shoulder_link_t16;
+            let shoulder_link_t18 = p_0 + shoulder_link_t17;
+            let shoulder_link_v = ground_t29 * shoulder_link_t18;
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot26 * shoulder_link_rest19;
-            let ground_vel1 = shoulder_link_rest15 - ground_vel0;
-            let ground_vel2 = ground_pivot17 * ground_vel1;
-            let ground_vel3 = shoulder_link_rest9 - ground_vel2;
-            let ground_vel4 = ground_pivot20 * shoulder_link_rest19;
-            let ground_vel5 = ground_vel3 - ground_vel4;
-            let ground_vel6 = ground_pivot1 * ground_vel5;
-            let ground_vel7 = shoulder_link_rest1 - ground_vel6;
-            let ground_vel8 = ground_pivot4 * ground_vel1;
-            let ground_vel9 = ground_vel7 - ground_vel8;
-            let ground_vel10 = ground_pivot7 * shoulder_link_rest19;
-            let ground_vel11 = ground_vel9 - ground_vel10;
+            let ground_t30 = ground_t26 * shoulder_link_v;
+            let upper_arm_link_v = shoulder_link_t15 - ground_t30;
+            let ground_t31 = ground_t17 * upper_arm_link_v;
+            let ground_t32 = shoulder_link_t9 - ground_t31;
+            let ground_t33 = ground_t20 * shoulder_link_v;
+            let forearm_link_v = ground_t32 - ground_t33;
+            let ground_t34 = ground_t1 * forearm_link_v;
+            let ground_t35 = shoulder_link_t1 - ground_t34;
+            let ground_t36 = ground_t4 * upper_arm_link_v;
+            let ground_t37 = ground_t35 - ground_t36;
+            let ground_t38 = ground_t7 * shoulder_link_v;
+            let wrist_1_link_v = ground_t37 - ground_t38;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = ground_vel1 + ground_vel5;
+            let forearm_link_omega_rz = upper_arm_link_v + forearm_link_v;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = ground_vel11 + forearm_link_vel0;
-            let wrist_1_link_vel1 = wrist_1_link_sin0 * shoulder_link_rest19;
-            let wrist_1_link_vel2 = wrist_1_link_cos0 * shoulder_link_rest19;
+            let wrist_1_link_omega_rz = wrist_1_link_v + forearm_link_omega_rz;
+            let wrist_1_link_omega_rx = wrist_1_link_sin * shoulder_link_v;
+            let wrist_1_link_omega_ry = wrist_1_link_cos * shoulder_link_v;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_pivot1 * wrist_1_link_vel1;
-            let wrist_2_link_vel1 = wrist_2_link_pivot2 * wrist_1_link_vel0;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_rest2 - wrist_2_link_vel2;
-            let wrist_2_link_vel4 = wrist_1_link_vel2 - wrist_2_link_vel3;
-            let wrist_2_link_vel5 = wrist_2_link_cos0 * wrist_1_link_vel0;
-            let wrist_2_link_vel6 = wrist_2_link_sin0 * wrist_1_link_vel1;
-            let wrist_2_link_vel7 = wrist_2_link_vel5 - wrist_2_link_vel6;
+            let wrist_2_link_t11 = wrist_2_link_minus_k_rx * wrist_1_link_omega_rx;
+            let wrist_2_link_t12 = wrist_2_link_minus_k_ry * wrist_1_link_omega_rz;
+            let wrist_2_link_t13 = wrist_2_link_t11 + wrist_2_link_t12;
+            let wrist_2_link_minus_omega_rz = wrist_2_link_minus_e - wrist_2_link_t13;
+            let wrist_2_link_v = wrist_1_link_omega_ry - wrist_2_link_minus_omega_rz;
+            let wrist_2_link_t14 = wrist_2_link_cos * wrist_1_link_omega_rz;
+            let wrist_2_link_t15 = wrist_2_link_sin * wrist_1_link_omega_rx;
+            let wrist_2_link_omega_ry = wrist_2_link_t14 - wrist_2_link_t15;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_rest0 - wrist_2_link_vel7;
+            let wrist_3_link_v = wrist_3_link_e - wrist_2_link_omega_ry;
             // wrist_2_link: energy
-            let wrist_2_link_energy0 = p_4 * wrist_2_link_vel4;
+            let wrist_2_link_t16 = p_4 * wrist_2_link_v;
             // wrist_3_link: energy
-            let wrist_3_link_energy0 = p_5 * wrist_3_link_vel0;
-            let wrist_3_link_energy1 = wrist_2_link_energy0 + wrist_3_link_energy0;
-            let wrist_3_link_energy2 = p_3 * ground_vel11;
-            let wrist_3_link_energy3 = wrist_3_link_energy1 + wrist_3_link_energy2;
-            let wrist_3_link_energy4 = p_2 * ground_vel5;
-            let wrist_3_link_energy5 = wrist_3_link_energy3 + wrist_3_link_energy4;
-            let wrist_3_link_energy6 = p_1 * ground_vel1;
-            let wrist_3_link_energy7 = wrist_3_link_energy5 + wrist_3_link_energy6;
-            let wrist_3_link_energy8 = p_0 * shoulder_link_rest19;
-            let wrist_3_link_energy9 = wrist_3_link_energy7 + wrist_3_link_energy8;
-            let wrist_3_link_energy10 = 0.5 * wrist_3_link_energy9;
+            let wrist_3_link_t1 = p_5 * wrist_3_link_v;
+            let wrist_3_link_t2 = wrist_2_link_t16 + wrist_3_link_t1;
+            let wrist_3_link_t3 = p_3 * wrist_1_link_v;
+            let wrist_3_link_t4 = wrist_3_link_t2 + wrist_3_link_t3;
+            let wrist_3_link_t5 = p_2 * forearm_link_v;
+            let wrist_3_link_t6 = wrist_3_link_t4 + wrist_3_link_t5;
+            let wrist_3_link_t7 = p_1 * upper_arm_link_v;
+            let wrist_3_link_t8 = wrist_3_link_t6 + wrist_3_link_t7;
+            let wrist_3_link_t9 = p_0 * shoulder_link_v;
+            let wrist_3_link_t10 = wrist_3_link_t8 + wrist_3_link_t9;
+            let energy_0 = 0.5 * wrist_3_link_t10;
             // shoulder_link: gravity and wrenches
-            let shoulder_link_load0 = forearm_link_inertia7 - 1.5151591301;
+            let shoulder_link_t19 = upper_arm_link_m_rx_z - 1.5151591301;
             // ground: energy
-            let ground_energy0 = 9.81 * shoulder_link_load0;
-            results[0][l] = wrist_3_link_energy10;
-            results[1][l] = -ground_energy0;
+            let minus_energy_1 = 9.81 * shoulder_link_t19;
+            results[0][l] = energy_0;
+            results[1][l] = -minus_energy_1;
         }
-        result.give(0, &results[0]);
-        result.give(1, &results[1]);
+        energy.give(0, &results[0]);
+        energy.give(1, &results[1]);
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     /// 342 operations: 149 additions, 188 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
@@ -1203,13 +1203,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -1240,404 +1240,404 @@ impl Ur5 {
             let tau_4 = given[10][l];
             let tau_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 4.4329225 * upper_arm_link_cos;
+            let upper_arm_link_t1 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t2 = upper_arm_link_sin * upper_arm_link_t1;
+            let upper_arm_link_t3 = upper_arm_link_cos * upper_arm_link_t1;
+            let upper_arm_link_t4 = 0.408499208875 * upper_arm_link_cos;
+            let upper_arm_link_t5 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = forearm_link_cos * forearm_link_t5;
+            let forearm_link_t8 = 0.07714261911624999 * forearm_link_cos;
+            let forearm_link_t9 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia0 = forearm_link_pose1 + wrist_1_link_pose1;
-            let wrist_1_link_inertia1 = forearm_link_pose2 + wrist_1_link_pose2;
+            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
+            let wrist_1_link_t4 = forearm_link_t2 + wrist_1_link_t2;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_inertia1 = wrist_3_link_sin0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia2 = wrist_3_link_cos0 * wrist_3_link_inertia0;
-            let wrist_3_link_inertia3 = wrist_3_link_inertia1 - 0.016685526854599998;
-            let wrist_3_link_inertia4 = wrist_3_link_inertia3 + 0.033822000000000005;
-            let wrist_3_link_inertia5 = wrist_3_link_inertia1 - 0.253242;
+            let wrist_3_link_t0 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            let wrist_3_link_minus_mp_rx_ry = wrist_3_link_cos * wrist_3_link_t0;
+            let wrist_3_link_mp_rx_rx = wrist_3_link_minus_mp_ry_ry - 0.016685526854599998;
+            let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
+            let wrist_2_link_minus_m_rz_rz = wrist_3_link_minus_mp_ry_ry - 0.253242;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
-            let wrist_2_link_inertia1 = wrist_2_link_sin0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia2 = wrist_2_link_cos0 * wrist_2_link_inertia0;
-            let wrist_2_link_inertia3 = wrist_3_link_inertia4 - wrist_2_link_inertia1;
-            let wrist_2_link_inertia4 = wrist_2_link_cos0 * wrist_3_link_inertia2;
-            let wrist_2_link_inertia5 = wrist_2_link_sin0 * wrist_3_link_inertia2;
+            let wrist_2_link_t0 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_t0;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_2_link_t0;
+            let wrist_2_link_t3 = wrist_2_link_m_rx_rx - wrist_2_link_t1;
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
+            let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia5;
-            let wrist_2_link_pivot1 = wrist_2_link_inertia4 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot2 = wrist_2_link_inertia5 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot3 = wrist_2_link_inertia4 * wrist_2_link_pivot1;
-            let wrist_2_link_pivot4 = wrist_2_link_inertia3 + wrist_2_link_pivot3;
-            let wrist_2_link_pivot5 = wrist_2_link_inertia4 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot6 = wrist_2_link_inertia2 + wrist_2_link_pivot5;
-            let wrist_2_link_pivot7 = wrist_2_link_inertia5 * wrist_2_link_pivot2;
-            let wrist_2_link_pivot8 = wrist_2_link_inertia1 + wrist_2_link_pivot7;
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
+            let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
+            let wrist_2_link_minus_k_ry = wrist_2_link_u_ry * wrist_2_link_minus_rho;
+            let wrist_2_link_t4 = wrist_2_link_u_rx * wrist_2_link_minus_k_rx;
+            let wrist_2_link_mp_rx_rx = wrist_2_link_t3 + wrist_2_link_t4;
+            let wrist_2_link_t5 = wrist_2_link_u_rx * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_rx_ry = wrist_2_link_t2 + wrist_2_link_t5;
+            let wrist_2_link_t6 = wrist_2_link_u_ry * wrist_2_link_minus_k_ry;
+            let wrist_2_link_mp_ry_ry = wrist_2_link_t1 + wrist_2_link_t6;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia6 = wrist_2_link_pivot4 + 0.004608836229749974;
-            let wrist_2_link_inertia7 = wrist_2_link_pivot8 + 0.22402883622975;
+            let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
+            let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia2 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia3 = 0.01778473500000001 * wrist_1_link_sin0;
-            let wrist_1_link_inertia4 = wrist_1_link_sin0 * wrist_2_link_inertia6;
-            let wrist_1_link_inertia5 = wrist_1_link_sin0 * wrist_1_link_inertia4;
-            let wrist_1_link_inertia6 = wrist_1_link_sin0 * wrist_2_link_pivot6;
-            let wrist_1_link_inertia7 = 0.10915 * wrist_1_link_inertia2;
-            let wrist_1_link_inertia8 = wrist_1_link_inertia6 + wrist_1_link_inertia7;
+            let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
+            let wrist_1_link_t5 = wrist_1_link_sin * wrist_1_link_m_rx_rx;
+            let wrist_1_link_mp_ry_ry = wrist_1_link_sin * wrist_1_link_t5;
+            let wrist_1_link_t6 = wrist_1_link_sin * wrist_2_link_mp_rx_ry;
+            let wrist_1_link_t7 = 0.10915 * wrist_1_link_minus_u_x;
+            let wrist_1_link_minus_u_ry = wrist_1_link_t6 + wrist_1_link_t7;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot0 = wrist_1_link_pose2 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot1 = wrist_1_link_pose1 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot2 = wrist_1_link_pivot0 - wrist_1_link_pivot1;
-            let wrist_1_link_pivot3 = wrist_2_link_inertia7 + wrist_1_link_pivot2;
-            let wrist_1_link_pivot4 = wrist_1_link_inertia1 * wrist_1_link_inertia2;
-            let wrist_1_link_pivot5 = wrist_1_link_inertia0 * wrist_1_link_inertia3;
-            let wrist_1_link_pivot6 = wrist_1_link_pivot4 - wrist_1_link_pivot5;
-            let wrist_1_link_pivot7 = wrist_2_link_inertia7 + wrist_1_link_pivot6;
+            let wrist_1_link_t8 = wrist_1_link_t2 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t9 = wrist_1_link_t1 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t10 = wrist_1_link_t8 - wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_m_rz_rz + wrist_1_link_t10;
+            let wrist_1_link_t12 = wrist_1_link_t4 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t13 = wrist_1_link_t3 * wrist_1_link_minus_u_y;
+            let wrist_1_link_t14 = wrist_1_link_t12 - wrist_1_link_t13;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t14;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia9 = wrist_1_link_inertia2 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia10 = wrist_1_link_pose2 * wrist_1_link_inertia9;
-            let wrist_1_link_inertia11 = wrist_2_link_inertia7 + wrist_1_link_inertia10;
-            let wrist_1_link_inertia12 = wrist_1_link_inertia3 + wrist_1_link_inertia3;
-            let wrist_1_link_inertia13 = wrist_1_link_pose1 * wrist_1_link_inertia12;
-            let wrist_1_link_inertia14 = wrist_1_link_inertia5 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia15 = wrist_1_link_inertia11 - wrist_1_link_inertia13;
-            let wrist_1_link_inertia16 = forearm_link_pose3 + wrist_1_link_inertia2;
-            let wrist_1_link_inertia17 = forearm_link_pose4 - wrist_1_link_inertia3;
-            let wrist_1_link_inertia18 = forearm_link_pose6 - wrist_1_link_inertia14;
-            let wrist_1_link_inertia19 = forearm_link_pose9 + wrist_1_link_inertia8;
-            let wrist_1_link_inertia20 = wrist_1_link_inertia15 + 0.59565195167475;
+            let wrist_1_link_t16 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
+            let wrist_1_link_t17 = wrist_1_link_t2 * wrist_1_link_t16;
+            let wrist_1_link_t18 = wrist_1_link_m_rz_rz + wrist_1_link_t17;
+            let wrist_1_link_t19 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
+            let wrist_1_link_t20 = wrist_1_link_t1 * wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_1_link_mp_ry_ry - wrist_1_link_t20;
+            let wrist_1_link_t22 = wrist_1_link_t18 - wrist_1_link_t20;
+            let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
+            let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
+            let forearm_link_minus_m_ry_ry = forearm_link_t6 - wrist_1_link_t21;
+            let forearm_link_minus_m_ry_rz = forearm_link_t9 + wrist_1_link_minus_u_ry;
+            let forearm_link_m_rz_rz = wrist_1_link_t22 + 0.59565195167475;
             // forearm_link: U, Mj, k and the reduced inertia M' (4.44)
-            let forearm_link_pivot0 = forearm_link_pose2 * wrist_1_link_inertia16;
-            let forearm_link_pivot1 = forearm_link_pose1 * wrist_1_link_inertia17;
-            let forearm_link_pivot2 = forearm_link_pivot0 + forearm_link_pivot1;
-            let forearm_link_pivot3 = wrist_1_link_inertia20 + forearm_link_pivot2;
+            let forearm_link_t10 = forearm_link_t2 * forearm_link_m_rx_z;
+            let forearm_link_t11 = forearm_link_t1 * forearm_link_minus_m_ry_z;
+            let forearm_link_t12 = forearm_link_t10 + forearm_link_t11;
+            let forearm_link_t13 = forearm_link_m_rz_rz + forearm_link_t12;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia0 = wrist_1_link_inertia16 + wrist_1_link_inertia16;
-            let forearm_link_inertia1 = forearm_link_pose2 * forearm_link_inertia0;
-            let forearm_link_inertia2 = wrist_1_link_inertia20 + forearm_link_inertia1;
-            let forearm_link_inertia3 = wrist_1_link_inertia17 + wrist_1_link_inertia17;
-            let forearm_link_inertia4 = forearm_link_pose1 * forearm_link_inertia3;
-            let forearm_link_inertia5 = wrist_1_link_inertia18 - forearm_link_inertia4;
-            let forearm_link_inertia6 = forearm_link_inertia2 + forearm_link_inertia4;
-            let forearm_link_inertia7 = upper_arm_link_pose2 + forearm_link_inertia5;
-            let forearm_link_inertia8 = upper_arm_link_pose5 + wrist_1_link_inertia19;
-            let forearm_link_inertia9 = forearm_link_inertia6 + 1.7701269384099998;
+            let forearm_link_t14 = forearm_link_m_rx_z + forearm_link_m_rx_z;
+            let forearm_link_t15 = forearm_link_t2 * forearm_link_t14;
+            let forearm_link_t16 = forearm_link_m_rz_rz + forearm_link_t15;
+            let forearm_link_t17 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t18 = forearm_link_t1 * forearm_link_t17;
+            let forearm_link_t19 = forearm_link_minus_m_ry_ry - forearm_link_t18;
+            let forearm_link_t20 = forearm_link_t16 + forearm_link_t18;
+            let upper_arm_link_minus_m_ry_ry = upper_arm_link_t2 + forearm_link_t19;
+            let upper_arm_link_minus_m_ry_rz = upper_arm_link_t5 + forearm_link_minus_m_ry_rz;
+            let upper_arm_link_m_rz_rz = forearm_link_t20 + 1.7701269384099998;
             // upper_arm_link: inertia carried to the parent, M* (4.48)
-            let upper_arm_link_inertia0 = forearm_link_inertia7 + forearm_link_inertia9;
-            let upper_arm_link_inertia1 = forearm_link_inertia9 - upper_arm_link_inertia0;
-            let upper_arm_link_inertia2 = upper_arm_link_inertia1 + 2.7644263025275;
+            let upper_arm_link_t6 = upper_arm_link_minus_m_ry_ry + upper_arm_link_m_rz_rz;
+            let upper_arm_link_t7 = upper_arm_link_m_rz_rz - upper_arm_link_t6;
+            let shoulder_link_m_rz_rz = upper_arm_link_t7 + 2.7644263025275;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = 1.0 / wrist_2_link_inertia7;
-            let ground_pivot1 = wrist_1_link_pivot3 * ground_pivot0;
-            let ground_pivot2 = wrist_1_link_pivot3 * ground_pivot1;
-            let ground_pivot3 = wrist_1_link_inertia20 - ground_pivot2;
-            let ground_pivot4 = wrist_1_link_pivot7 * ground_pivot0;
-            let ground_pivot5 = wrist_1_link_pivot3 * ground_pivot4;
-            let ground_pivot6 = forearm_link_pivot3 - ground_pivot5;
-            let ground_pivot7 = wrist_1_link_inertia8 * ground_pivot0;
-            let ground_pivot8 = wrist_1_link_pivot3 * ground_pivot7;
-            let ground_pivot9 = wrist_1_link_inertia19 - ground_pivot8;
-            let ground_pivot10 = wrist_1_link_pivot7 * ground_pivot4;
-            let ground_pivot11 = forearm_link_inertia9 - ground_pivot10;
-            let ground_pivot12 = wrist_1_link_pivot7 * ground_pivot7;
-            let ground_pivot13 = forearm_link_inertia8 - ground_pivot12;
-            let ground_pivot14 = wrist_1_link_inertia8 * ground_pivot7;
-            let ground_pivot15 = upper_arm_link_inertia2 - ground_pivot14;
-            let ground_pivot16 = 1.0 / ground_pivot3;
-            let ground_pivot17 = ground_pivot6 * ground_pivot16;
-            let ground_pivot18 = ground_pivot6 * ground_pivot17;
-            let ground_pivot19 = ground_pivot11 - ground_pivot18;
-            let ground_pivot20 = ground_pivot9 * ground_pivot16;
-            let ground_pivot21 = ground_pivot6 * ground_pivot20;
-            let ground_pivot22 = ground_pivot13 - ground_pivot21;
-            let ground_pivot23 = ground_pivot9 * ground_pivot20;
-            let ground_pivot24 = ground_pivot15 - ground_pivot23;
-            let ground_pivot25 = 1.0 / ground_pivot19;
-            let ground_pivot26 = ground_pivot22 * ground_pivot25;
-            let ground_pivot27 = ground_pivot22 * ground_pivot26;
-            let ground_pivot28 = ground_pivot24 - ground_pivot27;
-            let ground_pivot29 = 1.0 / ground_pivot28;
+            let ground_t0 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t1 = wrist_1_link_t11 * ground_t0;
+            let ground_t2 = wrist_1_link_t11 * ground_t1;
+            let ground_t3 = forearm_link_m_rz_rz - ground_t2;
+            let ground_t4 = wrist_1_link_t15 * ground_t0;
+            let ground_t5 = wrist_1_link_t11 * ground_t4;
+            let ground_t6 = forearm_link_t13 - ground_t5;
+            let ground_t7 = wrist_1_link_minus_u_ry * ground_t0;
+            let ground_t8 = wrist_1_link_t11 * ground_t7;
+            let ground_t9 = forearm_link_minus_m_ry_rz - ground_t8;
+            let ground_t10 = wrist_1_link_t15 * ground_t4;
+            let ground_t11 = upper_arm_link_m_rz_rz - ground_t10;
+            let ground_t12 = wrist_1_link_t15 * ground_t7;
+            let ground_t13 = upper_arm_link_minus_m_ry_rz - ground_t12;
+            let ground_t14 = wrist_1_link_minus_u_ry * ground_t7;
+            let ground_t15 = shoulder_link_m_rz_rz - ground_t14;
+            let ground_t16 = 1.0 / ground_t3;
+            let ground_t17 = ground_t6 * ground_t16;
+            let ground_t18 = ground_t6 * ground_t17;
+            let ground_t19 = ground_t11 - ground_t18;
+            let ground_t20 = ground_t9 * ground_t16;
+            let ground_t21 = ground_t6 * ground_t20;
+            let ground_t22 = ground_t13 - ground_t21;
+            let ground_t23 = ground_t9 * ground_t20;
+            let ground_t24 = ground_t15 - ground_t23;
+            let ground_t25 = 1.0 / ground_t19;
+            let ground_t26 = ground_t22 * ground_t25;
+            let ground_t27 = ground_t22 * ground_t26;
+            let ground_t28 = ground_t24 - ground_t27;
+            let ground_t29 = 1.0 / ground_t28;
             // upper_arm_link: acceleration
-            let upper_arm_link_acc0 = v_0 * v_1;
-            let upper_arm_link_acc1 = v_0 * v_0;
+            let upper_arm_link_minus_alpha_x = v_0 * v_1;
+            let upper_arm_link_t8 = v_0 * v_0;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = v_1 * v_1;
-            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-            let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
-            let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
-            let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
-            let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
-            let forearm_link_vel6 = forearm_link_vel5 + 9.81;
-            let forearm_link_vel7 = v_1 + v_2;
+            let forearm_link_t21 = v_1 * v_1;
+            let forearm_link_t22 = upper_arm_link_t8 + forearm_link_t21;
+            let forearm_link_minus_accel_x = forearm_link_t1 * forearm_link_t22;
+            let forearm_link_t23 = upper_arm_link_minus_alpha_x + upper_arm_link_minus_alpha_x;
+            let forearm_link_minus_accel_z = forearm_link_t2 * forearm_link_t23;
+            let forearm_link_t24 = forearm_link_t2 * forearm_link_t21;
+            let forearm_link_minus_accel_y = forearm_link_t24 + 9.81;
+            let forearm_link_spin_z = v_1 + v_2;
             // forearm_link: acceleration
-            let forearm_link_acc0 = v_0 * v_2;
-            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-            let forearm_link_acc2 = v_0 * forearm_link_vel7;
-            let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
+            let forearm_link_t25 = v_0 * v_2;
+            let forearm_link_minus_alpha_x = upper_arm_link_minus_alpha_x + forearm_link_t25;
+            let forearm_link_t26 = v_0 * forearm_link_spin_z;
+            let forearm_link_t27 = forearm_link_minus_alpha_x - forearm_link_t26;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
-            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-            let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
-            let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
-            let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
-            let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
-            let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
-            let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
-            let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
-            let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
-            let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
-            let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
-            let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
-            let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
-            let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
-            let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
-            let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
+            let wrist_1_link_t23 = forearm_link_spin_z * forearm_link_spin_z;
+            let wrist_1_link_t24 = upper_arm_link_t8 + wrist_1_link_t23;
+            let wrist_1_link_t25 = wrist_1_link_t1 * wrist_1_link_t24;
+            let wrist_1_link_t26 = forearm_link_minus_accel_x + wrist_1_link_t25;
+            let wrist_1_link_t27 = forearm_link_minus_alpha_x + forearm_link_t26;
+            let wrist_1_link_t28 = wrist_1_link_t2 * wrist_1_link_t27;
+            let wrist_1_link_t29 = forearm_link_minus_accel_z + wrist_1_link_t28;
+            let wrist_1_link_t30 = wrist_1_link_t2 * wrist_1_link_t23;
+            let wrist_1_link_t31 = forearm_link_minus_accel_y + wrist_1_link_t30;
+            let wrist_1_link_spin_x = v_0 * wrist_1_link_sin;
+            let wrist_1_link_spin_y = v_0 * wrist_1_link_cos;
+            let wrist_1_link_t32 = wrist_1_link_cos * forearm_link_minus_alpha_x;
+            let wrist_1_link_t33 = wrist_1_link_sin * forearm_link_minus_alpha_x;
+            let wrist_1_link_t34 = wrist_1_link_cos * wrist_1_link_t26;
+            let wrist_1_link_t35 = wrist_1_link_sin * wrist_1_link_t31;
+            let wrist_1_link_t36 = wrist_1_link_t34 + wrist_1_link_t35;
+            let wrist_1_link_spin_z = v_3 + forearm_link_spin_z;
             // wrist_1_link: acceleration
-            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
-            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
-            let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
-            let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
-            let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
-            let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
-            let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
-            let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
-            let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
-            let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
-            let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
-            let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
-            let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
-            let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
+            let wrist_1_link_t37 = v_3 * wrist_1_link_spin_y;
+            let wrist_1_link_t38 = v_3 * wrist_1_link_spin_x;
+            let wrist_1_link_alpha_x = wrist_1_link_t32 + wrist_1_link_t37;
+            let wrist_1_link_minus_alpha_y = wrist_1_link_t33 + wrist_1_link_t38;
+            let wrist_1_link_t39 = wrist_1_link_spin_x * wrist_1_link_spin_z;
+            let wrist_1_link_t40 = wrist_1_link_minus_alpha_y - wrist_1_link_t39;
+            let wrist_1_link_t41 = wrist_1_link_spin_y * wrist_1_link_spin_z;
+            let wrist_1_link_t42 = wrist_1_link_spin_x * wrist_1_link_spin_x;
+            let wrist_1_link_t43 = wrist_1_link_spin_y * wrist_1_link_spin_y;
+            let wrist_1_link_t44 = wrist_1_link_t42 + wrist_1_link_t43;
+            let wrist_1_link_t45 = 0.10915 * wrist_1_link_t40;
+            let wrist_1_link_accel_x = wrist_1_link_t36 - wrist_1_link_t45;
+            let wrist_1_link_t46 = 0.10915 * wrist_1_link_t44;
+            let wrist_1_link_minus_accel_z = wrist_1_link_t29 + wrist_1_link_t46;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
-            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
-            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
-            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
-            let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
+            let wrist_2_link_t7 = wrist_2_link_cos * wrist_1_link_spin_x;
+            let wrist_2_link_t8 = wrist_2_link_sin * wrist_1_link_spin_z;
+            let wrist_2_link_spin_x = wrist_2_link_t7 + wrist_2_link_t8;
+            let wrist_2_link_t9 = wrist_2_link_cos * wrist_1_link_spin_z;
+            let wrist_2_link_t10 = wrist_2_link_sin * wrist_1_link_spin_x;
+            let wrist_2_link_spin_y = wrist_2_link_t9 - wrist_2_link_t10;
+            let wrist_2_link_t11 = wrist_2_link_cos * wrist_1_link_alpha_x;
+            let wrist_2_link_t12 = wrist_2_link_sin * wrist_1_link_alpha_x;
+            let wrist_2_link_spin_z = v_4 - wrist_1_link_spin_y;
             // wrist_2_link: acceleration
-            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-            let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
-            let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
-            let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
-            let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
+            let wrist_2_link_t13 = v_4 * wrist_2_link_spin_y;
+            let wrist_2_link_t14 = v_4 * wrist_2_link_spin_x;
+            let wrist_2_link_alpha_x = wrist_2_link_t11 + wrist_2_link_t13;
+            let wrist_2_link_minus_alpha_y = wrist_2_link_t12 + wrist_2_link_t14;
+            let wrist_2_link_t15 = wrist_2_link_spin_x * wrist_2_link_spin_z;
+            let wrist_2_link_t16 = wrist_2_link_spin_y * wrist_2_link_spin_z;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
-            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
-            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-            let wrist_3_link_vel7 = v_5 + wrist_2_link_vel5;
+            let wrist_3_link_t1 = wrist_3_link_cos * wrist_2_link_spin_x;
+            let wrist_3_link_t2 = wrist_3_link_sin * wrist_2_link_spin_z;
+            let wrist_3_link_spin_x = wrist_3_link_t1 - wrist_3_link_t2;
+            let wrist_3_link_t3 = wrist_3_link_cos * wrist_2_link_spin_z;
+            let wrist_3_link_t4 = wrist_3_link_sin * wrist_2_link_spin_x;
+            let wrist_3_link_minus_spin_y = wrist_3_link_t3 + wrist_3_link_t4;
+            let wrist_3_link_t5 = wrist_3_link_cos * wrist_2_link_alpha_x;
+            let wrist_3_link_spin_z = v_5 + wrist_2_link_spin_y;
             // wrist_3_link: acceleration
-            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-            let wrist_3_link_acc1 = wrist_3_link_vel6 - wrist_3_link_acc0;
-            let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel7;
-            let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel7;
+            let wrist_3_link_t6 = v_5 * wrist_3_link_minus_spin_y;
+            let wrist_3_link_alpha_x = wrist_3_link_t5 - wrist_3_link_t6;
+            let wrist_3_link_t7 = wrist_3_link_spin_x * wrist_3_link_spin_z;
+            let wrist_3_link_t8 = wrist_3_link_minus_spin_y * wrist_3_link_spin_z;
             // upper_arm_link: gravity and wrenches
-            let upper_arm_link_load0 = upper_arm_link_pose3 * forearm_link_vel3;
-            let upper_arm_link_load1 = upper_arm_link_pose4 * forearm_link_vel0;
-            let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
-            let upper_arm_link_load3 = upper_arm_link_pose3 * upper_arm_link_acc1;
-            let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
-            let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
+            let upper_arm_link_t9 = upper_arm_link_t3 * forearm_link_t23;
+            let upper_arm_link_t10 = upper_arm_link_t4 * forearm_link_t21;
+            let upper_arm_link_f_ry = upper_arm_link_t9 - upper_arm_link_t10;
+            let upper_arm_link_t11 = upper_arm_link_t3 * upper_arm_link_t8;
+            let upper_arm_link_t12 = 9.81 * upper_arm_link_t0;
+            let upper_arm_link_f_rz = upper_arm_link_t11 - upper_arm_link_t12;
             // forearm_link: gravity and wrenches
-            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-            let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
-            let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
-            let forearm_link_load3 = forearm_link_pose7 * wrist_1_link_vel4;
-            let forearm_link_load4 = forearm_link_pose8 * wrist_1_link_vel0;
-            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-            let forearm_link_load6 = forearm_link_pose8 * forearm_link_acc3;
-            let forearm_link_load7 = forearm_link_pose7 * upper_arm_link_acc1;
-            let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
-            let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
-            let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
-            let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
-            let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
-            let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
-            let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
+            let forearm_link_minus_f_x = forearm_link_t4 * wrist_1_link_t24;
+            let forearm_link_minus_f_y = forearm_link_t3 * wrist_1_link_t23;
+            let forearm_link_minus_f_z = forearm_link_t3 * wrist_1_link_t27;
+            let forearm_link_t28 = forearm_link_t7 * wrist_1_link_t27;
+            let forearm_link_t29 = forearm_link_t8 * wrist_1_link_t23;
+            let forearm_link_t30 = forearm_link_t28 - forearm_link_t29;
+            let forearm_link_t31 = forearm_link_t8 * forearm_link_t27;
+            let forearm_link_t32 = forearm_link_t7 * upper_arm_link_t8;
+            let forearm_link_t33 = forearm_link_t31 + forearm_link_t32;
+            let forearm_link_t34 = forearm_link_t4 * forearm_link_minus_accel_z;
+            let forearm_link_t35 = forearm_link_t4 * forearm_link_minus_accel_y;
+            let forearm_link_t36 = forearm_link_t3 * forearm_link_minus_accel_x;
+            let forearm_link_t37 = forearm_link_t35 - forearm_link_t36;
+            let forearm_link_f_ry = forearm_link_t30 + forearm_link_t34;
+            let forearm_link_f_rz = forearm_link_t33 - forearm_link_t37;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
-            let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
-            let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
-            let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
-            let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
-            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-            let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
-            let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
-            let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
-            let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
-            let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
-            let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
-            let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
-            let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
-            let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
+            let wrist_1_link_t47 = wrist_1_link_spin_z * wrist_1_link_spin_z;
+            let wrist_1_link_t48 = wrist_1_link_spin_x * wrist_1_link_spin_y;
+            let wrist_1_link_t49 = wrist_1_link_t42 + wrist_1_link_t47;
+            let wrist_1_link_t50 = wrist_1_link_alpha_x + wrist_1_link_t41;
+            let wrist_1_link_minus_f_x = 0.01778473500000001 * wrist_1_link_t48;
+            let wrist_1_link_f_y = 0.01778473500000001 * wrist_1_link_t49;
+            let wrist_1_link_minus_f_z = 0.01778473500000001 * wrist_1_link_t50;
+            let wrist_1_link_t51 = 0.004608836229749974 * wrist_1_link_alpha_x;
+            let wrist_1_link_t52 = 0.22402883622975 * wrist_1_link_t41;
+            let wrist_1_link_t53 = wrist_1_link_t51 + wrist_1_link_t52;
+            let wrist_1_link_minus_f_ry = 0.21942000000000003 * wrist_1_link_t39;
+            let wrist_1_link_t54 = 0.004608836229749974 * wrist_1_link_t48;
+            let wrist_1_link_t55 = 0.01778473500000001 * wrist_1_link_minus_accel_z;
+            let wrist_1_link_t56 = 0.01778473500000001 * wrist_1_link_accel_x;
+            let wrist_1_link_f_rx = wrist_1_link_t53 + wrist_1_link_t55;
+            let wrist_1_link_minus_f_rz = wrist_1_link_t54 - wrist_1_link_t56;
             // wrist_2_link: gravity and wrenches
-            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
-            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
-            let wrist_2_link_load5 = 0.033822000000000005 * wrist_2_link_load0;
+            let wrist_2_link_t17 = wrist_2_link_spin_x * wrist_2_link_spin_y;
+            let wrist_2_link_t18 = 0.033822000000000005 * wrist_2_link_alpha_x;
+            let wrist_2_link_t19 = 0.253242 * wrist_2_link_t16;
+            let wrist_2_link_f_rx = wrist_2_link_t18 + wrist_2_link_t19;
+            let wrist_2_link_minus_f_ry = 0.21942 * wrist_2_link_t15;
+            let wrist_2_link_minus_f_rz = 0.033822000000000005 * wrist_2_link_t17;
             // wrist_3_link: gravity and wrenches
-            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
-            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
-            let wrist_3_link_load5 = 0.016685526854599998 * wrist_3_link_load0;
-            // wrist_3_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_3_link_rest0 = wrist_3_link_cos0 * wrist_3_link_load3;
-            let wrist_3_link_rest1 = wrist_3_link_sin0 * wrist_3_link_load4;
-            let wrist_3_link_rest2 = wrist_3_link_rest0 - wrist_3_link_rest1;
-            let wrist_3_link_rest3 = wrist_3_link_sin0 * wrist_3_link_load3;
-            let wrist_3_link_rest4 = wrist_3_link_cos0 * wrist_3_link_load4;
-            let wrist_3_link_rest5 = wrist_3_link_rest3 + wrist_3_link_rest4;
-            let wrist_3_link_rest6 = tau_5 + wrist_3_link_load5;
-            let wrist_3_link_rest7 = 58.355064750790525 * wrist_3_link_rest6;
-            let wrist_3_link_rest8 = wrist_2_link_load3 - wrist_3_link_rest2;
-            let wrist_3_link_rest9 = tau_5 - wrist_2_link_load4;
-            let wrist_3_link_rest10 = wrist_2_link_load5 - wrist_3_link_rest5;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest0 = wrist_2_link_cos0 * wrist_3_link_rest8;
-            let wrist_2_link_rest1 = wrist_2_link_sin0 * wrist_3_link_rest9;
-            let wrist_2_link_rest2 = wrist_2_link_rest0 - wrist_2_link_rest1;
-            let wrist_2_link_rest3 = wrist_2_link_sin0 * wrist_3_link_rest8;
-            let wrist_2_link_rest4 = wrist_2_link_cos0 * wrist_3_link_rest9;
-            let wrist_2_link_rest5 = wrist_2_link_rest3 + wrist_2_link_rest4;
-            let wrist_2_link_rest6 = tau_4 + wrist_3_link_rest10;
-            let wrist_2_link_rest7 = wrist_2_link_pivot0 * wrist_2_link_rest6;
-            let wrist_2_link_rest8 = wrist_2_link_inertia4 * wrist_2_link_rest7;
-            let wrist_2_link_rest9 = wrist_2_link_rest2 - wrist_2_link_rest8;
-            let wrist_2_link_rest10 = wrist_2_link_inertia5 * wrist_2_link_rest7;
-            let wrist_2_link_rest11 = wrist_2_link_rest5 - wrist_2_link_rest10;
-            let wrist_2_link_rest12 = wrist_1_link_load14 + wrist_2_link_rest9;
-            let wrist_2_link_rest13 = tau_4 + wrist_1_link_load10;
-            let wrist_2_link_rest14 = wrist_1_link_load15 - wrist_2_link_rest11;
-            // wrist_1_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_1_link_rest0 = wrist_1_link_cos0 * wrist_1_link_load4;
-            let wrist_1_link_rest1 = wrist_1_link_sin0 * wrist_1_link_load5;
-            let wrist_1_link_rest2 = wrist_1_link_rest0 + wrist_1_link_rest1;
-            let wrist_1_link_rest3 = wrist_1_link_sin0 * wrist_1_link_load4;
-            let wrist_1_link_rest4 = wrist_1_link_cos0 * wrist_1_link_load5;
-            let wrist_1_link_rest5 = wrist_1_link_rest3 - wrist_1_link_rest4;
-            let wrist_1_link_rest6 = wrist_1_link_sin0 * wrist_2_link_rest12;
-            let wrist_1_link_rest7 = wrist_1_link_cos0 * wrist_2_link_rest13;
-            let wrist_1_link_rest8 = wrist_1_link_rest6 - wrist_1_link_rest7;
-            let wrist_1_link_rest9 = 0.10915 * wrist_1_link_rest2;
-            let wrist_1_link_rest10 = wrist_1_link_rest8 - wrist_1_link_rest9;
-            let wrist_1_link_rest11 = wrist_1_link_pose2 * wrist_1_link_rest2;
-            let wrist_1_link_rest12 = wrist_2_link_rest14 + wrist_1_link_rest11;
-            let wrist_1_link_rest13 = wrist_1_link_pose1 * wrist_1_link_load6;
-            let wrist_1_link_rest14 = wrist_1_link_rest10 - wrist_1_link_rest13;
-            let wrist_1_link_rest15 = wrist_1_link_pose1 * wrist_1_link_rest5;
-            let wrist_1_link_rest16 = wrist_1_link_rest12 - wrist_1_link_rest15;
-            let wrist_1_link_rest17 = forearm_link_load0 - wrist_1_link_rest2;
-            let wrist_1_link_rest18 = forearm_link_load1 - wrist_1_link_rest5;
-            let wrist_1_link_rest19 = forearm_link_load2 + wrist_1_link_load6;
-            let wrist_1_link_rest20 = forearm_link_load13 - wrist_1_link_rest14;
-            let wrist_1_link_rest21 = forearm_link_load14 - wrist_1_link_rest16;
-            // forearm_link: momentum remainder D, D' (4.45, 4.49)
-            let forearm_link_rest0 = forearm_link_pose2 * wrist_1_link_rest17;
-            let forearm_link_rest1 = wrist_1_link_rest21 + forearm_link_rest0;
-            let forearm_link_rest2 = forearm_link_pose1 * wrist_1_link_rest19;
-            let forearm_link_rest3 = wrist_1_link_rest20 + forearm_link_rest2;
-            let forearm_link_rest4 = forearm_link_pose1 * wrist_1_link_rest18;
-            let forearm_link_rest5 = forearm_link_rest1 - forearm_link_rest4;
-            let forearm_link_rest6 = upper_arm_link_load2 + forearm_link_rest3;
-            let forearm_link_rest7 = upper_arm_link_load5 + forearm_link_rest5;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest0 = tau_3 + wrist_2_link_rest14;
-            let shoulder_link_rest1 = ground_pivot0 * shoulder_link_rest0;
-            let shoulder_link_rest2 = wrist_1_link_pivot3 * shoulder_link_rest1;
-            let shoulder_link_rest3 = wrist_1_link_rest21 + shoulder_link_rest2;
-            let shoulder_link_rest4 = wrist_1_link_pivot7 * shoulder_link_rest1;
-            let shoulder_link_rest5 = forearm_link_rest7 + shoulder_link_rest4;
-            let shoulder_link_rest6 = wrist_1_link_inertia8 * shoulder_link_rest1;
-            let shoulder_link_rest7 = forearm_link_rest6 - shoulder_link_rest6;
-            let shoulder_link_rest8 = tau_2 - shoulder_link_rest3;
-            let shoulder_link_rest9 = ground_pivot16 * shoulder_link_rest8;
-            let shoulder_link_rest10 = ground_pivot6 * shoulder_link_rest9;
-            let shoulder_link_rest11 = shoulder_link_rest5 + shoulder_link_rest10;
-            let shoulder_link_rest12 = ground_pivot9 * shoulder_link_rest9;
-            let shoulder_link_rest13 = shoulder_link_rest7 - shoulder_link_rest12;
-            let shoulder_link_rest14 = tau_1 - shoulder_link_rest11;
-            let shoulder_link_rest15 = ground_pivot25 * shoulder_link_rest14;
-            let shoulder_link_rest16 = ground_pivot22 * shoulder_link_rest15;
-            let shoulder_link_rest17 = shoulder_link_rest13 - shoulder_link_rest16;
-            let shoulder_link_rest18 = tau_0 + shoulder_link_rest17;
-            let shoulder_link_rest19 = ground_pivot29 * shoulder_link_rest18;
+            let wrist_3_link_t9 = wrist_3_link_spin_x * wrist_3_link_minus_spin_y;
+            let wrist_3_link_t10 = 0.016685526854599998 * wrist_3_link_alpha_x;
+            let wrist_3_link_t11 = 0.0171364731454 * wrist_3_link_t8;
+            let wrist_3_link_minus_f_rx = wrist_3_link_t10 + wrist_3_link_t11;
+            let wrist_3_link_minus_f_ry = 0.033822 * wrist_3_link_t7;
+            let wrist_3_link_minus_f_rz = 0.016685526854599998 * wrist_3_link_t9;
+            // wrist_3_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_3_link_t12 = wrist_3_link_cos * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t13 = wrist_3_link_sin * wrist_3_link_minus_f_ry;
+            let wrist_3_link_minus_dp_rx = wrist_3_link_t12 - wrist_3_link_t13;
+            let wrist_3_link_t14 = wrist_3_link_sin * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t15 = wrist_3_link_cos * wrist_3_link_minus_f_ry;
+            let wrist_3_link_minus_dp_ry = wrist_3_link_t14 + wrist_3_link_t15;
+            let wrist_3_link_t16 = tau_5 + wrist_3_link_minus_f_rz;
+            let wrist_3_link_e = 58.355064750790525 * wrist_3_link_t16;
+            let wrist_2_link_d_rx = wrist_2_link_f_rx - wrist_3_link_minus_dp_rx;
+            let wrist_2_link_d_ry = tau_5 - wrist_2_link_minus_f_ry;
+            let wrist_2_link_minus_d_rz = wrist_2_link_minus_f_rz - wrist_3_link_minus_dp_ry;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t20 = wrist_2_link_cos * wrist_2_link_d_rx;
+            let wrist_2_link_t21 = wrist_2_link_sin * wrist_2_link_d_ry;
+            let wrist_2_link_t22 = wrist_2_link_t20 - wrist_2_link_t21;
+            let wrist_2_link_t23 = wrist_2_link_sin * wrist_2_link_d_rx;
+            let wrist_2_link_t24 = wrist_2_link_cos * wrist_2_link_d_ry;
+            let wrist_2_link_t25 = wrist_2_link_t23 + wrist_2_link_t24;
+            let wrist_2_link_t26 = tau_4 + wrist_2_link_minus_d_rz;
+            let wrist_2_link_minus_e = wrist_2_link_minus_rho * wrist_2_link_t26;
+            let wrist_2_link_t27 = wrist_2_link_u_rx * wrist_2_link_minus_e;
+            let wrist_2_link_dp_rx = wrist_2_link_t22 - wrist_2_link_t27;
+            let wrist_2_link_t28 = wrist_2_link_u_ry * wrist_2_link_minus_e;
+            let wrist_2_link_dp_ry = wrist_2_link_t25 - wrist_2_link_t28;
+            let wrist_1_link_d_rx = wrist_1_link_f_rx + wrist_2_link_dp_rx;
+            let wrist_1_link_minus_d_ry = tau_4 + wrist_1_link_minus_f_ry;
+            let wrist_1_link_minus_d_rz = wrist_1_link_minus_f_rz - wrist_2_link_dp_ry;
+            // wrist_1_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_1_link_t57 = wrist_1_link_cos * wrist_1_link_minus_f_x;
+            let wrist_1_link_t58 = wrist_1_link_sin * wrist_1_link_f_y;
+            let wrist_1_link_dp_x = wrist_1_link_t57 + wrist_1_link_t58;
+            let wrist_1_link_t59 = wrist_1_link_sin * wrist_1_link_minus_f_x;
+            let wrist_1_link_t60 = wrist_1_link_cos * wrist_1_link_f_y;
+            let wrist_1_link_dp_y = wrist_1_link_t59 - wrist_1_link_t60;
+            let wrist_1_link_t61 = wrist_1_link_sin * wrist_1_link_d_rx;
+            let wrist_1_link_t62 = wrist_1_link_cos * wrist_1_link_minus_d_ry;
+            let wrist_1_link_t63 = wrist_1_link_t61 - wrist_1_link_t62;
+            let wrist_1_link_t64 = 0.10915 * wrist_1_link_dp_x;
+            let wrist_1_link_minus_dp_ry = wrist_1_link_t63 - wrist_1_link_t64;
+            let wrist_1_link_t65 = wrist_1_link_t2 * wrist_1_link_dp_x;
+            let wrist_1_link_t66 = wrist_1_link_minus_d_rz + wrist_1_link_t65;
+            let wrist_1_link_t67 = wrist_1_link_t1 * wrist_1_link_minus_f_z;
+            let wrist_1_link_t68 = wrist_1_link_minus_dp_ry - wrist_1_link_t67;
+            let wrist_1_link_t69 = wrist_1_link_t1 * wrist_1_link_dp_y;
+            let wrist_1_link_t70 = wrist_1_link_t66 - wrist_1_link_t69;
+            let forearm_link_minus_d_x = forearm_link_minus_f_x - wrist_1_link_dp_x;
+            let forearm_link_minus_d_y = forearm_link_minus_f_y - wrist_1_link_dp_y;
+            let forearm_link_minus_d_z = forearm_link_minus_f_z + wrist_1_link_minus_f_z;
+            let forearm_link_d_ry = forearm_link_f_ry - wrist_1_link_t68;
+            let forearm_link_d_rz = forearm_link_f_rz - wrist_1_link_t70;
+            // forearm_link: bias momentum D, D' (4.45, 4.49)
+            let forearm_link_t38 = forearm_link_t2 * forearm_link_minus_d_x;
+            let forearm_link_t39 = forearm_link_d_rz + forearm_link_t38;
+            let forearm_link_t40 = forearm_link_t1 * forearm_link_minus_d_z;
+            let forearm_link_t41 = forearm_link_d_ry + forearm_link_t40;
+            let forearm_link_t42 = forearm_link_t1 * forearm_link_minus_d_y;
+            let forearm_link_t43 = forearm_link_t39 - forearm_link_t42;
+            let upper_arm_link_d_ry = upper_arm_link_f_ry + forearm_link_t41;
+            let upper_arm_link_d_rz = upper_arm_link_f_rz + forearm_link_t43;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t0 = tau_3 + wrist_1_link_minus_d_rz;
+            let shoulder_link_t1 = ground_t0 * shoulder_link_t0;
+            let shoulder_link_t2 = wrist_1_link_t11 * shoulder_link_t1;
+            let shoulder_link_t3 = forearm_link_d_rz + shoulder_link_t2;
+            let shoulder_link_t4 = wrist_1_link_t15 * shoulder_link_t1;
+            let shoulder_link_t5 = upper_arm_link_d_rz + shoulder_link_t4;
+            let shoulder_link_t6 = wrist_1_link_minus_u_ry * shoulder_link_t1;
+            let shoulder_link_t7 = upper_arm_link_d_ry - shoulder_link_t6;
+            let shoulder_link_t8 = tau_2 - shoulder_link_t3;
+            let shoulder_link_t9 = ground_t16 * shoulder_link_t8;
+            let shoulder_link_t10 = ground_t6 * shoulder_link_t9;
+            let shoulder_link_t11 = shoulder_link_t5 + shoulder_link_t10;
+            let shoulder_link_t12 = ground_t9 * shoulder_link_t9;
+            let shoulder_link_t13 = shoulder_link_t7 - shoulder_link_t12;
+            let shoulder_link_t14 = tau_1 - shoulder_link_t11;
+            let shoulder_link_t15 = ground_t25 * shoulder_link_t14;
+            let shoulder_link_t16 = ground_t22 * shoulder_link_t15;
+            let shoulder_link_t17 = shoulder_link_t13 - shoulder_link_t16;
+            let shoulder_link_t18 = tau_0 + shoulder_link_t17;
+            let shoulder_link_a = ground_t29 * shoulder_link_t18;
             // ground: acceleration
-            let ground_acc0 = ground_pivot26 * shoulder_link_rest19;
-            let ground_acc1 = shoulder_link_rest15 - ground_acc0;
-            let ground_acc2 = ground_pivot17 * ground_acc1;
-            let ground_acc3 = shoulder_link_rest9 - ground_acc2;
-            let ground_acc4 = ground_pivot20 * shoulder_link_rest19;
-            let ground_acc5 = ground_acc3 - ground_acc4;
-            let ground_acc6 = ground_pivot1 * ground_acc5;
-            let ground_acc7 = shoulder_link_rest1 - ground_acc6;
-            let ground_acc8 = ground_pivot4 * ground_acc1;
-            let ground_acc9 = ground_acc7 - ground_acc8;
-            let ground_acc10 = ground_pivot7 * shoulder_link_rest19;
-            let ground_acc11 = ground_acc9 - ground_acc10;
+            let ground_t30 = ground_t26 * shoulder_link_a;
+            let upper_arm_link_a = shoulder_link_t15 - ground_t30;
+            let ground_t31 = ground_t17 * upper_arm_link_a;
+            let ground_t32 = shoulder_link_t9 - ground_t31;
+            let ground_t33 = ground_t20 * shoulder_link_a;
+            let forearm_link_a = ground_t32 - ground_t33;
+            let ground_t34 = ground_t1 * forearm_link_a;
+            let ground_t35 = shoulder_link_t1 - ground_t34;
+            let ground_t36 = ground_t4 * upper_arm_link_a;
+            let ground_t37 = ground_t35 - ground_t36;
+            let ground_t38 = ground_t7 * shoulder_link_a;
+            let wrist_1_link_a = ground_t37 - ground_t38;
             // forearm_link: acceleration
-            let forearm_link_acc4 = ground_acc1 + ground_acc5;
+            let forearm_link_omegad_rz = upper_arm_link_a + forearm_link_a;
             // wrist_1_link: acceleration
-            let wrist_1_link_acc14 = ground_acc11 + forearm_link_acc4;
-            let wrist_1_link_acc15 = wrist_1_link_sin0 * shoulder_link_rest19;
-            let wrist_1_link_acc16 = wrist_1_link_cos0 * shoulder_link_rest19;
+            let wrist_1_link_omegad_rz = wrist_1_link_a + forearm_link_omegad_rz;
+            let wrist_1_link_omegad_rx = wrist_1_link_sin * shoulder_link_a;
+            let wrist_1_link_omegad_ry = wrist_1_link_cos * shoulder_link_a;
             // wrist_2_link: acceleration
-            let wrist_2_link_acc6 = wrist_2_link_pivot1 * wrist_1_link_acc15;
-            let wrist_2_link_acc7 = wrist_2_link_pivot2 * wrist_1_link_acc14;
-            let wrist_2_link_acc8 = wrist_2_link_acc6 + wrist_2_link_acc7;
-            let wrist_2_link_acc9 = wrist_2_link_rest7 - wrist_2_link_acc8;
-            let wrist_2_link_acc10 = wrist_1_link_acc16 - wrist_2_link_acc9;
-            let wrist_2_link_acc11 = wrist_2_link_cos0 * wrist_1_link_acc14;
-            let wrist_2_link_acc12 = wrist_2_link_sin0 * wrist_1_link_acc15;
-            let wrist_2_link_acc13 = wrist_2_link_acc11 - wrist_2_link_acc12;
+            let wrist_2_link_t29 = wrist_2_link_minus_k_rx * wrist_1_link_omegad_rx;
+            let wrist_2_link_t30 = wrist_2_link_minus_k_ry * wrist_1_link_omegad_rz;
+            let wrist_2_link_t31 = wrist_2_link_t29 + wrist_2_link_t30;
+            let wrist_2_link_minus_omegad_rz = wrist_2_link_minus_e - wrist_2_link_t31;
+            let wrist_2_link_a = wrist_1_link_omegad_ry - wrist_2_link_minus_omegad_rz;
+            let wrist_2_link_t32 = wrist_2_link_cos * wrist_1_link_omegad_rz;
+            let wrist_2_link_t33 = wrist_2_link_sin * wrist_1_link_omegad_rx;
+            let wrist_2_link_omegad_ry = wrist_2_link_t32 - wrist_2_link_t33;
             // wrist_3_link: acceleration
-            let wrist_3_link_acc4 = wrist_3_link_rest7 - wrist_2_link_acc13;
+            let wrist_3_link_a = wrist_3_link_e - wrist_2_link_omegad_ry;
             // wrist_2_link: acceleration
-            let wrist_2_link_acc14 = wrist_2_link_acc10 - wrist_1_link_acc3;
+            let a_4 = wrist_2_link_a - wrist_1_link_minus_alpha_y;
             // wrist_3_link: acceleration
-            let wrist_3_link_acc5 = wrist_2_link_acc3 + wrist_3_link_acc4;
-            results[0][l] = shoulder_link_rest19;
-            results[1][l] = ground_acc1;
-            results[2][l] = ground_acc5;
-            results[3][l] = ground_acc11;
-            results[4][l] = wrist_2_link_acc14;
-            results[5][l] = wrist_3_link_acc5;
+            let a_5 = wrist_2_link_minus_alpha_y + wrist_3_link_a;
+            results[0][l] = shoulder_link_a;
+            results[1][l] = upper_arm_link_a;
+            results[2][l] = forearm_link_a;
+            results[3][l] = wrist_1_link_a;
+            results[4][l] = a_4;
+            results[5][l] = a_5;
         }
         a.give(0, &results[0]);
         a.give(1, &results[1]);
@@ -1663,162 +1663,162 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
         for l in 0..LANES {
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose1 = upper_arm_link_sin0 * upper_arm_link_pose0;
-            let upper_arm_link_pose2 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t1 = upper_arm_link_sin * upper_arm_link_t0;
+            let upper_arm_link_t2 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_3_link: mass matrix by composite inertias
-            let wrist_3_link_mass0 = 0.0171364731454 * wrist_2_link_sin0;
-            let wrist_3_link_mass1 = 0.0171364731454 * wrist_2_link_cos0;
-            let wrist_3_link_mass2 = wrist_1_link_sin0 * wrist_3_link_mass0;
-            let wrist_3_link_mass3 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_mass4 = wrist_3_link_sin0 * wrist_3_link_mass3;
-            let wrist_3_link_mass5 = wrist_3_link_cos0 * wrist_3_link_mass3;
-            let wrist_3_link_mass6 = wrist_3_link_mass4 - 0.016685526854599998;
-            let wrist_3_link_mass7 = wrist_3_link_mass4 + 0.0171364731454;
-            let wrist_3_link_mass8 = wrist_3_link_mass4 - wrist_3_link_mass7;
-            let wrist_3_link_mass9 = wrist_3_link_mass7 - 0.0171364731454;
-            let wrist_3_link_mass10 = wrist_3_link_mass6 + 0.033822000000000005;
-            let wrist_3_link_mass11 = wrist_3_link_mass9 - 0.253242;
+            let wrist_3_link_t0 = 0.0171364731454 * wrist_2_link_sin;
+            let m_1_5 = 0.0171364731454 * wrist_2_link_cos;
+            let minus_m_0_5 = wrist_1_link_sin * wrist_3_link_t0;
+            let wrist_3_link_t1 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_t2 = wrist_3_link_sin * wrist_3_link_t1;
+            let wrist_3_link_t3 = wrist_3_link_cos * wrist_3_link_t1;
+            let wrist_3_link_t4 = wrist_3_link_t2 - 0.016685526854599998;
+            let wrist_3_link_t5 = wrist_3_link_t2 + 0.0171364731454;
+            let wrist_3_link_t6 = wrist_3_link_t2 - wrist_3_link_t5;
+            let wrist_3_link_t7 = wrist_3_link_t5 - 0.0171364731454;
+            let wrist_3_link_t8 = wrist_3_link_t4 + 0.033822000000000005;
+            let minus_m_4_4 = wrist_3_link_t7 - 0.253242;
             // wrist_2_link: mass matrix by composite inertias
-            let wrist_2_link_mass0 = wrist_2_link_cos0 * wrist_3_link_mass5;
-            let wrist_2_link_mass1 = wrist_2_link_sin0 * wrist_3_link_mass5;
-            let wrist_2_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass0;
-            let wrist_2_link_mass3 = wrist_1_link_cos0 * wrist_3_link_mass11;
-            let wrist_2_link_mass4 = wrist_2_link_mass2 + wrist_2_link_mass3;
-            let wrist_2_link_mass5 = wrist_3_link_mass8 + wrist_3_link_mass10;
-            let wrist_2_link_mass6 = wrist_2_link_sin0 * wrist_2_link_mass5;
-            let wrist_2_link_mass7 = wrist_2_link_sin0 * wrist_2_link_mass6;
-            let wrist_2_link_mass8 = wrist_2_link_cos0 * wrist_2_link_mass6;
-            let wrist_2_link_mass9 = wrist_3_link_mass10 - wrist_2_link_mass7;
-            let wrist_2_link_mass10 = wrist_3_link_mass8 - wrist_2_link_mass7;
-            let wrist_2_link_mass11 = wrist_3_link_mass11 - wrist_2_link_mass10;
-            let wrist_2_link_mass12 = wrist_2_link_mass10 + wrist_2_link_mass11;
-            let wrist_2_link_mass13 = wrist_3_link_mass11 - wrist_2_link_mass11;
-            let wrist_2_link_mass14 = wrist_2_link_mass9 + 0.004608836229749974;
-            let wrist_2_link_mass15 = wrist_2_link_mass13 - 0.22402883622975;
+            let wrist_2_link_t0 = wrist_2_link_cos * wrist_3_link_t3;
+            let m_1_4 = wrist_2_link_sin * wrist_3_link_t3;
+            let wrist_2_link_t1 = wrist_1_link_sin * wrist_2_link_t0;
+            let wrist_2_link_t2 = wrist_1_link_cos * minus_m_4_4;
+            let m_0_4 = wrist_2_link_t1 + wrist_2_link_t2;
+            let wrist_2_link_t3 = wrist_3_link_t6 + wrist_3_link_t8;
+            let wrist_2_link_t4 = wrist_2_link_sin * wrist_2_link_t3;
+            let wrist_2_link_t5 = wrist_2_link_sin * wrist_2_link_t4;
+            let wrist_2_link_t6 = wrist_2_link_cos * wrist_2_link_t4;
+            let wrist_2_link_t7 = wrist_3_link_t8 - wrist_2_link_t5;
+            let wrist_2_link_t8 = wrist_3_link_t6 - wrist_2_link_t5;
+            let wrist_2_link_t9 = minus_m_4_4 - wrist_2_link_t8;
+            let wrist_2_link_t10 = wrist_2_link_t8 + wrist_2_link_t9;
+            let wrist_2_link_t11 = minus_m_4_4 - wrist_2_link_t9;
+            let wrist_2_link_t12 = wrist_2_link_t7 + 0.004608836229749974;
+            let minus_m_3_3 = wrist_2_link_t11 - 0.22402883622975;
             // wrist_1_link: mass matrix by composite inertias
-            let wrist_1_link_mass0 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_mass1 = 0.01778473500000001 * wrist_1_link_sin0;
-            let wrist_1_link_mass2 = wrist_1_link_sin0 * wrist_2_link_mass8;
-            let wrist_1_link_mass3 = wrist_1_link_cos0 * wrist_2_link_mass1;
-            let wrist_1_link_mass4 = wrist_1_link_mass2 - wrist_1_link_mass3;
-            let wrist_1_link_mass5 = 0.10915 * wrist_1_link_mass0;
-            let wrist_1_link_mass6 = wrist_1_link_mass4 + wrist_1_link_mass5;
-            let wrist_1_link_mass7 = wrist_1_link_pose2 * wrist_1_link_mass0;
-            let wrist_1_link_mass8 = wrist_2_link_mass15 - wrist_1_link_mass7;
-            let wrist_1_link_mass9 = wrist_1_link_pose1 * wrist_1_link_mass1;
-            let wrist_1_link_mass10 = wrist_1_link_mass8 + wrist_1_link_mass9;
-            let wrist_1_link_mass11 = forearm_link_pose2 * wrist_1_link_mass0;
-            let wrist_1_link_mass12 = wrist_1_link_mass10 - wrist_1_link_mass11;
-            let wrist_1_link_mass13 = forearm_link_pose1 * wrist_1_link_mass1;
-            let wrist_1_link_mass14 = wrist_1_link_mass12 + wrist_1_link_mass13;
-            let wrist_1_link_mass15 = wrist_1_link_cos0 + wrist_1_link_cos0;
-            let wrist_1_link_mass16 = wrist_2_link_mass12 + wrist_2_link_mass14;
-            let wrist_1_link_mass17 = wrist_1_link_sin0 * wrist_1_link_mass16;
-            let wrist_1_link_mass18 = wrist_2_link_mass0 * wrist_1_link_mass15;
-            let wrist_1_link_mass19 = wrist_1_link_mass17 - wrist_1_link_mass18;
-            let wrist_1_link_mass20 = wrist_1_link_sin0 * wrist_1_link_mass19;
-            let wrist_1_link_mass21 = wrist_2_link_mass12 - wrist_1_link_mass20;
-            let wrist_1_link_mass22 = wrist_1_link_mass0 + wrist_1_link_mass0;
-            let wrist_1_link_mass23 = wrist_1_link_pose2 * wrist_1_link_mass22;
-            let wrist_1_link_mass24 = wrist_2_link_mass15 - wrist_1_link_mass23;
-            let wrist_1_link_mass25 = wrist_1_link_mass1 + wrist_1_link_mass1;
-            let wrist_1_link_mass26 = wrist_1_link_pose1 * wrist_1_link_mass25;
-            let wrist_1_link_mass27 = wrist_1_link_mass21 + wrist_1_link_mass26;
-            let wrist_1_link_mass28 = wrist_1_link_mass24 + wrist_1_link_mass26;
-            let wrist_1_link_mass29 = forearm_link_pose3 + wrist_1_link_mass0;
-            let wrist_1_link_mass30 = forearm_link_pose4 - wrist_1_link_mass1;
-            let wrist_1_link_mass31 = forearm_link_pose6 + wrist_1_link_mass27;
-            let wrist_1_link_mass32 = forearm_link_pose7 + wrist_1_link_mass6;
-            let wrist_1_link_mass33 = wrist_1_link_mass28 - 0.59565195167475;
+            let wrist_1_link_t3 = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_t4 = 0.01778473500000001 * wrist_1_link_sin;
+            let wrist_1_link_t5 = wrist_1_link_sin * wrist_2_link_t6;
+            let wrist_1_link_t6 = wrist_1_link_cos * m_1_4;
+            let wrist_1_link_t7 = wrist_1_link_t5 - wrist_1_link_t6;
+            let wrist_1_link_t8 = 0.10915 * wrist_1_link_t3;
+            let m_0_3 = wrist_1_link_t7 + wrist_1_link_t8;
+            let wrist_1_link_t9 = wrist_1_link_t2 * wrist_1_link_t3;
+            let wrist_1_link_t10 = minus_m_3_3 - wrist_1_link_t9;
+            let wrist_1_link_t11 = wrist_1_link_t1 * wrist_1_link_t4;
+            let minus_m_2_3 = wrist_1_link_t10 + wrist_1_link_t11;
+            let wrist_1_link_t12 = forearm_link_t2 * wrist_1_link_t3;
+            let wrist_1_link_t13 = minus_m_2_3 - wrist_1_link_t12;
+            let wrist_1_link_t14 = forearm_link_t1 * wrist_1_link_t4;
+            let minus_m_1_3 = wrist_1_link_t13 + wrist_1_link_t14;
+            let wrist_1_link_t15 = wrist_1_link_cos + wrist_1_link_cos;
+            let wrist_1_link_t16 = wrist_2_link_t10 + wrist_2_link_t12;
+            let wrist_1_link_t17 = wrist_1_link_sin * wrist_1_link_t16;
+            let wrist_1_link_t18 = wrist_2_link_t0 * wrist_1_link_t15;
+            let wrist_1_link_t19 = wrist_1_link_t17 - wrist_1_link_t18;
+            let wrist_1_link_t20 = wrist_1_link_sin * wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_2_link_t10 - wrist_1_link_t20;
+            let wrist_1_link_t22 = wrist_1_link_t3 + wrist_1_link_t3;
+            let wrist_1_link_t23 = wrist_1_link_t2 * wrist_1_link_t22;
+            let wrist_1_link_t24 = minus_m_3_3 - wrist_1_link_t23;
+            let wrist_1_link_t25 = wrist_1_link_t4 + wrist_1_link_t4;
+            let wrist_1_link_t26 = wrist_1_link_t1 * wrist_1_link_t25;
+            let wrist_1_link_t27 = wrist_1_link_t21 + wrist_1_link_t26;
+            let wrist_1_link_t28 = wrist_1_link_t24 + wrist_1_link_t26;
+            let wrist_1_link_t29 = forearm_link_t3 + wrist_1_link_t3;
+            let wrist_1_link_t30 = forearm_link_t4 - wrist_1_link_t4;
+            let wrist_1_link_t31 = forearm_link_t6 + wrist_1_link_t27;
+            let m_0_2 = forearm_link_t7 + m_0_3;
+            let minus_m_2_2 = wrist_1_link_t28 - 0.59565195167475;
             // forearm_link: mass matrix by composite inertias
-            let forearm_link_mass0 = forearm_link_pose2 * wrist_1_link_mass29;
-            let forearm_link_mass1 = wrist_1_link_mass33 - forearm_link_mass0;
-            let forearm_link_mass2 = forearm_link_pose1 * wrist_1_link_mass30;
-            let forearm_link_mass3 = forearm_link_mass2 - forearm_link_mass1;
-            let forearm_link_mass4 = wrist_1_link_mass29 + wrist_1_link_mass29;
-            let forearm_link_mass5 = forearm_link_pose2 * forearm_link_mass4;
-            let forearm_link_mass6 = wrist_1_link_mass33 - forearm_link_mass5;
-            let forearm_link_mass7 = wrist_1_link_mass30 + wrist_1_link_mass30;
-            let forearm_link_mass8 = forearm_link_pose1 * forearm_link_mass7;
-            let forearm_link_mass9 = wrist_1_link_mass31 - forearm_link_mass8;
-            let forearm_link_mass10 = forearm_link_mass6 - forearm_link_mass8;
-            let forearm_link_mass11 = upper_arm_link_pose1 + forearm_link_mass9;
-            let forearm_link_mass12 = upper_arm_link_pose2 + wrist_1_link_mass32;
-            let forearm_link_mass13 = forearm_link_mass10 - 1.7701269384099998;
+            let forearm_link_t8 = forearm_link_t2 * wrist_1_link_t29;
+            let forearm_link_t9 = minus_m_2_2 - forearm_link_t8;
+            let forearm_link_t10 = forearm_link_t1 * wrist_1_link_t30;
+            let m_1_2 = forearm_link_t10 - forearm_link_t9;
+            let forearm_link_t11 = wrist_1_link_t29 + wrist_1_link_t29;
+            let forearm_link_t12 = forearm_link_t2 * forearm_link_t11;
+            let forearm_link_t13 = minus_m_2_2 - forearm_link_t12;
+            let forearm_link_t14 = wrist_1_link_t30 + wrist_1_link_t30;
+            let forearm_link_t15 = forearm_link_t1 * forearm_link_t14;
+            let forearm_link_t16 = wrist_1_link_t31 - forearm_link_t15;
+            let forearm_link_t17 = forearm_link_t13 - forearm_link_t15;
+            let forearm_link_t18 = upper_arm_link_t1 + forearm_link_t16;
+            let m_0_1 = upper_arm_link_t2 + m_0_2;
+            let minus_m_1_1 = forearm_link_t17 - 1.7701269384099998;
             // upper_arm_link: mass matrix by composite inertias
-            let upper_arm_link_mass0 = forearm_link_mass11 - forearm_link_mass13;
-            let upper_arm_link_mass1 = forearm_link_mass13 + upper_arm_link_mass0;
-            let upper_arm_link_mass2 = 2.7644263025275 - upper_arm_link_mass1;
-            results[0][l] = upper_arm_link_mass2;
-            results[1][l] = forearm_link_mass12;
-            results[2][l] = wrist_1_link_mass32;
-            results[3][l] = wrist_1_link_mass6;
-            results[4][l] = wrist_2_link_mass4;
-            results[5][l] = -wrist_3_link_mass2;
-            results[6][l] = forearm_link_mass12;
-            results[7][l] = -forearm_link_mass13;
-            results[8][l] = forearm_link_mass3;
-            results[9][l] = -wrist_1_link_mass14;
-            results[10][l] = wrist_2_link_mass1;
-            results[11][l] = wrist_3_link_mass1;
-            results[12][l] = wrist_1_link_mass32;
-            results[13][l] = forearm_link_mass3;
-            results[14][l] = -wrist_1_link_mass33;
-            results[15][l] = -wrist_1_link_mass10;
-            results[16][l] = wrist_2_link_mass1;
-            results[17][l] = wrist_3_link_mass1;
-            results[18][l] = wrist_1_link_mass6;
-            results[19][l] = -wrist_1_link_mass14;
-            results[20][l] = -wrist_1_link_mass10;
-            results[21][l] = -wrist_2_link_mass15;
-            results[22][l] = wrist_2_link_mass1;
-            results[23][l] = wrist_3_link_mass1;
-            results[24][l] = wrist_2_link_mass4;
-            results[25][l] = wrist_2_link_mass1;
-            results[26][l] = wrist_2_link_mass1;
-            results[27][l] = wrist_2_link_mass1;
-            results[28][l] = -wrist_3_link_mass11;
+            let upper_arm_link_t3 = forearm_link_t18 - minus_m_1_1;
+            let upper_arm_link_t4 = minus_m_1_1 + upper_arm_link_t3;
+            let m_0_0 = 2.7644263025275 - upper_arm_link_t4;
+            results[0][l] = m_0_0;
+            results[1][l] = m_0_1;
+            results[2][l] = m_0_2;
+            results[3][l] = m_0_3;
+            results[4][l] = m_0_4;
+            results[5][l] = -minus_m_0_5;
+            results[6][l] = m_0_1;
+            results[7][l] = -minus_m_1_1;
+            results[8][l] = m_1_2;
+            results[9][l] = -minus_m_1_3;
+            results[10][l] = m_1_4;
+            results[11][l] = m_1_5;
+            results[12][l] = m_0_2;
+            results[13][l] = m_1_2;
+            results[14][l] = -minus_m_2_2;
+            results[15][l] = -minus_m_2_3;
+            results[16][l] = m_1_4;
+            results[17][l] = m_1_5;
+            results[18][l] = m_0_3;
+            results[19][l] = -minus_m_1_3;
+            results[20][l] = -minus_m_2_3;
+            results[21][l] = -minus_m_3_3;
+            results[22][l] = m_1_4;
+            results[23][l] = m_1_5;
+            results[24][l] = m_0_4;
+            results[25][l] = m_1_4;
+            results[26][l] = m_1_4;
+            results[27][l] = m_1_4;
+            results[28][l] = -minus_m_4_4;
             results[29][l] = 0.0;
-            results[30][l] = -wrist_3_link_mass2;
-            results[31][l] = wrist_3_link_mass1;
-            results[32][l] = wrist_3_link_mass1;
-            results[33][l] = wrist_3_link_mass1;
+            results[30][l] = -minus_m_0_5;
+            results[31][l] = m_1_5;
+            results[32][l] = m_1_5;
+            results[33][l] = m_1_5;
             results[34][l] = 0.0;
             results[35][l] = 0.0171364731454;
         }
@@ -1860,7 +1860,8 @@ impl Ur5 {
         m.give(35, &results[35]);
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     /// 245 operations: 102 additions, 143 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[f64; 6], v: &[f64; 6], a: &[f64; 6], tau: &mut [f64; 6]) {
@@ -1876,13 +1877,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -1913,288 +1914,288 @@ impl Ur5 {
             let a_4 = given[10][l];
             let a_5 = given[11][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose2 = upper_arm_link_sin0 * upper_arm_link_pose1;
-            let upper_arm_link_pose3 = upper_arm_link_cos0 * upper_arm_link_pose1;
-            let upper_arm_link_pose4 = 0.408499208875 * upper_arm_link_cos0;
-            let upper_arm_link_pose5 = 0.408499208875 * upper_arm_link_sin0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 4.4329225 * upper_arm_link_cos;
+            let upper_arm_link_t1 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t2 = upper_arm_link_sin * upper_arm_link_t1;
+            let upper_arm_link_t3 = upper_arm_link_cos * upper_arm_link_t1;
+            let upper_arm_link_t4 = 0.408499208875 * upper_arm_link_cos;
+            let upper_arm_link_t5 = 0.408499208875 * upper_arm_link_sin;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_sin0 * forearm_link_pose5;
-            let forearm_link_pose7 = forearm_link_cos0 * forearm_link_pose5;
-            let forearm_link_pose8 = 0.07714261911624999 * forearm_link_cos0;
-            let forearm_link_pose9 = 0.07714261911624999 * forearm_link_sin0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_sin * forearm_link_t5;
+            let forearm_link_t7 = forearm_link_cos * forearm_link_t5;
+            let forearm_link_t8 = 0.07714261911624999 * forearm_link_cos;
+            let forearm_link_t9 = 0.07714261911624999 * forearm_link_sin;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // upper_arm_link: acceleration
-            let upper_arm_link_acc0 = v_0 * v_1;
-            let upper_arm_link_acc1 = v_0 * v_0;
+            let upper_arm_link_minus_alpha_x = v_0 * v_1;
+            let upper_arm_link_t6 = v_0 * v_0;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = v_1 * v_1;
-            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-            let forearm_link_vel2 = a_1 * forearm_link_pose1;
-            let forearm_link_vel3 = forearm_link_vel2 - 9.81;
-            let forearm_link_vel4 = a_0 * forearm_link_pose1;
-            let forearm_link_vel5 = forearm_link_pose1 * forearm_link_vel1;
-            let forearm_link_vel6 = upper_arm_link_acc0 + upper_arm_link_acc0;
-            let forearm_link_vel7 = forearm_link_pose2 * forearm_link_vel6;
-            let forearm_link_vel8 = forearm_link_vel4 - forearm_link_vel7;
-            let forearm_link_vel9 = a_1 * forearm_link_pose2;
-            let forearm_link_vel10 = forearm_link_vel5 + forearm_link_vel9;
-            let forearm_link_vel11 = forearm_link_pose2 * forearm_link_vel0;
-            let forearm_link_vel12 = forearm_link_vel3 - forearm_link_vel11;
-            let forearm_link_vel13 = v_1 + v_2;
+            let forearm_link_t10 = v_1 * v_1;
+            let forearm_link_t11 = upper_arm_link_t6 + forearm_link_t10;
+            let forearm_link_t12 = a_1 * forearm_link_t1;
+            let forearm_link_t13 = forearm_link_t12 - 9.81;
+            let forearm_link_t14 = a_0 * forearm_link_t1;
+            let forearm_link_t15 = forearm_link_t1 * forearm_link_t11;
+            let forearm_link_t16 = upper_arm_link_minus_alpha_x + upper_arm_link_minus_alpha_x;
+            let forearm_link_t17 = forearm_link_t2 * forearm_link_t16;
+            let forearm_link_accel_z = forearm_link_t14 - forearm_link_t17;
+            let forearm_link_t18 = a_1 * forearm_link_t2;
+            let forearm_link_minus_accel_x = forearm_link_t15 + forearm_link_t18;
+            let forearm_link_t19 = forearm_link_t2 * forearm_link_t10;
+            let forearm_link_accel_y = forearm_link_t13 - forearm_link_t19;
+            let forearm_link_spin_z = v_1 + v_2;
             // forearm_link: acceleration
-            let forearm_link_acc0 = v_0 * v_2;
-            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-            let forearm_link_acc2 = a_1 + a_2;
-            let forearm_link_acc3 = v_0 * forearm_link_vel13;
-            let forearm_link_acc4 = forearm_link_acc1 - forearm_link_acc3;
+            let forearm_link_t20 = v_0 * v_2;
+            let forearm_link_minus_alpha_x = upper_arm_link_minus_alpha_x + forearm_link_t20;
+            let forearm_link_alpha_z = a_1 + a_2;
+            let forearm_link_t21 = v_0 * forearm_link_spin_z;
+            let forearm_link_t22 = forearm_link_minus_alpha_x - forearm_link_t21;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = forearm_link_vel13 * forearm_link_vel13;
-            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-            let wrist_1_link_vel2 = wrist_1_link_pose1 * forearm_link_acc2;
-            let wrist_1_link_vel3 = forearm_link_vel12 + wrist_1_link_vel2;
-            let wrist_1_link_vel4 = a_0 * wrist_1_link_pose1;
-            let wrist_1_link_vel5 = forearm_link_vel8 + wrist_1_link_vel4;
-            let wrist_1_link_vel6 = wrist_1_link_pose1 * wrist_1_link_vel1;
-            let wrist_1_link_vel7 = forearm_link_vel10 + wrist_1_link_vel6;
-            let wrist_1_link_vel8 = forearm_link_acc1 + forearm_link_acc3;
-            let wrist_1_link_vel9 = wrist_1_link_pose2 * wrist_1_link_vel8;
-            let wrist_1_link_vel10 = wrist_1_link_vel5 - wrist_1_link_vel9;
-            let wrist_1_link_vel11 = wrist_1_link_pose2 * forearm_link_acc2;
-            let wrist_1_link_vel12 = wrist_1_link_vel7 + wrist_1_link_vel11;
-            let wrist_1_link_vel13 = wrist_1_link_pose2 * wrist_1_link_vel0;
-            let wrist_1_link_vel14 = wrist_1_link_vel3 - wrist_1_link_vel13;
-            let wrist_1_link_vel15 = v_0 * wrist_1_link_sin0;
-            let wrist_1_link_vel16 = v_0 * wrist_1_link_cos0;
-            let wrist_1_link_vel17 = wrist_1_link_cos0 * forearm_link_acc1;
-            let wrist_1_link_vel18 = a_0 * wrist_1_link_sin0;
-            let wrist_1_link_vel19 = wrist_1_link_vel17 + wrist_1_link_vel18;
-            let wrist_1_link_vel20 = a_0 * wrist_1_link_cos0;
-            let wrist_1_link_vel21 = wrist_1_link_sin0 * forearm_link_acc1;
-            let wrist_1_link_vel22 = wrist_1_link_vel20 - wrist_1_link_vel21;
-            let wrist_1_link_vel23 = wrist_1_link_cos0 * wrist_1_link_vel12;
-            let wrist_1_link_vel24 = wrist_1_link_sin0 * wrist_1_link_vel14;
-            let wrist_1_link_vel25 = wrist_1_link_vel23 - wrist_1_link_vel24;
-            let wrist_1_link_vel26 = v_3 + forearm_link_vel13;
+            let wrist_1_link_t3 = forearm_link_spin_z * forearm_link_spin_z;
+            let wrist_1_link_t4 = upper_arm_link_t6 + wrist_1_link_t3;
+            let wrist_1_link_t5 = wrist_1_link_t1 * forearm_link_alpha_z;
+            let wrist_1_link_t6 = forearm_link_accel_y + wrist_1_link_t5;
+            let wrist_1_link_t7 = a_0 * wrist_1_link_t1;
+            let wrist_1_link_t8 = forearm_link_accel_z + wrist_1_link_t7;
+            let wrist_1_link_t9 = wrist_1_link_t1 * wrist_1_link_t4;
+            let wrist_1_link_t10 = forearm_link_minus_accel_x + wrist_1_link_t9;
+            let wrist_1_link_t11 = forearm_link_minus_alpha_x + forearm_link_t21;
+            let wrist_1_link_t12 = wrist_1_link_t2 * wrist_1_link_t11;
+            let wrist_1_link_t13 = wrist_1_link_t8 - wrist_1_link_t12;
+            let wrist_1_link_t14 = wrist_1_link_t2 * forearm_link_alpha_z;
+            let wrist_1_link_t15 = wrist_1_link_t10 + wrist_1_link_t14;
+            let wrist_1_link_t16 = wrist_1_link_t2 * wrist_1_link_t3;
+            let wrist_1_link_t17 = wrist_1_link_t6 - wrist_1_link_t16;
+            let wrist_1_link_spin_x = v_0 * wrist_1_link_sin;
+            let wrist_1_link_spin_y = v_0 * wrist_1_link_cos;
+            let wrist_1_link_t18 = wrist_1_link_cos * forearm_link_minus_alpha_x;
+            let wrist_1_link_t19 = a_0 * wrist_1_link_sin;
+            let wrist_1_link_t20 = wrist_1_link_t18 + wrist_1_link_t19;
+            let wrist_1_link_t21 = a_0 * wrist_1_link_cos;
+            let wrist_1_link_t22 = wrist_1_link_sin * forearm_link_minus_alpha_x;
+            let wrist_1_link_t23 = wrist_1_link_t21 - wrist_1_link_t22;
+            let wrist_1_link_t24 = wrist_1_link_cos * wrist_1_link_t15;
+            let wrist_1_link_t25 = wrist_1_link_sin * wrist_1_link_t17;
+            let wrist_1_link_t26 = wrist_1_link_t24 - wrist_1_link_t25;
+            let wrist_1_link_spin_z = v_3 + forearm_link_spin_z;
             // wrist_1_link: acceleration
-            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel16;
-            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel15;
-            let wrist_1_link_acc2 = wrist_1_link_vel19 + wrist_1_link_acc0;
-            let wrist_1_link_acc3 = wrist_1_link_vel22 - wrist_1_link_acc1;
-            let wrist_1_link_acc4 = a_3 + forearm_link_acc2;
-            let wrist_1_link_acc5 = wrist_1_link_vel15 * wrist_1_link_vel26;
-            let wrist_1_link_acc6 = wrist_1_link_acc3 + wrist_1_link_acc5;
-            let wrist_1_link_acc7 = wrist_1_link_vel16 * wrist_1_link_vel26;
-            let wrist_1_link_acc8 = wrist_1_link_vel15 * wrist_1_link_vel15;
-            let wrist_1_link_acc9 = wrist_1_link_vel16 * wrist_1_link_vel16;
-            let wrist_1_link_acc10 = wrist_1_link_acc8 + wrist_1_link_acc9;
-            let wrist_1_link_acc11 = 0.10915 * wrist_1_link_acc6;
-            let wrist_1_link_acc12 = wrist_1_link_vel25 + wrist_1_link_acc11;
-            let wrist_1_link_acc13 = 0.10915 * wrist_1_link_acc10;
-            let wrist_1_link_acc14 = wrist_1_link_vel10 - wrist_1_link_acc13;
+            let wrist_1_link_t27 = v_3 * wrist_1_link_spin_y;
+            let wrist_1_link_t28 = v_3 * wrist_1_link_spin_x;
+            let wrist_1_link_alpha_x = wrist_1_link_t20 + wrist_1_link_t27;
+            let wrist_1_link_alpha_y = wrist_1_link_t23 - wrist_1_link_t28;
+            let wrist_1_link_alpha_z = a_3 + forearm_link_alpha_z;
+            let wrist_1_link_t29 = wrist_1_link_spin_x * wrist_1_link_spin_z;
+            let wrist_1_link_t30 = wrist_1_link_alpha_y + wrist_1_link_t29;
+            let wrist_1_link_t31 = wrist_1_link_spin_y * wrist_1_link_spin_z;
+            let wrist_1_link_t32 = wrist_1_link_spin_x * wrist_1_link_spin_x;
+            let wrist_1_link_t33 = wrist_1_link_spin_y * wrist_1_link_spin_y;
+            let wrist_1_link_t34 = wrist_1_link_t32 + wrist_1_link_t33;
+            let wrist_1_link_t35 = 0.10915 * wrist_1_link_t30;
+            let wrist_1_link_accel_x = wrist_1_link_t26 + wrist_1_link_t35;
+            let wrist_1_link_t36 = 0.10915 * wrist_1_link_t34;
+            let wrist_1_link_accel_z = wrist_1_link_t13 - wrist_1_link_t36;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel15;
-            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel26;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel26;
-            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel15;
-            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc4;
-            let wrist_2_link_vel8 = wrist_2_link_vel6 + wrist_2_link_vel7;
-            let wrist_2_link_vel9 = wrist_2_link_cos0 * wrist_1_link_acc4;
-            let wrist_2_link_vel10 = wrist_2_link_sin0 * wrist_1_link_acc2;
-            let wrist_2_link_vel11 = wrist_2_link_vel9 - wrist_2_link_vel10;
-            let wrist_2_link_vel12 = v_4 - wrist_1_link_vel16;
+            let wrist_2_link_t0 = wrist_2_link_cos * wrist_1_link_spin_x;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_1_link_spin_z;
+            let wrist_2_link_spin_x = wrist_2_link_t0 + wrist_2_link_t1;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_1_link_spin_z;
+            let wrist_2_link_t3 = wrist_2_link_sin * wrist_1_link_spin_x;
+            let wrist_2_link_spin_y = wrist_2_link_t2 - wrist_2_link_t3;
+            let wrist_2_link_t4 = wrist_2_link_cos * wrist_1_link_alpha_x;
+            let wrist_2_link_t5 = wrist_2_link_sin * wrist_1_link_alpha_z;
+            let wrist_2_link_t6 = wrist_2_link_t4 + wrist_2_link_t5;
+            let wrist_2_link_t7 = wrist_2_link_cos * wrist_1_link_alpha_z;
+            let wrist_2_link_t8 = wrist_2_link_sin * wrist_1_link_alpha_x;
+            let wrist_2_link_t9 = wrist_2_link_t7 - wrist_2_link_t8;
+            let wrist_2_link_spin_z = v_4 - wrist_1_link_spin_y;
             // wrist_2_link: acceleration
-            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-            let wrist_2_link_acc2 = wrist_2_link_vel8 + wrist_2_link_acc0;
-            let wrist_2_link_acc3 = wrist_2_link_vel11 - wrist_2_link_acc1;
-            let wrist_2_link_acc4 = a_4 - wrist_1_link_acc3;
-            let wrist_2_link_acc5 = wrist_2_link_vel2 * wrist_2_link_vel12;
-            let wrist_2_link_acc6 = wrist_2_link_vel5 * wrist_2_link_vel12;
+            let wrist_2_link_t10 = v_4 * wrist_2_link_spin_y;
+            let wrist_2_link_t11 = v_4 * wrist_2_link_spin_x;
+            let wrist_2_link_alpha_x = wrist_2_link_t6 + wrist_2_link_t10;
+            let wrist_2_link_alpha_y = wrist_2_link_t9 - wrist_2_link_t11;
+            let wrist_2_link_alpha_z = a_4 - wrist_1_link_alpha_y;
+            let wrist_2_link_t12 = wrist_2_link_spin_x * wrist_2_link_spin_z;
+            let wrist_2_link_t13 = wrist_2_link_spin_y * wrist_2_link_spin_z;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel12;
-            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel12;
-            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-            let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_2_link_acc4;
-            let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
-            let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
+            let wrist_3_link_t0 = wrist_3_link_cos * wrist_2_link_spin_x;
+            let wrist_3_link_t1 = wrist_3_link_sin * wrist_2_link_spin_z;
+            let wrist_3_link_spin_x = wrist_3_link_t0 - wrist_3_link_t1;
+            let wrist_3_link_t2 = wrist_3_link_cos * wrist_2_link_spin_z;
+            let wrist_3_link_t3 = wrist_3_link_sin * wrist_2_link_spin_x;
+            let wrist_3_link_minus_spin_y = wrist_3_link_t2 + wrist_3_link_t3;
+            let wrist_3_link_t4 = wrist_3_link_cos * wrist_2_link_alpha_x;
+            let wrist_3_link_t5 = wrist_3_link_sin * wrist_2_link_alpha_z;
+            let wrist_3_link_t6 = wrist_3_link_t4 - wrist_3_link_t5;
+            let wrist_3_link_spin_z = v_5 + wrist_2_link_spin_y;
             // wrist_3_link: acceleration
-            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-            let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
-            let wrist_3_link_acc2 = a_5 + wrist_2_link_acc3;
-            let wrist_3_link_acc3 = wrist_3_link_vel2 * wrist_3_link_vel9;
-            let wrist_3_link_acc4 = wrist_3_link_vel5 * wrist_3_link_vel9;
+            let wrist_3_link_t7 = v_5 * wrist_3_link_minus_spin_y;
+            let wrist_3_link_alpha_x = wrist_3_link_t6 - wrist_3_link_t7;
+            let wrist_3_link_alpha_z = a_5 + wrist_2_link_alpha_y;
+            let wrist_3_link_t8 = wrist_3_link_spin_x * wrist_3_link_spin_z;
+            let wrist_3_link_t9 = wrist_3_link_minus_spin_y * wrist_3_link_spin_z;
             // shoulder_link: gravity and wrenches
-            let shoulder_link_load0 = 2.7644263025275 * a_0;
+            let shoulder_link_f_rz = 2.7644263025275 * a_0;
             // upper_arm_link: gravity and wrenches
-            let upper_arm_link_load0 = a_0 * upper_arm_link_pose2;
-            let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel6;
-            let upper_arm_link_load2 = upper_arm_link_load0 + upper_arm_link_load1;
-            let upper_arm_link_load3 = a_1 * upper_arm_link_pose5;
-            let upper_arm_link_load4 = upper_arm_link_load2 - upper_arm_link_load3;
-            let upper_arm_link_load5 = upper_arm_link_pose4 * forearm_link_vel0;
-            let upper_arm_link_load6 = upper_arm_link_load4 - upper_arm_link_load5;
-            let upper_arm_link_load7 = 1.7701269384099998 * a_1;
-            let upper_arm_link_load8 = a_0 * upper_arm_link_pose5;
-            let upper_arm_link_load9 = upper_arm_link_load7 + upper_arm_link_load8;
-            let upper_arm_link_load10 = upper_arm_link_pose3 * upper_arm_link_acc1;
-            let upper_arm_link_load11 = upper_arm_link_load9 + upper_arm_link_load10;
-            let upper_arm_link_load12 = 9.81 * upper_arm_link_pose0;
-            let upper_arm_link_load13 = upper_arm_link_load11 - upper_arm_link_load12;
+            let upper_arm_link_t7 = a_0 * upper_arm_link_t2;
+            let upper_arm_link_t8 = upper_arm_link_t3 * forearm_link_t16;
+            let upper_arm_link_t9 = upper_arm_link_t7 + upper_arm_link_t8;
+            let upper_arm_link_t10 = a_1 * upper_arm_link_t5;
+            let upper_arm_link_t11 = upper_arm_link_t9 - upper_arm_link_t10;
+            let upper_arm_link_t12 = upper_arm_link_t4 * forearm_link_t10;
+            let upper_arm_link_f_ry = upper_arm_link_t11 - upper_arm_link_t12;
+            let upper_arm_link_t13 = 1.7701269384099998 * a_1;
+            let upper_arm_link_t14 = a_0 * upper_arm_link_t5;
+            let upper_arm_link_t15 = upper_arm_link_t13 + upper_arm_link_t14;
+            let upper_arm_link_t16 = upper_arm_link_t3 * upper_arm_link_t6;
+            let upper_arm_link_t17 = upper_arm_link_t15 + upper_arm_link_t16;
+            let upper_arm_link_t18 = 9.81 * upper_arm_link_t0;
+            let upper_arm_link_f_rz = upper_arm_link_t17 - upper_arm_link_t18;
             // forearm_link: gravity and wrenches
-            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-            let forearm_link_load1 = forearm_link_pose3 * forearm_link_acc2;
-            let forearm_link_load2 = forearm_link_load0 + forearm_link_load1;
-            let forearm_link_load3 = forearm_link_pose4 * forearm_link_acc2;
-            let forearm_link_load4 = forearm_link_pose3 * wrist_1_link_vel0;
-            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-            let forearm_link_load6 = a_0 * forearm_link_pose4;
-            let forearm_link_load7 = forearm_link_pose3 * wrist_1_link_vel8;
-            let forearm_link_load8 = forearm_link_load6 - forearm_link_load7;
-            let forearm_link_load9 = a_0 * forearm_link_pose6;
-            let forearm_link_load10 = forearm_link_pose7 * wrist_1_link_vel8;
-            let forearm_link_load11 = forearm_link_load9 + forearm_link_load10;
-            let forearm_link_load12 = forearm_link_pose9 * forearm_link_acc2;
-            let forearm_link_load13 = forearm_link_load11 - forearm_link_load12;
-            let forearm_link_load14 = forearm_link_pose8 * wrist_1_link_vel0;
-            let forearm_link_load15 = forearm_link_load13 - forearm_link_load14;
-            let forearm_link_load16 = 0.59565195167475 * forearm_link_acc2;
-            let forearm_link_load17 = forearm_link_pose8 * forearm_link_acc4;
-            let forearm_link_load18 = forearm_link_load16 + forearm_link_load17;
-            let forearm_link_load19 = a_0 * forearm_link_pose9;
-            let forearm_link_load20 = forearm_link_load18 + forearm_link_load19;
-            let forearm_link_load21 = forearm_link_pose7 * upper_arm_link_acc1;
-            let forearm_link_load22 = forearm_link_load20 + forearm_link_load21;
-            let forearm_link_load23 = forearm_link_pose4 * forearm_link_vel8;
-            let forearm_link_load24 = forearm_link_pose4 * forearm_link_vel12;
-            let forearm_link_load25 = forearm_link_pose3 * forearm_link_vel10;
-            let forearm_link_load26 = forearm_link_load24 + forearm_link_load25;
-            let forearm_link_load27 = forearm_link_load15 - forearm_link_load23;
-            let forearm_link_load28 = forearm_link_load22 + forearm_link_load26;
+            let forearm_link_t23 = forearm_link_t4 * wrist_1_link_t4;
+            let forearm_link_t24 = forearm_link_t3 * forearm_link_alpha_z;
+            let forearm_link_minus_f_x = forearm_link_t23 + forearm_link_t24;
+            let forearm_link_t25 = forearm_link_t4 * forearm_link_alpha_z;
+            let forearm_link_t26 = forearm_link_t3 * wrist_1_link_t3;
+            let forearm_link_f_y = forearm_link_t25 - forearm_link_t26;
+            let forearm_link_t27 = a_0 * forearm_link_t4;
+            let forearm_link_t28 = forearm_link_t3 * wrist_1_link_t11;
+            let forearm_link_f_z = forearm_link_t27 - forearm_link_t28;
+            let forearm_link_t29 = a_0 * forearm_link_t6;
+            let forearm_link_t30 = forearm_link_t7 * wrist_1_link_t11;
+            let forearm_link_t31 = forearm_link_t29 + forearm_link_t30;
+            let forearm_link_t32 = forearm_link_t9 * forearm_link_alpha_z;
+            let forearm_link_t33 = forearm_link_t31 - forearm_link_t32;
+            let forearm_link_t34 = forearm_link_t8 * wrist_1_link_t3;
+            let forearm_link_t35 = forearm_link_t33 - forearm_link_t34;
+            let forearm_link_t36 = 0.59565195167475 * forearm_link_alpha_z;
+            let forearm_link_t37 = forearm_link_t8 * forearm_link_t22;
+            let forearm_link_t38 = forearm_link_t36 + forearm_link_t37;
+            let forearm_link_t39 = a_0 * forearm_link_t9;
+            let forearm_link_t40 = forearm_link_t38 + forearm_link_t39;
+            let forearm_link_t41 = forearm_link_t7 * upper_arm_link_t6;
+            let forearm_link_t42 = forearm_link_t40 + forearm_link_t41;
+            let forearm_link_t43 = forearm_link_t4 * forearm_link_accel_z;
+            let forearm_link_t44 = forearm_link_t4 * forearm_link_accel_y;
+            let forearm_link_t45 = forearm_link_t3 * forearm_link_minus_accel_x;
+            let forearm_link_t46 = forearm_link_t44 + forearm_link_t45;
+            let forearm_link_f_ry = forearm_link_t35 - forearm_link_t43;
+            let forearm_link_f_rz = forearm_link_t42 + forearm_link_t46;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load0 = wrist_1_link_vel26 * wrist_1_link_vel26;
-            let wrist_1_link_load1 = wrist_1_link_vel15 * wrist_1_link_vel16;
-            let wrist_1_link_load2 = wrist_1_link_acc4 - wrist_1_link_load1;
-            let wrist_1_link_load3 = wrist_1_link_acc8 + wrist_1_link_load0;
-            let wrist_1_link_load4 = wrist_1_link_acc2 + wrist_1_link_acc7;
-            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-            let wrist_1_link_load7 = 0.01778473500000001 * wrist_1_link_load4;
-            let wrist_1_link_load8 = 0.004608836229749974 * wrist_1_link_acc2;
-            let wrist_1_link_load9 = 0.22402883622975 * wrist_1_link_acc7;
-            let wrist_1_link_load10 = wrist_1_link_load8 + wrist_1_link_load9;
-            let wrist_1_link_load11 = 0.21942000000000003 * wrist_1_link_acc5;
-            let wrist_1_link_load12 = 0.22402883622975 * wrist_1_link_acc4;
-            let wrist_1_link_load13 = 0.004608836229749974 * wrist_1_link_load1;
-            let wrist_1_link_load14 = wrist_1_link_load12 - wrist_1_link_load13;
-            let wrist_1_link_load15 = 0.01778473500000001 * wrist_1_link_acc14;
-            let wrist_1_link_load16 = 0.01778473500000001 * wrist_1_link_acc12;
-            let wrist_1_link_load17 = wrist_1_link_load10 - wrist_1_link_load15;
-            let wrist_1_link_load18 = wrist_1_link_load14 + wrist_1_link_load16;
+            let wrist_1_link_t37 = wrist_1_link_spin_z * wrist_1_link_spin_z;
+            let wrist_1_link_t38 = wrist_1_link_spin_x * wrist_1_link_spin_y;
+            let wrist_1_link_t39 = wrist_1_link_alpha_z - wrist_1_link_t38;
+            let wrist_1_link_t40 = wrist_1_link_t32 + wrist_1_link_t37;
+            let wrist_1_link_t41 = wrist_1_link_alpha_x + wrist_1_link_t31;
+            let wrist_1_link_f_x = 0.01778473500000001 * wrist_1_link_t39;
+            let wrist_1_link_f_y = 0.01778473500000001 * wrist_1_link_t40;
+            let wrist_1_link_minus_f_z = 0.01778473500000001 * wrist_1_link_t41;
+            let wrist_1_link_t42 = 0.004608836229749974 * wrist_1_link_alpha_x;
+            let wrist_1_link_t43 = 0.22402883622975 * wrist_1_link_t31;
+            let wrist_1_link_t44 = wrist_1_link_t42 + wrist_1_link_t43;
+            let wrist_1_link_minus_f_ry = 0.21942000000000003 * wrist_1_link_t29;
+            let wrist_1_link_t45 = 0.22402883622975 * wrist_1_link_alpha_z;
+            let wrist_1_link_t46 = 0.004608836229749974 * wrist_1_link_t38;
+            let wrist_1_link_t47 = wrist_1_link_t45 - wrist_1_link_t46;
+            let wrist_1_link_t48 = 0.01778473500000001 * wrist_1_link_accel_z;
+            let wrist_1_link_t49 = 0.01778473500000001 * wrist_1_link_accel_x;
+            let wrist_1_link_f_rx = wrist_1_link_t44 - wrist_1_link_t48;
+            let wrist_1_link_f_rz = wrist_1_link_t47 + wrist_1_link_t49;
             // wrist_2_link: gravity and wrenches
-            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc6;
-            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc5;
-            let wrist_2_link_load5 = 0.253242 * wrist_2_link_acc4;
-            let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
-            let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
+            let wrist_2_link_t14 = wrist_2_link_spin_x * wrist_2_link_spin_y;
+            let wrist_2_link_t15 = 0.033822000000000005 * wrist_2_link_alpha_x;
+            let wrist_2_link_t16 = 0.253242 * wrist_2_link_t13;
+            let wrist_2_link_f_rx = wrist_2_link_t15 + wrist_2_link_t16;
+            let wrist_2_link_minus_f_ry = 0.21942 * wrist_2_link_t12;
+            let wrist_2_link_t17 = 0.253242 * wrist_2_link_alpha_z;
+            let wrist_2_link_t18 = 0.033822000000000005 * wrist_2_link_t14;
+            let wrist_2_link_f_rz = wrist_2_link_t17 - wrist_2_link_t18;
             // wrist_3_link: gravity and wrenches
-            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc4;
-            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc3;
-            let wrist_3_link_load5 = 0.0171364731454 * wrist_3_link_acc2;
-            let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
-            let wrist_3_link_load7 = wrist_3_link_load5 - wrist_3_link_load6;
-            let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
-            let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
-            let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
-            let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
-            let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
-            let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
-            let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
-            let wrist_3_link_load15 = wrist_2_link_load4 - wrist_3_link_load7;
-            let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
+            let wrist_3_link_t10 = wrist_3_link_spin_x * wrist_3_link_minus_spin_y;
+            let wrist_3_link_t11 = 0.016685526854599998 * wrist_3_link_alpha_x;
+            let wrist_3_link_t12 = 0.0171364731454 * wrist_3_link_t9;
+            let wrist_3_link_minus_f_rx = wrist_3_link_t11 + wrist_3_link_t12;
+            let wrist_3_link_minus_f_ry = 0.033822 * wrist_3_link_t8;
+            let wrist_3_link_t13 = 0.0171364731454 * wrist_3_link_alpha_z;
+            let wrist_3_link_t14 = 0.016685526854599998 * wrist_3_link_t10;
+            let wrist_3_link_f_rz = wrist_3_link_t13 - wrist_3_link_t14;
+            let wrist_3_link_t15 = wrist_3_link_cos * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t16 = wrist_3_link_sin * wrist_3_link_minus_f_ry;
+            let wrist_3_link_t17 = wrist_3_link_t15 - wrist_3_link_t16;
+            let wrist_3_link_t18 = wrist_3_link_sin * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t19 = wrist_3_link_cos * wrist_3_link_minus_f_ry;
+            let wrist_3_link_t20 = wrist_3_link_t18 + wrist_3_link_t19;
+            let wrist_3_link_t21 = wrist_2_link_f_rx - wrist_3_link_t17;
+            let wrist_3_link_t22 = wrist_2_link_minus_f_ry - wrist_3_link_f_rz;
+            let tau_4 = wrist_2_link_f_rz + wrist_3_link_t20;
             // wrist_2_link: gravity and wrenches
-            let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
-            let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
-            let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
-            let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
-            let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
-            let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
-            let wrist_2_link_load14 = wrist_1_link_load17 + wrist_2_link_load10;
-            let wrist_2_link_load15 = wrist_1_link_load11 + wrist_3_link_load16;
-            let wrist_2_link_load16 = wrist_1_link_load18 + wrist_2_link_load13;
+            let wrist_2_link_t19 = wrist_2_link_cos * wrist_3_link_t21;
+            let wrist_2_link_t20 = wrist_2_link_sin * wrist_3_link_t22;
+            let wrist_2_link_t21 = wrist_2_link_t19 + wrist_2_link_t20;
+            let wrist_2_link_t22 = wrist_2_link_sin * wrist_3_link_t21;
+            let wrist_2_link_t23 = wrist_2_link_cos * wrist_3_link_t22;
+            let wrist_2_link_t24 = wrist_2_link_t22 - wrist_2_link_t23;
+            let wrist_2_link_t25 = wrist_1_link_f_rx + wrist_2_link_t21;
+            let wrist_2_link_t26 = wrist_1_link_minus_f_ry + tau_4;
+            let tau_3 = wrist_1_link_f_rz + wrist_2_link_t24;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load19 = wrist_1_link_cos0 * wrist_1_link_load5;
-            let wrist_1_link_load20 = wrist_1_link_sin0 * wrist_1_link_load6;
-            let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
-            let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_1_link_load5;
-            let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_1_link_load6;
-            let wrist_1_link_load24 = wrist_1_link_load22 + wrist_1_link_load23;
-            let wrist_1_link_load25 = wrist_1_link_sin0 * wrist_2_link_load14;
-            let wrist_1_link_load26 = wrist_1_link_cos0 * wrist_2_link_load15;
-            let wrist_1_link_load27 = wrist_1_link_load25 - wrist_1_link_load26;
-            let wrist_1_link_load28 = 0.10915 * wrist_1_link_load21;
-            let wrist_1_link_load29 = wrist_1_link_load27 + wrist_1_link_load28;
-            let wrist_1_link_load30 = wrist_1_link_pose2 * wrist_1_link_load21;
-            let wrist_1_link_load31 = wrist_2_link_load16 + wrist_1_link_load30;
-            let wrist_1_link_load32 = wrist_1_link_pose1 * wrist_1_link_load7;
-            let wrist_1_link_load33 = wrist_1_link_load29 - wrist_1_link_load32;
-            let wrist_1_link_load34 = wrist_1_link_pose1 * wrist_1_link_load24;
-            let wrist_1_link_load35 = wrist_1_link_load31 - wrist_1_link_load34;
-            let wrist_1_link_load36 = forearm_link_load2 + wrist_1_link_load21;
-            let wrist_1_link_load37 = forearm_link_load5 - wrist_1_link_load24;
-            let wrist_1_link_load38 = forearm_link_load8 - wrist_1_link_load7;
-            let wrist_1_link_load39 = forearm_link_load27 - wrist_1_link_load33;
-            let wrist_1_link_load40 = forearm_link_load28 + wrist_1_link_load35;
+            let wrist_1_link_t50 = wrist_1_link_cos * wrist_1_link_f_x;
+            let wrist_1_link_t51 = wrist_1_link_sin * wrist_1_link_f_y;
+            let wrist_1_link_t52 = wrist_1_link_t50 - wrist_1_link_t51;
+            let wrist_1_link_t53 = wrist_1_link_sin * wrist_1_link_f_x;
+            let wrist_1_link_t54 = wrist_1_link_cos * wrist_1_link_f_y;
+            let wrist_1_link_t55 = wrist_1_link_t53 + wrist_1_link_t54;
+            let wrist_1_link_t56 = wrist_1_link_sin * wrist_2_link_t25;
+            let wrist_1_link_t57 = wrist_1_link_cos * wrist_2_link_t26;
+            let wrist_1_link_t58 = wrist_1_link_t56 - wrist_1_link_t57;
+            let wrist_1_link_t59 = 0.10915 * wrist_1_link_t52;
+            let wrist_1_link_t60 = wrist_1_link_t58 + wrist_1_link_t59;
+            let wrist_1_link_t61 = wrist_1_link_t2 * wrist_1_link_t52;
+            let wrist_1_link_t62 = tau_3 + wrist_1_link_t61;
+            let wrist_1_link_t63 = wrist_1_link_t1 * wrist_1_link_minus_f_z;
+            let wrist_1_link_t64 = wrist_1_link_t60 - wrist_1_link_t63;
+            let wrist_1_link_t65 = wrist_1_link_t1 * wrist_1_link_t55;
+            let wrist_1_link_t66 = wrist_1_link_t62 - wrist_1_link_t65;
+            let wrist_1_link_t67 = forearm_link_minus_f_x + wrist_1_link_t52;
+            let wrist_1_link_t68 = forearm_link_f_y - wrist_1_link_t55;
+            let wrist_1_link_t69 = forearm_link_f_z - wrist_1_link_minus_f_z;
+            let wrist_1_link_t70 = forearm_link_f_ry - wrist_1_link_t64;
+            let tau_2 = forearm_link_f_rz + wrist_1_link_t66;
             // forearm_link: gravity and wrenches
-            let forearm_link_load29 = forearm_link_pose2 * wrist_1_link_load36;
-            let forearm_link_load30 = wrist_1_link_load40 + forearm_link_load29;
-            let forearm_link_load31 = forearm_link_pose1 * wrist_1_link_load38;
-            let forearm_link_load32 = wrist_1_link_load39 - forearm_link_load31;
-            let forearm_link_load33 = forearm_link_pose1 * wrist_1_link_load37;
-            let forearm_link_load34 = forearm_link_load30 + forearm_link_load33;
-            let forearm_link_load35 = upper_arm_link_load6 + forearm_link_load32;
-            let forearm_link_load36 = upper_arm_link_load13 + forearm_link_load34;
+            let forearm_link_t47 = forearm_link_t2 * wrist_1_link_t67;
+            let forearm_link_t48 = tau_2 + forearm_link_t47;
+            let forearm_link_t49 = forearm_link_t1 * wrist_1_link_t69;
+            let forearm_link_t50 = wrist_1_link_t70 - forearm_link_t49;
+            let forearm_link_t51 = forearm_link_t1 * wrist_1_link_t68;
+            let forearm_link_t52 = forearm_link_t48 + forearm_link_t51;
+            let forearm_link_t53 = upper_arm_link_f_ry + forearm_link_t50;
+            let tau_1 = upper_arm_link_f_rz + forearm_link_t52;
             // upper_arm_link: gravity and wrenches
-            let upper_arm_link_load14 = shoulder_link_load0 - forearm_link_load35;
-            results[0][l] = upper_arm_link_load14;
-            results[1][l] = forearm_link_load36;
-            results[2][l] = wrist_1_link_load40;
-            results[3][l] = wrist_2_link_load16;
-            results[4][l] = wrist_3_link_load16;
-            results[5][l] = wrist_3_link_load7;
+            let tau_0 = shoulder_link_f_rz - forearm_link_t53;
+            results[0][l] = tau_0;
+            results[1][l] = tau_1;
+            results[2][l] = tau_2;
+            results[3][l] = tau_3;
+            results[4][l] = tau_4;
+            results[5][l] = wrist_3_link_f_rz;
         }
         tau.give(0, &results[0]);
         tau.give(1, &results[1]);
@@ -2204,7 +2205,8 @@ impl Ur5 {
         tau.give(5, &results[5]);
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     /// 190 operations: 74 additions, 116 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn bias(&self, q: &[f64; 6], v: &[f64; 6], h: &mut [f64; 6]) {
@@ -2220,13 +2222,13 @@ impl Ur5 {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
@@ -2245,231 +2247,231 @@ impl Ur5 {
             let v_4 = given[4][l];
             let v_5 = given[5][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
-            let upper_arm_link_pose0 = 4.4329225 * upper_arm_link_cos0;
-            let upper_arm_link_pose1 = 1.75501953841 * upper_arm_link_sin0;
-            let upper_arm_link_pose2 = upper_arm_link_cos0 * upper_arm_link_pose1;
-            let upper_arm_link_pose3 = 0.408499208875 * upper_arm_link_cos0;
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
+            let upper_arm_link_t0 = 4.4329225 * upper_arm_link_cos;
+            let upper_arm_link_t1 = 1.75501953841 * upper_arm_link_sin;
+            let upper_arm_link_t2 = upper_arm_link_cos * upper_arm_link_t1;
+            let upper_arm_link_t3 = 0.408499208875 * upper_arm_link_cos;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_cos0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
-            let forearm_link_pose6 = forearm_link_cos0 * forearm_link_pose5;
-            let forearm_link_pose7 = 0.07714261911624999 * forearm_link_cos0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_cos;
+            let forearm_link_t2 = 0.425 * upper_arm_link_sin;
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t6 = forearm_link_cos * forearm_link_t5;
+            let forearm_link_t7 = 0.07714261911624999 * forearm_link_cos;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_cos0;
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_sin0 = sines[4][l];
-            let wrist_1_link_cos0 = cosines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_cos;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_sin = sines[4][l];
+            let wrist_1_link_cos = cosines[4][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // upper_arm_link: acceleration
-            let upper_arm_link_acc0 = v_0 * v_1;
-            let upper_arm_link_acc1 = v_0 * v_0;
+            let upper_arm_link_minus_alpha_x = v_0 * v_1;
+            let upper_arm_link_t4 = v_0 * v_0;
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = v_1 * v_1;
-            let forearm_link_vel1 = upper_arm_link_acc1 + forearm_link_vel0;
-            let forearm_link_vel2 = forearm_link_pose1 * forearm_link_vel1;
-            let forearm_link_vel3 = upper_arm_link_acc0 + upper_arm_link_acc0;
-            let forearm_link_vel4 = forearm_link_pose2 * forearm_link_vel3;
-            let forearm_link_vel5 = forearm_link_pose2 * forearm_link_vel0;
-            let forearm_link_vel6 = forearm_link_vel5 + 9.81;
-            let forearm_link_vel7 = v_1 + v_2;
+            let forearm_link_t8 = v_1 * v_1;
+            let forearm_link_t9 = upper_arm_link_t4 + forearm_link_t8;
+            let forearm_link_minus_accel_x = forearm_link_t1 * forearm_link_t9;
+            let forearm_link_t10 = upper_arm_link_minus_alpha_x + upper_arm_link_minus_alpha_x;
+            let forearm_link_minus_accel_z = forearm_link_t2 * forearm_link_t10;
+            let forearm_link_t11 = forearm_link_t2 * forearm_link_t8;
+            let forearm_link_minus_accel_y = forearm_link_t11 + 9.81;
+            let forearm_link_spin_z = v_1 + v_2;
             // forearm_link: acceleration
-            let forearm_link_acc0 = v_0 * v_2;
-            let forearm_link_acc1 = upper_arm_link_acc0 + forearm_link_acc0;
-            let forearm_link_acc2 = v_0 * forearm_link_vel7;
-            let forearm_link_acc3 = forearm_link_acc1 - forearm_link_acc2;
+            let forearm_link_t12 = v_0 * v_2;
+            let forearm_link_minus_alpha_x = upper_arm_link_minus_alpha_x + forearm_link_t12;
+            let forearm_link_t13 = v_0 * forearm_link_spin_z;
+            let forearm_link_t14 = forearm_link_minus_alpha_x - forearm_link_t13;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = forearm_link_vel7 * forearm_link_vel7;
-            let wrist_1_link_vel1 = upper_arm_link_acc1 + wrist_1_link_vel0;
-            let wrist_1_link_vel2 = wrist_1_link_pose1 * wrist_1_link_vel1;
-            let wrist_1_link_vel3 = forearm_link_vel2 + wrist_1_link_vel2;
-            let wrist_1_link_vel4 = forearm_link_acc1 + forearm_link_acc2;
-            let wrist_1_link_vel5 = wrist_1_link_pose2 * wrist_1_link_vel4;
-            let wrist_1_link_vel6 = forearm_link_vel4 + wrist_1_link_vel5;
-            let wrist_1_link_vel7 = wrist_1_link_pose2 * wrist_1_link_vel0;
-            let wrist_1_link_vel8 = forearm_link_vel6 + wrist_1_link_vel7;
-            let wrist_1_link_vel9 = v_0 * wrist_1_link_sin0;
-            let wrist_1_link_vel10 = v_0 * wrist_1_link_cos0;
-            let wrist_1_link_vel11 = wrist_1_link_cos0 * forearm_link_acc1;
-            let wrist_1_link_vel12 = wrist_1_link_sin0 * forearm_link_acc1;
-            let wrist_1_link_vel13 = wrist_1_link_cos0 * wrist_1_link_vel3;
-            let wrist_1_link_vel14 = wrist_1_link_sin0 * wrist_1_link_vel8;
-            let wrist_1_link_vel15 = wrist_1_link_vel13 + wrist_1_link_vel14;
-            let wrist_1_link_vel16 = v_3 + forearm_link_vel7;
+            let wrist_1_link_t3 = forearm_link_spin_z * forearm_link_spin_z;
+            let wrist_1_link_t4 = upper_arm_link_t4 + wrist_1_link_t3;
+            let wrist_1_link_t5 = wrist_1_link_t1 * wrist_1_link_t4;
+            let wrist_1_link_t6 = forearm_link_minus_accel_x + wrist_1_link_t5;
+            let wrist_1_link_t7 = forearm_link_minus_alpha_x + forearm_link_t13;
+            let wrist_1_link_t8 = wrist_1_link_t2 * wrist_1_link_t7;
+            let wrist_1_link_t9 = forearm_link_minus_accel_z + wrist_1_link_t8;
+            let wrist_1_link_t10 = wrist_1_link_t2 * wrist_1_link_t3;
+            let wrist_1_link_t11 = forearm_link_minus_accel_y + wrist_1_link_t10;
+            let wrist_1_link_spin_x = v_0 * wrist_1_link_sin;
+            let wrist_1_link_spin_y = v_0 * wrist_1_link_cos;
+            let wrist_1_link_t12 = wrist_1_link_cos * forearm_link_minus_alpha_x;
+            let wrist_1_link_t13 = wrist_1_link_sin * forearm_link_minus_alpha_x;
+            let wrist_1_link_t14 = wrist_1_link_cos * wrist_1_link_t6;
+            let wrist_1_link_t15 = wrist_1_link_sin * wrist_1_link_t11;
+            let wrist_1_link_t16 = wrist_1_link_t14 + wrist_1_link_t15;
+            let wrist_1_link_spin_z = v_3 + forearm_link_spin_z;
             // wrist_1_link: acceleration
-            let wrist_1_link_acc0 = v_3 * wrist_1_link_vel10;
-            let wrist_1_link_acc1 = v_3 * wrist_1_link_vel9;
-            let wrist_1_link_acc2 = wrist_1_link_vel11 + wrist_1_link_acc0;
-            let wrist_1_link_acc3 = wrist_1_link_vel12 + wrist_1_link_acc1;
-            let wrist_1_link_acc4 = wrist_1_link_vel9 * wrist_1_link_vel16;
-            let wrist_1_link_acc5 = wrist_1_link_acc3 - wrist_1_link_acc4;
-            let wrist_1_link_acc6 = wrist_1_link_vel10 * wrist_1_link_vel16;
-            let wrist_1_link_acc7 = wrist_1_link_vel9 * wrist_1_link_vel9;
-            let wrist_1_link_acc8 = wrist_1_link_vel10 * wrist_1_link_vel10;
-            let wrist_1_link_acc9 = wrist_1_link_acc7 + wrist_1_link_acc8;
-            let wrist_1_link_acc10 = 0.10915 * wrist_1_link_acc5;
-            let wrist_1_link_acc11 = wrist_1_link_vel15 - wrist_1_link_acc10;
-            let wrist_1_link_acc12 = 0.10915 * wrist_1_link_acc9;
-            let wrist_1_link_acc13 = wrist_1_link_vel6 + wrist_1_link_acc12;
+            let wrist_1_link_t17 = v_3 * wrist_1_link_spin_y;
+            let wrist_1_link_t18 = v_3 * wrist_1_link_spin_x;
+            let wrist_1_link_alpha_x = wrist_1_link_t12 + wrist_1_link_t17;
+            let wrist_1_link_minus_alpha_y = wrist_1_link_t13 + wrist_1_link_t18;
+            let wrist_1_link_t19 = wrist_1_link_spin_x * wrist_1_link_spin_z;
+            let wrist_1_link_t20 = wrist_1_link_minus_alpha_y - wrist_1_link_t19;
+            let wrist_1_link_t21 = wrist_1_link_spin_y * wrist_1_link_spin_z;
+            let wrist_1_link_t22 = wrist_1_link_spin_x * wrist_1_link_spin_x;
+            let wrist_1_link_t23 = wrist_1_link_spin_y * wrist_1_link_spin_y;
+            let wrist_1_link_t24 = wrist_1_link_t22 + wrist_1_link_t23;
+            let wrist_1_link_t25 = 0.10915 * wrist_1_link_t20;
+            let wrist_1_link_accel_x = wrist_1_link_t16 - wrist_1_link_t25;
+            let wrist_1_link_t26 = 0.10915 * wrist_1_link_t24;
+            let wrist_1_link_minus_accel_z = wrist_1_link_t9 + wrist_1_link_t26;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = wrist_2_link_cos0 * wrist_1_link_vel9;
-            let wrist_2_link_vel1 = wrist_2_link_sin0 * wrist_1_link_vel16;
-            let wrist_2_link_vel2 = wrist_2_link_vel0 + wrist_2_link_vel1;
-            let wrist_2_link_vel3 = wrist_2_link_cos0 * wrist_1_link_vel16;
-            let wrist_2_link_vel4 = wrist_2_link_sin0 * wrist_1_link_vel9;
-            let wrist_2_link_vel5 = wrist_2_link_vel3 - wrist_2_link_vel4;
-            let wrist_2_link_vel6 = wrist_2_link_cos0 * wrist_1_link_acc2;
-            let wrist_2_link_vel7 = wrist_2_link_sin0 * wrist_1_link_acc2;
-            let wrist_2_link_vel8 = v_4 - wrist_1_link_vel10;
+            let wrist_2_link_t0 = wrist_2_link_cos * wrist_1_link_spin_x;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_1_link_spin_z;
+            let wrist_2_link_spin_x = wrist_2_link_t0 + wrist_2_link_t1;
+            let wrist_2_link_t2 = wrist_2_link_cos * wrist_1_link_spin_z;
+            let wrist_2_link_t3 = wrist_2_link_sin * wrist_1_link_spin_x;
+            let wrist_2_link_spin_y = wrist_2_link_t2 - wrist_2_link_t3;
+            let wrist_2_link_t4 = wrist_2_link_cos * wrist_1_link_alpha_x;
+            let wrist_2_link_t5 = wrist_2_link_sin * wrist_1_link_alpha_x;
+            let wrist_2_link_spin_z = v_4 - wrist_1_link_spin_y;
             // wrist_2_link: acceleration
-            let wrist_2_link_acc0 = v_4 * wrist_2_link_vel5;
-            let wrist_2_link_acc1 = v_4 * wrist_2_link_vel2;
-            let wrist_2_link_acc2 = wrist_2_link_vel6 + wrist_2_link_acc0;
-            let wrist_2_link_acc3 = wrist_2_link_vel7 + wrist_2_link_acc1;
-            let wrist_2_link_acc4 = wrist_2_link_vel2 * wrist_2_link_vel8;
-            let wrist_2_link_acc5 = wrist_2_link_vel5 * wrist_2_link_vel8;
+            let wrist_2_link_t6 = v_4 * wrist_2_link_spin_y;
+            let wrist_2_link_t7 = v_4 * wrist_2_link_spin_x;
+            let wrist_2_link_alpha_x = wrist_2_link_t4 + wrist_2_link_t6;
+            let wrist_2_link_minus_alpha_y = wrist_2_link_t5 + wrist_2_link_t7;
+            let wrist_2_link_t8 = wrist_2_link_spin_x * wrist_2_link_spin_z;
+            let wrist_2_link_t9 = wrist_2_link_spin_y * wrist_2_link_spin_z;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = wrist_3_link_cos0 * wrist_2_link_vel2;
-            let wrist_3_link_vel1 = wrist_3_link_sin0 * wrist_2_link_vel8;
-            let wrist_3_link_vel2 = wrist_3_link_vel0 - wrist_3_link_vel1;
-            let wrist_3_link_vel3 = wrist_3_link_cos0 * wrist_2_link_vel8;
-            let wrist_3_link_vel4 = wrist_3_link_sin0 * wrist_2_link_vel2;
-            let wrist_3_link_vel5 = wrist_3_link_vel3 + wrist_3_link_vel4;
-            let wrist_3_link_vel6 = wrist_3_link_cos0 * wrist_2_link_acc2;
-            let wrist_3_link_vel7 = wrist_3_link_sin0 * wrist_1_link_acc3;
-            let wrist_3_link_vel8 = wrist_3_link_vel6 - wrist_3_link_vel7;
-            let wrist_3_link_vel9 = v_5 + wrist_2_link_vel5;
+            let wrist_3_link_t0 = wrist_3_link_cos * wrist_2_link_spin_x;
+            let wrist_3_link_t1 = wrist_3_link_sin * wrist_2_link_spin_z;
+            let wrist_3_link_spin_x = wrist_3_link_t0 - wrist_3_link_t1;
+            let wrist_3_link_t2 = wrist_3_link_cos * wrist_2_link_spin_z;
+            let wrist_3_link_t3 = wrist_3_link_sin * wrist_2_link_spin_x;
+            let wrist_3_link_minus_spin_y = wrist_3_link_t2 + wrist_3_link_t3;
+            let wrist_3_link_t4 = wrist_3_link_cos * wrist_2_link_alpha_x;
+            let wrist_3_link_t5 = wrist_3_link_sin * wrist_1_link_minus_alpha_y;
+            let wrist_3_link_t6 = wrist_3_link_t4 - wrist_3_link_t5;
+            let wrist_3_link_spin_z = v_5 + wrist_2_link_spin_y;
             // wrist_3_link: acceleration
-            let wrist_3_link_acc0 = v_5 * wrist_3_link_vel5;
-            let wrist_3_link_acc1 = wrist_3_link_vel8 - wrist_3_link_acc0;
-            let wrist_3_link_acc2 = wrist_3_link_vel2 * wrist_3_link_vel9;
-            let wrist_3_link_acc3 = wrist_3_link_vel5 * wrist_3_link_vel9;
+            let wrist_3_link_t7 = v_5 * wrist_3_link_minus_spin_y;
+            let wrist_3_link_alpha_x = wrist_3_link_t6 - wrist_3_link_t7;
+            let wrist_3_link_t8 = wrist_3_link_spin_x * wrist_3_link_spin_z;
+            let wrist_3_link_t9 = wrist_3_link_minus_spin_y * wrist_3_link_spin_z;
             // upper_arm_link: gravity and wrenches
-            let upper_arm_link_load0 = upper_arm_link_pose2 * forearm_link_vel3;
-            let upper_arm_link_load1 = upper_arm_link_pose3 * forearm_link_vel0;
-            let upper_arm_link_load2 = upper_arm_link_load0 - upper_arm_link_load1;
-            let upper_arm_link_load3 = upper_arm_link_pose2 * upper_arm_link_acc1;
-            let upper_arm_link_load4 = 9.81 * upper_arm_link_pose0;
-            let upper_arm_link_load5 = upper_arm_link_load3 - upper_arm_link_load4;
+            let upper_arm_link_t5 = upper_arm_link_t2 * forearm_link_t10;
+            let upper_arm_link_t6 = upper_arm_link_t3 * forearm_link_t8;
+            let upper_arm_link_f_ry = upper_arm_link_t5 - upper_arm_link_t6;
+            let upper_arm_link_t7 = upper_arm_link_t2 * upper_arm_link_t4;
+            let upper_arm_link_t8 = 9.81 * upper_arm_link_t0;
+            let upper_arm_link_f_rz = upper_arm_link_t7 - upper_arm_link_t8;
             // forearm_link: gravity and wrenches
-            let forearm_link_load0 = forearm_link_pose4 * wrist_1_link_vel1;
-            let forearm_link_load1 = forearm_link_pose3 * wrist_1_link_vel0;
-            let forearm_link_load2 = forearm_link_pose3 * wrist_1_link_vel4;
-            let forearm_link_load3 = forearm_link_pose6 * wrist_1_link_vel4;
-            let forearm_link_load4 = forearm_link_pose7 * wrist_1_link_vel0;
-            let forearm_link_load5 = forearm_link_load3 - forearm_link_load4;
-            let forearm_link_load6 = forearm_link_pose7 * forearm_link_acc3;
-            let forearm_link_load7 = forearm_link_pose6 * upper_arm_link_acc1;
-            let forearm_link_load8 = forearm_link_load6 + forearm_link_load7;
-            let forearm_link_load9 = forearm_link_pose4 * forearm_link_vel4;
-            let forearm_link_load10 = forearm_link_pose4 * forearm_link_vel6;
-            let forearm_link_load11 = forearm_link_pose3 * forearm_link_vel2;
-            let forearm_link_load12 = forearm_link_load10 - forearm_link_load11;
-            let forearm_link_load13 = forearm_link_load5 + forearm_link_load9;
-            let forearm_link_load14 = forearm_link_load8 - forearm_link_load12;
+            let forearm_link_minus_f_x = forearm_link_t4 * wrist_1_link_t4;
+            let forearm_link_minus_f_y = forearm_link_t3 * wrist_1_link_t3;
+            let forearm_link_minus_f_z = forearm_link_t3 * wrist_1_link_t7;
+            let forearm_link_t15 = forearm_link_t6 * wrist_1_link_t7;
+            let forearm_link_t16 = forearm_link_t7 * wrist_1_link_t3;
+            let forearm_link_t17 = forearm_link_t15 - forearm_link_t16;
+            let forearm_link_t18 = forearm_link_t7 * forearm_link_t14;
+            let forearm_link_t19 = forearm_link_t6 * upper_arm_link_t4;
+            let forearm_link_t20 = forearm_link_t18 + forearm_link_t19;
+            let forearm_link_t21 = forearm_link_t4 * forearm_link_minus_accel_z;
+            let forearm_link_t22 = forearm_link_t4 * forearm_link_minus_accel_y;
+            let forearm_link_t23 = forearm_link_t3 * forearm_link_minus_accel_x;
+            let forearm_link_t24 = forearm_link_t22 - forearm_link_t23;
+            let forearm_link_f_ry = forearm_link_t17 + forearm_link_t21;
+            let forearm_link_f_rz = forearm_link_t20 - forearm_link_t24;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load0 = wrist_1_link_vel16 * wrist_1_link_vel16;
-            let wrist_1_link_load1 = wrist_1_link_vel9 * wrist_1_link_vel10;
-            let wrist_1_link_load2 = wrist_1_link_acc7 + wrist_1_link_load0;
-            let wrist_1_link_load3 = wrist_1_link_acc2 + wrist_1_link_acc6;
-            let wrist_1_link_load4 = 0.01778473500000001 * wrist_1_link_load1;
-            let wrist_1_link_load5 = 0.01778473500000001 * wrist_1_link_load2;
-            let wrist_1_link_load6 = 0.01778473500000001 * wrist_1_link_load3;
-            let wrist_1_link_load7 = 0.004608836229749974 * wrist_1_link_acc2;
-            let wrist_1_link_load8 = 0.22402883622975 * wrist_1_link_acc6;
-            let wrist_1_link_load9 = wrist_1_link_load7 + wrist_1_link_load8;
-            let wrist_1_link_load10 = 0.21942000000000003 * wrist_1_link_acc4;
-            let wrist_1_link_load11 = 0.004608836229749974 * wrist_1_link_load1;
-            let wrist_1_link_load12 = 0.01778473500000001 * wrist_1_link_acc13;
-            let wrist_1_link_load13 = 0.01778473500000001 * wrist_1_link_acc11;
-            let wrist_1_link_load14 = wrist_1_link_load9 + wrist_1_link_load12;
-            let wrist_1_link_load15 = wrist_1_link_load11 - wrist_1_link_load13;
+            let wrist_1_link_t27 = wrist_1_link_spin_z * wrist_1_link_spin_z;
+            let wrist_1_link_t28 = wrist_1_link_spin_x * wrist_1_link_spin_y;
+            let wrist_1_link_t29 = wrist_1_link_t22 + wrist_1_link_t27;
+            let wrist_1_link_t30 = wrist_1_link_alpha_x + wrist_1_link_t21;
+            let wrist_1_link_minus_f_x = 0.01778473500000001 * wrist_1_link_t28;
+            let wrist_1_link_f_y = 0.01778473500000001 * wrist_1_link_t29;
+            let wrist_1_link_minus_f_z = 0.01778473500000001 * wrist_1_link_t30;
+            let wrist_1_link_t31 = 0.004608836229749974 * wrist_1_link_alpha_x;
+            let wrist_1_link_t32 = 0.22402883622975 * wrist_1_link_t21;
+            let wrist_1_link_t33 = wrist_1_link_t31 + wrist_1_link_t32;
+            let wrist_1_link_minus_f_ry = 0.21942000000000003 * wrist_1_link_t19;
+            let wrist_1_link_t34 = 0.004608836229749974 * wrist_1_link_t28;
+            let wrist_1_link_t35 = 0.01778473500000001 * wrist_1_link_minus_accel_z;
+            let wrist_1_link_t36 = 0.01778473500000001 * wrist_1_link_accel_x;
+            let wrist_1_link_f_rx = wrist_1_link_t33 + wrist_1_link_t35;
+            let wrist_1_link_minus_f_rz = wrist_1_link_t34 - wrist_1_link_t36;
             // wrist_2_link: gravity and wrenches
-            let wrist_2_link_load0 = wrist_2_link_vel2 * wrist_2_link_vel5;
-            let wrist_2_link_load1 = 0.033822000000000005 * wrist_2_link_acc2;
-            let wrist_2_link_load2 = 0.253242 * wrist_2_link_acc5;
-            let wrist_2_link_load3 = wrist_2_link_load1 + wrist_2_link_load2;
-            let wrist_2_link_load4 = 0.21942 * wrist_2_link_acc4;
-            let wrist_2_link_load5 = 0.253242 * wrist_1_link_acc3;
-            let wrist_2_link_load6 = 0.033822000000000005 * wrist_2_link_load0;
-            let wrist_2_link_load7 = wrist_2_link_load5 - wrist_2_link_load6;
+            let wrist_2_link_t10 = wrist_2_link_spin_x * wrist_2_link_spin_y;
+            let wrist_2_link_t11 = 0.033822000000000005 * wrist_2_link_alpha_x;
+            let wrist_2_link_t12 = 0.253242 * wrist_2_link_t9;
+            let wrist_2_link_f_rx = wrist_2_link_t11 + wrist_2_link_t12;
+            let wrist_2_link_minus_f_ry = 0.21942 * wrist_2_link_t8;
+            let wrist_2_link_t13 = 0.253242 * wrist_1_link_minus_alpha_y;
+            let wrist_2_link_t14 = 0.033822000000000005 * wrist_2_link_t10;
+            let wrist_2_link_f_rz = wrist_2_link_t13 - wrist_2_link_t14;
             // wrist_3_link: gravity and wrenches
-            let wrist_3_link_load0 = wrist_3_link_vel2 * wrist_3_link_vel5;
-            let wrist_3_link_load1 = 0.016685526854599998 * wrist_3_link_acc1;
-            let wrist_3_link_load2 = 0.0171364731454 * wrist_3_link_acc3;
-            let wrist_3_link_load3 = wrist_3_link_load1 + wrist_3_link_load2;
-            let wrist_3_link_load4 = 0.033822 * wrist_3_link_acc2;
-            let wrist_3_link_load5 = 0.0171364731454 * wrist_2_link_acc3;
-            let wrist_3_link_load6 = 0.016685526854599998 * wrist_3_link_load0;
-            let wrist_3_link_load7 = wrist_3_link_load5 + wrist_3_link_load6;
-            let wrist_3_link_load8 = wrist_3_link_cos0 * wrist_3_link_load3;
-            let wrist_3_link_load9 = wrist_3_link_sin0 * wrist_3_link_load4;
-            let wrist_3_link_load10 = wrist_3_link_load8 - wrist_3_link_load9;
-            let wrist_3_link_load11 = wrist_3_link_sin0 * wrist_3_link_load3;
-            let wrist_3_link_load12 = wrist_3_link_cos0 * wrist_3_link_load4;
-            let wrist_3_link_load13 = wrist_3_link_load11 + wrist_3_link_load12;
-            let wrist_3_link_load14 = wrist_2_link_load3 - wrist_3_link_load10;
-            let wrist_3_link_load15 = wrist_2_link_load4 + wrist_3_link_load7;
-            let wrist_3_link_load16 = wrist_2_link_load7 + wrist_3_link_load13;
+            let wrist_3_link_t10 = wrist_3_link_spin_x * wrist_3_link_minus_spin_y;
+            let wrist_3_link_t11 = 0.016685526854599998 * wrist_3_link_alpha_x;
+            let wrist_3_link_t12 = 0.0171364731454 * wrist_3_link_t9;
+            let wrist_3_link_minus_f_rx = wrist_3_link_t11 + wrist_3_link_t12;
+            let wrist_3_link_minus_f_ry = 0.033822 * wrist_3_link_t8;
+            let wrist_3_link_t13 = 0.0171364731454 * wrist_2_link_minus_alpha_y;
+            let wrist_3_link_t14 = 0.016685526854599998 * wrist_3_link_t10;
+            let wrist_3_link_minus_f_rz = wrist_3_link_t13 + wrist_3_link_t14;
+            let wrist_3_link_t15 = wrist_3_link_cos * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t16 = wrist_3_link_sin * wrist_3_link_minus_f_ry;
+            let wrist_3_link_t17 = wrist_3_link_t15 - wrist_3_link_t16;
+            let wrist_3_link_t18 = wrist_3_link_sin * wrist_3_link_minus_f_rx;
+            let wrist_3_link_t19 = wrist_3_link_cos * wrist_3_link_minus_f_ry;
+            let wrist_3_link_t20 = wrist_3_link_t18 + wrist_3_link_t19;
+            let wrist_3_link_t21 = wrist_2_link_f_rx - wrist_3_link_t17;
+            let wrist_3_link_t22 = wrist_2_link_minus_f_ry + wrist_3_link_minus_f_rz;
+            let h_4 = wrist_2_link_f_rz + wrist_3_link_t20;
             // wrist_2_link: gravity and wrenches
-            let wrist_2_link_load8 = wrist_2_link_cos0 * wrist_3_link_load14;
-            let wrist_2_link_load9 = wrist_2_link_sin0 * wrist_3_link_load15;
-            let wrist_2_link_load10 = wrist_2_link_load8 + wrist_2_link_load9;
-            let wrist_2_link_load11 = wrist_2_link_sin0 * wrist_3_link_load14;
-            let wrist_2_link_load12 = wrist_2_link_cos0 * wrist_3_link_load15;
-            let wrist_2_link_load13 = wrist_2_link_load11 - wrist_2_link_load12;
-            let wrist_2_link_load14 = wrist_1_link_load14 + wrist_2_link_load10;
-            let wrist_2_link_load15 = wrist_1_link_load10 + wrist_3_link_load16;
-            let wrist_2_link_load16 = wrist_1_link_load15 - wrist_2_link_load13;
+            let wrist_2_link_t15 = wrist_2_link_cos * wrist_3_link_t21;
+            let wrist_2_link_t16 = wrist_2_link_sin * wrist_3_link_t22;
+            let wrist_2_link_t17 = wrist_2_link_t15 + wrist_2_link_t16;
+            let wrist_2_link_t18 = wrist_2_link_sin * wrist_3_link_t21;
+            let wrist_2_link_t19 = wrist_2_link_cos * wrist_3_link_t22;
+            let wrist_2_link_t20 = wrist_2_link_t18 - wrist_2_link_t19;
+            let wrist_2_link_t21 = wrist_1_link_f_rx + wrist_2_link_t17;
+            let wrist_2_link_t22 = wrist_1_link_minus_f_ry + h_4;
+            let minus_h_3 = wrist_1_link_minus_f_rz - wrist_2_link_t20;
             // wrist_1_link: gravity and wrenches
-            let wrist_1_link_load16 = wrist_1_link_cos0 * wrist_1_link_load4;
-            let wrist_1_link_load17 = wrist_1_link_sin0 * wrist_1_link_load5;
-            let wrist_1_link_load18 = wrist_1_link_load16 + wrist_1_link_load17;
-            let wrist_1_link_load19 = wrist_1_link_sin0 * wrist_1_link_load4;
-            let wrist_1_link_load20 = wrist_1_link_cos0 * wrist_1_link_load5;
-            let wrist_1_link_load21 = wrist_1_link_load19 - wrist_1_link_load20;
-            let wrist_1_link_load22 = wrist_1_link_sin0 * wrist_2_link_load14;
-            let wrist_1_link_load23 = wrist_1_link_cos0 * wrist_2_link_load15;
-            let wrist_1_link_load24 = wrist_1_link_load22 - wrist_1_link_load23;
-            let wrist_1_link_load25 = 0.10915 * wrist_1_link_load18;
-            let wrist_1_link_load26 = wrist_1_link_load24 - wrist_1_link_load25;
-            let wrist_1_link_load27 = wrist_1_link_pose2 * wrist_1_link_load18;
-            let wrist_1_link_load28 = wrist_2_link_load16 + wrist_1_link_load27;
-            let wrist_1_link_load29 = wrist_1_link_pose1 * wrist_1_link_load6;
-            let wrist_1_link_load30 = wrist_1_link_load26 - wrist_1_link_load29;
-            let wrist_1_link_load31 = wrist_1_link_pose1 * wrist_1_link_load21;
-            let wrist_1_link_load32 = wrist_1_link_load28 - wrist_1_link_load31;
-            let wrist_1_link_load33 = forearm_link_load0 - wrist_1_link_load18;
-            let wrist_1_link_load34 = forearm_link_load1 - wrist_1_link_load21;
-            let wrist_1_link_load35 = forearm_link_load2 + wrist_1_link_load6;
-            let wrist_1_link_load36 = forearm_link_load13 - wrist_1_link_load30;
-            let wrist_1_link_load37 = forearm_link_load14 - wrist_1_link_load32;
+            let wrist_1_link_t37 = wrist_1_link_cos * wrist_1_link_minus_f_x;
+            let wrist_1_link_t38 = wrist_1_link_sin * wrist_1_link_f_y;
+            let wrist_1_link_t39 = wrist_1_link_t37 + wrist_1_link_t38;
+            let wrist_1_link_t40 = wrist_1_link_sin * wrist_1_link_minus_f_x;
+            let wrist_1_link_t41 = wrist_1_link_cos * wrist_1_link_f_y;
+            let wrist_1_link_t42 = wrist_1_link_t40 - wrist_1_link_t41;
+            let wrist_1_link_t43 = wrist_1_link_sin * wrist_2_link_t21;
+            let wrist_1_link_t44 = wrist_1_link_cos * wrist_2_link_t22;
+            let wrist_1_link_t45 = wrist_1_link_t43 - wrist_1_link_t44;
+            let wrist_1_link_t46 = 0.10915 * wrist_1_link_t39;
+            let wrist_1_link_t47 = wrist_1_link_t45 - wrist_1_link_t46;
+            let wrist_1_link_t48 = wrist_1_link_t2 * wrist_1_link_t39;
+            let wrist_1_link_t49 = minus_h_3 + wrist_1_link_t48;
+            let wrist_1_link_t50 = wrist_1_link_t1 * wrist_1_link_minus_f_z;
+            let wrist_1_link_t51 = wrist_1_link_t47 - wrist_1_link_t50;
+            let wrist_1_link_t52 = wrist_1_link_t1 * wrist_1_link_t42;
+            let wrist_1_link_t53 = wrist_1_link_t49 - wrist_1_link_t52;
+            let wrist_1_link_t54 = forearm_link_minus_f_x - wrist_1_link_t39;
+            let wrist_1_link_t55 = forearm_link_minus_f_y - wrist_1_link_t42;
+            let wrist_1_link_t56 = forearm_link_minus_f_z + wrist_1_link_minus_f_z;
+            let wrist_1_link_t57 = forearm_link_f_ry - wrist_1_link_t51;
+            let h_2 = forearm_link_f_rz - wrist_1_link_t53;
             // forearm_link: gravity and wrenches
-            let forearm_link_load15 = forearm_link_pose2 * wrist_1_link_load33;
-            let forearm_link_load16 = wrist_1_link_load37 + forearm_link_load15;
-            let forearm_link_load17 = forearm_link_pose1 * wrist_1_link_load35;
-            let forearm_link_load18 = wrist_1_link_load36 + forearm_link_load17;
-            let forearm_link_load19 = forearm_link_pose1 * wrist_1_link_load34;
-            let forearm_link_load20 = forearm_link_load16 - forearm_link_load19;
-            let forearm_link_load21 = upper_arm_link_load2 + forearm_link_load18;
-            let forearm_link_load22 = upper_arm_link_load5 + forearm_link_load20;
-            results[0][l] = -forearm_link_load21;
-            results[1][l] = forearm_link_load22;
-            results[2][l] = wrist_1_link_load37;
-            results[3][l] = -wrist_2_link_load16;
-            results[4][l] = wrist_3_link_load16;
-            results[5][l] = -wrist_3_link_load7;
+            let forearm_link_t25 = forearm_link_t2 * wrist_1_link_t54;
+            let forearm_link_t26 = h_2 + forearm_link_t25;
+            let forearm_link_t27 = forearm_link_t1 * wrist_1_link_t56;
+            let forearm_link_t28 = wrist_1_link_t57 + forearm_link_t27;
+            let forearm_link_t29 = forearm_link_t1 * wrist_1_link_t55;
+            let forearm_link_t30 = forearm_link_t26 - forearm_link_t29;
+            let minus_h_0 = upper_arm_link_f_ry + forearm_link_t28;
+            let h_1 = upper_arm_link_f_rz + forearm_link_t30;
+            results[0][l] = -minus_h_0;
+            results[1][l] = h_1;
+            results[2][l] = h_2;
+            results[3][l] = -minus_h_3;
+            results[4][l] = h_4;
+            results[5][l] = -wrist_3_link_minus_f_rz;
         }
         h.give(0, &results[0]);
         h.give(1, &results[1]);
@@ -2561,8 +2563,8 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 #[rustfmt::skip]
 impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::runtime::kernel::Read<f64> + ?Sized, P2: ::multibody::runtime::kernel::Write<f64> + ?Sized, const LANES: usize> ::multibody::runtime::kernel::Kernel<3, LANES, (&'a P0, &'a P1, &'a mut P2,)> for Ur5 {
     #[inline(always)]
-    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, result,): (&'a P0, &'a P1, &'a mut P2,)) {
-        Self::energy_kernel::<A, LANES>(q, p, result);
+    fn run<A: ::multibody::runtime::kernel::Arithmetic>((q, p, energy,): (&'a P0, &'a P1, &'a mut P2,)) {
+        Self::energy_kernel::<A, LANES>(q, p, energy);
     }
 }
 
@@ -2623,13 +2625,13 @@ impl<const LANES: usize> Ur5Lanes<LANES> {
         Ur5::new().lanes()
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     #[inline]
     pub fn rates(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6], qd: &mut [[f64; LANES]; 6], pd: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
     }
 
-    /// Velocities from momenta: `(q, p) → v`.
+    /// Velocities from momenta.
     #[inline]
     pub fn velocities(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6], v: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 1, LANES, f64, _>((q, p, v,));
@@ -2644,12 +2646,12 @@ impl<const LANES: usize> Ur5Lanes<LANES> {
     /// Kinetic and potential energy, J.
     #[inline]
     pub fn energy(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6]) -> [[f64; LANES]; 2] {
-        let mut result = [[0.0; LANES]; 2];
-        ::multibody::runtime::kernel::call_lanes::<Ur5, 3, LANES, f64, _>((q, p, &mut result,));
-        result
+        let mut energy = [[0.0; LANES]; 2];
+        ::multibody::runtime::kernel::call_lanes::<Ur5, 3, LANES, f64, _>((q, p, &mut energy,));
+        energy
     }
 
-    /// Accelerations: `(q, v) → v̇`.
+    /// Accelerations: time derivatives `v̇` of the velocities.
     #[inline]
     pub fn accelerations(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], a: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 4, LANES, f64, _>((q, v, &self.tau, a,));
@@ -2661,13 +2663,15 @@ impl<const LANES: usize> Ur5Lanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 5, LANES, f64, _>((q, m.as_flattened_mut(),));
     }
 
-    /// Joint forces of given accelerations: `τ = M v̇ + h`; the field `tau` is not read.
+    /// Joint forces of given accelerations: `τ = M v̇ + h`.
+    /// The field `tau` is not read.
     #[inline]
     pub fn inverse_dynamics(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], a: &[[f64; LANES]; 6], tau: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 6, LANES, f64, _>((q, v, a, tau,));
     }
 
-    /// Bias forces `h`, with `M v̇ + h = τ`: velocity products and gravity, less springs, dampers and external wrenches.
+    /// Bias forces `h`, with `M v̇ + h = τ`.
+    /// They are velocity products and gravity, less springs, dampers and external wrenches.
     #[inline]
     pub fn bias(&self, q: &[[f64; LANES]; 6], v: &[[f64; LANES]; 6], h: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5, 7, LANES, f64, _>((q, v, h,));
@@ -2700,10 +2704,12 @@ impl ::multibody::runtime::System for Ur5 {
     type Coordinates = [f64; 6];
     type Momenta = [f64; 6];
 
+    #[inline]
     fn neutral(&self) -> [f64; 6] {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
+    #[inline]
     fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
@@ -2719,6 +2725,14 @@ impl ::multibody::runtime::System for Ur5 {
     }
 
     #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
+    }
+
+    #[inline]
     fn coordinate_rates(&self, q: &[f64; 6], v: &[f64; 6], qd: &mut [f64; 6]) {
         Self::coordinate_rates(self, q, v, qd);
     }
@@ -2726,6 +2740,7 @@ impl ::multibody::runtime::System for Ur5 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Conjugate for Ur5 {
+
     #[inline]
     fn conjugate_momenta(&mut self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
         Self::momenta(self, q, v, p);
@@ -2734,6 +2749,7 @@ impl ::multibody::runtime::Conjugate for Ur5 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Energetic for Ur5 {
+
     #[inline]
     fn energies(&mut self, q: &[f64; 6], p: &[f64; 6]) -> (f64, f64) {
         let [kinetic, potential] = Self::energy(self, q, p);
@@ -2743,6 +2759,7 @@ impl ::multibody::runtime::Energetic for Ur5 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::Accelerated for Ur5 {
+
     #[inline]
     fn generalized_accelerations(&mut self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
         Self::accelerations(self, q, v, a);

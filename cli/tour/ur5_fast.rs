@@ -22,7 +22,7 @@ pub struct Ur5Fast {
     pub tau: [f64; 6],
 }
 
-#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, dead_code, non_snake_case)]
+#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl Ur5Fast {
     /// Number of coordinates.
@@ -63,7 +63,7 @@ impl Ur5Fast {
         Ur5Fast { tau: [0.0; 6] }
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 276 operations: 116 additions, 155 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
@@ -79,13 +79,13 @@ impl Ur5Fast {
             let q_3 = q.get(3, l);
             let q_4 = q.get(4, l);
             let q_5 = q.get(5, l);
-            let forearm_link_pose0 = q_1 + q_2;
-            let wrist_1_link_pose0 = q_3 + forearm_link_pose0;
+            let forearm_link_t0 = q_1 + q_2;
+            let wrist_1_link_t0 = q_3 + forearm_link_t0;
             angles[0][l] = q_1;
             angles[1][l] = q_4;
             angles[2][l] = q_5;
-            angles[3][l] = forearm_link_pose0;
-            angles[4][l] = wrist_1_link_pose0;
+            angles[3][l] = forearm_link_t0;
+            angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<A, LANES, 5>(&angles);
         let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
@@ -116,349 +116,349 @@ impl Ur5Fast {
             let tau_4 = given[10][l];
             let tau_5 = given[11][l];
             // wrist_3_link: sine and cosine, rotation
-            let wrist_3_link_sin0 = sines[2][l];
-            let wrist_3_link_cos0 = cosines[2][l];
+            let wrist_3_link_sin = sines[2][l];
+            let wrist_3_link_cos = cosines[2][l];
             // wrist_2_link: sine and cosine, rotation
-            let wrist_2_link_sin0 = sines[1][l];
-            let wrist_2_link_cos0 = cosines[1][l];
+            let wrist_2_link_sin = sines[1][l];
+            let wrist_2_link_cos = cosines[1][l];
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_sin0 = sines[0][l];
-            let upper_arm_link_cos0 = cosines[0][l];
+            let upper_arm_link_sin = sines[0][l];
+            let upper_arm_link_cos = cosines[0][l];
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia0 = 0.016685526854599998 * wrist_3_link_sin0;
-            let wrist_3_link_inertia1 = 0.016685526854599998 * wrist_3_link_cos0;
+            let wrist_3_link_t0 = 0.016685526854599998 * wrist_3_link_sin;
+            let wrist_3_link_t1 = 0.016685526854599998 * wrist_3_link_cos;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose1 = 0.425 * upper_arm_link_sin0;
-            let forearm_link_pose2 = 0.425 * upper_arm_link_cos0;
+            let forearm_link_t1 = 0.425 * upper_arm_link_sin;
+            let forearm_link_t2 = 0.425 * upper_arm_link_cos;
             // upper_arm_link: sine and cosine, rotation
-            let upper_arm_link_pose0 = 1.75501953841 * upper_arm_link_sin0;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest0 = p_5 * wrist_2_link_cos0;
+            let upper_arm_link_t0 = 1.75501953841 * upper_arm_link_sin;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t0 = p_5 * wrist_2_link_cos;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_sin0 = sines[3][l];
-            let forearm_link_cos0 = cosines[3][l];
+            let forearm_link_sin = sines[3][l];
+            let forearm_link_cos = cosines[3][l];
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia2 = A::fma_f64(wrist_3_link_sin0, wrist_3_link_inertia0, -0.253242);
-            let wrist_3_link_inertia3 = A::fma_f64(wrist_3_link_sin0, wrist_3_link_inertia0, -0.016685526854599998);
-            let wrist_3_link_inertia4 = wrist_3_link_sin0 * wrist_3_link_inertia1;
+            let wrist_2_link_minus_m_rz_rz = A::fma_f64(wrist_3_link_sin, wrist_3_link_t0, -0.253242);
+            let wrist_3_link_mp_rx_rx = A::fma_f64(wrist_3_link_sin, wrist_3_link_t0, -0.016685526854599998);
+            let wrist_3_link_minus_mp_rx_ry = wrist_3_link_sin * wrist_3_link_t1;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose1 = 0.39225 * forearm_link_sin0;
-            let wrist_1_link_cos0 = cosines[4][l];
-            let wrist_1_link_sin0 = sines[4][l];
+            let wrist_1_link_t1 = 0.39225 * forearm_link_sin;
+            let wrist_1_link_cos = cosines[4][l];
+            let wrist_1_link_sin = sines[4][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia0 = 0.01778473500000001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia1 = 0.01778473500000001 * wrist_1_link_sin0;
+            let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot0 = 1.0 / wrist_3_link_inertia2;
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
             // wrist_1_link: sine and cosine, rotation
-            let wrist_1_link_pose2 = 0.39225 * forearm_link_cos0;
+            let wrist_1_link_t2 = 0.39225 * forearm_link_cos;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia5 = wrist_3_link_inertia3 + 0.033822000000000005;
+            let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia0 = wrist_2_link_sin0 * wrist_3_link_inertia4;
+            let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose3 = 1.598759275 * forearm_link_sin0;
+            let forearm_link_t3 = 1.598759275 * forearm_link_sin;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia2 = forearm_link_pose1 + wrist_1_link_pose1;
+            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose4 = 1.598759275 * forearm_link_cos0;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia1 = wrist_2_link_cos0 * wrist_3_link_inertia4;
-            let wrist_2_link_inertia2 = wrist_2_link_sin0 * wrist_3_link_inertia5;
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
+            let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot0 = wrist_1_link_pose1 * wrist_1_link_inertia0;
+            let wrist_1_link_t4 = wrist_1_link_t1 * wrist_1_link_minus_u_x;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia3 = wrist_1_link_inertia0 + wrist_1_link_inertia0;
-            let wrist_1_link_inertia4 = wrist_1_link_inertia1 + wrist_1_link_inertia1;
+            let wrist_1_link_t5 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
+            let wrist_1_link_t6 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot1 = wrist_1_link_inertia2 * wrist_1_link_inertia0;
+            let wrist_1_link_t7 = wrist_1_link_t3 * wrist_1_link_minus_u_x;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_pose5 = 0.5915569516747501 * forearm_link_sin0;
+            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia5 = forearm_link_pose2 + wrist_1_link_pose2;
+            let wrist_1_link_t8 = forearm_link_t2 + wrist_1_link_t2;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_inertia6 = wrist_3_link_sin0 * wrist_3_link_inertia0;
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia6 = forearm_link_pose3 + wrist_1_link_inertia0;
-            let wrist_1_link_inertia7 = wrist_1_link_pose2 * wrist_1_link_inertia4;
-            let wrist_1_link_inertia8 = A::fma_f64(-wrist_1_link_pose1, wrist_1_link_inertia3, -0.59565195167475);
+            let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
+            let wrist_1_link_t9 = wrist_1_link_t2 * wrist_1_link_t6;
+            let wrist_1_link_t10 = A::fma_f64(-wrist_1_link_t1, wrist_1_link_t5, -0.59565195167475);
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot2 = A::fma_f64(-wrist_1_link_pose2, wrist_1_link_inertia1, wrist_1_link_pivot0);
-            let wrist_1_link_pivot3 = A::fma_f64(-wrist_1_link_inertia5, wrist_1_link_inertia1, wrist_1_link_pivot1);
+            let wrist_1_link_t11 = A::fma_f64(-wrist_1_link_t2, wrist_1_link_minus_u_y, wrist_1_link_t4);
+            let wrist_1_link_t12 = A::fma_f64(-wrist_1_link_t8, wrist_1_link_minus_u_y, wrist_1_link_t7);
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia3 = wrist_2_link_sin0 * wrist_2_link_inertia2;
+            let wrist_2_link_t2 = wrist_2_link_sin * wrist_2_link_t1;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia9 = forearm_link_pose4 - wrist_1_link_inertia1;
+            let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot1 = wrist_2_link_cos0 * wrist_2_link_inertia2;
+            let wrist_2_link_t3 = wrist_2_link_cos * wrist_2_link_t1;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot0 = wrist_3_link_inertia6 + wrist_3_link_inertia3;
+            let wrist_3_link_t2 = wrist_3_link_minus_mp_ry_ry + wrist_3_link_mp_rx_rx;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia0 = wrist_1_link_inertia6 + wrist_1_link_inertia6;
+            let forearm_link_t6 = forearm_link_m_rx_z + forearm_link_m_rx_z;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot0 = forearm_link_pose1 * wrist_1_link_inertia6;
+            let ground_t0 = forearm_link_t1 * forearm_link_m_rx_z;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia10 = wrist_1_link_inertia7 + wrist_1_link_inertia8;
+            let wrist_1_link_t13 = wrist_1_link_t9 + wrist_1_link_t10;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia1 = A::fma_f64(forearm_link_pose1, forearm_link_inertia0, 1.7701269384099998);
+            let forearm_link_t7 = A::fma_f64(forearm_link_t1, forearm_link_t6, 1.7701269384099998);
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot2 = wrist_3_link_inertia5 - wrist_2_link_inertia3;
+            let wrist_2_link_t4 = wrist_2_link_m_rx_rx - wrist_2_link_t2;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot1 = A::fma_f64(-forearm_link_pose2, wrist_1_link_inertia9, -ground_pivot0);
+            let ground_t1 = A::fma_f64(-forearm_link_t2, forearm_link_minus_m_ry_z, -ground_t0);
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot3 = wrist_2_link_inertia0 * wrist_2_link_inertia0;
-            let wrist_2_link_pivot4 = A::fma_f64(wrist_2_link_pivot0, wrist_2_link_pivot3, wrist_2_link_inertia3);
+            let wrist_2_link_t5 = wrist_2_link_u_ry * wrist_2_link_u_ry;
+            let wrist_2_link_mp_ry_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t5, wrist_2_link_t2);
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia4 = wrist_2_link_pivot4 + 0.22402883622975;
+            let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot4 = wrist_2_link_inertia4 + wrist_1_link_pivot2;
+            let wrist_1_link_t14 = wrist_1_link_m_rz_rz + wrist_1_link_t11;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia11 = wrist_2_link_inertia4 - wrist_1_link_inertia10;
+            let forearm_link_m_rz_rz = wrist_1_link_m_rz_rz - wrist_1_link_t13;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_pivot5 = wrist_2_link_inertia4 + wrist_1_link_pivot3;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t12;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot2 = 1.0 / wrist_2_link_inertia4;
-            let ground_pivot3 = wrist_1_link_inertia11 - ground_pivot1;
-            let ground_pivot4 = wrist_1_link_pivot4 * wrist_1_link_pivot4;
-            let ground_pivot5 = A::fma_f64(ground_pivot2, ground_pivot4, -wrist_1_link_inertia11);
-            let ground_pivot6 = 1.0 / ground_pivot5;
+            let ground_t2 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t3 = forearm_link_m_rz_rz - ground_t1;
+            let ground_t4 = wrist_1_link_t14 * wrist_1_link_t14;
+            let ground_t5 = A::fma_f64(ground_t2, ground_t4, -forearm_link_m_rz_rz);
+            let ground_t6 = 1.0 / ground_t5;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia2 = wrist_1_link_inertia9 + wrist_1_link_inertia9;
-            let forearm_link_inertia3 = forearm_link_pose2 * forearm_link_inertia2;
-            let forearm_link_inertia4 = forearm_link_inertia3 + forearm_link_inertia1;
-            let forearm_link_inertia5 = wrist_1_link_inertia11 + forearm_link_inertia4;
+            let forearm_link_t8 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t9 = forearm_link_t2 * forearm_link_t8;
+            let forearm_link_t10 = forearm_link_t9 + forearm_link_t7;
+            let upper_arm_link_m_rz_rz = forearm_link_m_rz_rz + forearm_link_t10;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot5 = wrist_2_link_inertia1 * wrist_2_link_inertia0;
-            let wrist_2_link_pivot6 = A::fma_f64(wrist_2_link_pivot0, wrist_2_link_pivot5, wrist_2_link_pivot1);
+            let wrist_2_link_t6 = wrist_2_link_u_rx * wrist_2_link_u_ry;
+            let wrist_2_link_mp_rx_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t6, wrist_2_link_t3);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot7 = A::fma_f64(upper_arm_link_sin0, upper_arm_link_pose0, -2.7644263025275);
-            let ground_pivot8 = A::fma_f64(forearm_link_sin0, forearm_link_pose5, ground_pivot7);
-            let ground_pivot9 = wrist_1_link_inertia7 + ground_pivot8;
-            let ground_pivot10 = forearm_link_inertia3 - ground_pivot9;
+            let ground_t7 = A::fma_f64(upper_arm_link_sin, upper_arm_link_t0, -2.7644263025275);
+            let ground_t8 = A::fma_f64(forearm_link_sin, forearm_link_t5, ground_t7);
+            let ground_t9 = wrist_1_link_t9 + ground_t8;
+            let ground_t10 = forearm_link_t9 - ground_t9;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot7 = wrist_2_link_inertia1 * wrist_2_link_pivot0;
-            let wrist_2_link_pivot8 = A::fma_f64(wrist_2_link_inertia1, wrist_2_link_pivot7, wrist_2_link_pivot2);
+            let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
+            let wrist_2_link_mp_rx_rx = A::fma_f64(wrist_2_link_u_rx, wrist_2_link_minus_k_rx, wrist_2_link_t4);
             // wrist_2_link: momentum rate (4.36)
-            let wrist_2_link_pdot0 = wrist_2_link_pivot8 - wrist_2_link_pivot4;
+            let wrist_2_link_t7 = wrist_2_link_mp_rx_rx - wrist_2_link_mp_ry_ry;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_inertia5 = wrist_2_link_pivot8 + 0.004608836229749974;
+            let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot11 = wrist_1_link_pivot5 * ground_pivot2;
-            let ground_pivot12 = A::fma_f64(wrist_1_link_pivot4, ground_pivot11, -ground_pivot3);
+            let ground_t11 = wrist_1_link_t15 * ground_t2;
+            let ground_t12 = A::fma_f64(wrist_1_link_t14, ground_t11, -ground_t3);
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_inertia12 = 0.001941203825250001 * wrist_1_link_cos0;
-            let wrist_1_link_inertia13 = A::fma_f64(wrist_1_link_sin0, wrist_2_link_pivot6, wrist_1_link_inertia12);
-            let wrist_1_link_inertia14 = 0.07714261911624999 * forearm_link_sin0;
-            let wrist_1_link_inertia15 = wrist_1_link_inertia13 + wrist_1_link_inertia14;
+            let wrist_1_link_t16 = 0.001941203825250001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_ry = A::fma_f64(wrist_1_link_sin, wrist_2_link_mp_rx_ry, wrist_1_link_t16);
+            let wrist_1_link_t17 = 0.07714261911624999 * forearm_link_sin;
+            let forearm_link_minus_m_ry_rz = wrist_1_link_minus_u_ry + wrist_1_link_t17;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot13 = wrist_1_link_sin0 * wrist_1_link_sin0;
-            let ground_pivot14 = A::fma_f64(-wrist_2_link_inertia5, ground_pivot13, -ground_pivot10);
-            let ground_pivot15 = forearm_link_inertia5 - ground_pivot14;
-            let ground_pivot16 = forearm_link_inertia5 - ground_pivot15;
-            let ground_pivot17 = A::fma_f64(-wrist_1_link_pivot5, ground_pivot11, forearm_link_inertia5);
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest1 = p_4 * wrist_2_link_pivot0;
+            let ground_t13 = wrist_1_link_sin * wrist_1_link_sin;
+            let ground_t14 = A::fma_f64(-wrist_1_link_m_rx_rx, ground_t13, -ground_t10);
+            let ground_t15 = upper_arm_link_m_rz_rz - ground_t14;
+            let ground_t16 = upper_arm_link_m_rz_rz - ground_t15;
+            let ground_t17 = A::fma_f64(-wrist_1_link_t15, ground_t11, upper_arm_link_m_rz_rz);
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_minus_e = p_4 * wrist_2_link_minus_rho;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_pivot9 = wrist_2_link_inertia0 * wrist_2_link_pivot0;
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest2 = A::fma_f64(-wrist_2_link_inertia0, wrist_2_link_rest1, wrist_2_link_rest0);
+            let wrist_2_link_minus_k_ry = wrist_2_link_u_ry * wrist_2_link_minus_rho;
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_dp_ry = A::fma_f64(-wrist_2_link_u_ry, wrist_2_link_minus_e, wrist_2_link_t0);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot18 = ground_pivot12 * ground_pivot12;
-            let ground_pivot19 = A::fma_f64(ground_pivot6, ground_pivot18, ground_pivot17);
-            let ground_pivot20 = 1.0 / ground_pivot19;
-            let ground_pivot21 = wrist_1_link_inertia13 * ground_pivot2;
-            let ground_pivot22 = A::fma_f64(wrist_1_link_inertia13, ground_pivot21, ground_pivot16);
-            let ground_pivot23 = 0.408499208875 * upper_arm_link_sin0;
-            let ground_pivot24 = wrist_1_link_inertia15 + ground_pivot23;
-            let ground_pivot25 = A::fma_f64(-wrist_1_link_pivot4, ground_pivot21, wrist_1_link_inertia15);
-            let ground_pivot26 = A::fma_f64(wrist_1_link_pivot5, ground_pivot21, -ground_pivot24);
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest0 = p_3 - wrist_2_link_rest2;
-            let shoulder_link_rest1 = ground_pivot2 * shoulder_link_rest0;
+            let ground_t18 = ground_t12 * ground_t12;
+            let ground_t19 = A::fma_f64(ground_t6, ground_t18, ground_t17);
+            let ground_t20 = 1.0 / ground_t19;
+            let ground_t21 = wrist_1_link_minus_u_ry * ground_t2;
+            let ground_t22 = A::fma_f64(wrist_1_link_minus_u_ry, ground_t21, ground_t16);
+            let ground_t23 = 0.408499208875 * upper_arm_link_sin;
+            let ground_t24 = forearm_link_minus_m_ry_rz + ground_t23;
+            let ground_t25 = A::fma_f64(-wrist_1_link_t14, ground_t21, forearm_link_minus_m_ry_rz);
+            let ground_t26 = A::fma_f64(wrist_1_link_t15, ground_t21, -ground_t24);
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t0 = p_3 - wrist_2_link_dp_ry;
+            let shoulder_link_t1 = ground_t2 * shoulder_link_t0;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot27 = wrist_1_link_pivot4 * ground_pivot2;
-            let ground_pivot28 = ground_pivot25 * ground_pivot6;
-            let ground_pivot29 = A::fma_f64(ground_pivot12, ground_pivot28, ground_pivot26);
-            let ground_pivot30 = A::fma_f64(-ground_pivot25, ground_pivot28, ground_pivot22);
-            // wrist_2_link: momentum remainder D, D' (4.45, 4.49)
-            let wrist_2_link_rest3 = p_5 * wrist_2_link_sin0;
-            let wrist_2_link_rest4 = A::fma_f64(wrist_2_link_inertia1, wrist_2_link_rest1, wrist_2_link_rest3);
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest2 = p_2 - wrist_2_link_rest2;
-            let shoulder_link_rest3 = A::fma_f64(wrist_1_link_pivot4, shoulder_link_rest1, -shoulder_link_rest2);
-            let shoulder_link_rest4 = ground_pivot6 * shoulder_link_rest3;
+            let ground_t27 = wrist_1_link_t14 * ground_t2;
+            let ground_t28 = ground_t25 * ground_t6;
+            let ground_t29 = A::fma_f64(ground_t12, ground_t28, ground_t26);
+            let ground_t30 = A::fma_f64(-ground_t25, ground_t28, ground_t22);
+            // wrist_2_link: bias momentum D, D' (4.45, 4.49)
+            let wrist_2_link_t8 = p_5 * wrist_2_link_sin;
+            let wrist_2_link_minus_dp_rx = A::fma_f64(wrist_2_link_u_rx, wrist_2_link_minus_e, wrist_2_link_t8);
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t2 = p_2 - wrist_2_link_dp_ry;
+            let shoulder_link_t3 = A::fma_f64(wrist_1_link_t14, shoulder_link_t1, -shoulder_link_t2);
+            let shoulder_link_t4 = ground_t6 * shoulder_link_t3;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot31 = ground_pivot12 * ground_pivot6;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest5 = A::fma_f64(p_4, wrist_1_link_cos0, p_0);
-            let shoulder_link_rest6 = A::fma_f64(wrist_1_link_sin0, wrist_2_link_rest4, shoulder_link_rest5);
-            let shoulder_link_rest7 = A::fma_f64(-wrist_1_link_inertia13, shoulder_link_rest1, shoulder_link_rest6);
-            let shoulder_link_rest8 = A::fma_f64(-ground_pivot25, shoulder_link_rest4, shoulder_link_rest7);
-            let shoulder_link_rest9 = p_1 - wrist_2_link_rest2;
-            let shoulder_link_rest10 = A::fma_f64(-wrist_1_link_pivot5, shoulder_link_rest1, shoulder_link_rest9);
-            let shoulder_link_rest11 = A::fma_f64(ground_pivot12, shoulder_link_rest4, shoulder_link_rest10);
-            let shoulder_link_rest12 = ground_pivot20 * shoulder_link_rest11;
-            let shoulder_link_rest13 = A::fma_f64(ground_pivot29, shoulder_link_rest12, shoulder_link_rest8);
+            let ground_t31 = ground_t12 * ground_t6;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_t5 = A::fma_f64(p_4, wrist_1_link_cos, p_0);
+            let shoulder_link_t6 = A::fma_f64(wrist_1_link_sin, wrist_2_link_minus_dp_rx, shoulder_link_t5);
+            let shoulder_link_t7 = A::fma_f64(-wrist_1_link_minus_u_ry, shoulder_link_t1, shoulder_link_t6);
+            let shoulder_link_t8 = A::fma_f64(-ground_t25, shoulder_link_t4, shoulder_link_t7);
+            let shoulder_link_t9 = p_1 - wrist_2_link_dp_ry;
+            let shoulder_link_t10 = A::fma_f64(-wrist_1_link_t15, shoulder_link_t1, shoulder_link_t9);
+            let shoulder_link_t11 = A::fma_f64(ground_t12, shoulder_link_t4, shoulder_link_t10);
+            let shoulder_link_t12 = ground_t20 * shoulder_link_t11;
+            let shoulder_link_t13 = A::fma_f64(ground_t29, shoulder_link_t12, shoulder_link_t8);
             // ground: velocity and joint rate (4.40)
-            let ground_vel0 = ground_pivot28 * shoulder_link_rest13;
-            let ground_vel1 = ground_pivot21 * shoulder_link_rest13;
+            let ground_t32 = ground_t28 * shoulder_link_t13;
+            let ground_t33 = ground_t21 * shoulder_link_t13;
             // forearm_link: momentum
-            let forearm_link_mom0 = upper_arm_link_pose0 * shoulder_link_rest13;
+            let forearm_link_t11 = upper_arm_link_t0 * shoulder_link_t13;
             // wrist_1_link: momentum
-            let wrist_1_link_mom0 = forearm_link_pose5 * shoulder_link_rest13;
+            let wrist_1_link_t18 = forearm_link_t5 * shoulder_link_t13;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot32 = ground_pivot29 * ground_pivot29;
-            let ground_pivot33 = ground_pivot29 * ground_pivot20;
-            let ground_pivot34 = A::fma_f64(ground_pivot20, ground_pivot32, ground_pivot30);
+            let ground_t34 = ground_t29 * ground_t29;
+            let ground_t35 = ground_t29 * ground_t20;
+            let ground_t36 = A::fma_f64(ground_t20, ground_t34, ground_t30);
             // ground: velocity and joint rate (4.40)
-            let ground_vel2 = ground_pivot33 * shoulder_link_rest13;
+            let ground_t37 = ground_t35 * shoulder_link_t13;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_pivot35 = 1.0 / ground_pivot34;
+            let ground_t38 = 1.0 / ground_t36;
             // ground: velocity and joint rate (4.40)
-            let ground_vel3 = A::fma_f64(-ground_pivot35, ground_vel2, shoulder_link_rest12);
-            let ground_vel4 = A::fma_f64(ground_pivot35, ground_vel0, -shoulder_link_rest4);
-            let ground_vel5 = A::fma_f64(ground_pivot35, ground_vel1, shoulder_link_rest1);
+            let upper_arm_link_v = A::fma_f64(-ground_t38, ground_t37, shoulder_link_t12);
+            let ground_t39 = A::fma_f64(ground_t38, ground_t32, -shoulder_link_t4);
+            let ground_t40 = A::fma_f64(ground_t38, ground_t33, shoulder_link_t1);
             // forearm_link: momentum
-            let forearm_link_mom1 = ground_pivot35 * forearm_link_mom0;
+            let forearm_link_t12 = ground_t38 * forearm_link_t11;
             // wrist_1_link: momentum
-            let wrist_1_link_mom1 = ground_pivot35 * wrist_1_link_mom0;
+            let wrist_1_link_t19 = ground_t38 * wrist_1_link_t18;
             // ground: velocity and joint rate (4.40)
-            let ground_vel6 = A::fma_f64(ground_pivot31, ground_vel3, ground_vel4);
-            let ground_vel7 = A::fma_f64(-ground_pivot11, ground_vel3, ground_vel5);
+            let forearm_link_minus_v = A::fma_f64(ground_t31, upper_arm_link_v, ground_t39);
+            let ground_t41 = A::fma_f64(-ground_t11, upper_arm_link_v, ground_t40);
             // forearm_link: momentum
-            let forearm_link_mom2 = A::fma_f64(0.408499208875, ground_vel3, forearm_link_mom1);
+            let forearm_link_t13 = A::fma_f64(0.408499208875, upper_arm_link_v, forearm_link_t12);
             // ground: velocity and joint rate (4.40)
-            let ground_vel8 = A::fma_f64(ground_pivot27, ground_vel6, ground_vel7);
+            let wrist_1_link_v = A::fma_f64(ground_t27, forearm_link_minus_v, ground_t41);
             // forearm_link: momentum
-            let forearm_link_mom3 = upper_arm_link_cos0 * forearm_link_mom2;
+            let forearm_link_t14 = upper_arm_link_cos * forearm_link_t13;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel0 = wrist_1_link_sin0 * shoulder_link_rest13;
-            let wrist_1_link_vel1 = ground_pivot35 * wrist_1_link_vel0;
+            let wrist_1_link_t20 = wrist_1_link_sin * shoulder_link_t13;
+            let wrist_1_link_minus_omega_rx = ground_t38 * wrist_1_link_t20;
             // wrist_2_link: momentum
-            let wrist_2_link_mom0 = wrist_2_link_inertia5 * wrist_1_link_vel1;
+            let wrist_2_link_t9 = wrist_1_link_m_rx_rx * wrist_1_link_minus_omega_rx;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel0 = A::fma_f64(wrist_2_link_pivot7, wrist_1_link_vel1, wrist_2_link_rest1);
+            let wrist_2_link_t10 = A::fma_f64(wrist_2_link_minus_k_rx, wrist_1_link_minus_omega_rx, wrist_2_link_minus_e);
             // wrist_2_link: momentum rate (4.36)
-            let wrist_2_link_pdot1 = A::fma_f64(wrist_2_link_pivot6, wrist_1_link_vel1, -wrist_2_link_rest2);
+            let wrist_2_link_t11 = A::fma_f64(wrist_2_link_mp_rx_ry, wrist_1_link_minus_omega_rx, -wrist_2_link_dp_ry);
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel0 = forearm_link_pose2 * shoulder_link_rest13;
-            let forearm_link_vel1 = forearm_link_pose2 * ground_vel3;
-            let forearm_link_vel2 = ground_pivot35 * forearm_link_vel0;
+            let forearm_link_t15 = forearm_link_t2 * shoulder_link_t13;
+            let forearm_link_hat_y = forearm_link_t2 * upper_arm_link_v;
+            let forearm_link_minus_hat_z = ground_t38 * forearm_link_t15;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel2 = wrist_1_link_pose2 * shoulder_link_rest13;
-            let wrist_1_link_vel3 = ground_pivot35 * wrist_1_link_vel2;
-            let wrist_1_link_vel4 = forearm_link_vel2 + wrist_1_link_vel3;
+            let wrist_1_link_t21 = wrist_1_link_t2 * shoulder_link_t13;
+            let wrist_1_link_t22 = ground_t38 * wrist_1_link_t21;
+            let wrist_1_link_minus_hat_z = forearm_link_minus_hat_z + wrist_1_link_t22;
             // wrist_1_link: momentum
-            let wrist_1_link_mom2 = forearm_link_pose3 * forearm_link_vel2;
+            let wrist_1_link_t23 = forearm_link_t3 * forearm_link_minus_hat_z;
             // wrist_2_link: momentum
-            let wrist_2_link_mom1 = A::fma_f64(-0.01778473500000001, wrist_1_link_vel4, wrist_2_link_mom0);
+            let wrist_2_link_t12 = A::fma_f64(-0.01778473500000001, wrist_1_link_minus_hat_z, wrist_2_link_t9);
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel3 = ground_vel3 - ground_vel6;
+            let forearm_link_omega_rz = upper_arm_link_v - forearm_link_minus_v;
             // wrist_1_link: momentum
-            let wrist_1_link_mom3 = A::fma_f64(0.07714261911624999, forearm_link_vel3, wrist_1_link_mom1);
-            let wrist_1_link_mom4 = forearm_link_pose3 * forearm_link_vel3;
+            let wrist_1_link_t24 = A::fma_f64(0.07714261911624999, forearm_link_omega_rz, wrist_1_link_t19);
+            let wrist_1_link_t25 = forearm_link_t3 * forearm_link_omega_rz;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel5 = A::fma_f64(wrist_1_link_pose2, forearm_link_vel3, forearm_link_vel1);
-            let wrist_1_link_vel6 = ground_vel8 + forearm_link_vel3;
+            let wrist_1_link_hat_y = A::fma_f64(wrist_1_link_t2, forearm_link_omega_rz, forearm_link_hat_y);
+            let wrist_1_link_omega_rz = wrist_1_link_v + forearm_link_omega_rz;
             // wrist_2_link: momentum
-            let wrist_2_link_mom2 = A::fma_f64(-wrist_2_link_pivot6, wrist_1_link_vel6, wrist_2_link_rest4);
+            let wrist_2_link_t13 = A::fma_f64(-wrist_2_link_mp_rx_ry, wrist_1_link_omega_rz, wrist_2_link_minus_dp_rx);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel1 = A::fma_f64(-wrist_2_link_pivot9, wrist_1_link_vel6, wrist_2_link_vel0);
+            let wrist_2_link_minus_omega_rz = A::fma_f64(-wrist_2_link_minus_k_ry, wrist_1_link_omega_rz, wrist_2_link_t10);
             // wrist_1_link: momentum
-            let wrist_1_link_mom5 = 0.01778473500000001 * wrist_1_link_vel6;
+            let wrist_1_link_t26 = 0.01778473500000001 * wrist_1_link_omega_rz;
             // wrist_2_link: momentum rate (4.36)
-            let wrist_2_link_pdot2 = A::fma_f64(wrist_1_link_vel6, wrist_2_link_pdot0, wrist_2_link_pdot1);
+            let wrist_2_link_t14 = A::fma_f64(wrist_1_link_omega_rz, wrist_2_link_t7, wrist_2_link_t11);
             // wrist_1_link: momentum
-            let wrist_1_link_mom6 = 0.01778473500000001 * wrist_1_link_vel1;
+            let wrist_1_link_t27 = 0.01778473500000001 * wrist_1_link_minus_omega_rx;
             // wrist_2_link: momentum
-            let wrist_2_link_mom3 = wrist_2_link_mom2 + wrist_2_link_mom1;
+            let wrist_2_link_t15 = wrist_2_link_t13 + wrist_2_link_t12;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot1 = A::fma_f64(-wrist_1_link_vel1, wrist_2_link_pdot2, tau_4);
+            let wrist_3_link_t3 = A::fma_f64(-wrist_1_link_minus_omega_rx, wrist_2_link_t14, tau_4);
             // wrist_1_link: momentum
-            let wrist_1_link_mom7 = A::fma_f64(wrist_1_link_pose1, wrist_1_link_mom6, -wrist_1_link_mom2);
+            let wrist_1_link_t28 = A::fma_f64(wrist_1_link_t1, wrist_1_link_t27, -wrist_1_link_t23);
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot2 = A::fma_f64(-wrist_1_link_vel6, wrist_2_link_mom2, wrist_3_link_pdot1);
+            let pd_4 = A::fma_f64(-wrist_1_link_omega_rz, wrist_2_link_t13, wrist_3_link_t3);
             // wrist_1_link: momentum
-            let wrist_1_link_mom8 = p_4 * wrist_1_link_sin0;
-            let wrist_1_link_mom9 = forearm_link_pose4 * shoulder_link_rest13;
-            let wrist_1_link_mom10 = forearm_link_pose4 * forearm_link_vel3;
-            let wrist_1_link_mom11 = A::fma_f64(-forearm_link_cos0, wrist_1_link_mom3, wrist_1_link_mom7);
+            let wrist_1_link_t29 = p_4 * wrist_1_link_sin;
+            let wrist_1_link_t30 = forearm_link_t4 * shoulder_link_t13;
+            let wrist_1_link_t31 = forearm_link_t4 * forearm_link_omega_rz;
+            let wrist_1_link_t32 = A::fma_f64(-forearm_link_cos, wrist_1_link_t24, wrist_1_link_t28);
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_vel4 = forearm_link_pose1 * ground_vel3;
+            let forearm_link_minus_hat_x = forearm_link_t1 * upper_arm_link_v;
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel2 = wrist_2_link_cos0 * wrist_1_link_vel1;
+            let wrist_2_link_t16 = wrist_2_link_cos * wrist_1_link_minus_omega_rx;
             // wrist_1_link: momentum
-            let wrist_1_link_mom12 = A::fma_f64(wrist_1_link_cos0, wrist_2_link_mom3, -wrist_1_link_mom8);
-            let wrist_1_link_mom13 = wrist_1_link_sin0 * wrist_1_link_mom5;
-            let wrist_1_link_mom14 = ground_pivot35 * wrist_1_link_mom9;
-            let wrist_1_link_mom15 = wrist_1_link_cos0 * wrist_1_link_mom5;
+            let wrist_1_link_t33 = A::fma_f64(wrist_1_link_cos, wrist_2_link_t15, -wrist_1_link_t29);
+            let wrist_1_link_t34 = wrist_1_link_sin * wrist_1_link_t26;
+            let wrist_1_link_t35 = ground_t38 * wrist_1_link_t30;
+            let wrist_1_link_t36 = wrist_1_link_cos * wrist_1_link_t26;
             // wrist_1_link: velocity and joint rate (4.40)
-            let wrist_1_link_vel7 = A::fma_f64(wrist_1_link_pose1, forearm_link_vel3, forearm_link_vel4);
+            let wrist_1_link_minus_hat_x = A::fma_f64(wrist_1_link_t1, forearm_link_omega_rz, forearm_link_minus_hat_x);
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot3 = A::fma_f64(9.81, wrist_1_link_inertia9, tau_2);
+            let wrist_3_link_t4 = A::fma_f64(9.81, forearm_link_minus_m_ry_z, tau_2);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel3 = A::fma_f64(-wrist_2_link_sin0, wrist_1_link_vel6, wrist_2_link_vel2);
+            let wrist_2_link_minus_omega_rx = A::fma_f64(-wrist_2_link_sin, wrist_1_link_omega_rz, wrist_2_link_t16);
             // wrist_1_link: momentum
-            let wrist_1_link_mom16 = A::fma_f64(0.10915, wrist_1_link_mom13, wrist_1_link_mom12);
-            let wrist_1_link_mom17 = wrist_1_link_mom13 - wrist_1_link_mom10;
-            let wrist_1_link_mom18 = wrist_1_link_mom6 - wrist_1_link_mom14;
-            let wrist_1_link_mom19 = wrist_1_link_mom15 + wrist_1_link_mom4;
+            let wrist_1_link_t37 = A::fma_f64(0.10915, wrist_1_link_t34, wrist_1_link_t33);
+            let wrist_1_link_t38 = wrist_1_link_t34 - wrist_1_link_t31;
+            let wrist_1_link_t39 = wrist_1_link_t27 - wrist_1_link_t35;
+            let wrist_1_link_t40 = wrist_1_link_t36 + wrist_1_link_t25;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot4 = A::fma_f64(-0.1744682503500001, wrist_1_link_sin0, tau_3);
-            let wrist_3_link_pdot5 = A::fma_f64(-forearm_link_vel4, wrist_1_link_mom17, wrist_3_link_pdot3);
+            let wrist_3_link_t5 = A::fma_f64(-0.1744682503500001, wrist_1_link_sin, tau_3);
+            let wrist_3_link_t6 = A::fma_f64(-forearm_link_minus_hat_x, wrist_1_link_t38, wrist_3_link_t4);
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia6 = 4.4329225 * upper_arm_link_cos0;
+            let forearm_link_t16 = 4.4329225 * upper_arm_link_cos;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel0 = 58.355064750790525 * p_5;
+            let wrist_3_link_t7 = 58.355064750790525 * p_5;
             // forearm_link: momentum
-            let forearm_link_mom4 = A::fma_f64(-forearm_link_pose1, wrist_1_link_mom18, forearm_link_mom3);
+            let forearm_link_t17 = A::fma_f64(-forearm_link_t1, wrist_1_link_t39, forearm_link_t14);
             // wrist_1_link: momentum
-            let wrist_1_link_mom20 = wrist_1_link_mom16 + wrist_1_link_mom11;
+            let wrist_1_link_t41 = wrist_1_link_t37 + wrist_1_link_t32;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot6 = wrist_3_link_inertia4 * wrist_2_link_vel3;
-            let wrist_3_link_pdot7 = wrist_3_link_inertia4 * wrist_2_link_vel1;
-            let wrist_3_link_pdot8 = A::fma_f64(-wrist_1_link_vel7, wrist_1_link_mom13, wrist_3_link_pdot4);
+            let wrist_3_link_t8 = wrist_3_link_minus_mp_rx_ry * wrist_2_link_minus_omega_rx;
+            let wrist_3_link_t9 = wrist_3_link_minus_mp_rx_ry * wrist_2_link_minus_omega_rz;
+            let wrist_3_link_t10 = A::fma_f64(-wrist_1_link_minus_hat_x, wrist_1_link_t34, wrist_3_link_t5);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel4 = wrist_1_link_cos0 * shoulder_link_rest13;
-            // shoulder_link: momentum remainder D, D' (4.45, 4.49)
-            let shoulder_link_rest14 = ground_pivot35 * shoulder_link_rest13;
+            let wrist_2_link_t17 = wrist_1_link_cos * shoulder_link_t13;
+            // shoulder_link: bias momentum D, D' (4.45, 4.49)
+            let shoulder_link_minus_v = ground_t38 * shoulder_link_t13;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot9 = A::fma_f64(-forearm_link_vel1, wrist_1_link_mom19, wrist_3_link_pdot5);
+            let wrist_3_link_t11 = A::fma_f64(-forearm_link_hat_y, wrist_1_link_t40, wrist_3_link_t6);
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_inertia7 = wrist_1_link_inertia9 + forearm_link_inertia6;
+            let upper_arm_link_minus_m_ry_z = forearm_link_minus_m_ry_z + forearm_link_t16;
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel1 = A::fma_f64(-wrist_2_link_sin0, wrist_1_link_vel1, wrist_3_link_vel0);
+            let wrist_3_link_t12 = A::fma_f64(-wrist_2_link_sin, wrist_1_link_minus_omega_rx, wrist_3_link_t7);
             // forearm_link: momentum
-            let forearm_link_mom5 = wrist_1_link_mom20 - forearm_link_mom4;
+            let forearm_link_t18 = wrist_1_link_t41 - forearm_link_t17;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot10 = A::fma_f64(-wrist_2_link_vel1, wrist_3_link_pdot0, wrist_3_link_pdot6);
-            let wrist_3_link_pdot11 = A::fma_f64(-wrist_2_link_vel1, wrist_3_link_pdot7, tau_5);
-            let wrist_3_link_pdot12 = A::fma_f64(9.81, forearm_link_inertia7, tau_1);
-            let wrist_3_link_pdot13 = A::fma_f64(-wrist_1_link_vel5, wrist_1_link_mom15, wrist_3_link_pdot8);
+            let wrist_3_link_t13 = A::fma_f64(-wrist_2_link_minus_omega_rz, wrist_3_link_t2, wrist_3_link_t8);
+            let wrist_3_link_t14 = A::fma_f64(-wrist_2_link_minus_omega_rz, wrist_3_link_t9, tau_5);
+            let wrist_3_link_t15 = A::fma_f64(9.81, upper_arm_link_minus_m_ry_z, tau_1);
+            let wrist_3_link_t16 = A::fma_f64(-wrist_1_link_hat_y, wrist_1_link_t36, wrist_3_link_t10);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel5 = ground_pivot35 * wrist_2_link_vel4;
+            let wrist_2_link_t18 = ground_t38 * wrist_2_link_t17;
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot14 = A::fma_f64(shoulder_link_rest14, wrist_1_link_mom20, wrist_3_link_pdot9);
+            let pd_2 = A::fma_f64(shoulder_link_minus_v, wrist_1_link_t41, wrist_3_link_t11);
             // wrist_3_link: velocity and joint rate (4.40)
-            let wrist_3_link_vel2 = A::fma_f64(-wrist_2_link_cos0, wrist_1_link_vel6, wrist_3_link_vel1);
+            let wrist_3_link_v = A::fma_f64(-wrist_2_link_cos, wrist_1_link_omega_rz, wrist_3_link_t12);
             // wrist_3_link: momentum rate (4.36)
-            let wrist_3_link_pdot15 = A::fma_f64(wrist_2_link_vel3, wrist_3_link_pdot10, wrist_3_link_pdot11);
-            let wrist_3_link_pdot16 = A::fma_f64(shoulder_link_rest14, forearm_link_mom5, wrist_3_link_pdot12);
-            let wrist_3_link_pdot17 = A::fma_f64(shoulder_link_rest14, wrist_1_link_mom16, wrist_3_link_pdot13);
+            let pd_5 = A::fma_f64(wrist_2_link_minus_omega_rx, wrist_3_link_t13, wrist_3_link_t14);
+            let pd_1 = A::fma_f64(shoulder_link_minus_v, forearm_link_t18, wrist_3_link_t15);
+            let pd_3 = A::fma_f64(shoulder_link_minus_v, wrist_1_link_t37, wrist_3_link_t16);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_vel6 = wrist_2_link_vel1 + wrist_2_link_vel5;
-            results[0][l] = -shoulder_link_rest14;
-            results[1][l] = ground_vel3;
-            results[2][l] = -ground_vel6;
-            results[3][l] = ground_vel8;
-            results[4][l] = -wrist_2_link_vel6;
-            results[5][l] = wrist_3_link_vel2;
+            let wrist_2_link_minus_v = wrist_2_link_minus_omega_rz + wrist_2_link_t18;
+            results[0][l] = -shoulder_link_minus_v;
+            results[1][l] = upper_arm_link_v;
+            results[2][l] = -forearm_link_minus_v;
+            results[3][l] = wrist_1_link_v;
+            results[4][l] = -wrist_2_link_minus_v;
+            results[5][l] = wrist_3_link_v;
             results[6][l] = tau_0;
-            results[7][l] = wrist_3_link_pdot16;
-            results[8][l] = wrist_3_link_pdot14;
-            results[9][l] = wrist_3_link_pdot17;
-            results[10][l] = wrist_3_link_pdot2;
-            results[11][l] = wrist_3_link_pdot15;
+            results[7][l] = pd_1;
+            results[8][l] = pd_2;
+            results[9][l] = pd_3;
+            results[10][l] = pd_4;
+            results[11][l] = pd_5;
         }
         qd.give(0, &results[0]);
         qd.give(1, &results[1]);
@@ -562,7 +562,7 @@ impl<const LANES: usize> Ur5FastLanes<LANES> {
         Ur5Fast::new().lanes()
     }
 
-    /// Rates of the state: `(q, p) → (q̇, ṗ)`.
+    /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     #[inline]
     pub fn rates(&self, q: &[[f64; LANES]; 6], p: &[[f64; LANES]; 6], qd: &mut [[f64; LANES]; 6], pd: &mut [[f64; LANES]; 6]) {
         ::multibody::runtime::kernel::call_lanes::<Ur5Fast, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
@@ -595,10 +595,12 @@ impl ::multibody::runtime::System for Ur5Fast {
     type Coordinates = [f64; 6];
     type Momenta = [f64; 6];
 
+    #[inline]
     fn neutral(&self) -> [f64; 6] {
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     }
 
+    #[inline]
     fn zero_momenta(&self) -> [f64; 6] {
         [0.0; 6]
     }
@@ -611,6 +613,14 @@ impl ::multibody::runtime::System for Ur5Fast {
     #[inline]
     fn rates_at(&mut self, _t: f64, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         Self::rates(self, q, p, qd, pd);
+    }
+
+    #[inline]
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+        match part {
+            ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
+            ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },
+        }
     }
 
     #[inline]

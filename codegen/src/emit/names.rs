@@ -78,7 +78,11 @@ impl Names {
                 (Op::Input(k), _) => self.unique(input(k as usize)),
                 (Op::Sin(_), _) => self.unique(format!("{}_sin", body(*node))),
                 (Op::Cos(_), _) => self.unique(format!("{}_cos", body(*node))),
-                (_, Some(name)) => self.unique(format!("{}_{}", body(name.node), component(&name))),
+                (_, Some(name)) => self.unique(match name.entry {
+                    Entry::Axes(_) => format!("{}_{}", body(name.node), component(&name)),
+                    // Results are not of one body.
+                    Entry::Number(_) | Entry::Pair(..) => component(&name),
+                }),
                 (_, None) => self.numbered(format!("{}_t", body(*node)), 0),
             };
             names.insert(*id, name);
