@@ -1,3 +1,3 @@
-multibody::mbd_model! { path = "main.rs", name = Arm }
+multibody::mbd_model! { path = "unknown_format.rs", name = Arm }
 
 fn main() {}
