@@ -1,0 +1,65 @@
+//! Plans with eliminations drawn at random: what the search would find, layouts that no search picks, and none of its time.
+
+use mbd_codegen::model::Model;
+use mbd_codegen::options::{EliminationStrategy, PlanOptions, RolledCode};
+use mbd_codegen::plan::{parallel_runs, tip_chains, ChainElimination, Plan};
+use mbd_codegen::search;
+
+use crate::random::Rng;
+
+/// A plan whose freedoms are eliminated one by one or together, at random.
+pub fn random_plan(model: &Model, seed: u64) -> Plan {
+    random_plan_snapped(model, PlanOptions::default().snap, seed)
+}
+
+/// The same with [`PlanOptions::snap`] given, rad.
+pub fn random_plan_snapped(model: &Model, snap: f64, seed: u64) -> Plan {
+    let single = PlanOptions {
+        snap,
+        elimination: EliminationStrategy::Single,
+        rolled: RolledCode::Never,
+        accelerations: false,
+        mass_matrix: false,
+    };
+    let single = search::plan(model, single);
+    let mut rng = Rng::new(seed, 20);
+    let mut plan = eliminated(&single, &mut rng);
+    if rng.chance(0.5) {
+        plan.accelerations = Some(Box::new(eliminated(&single, &mut rng)));
+    }
+    plan
+}
+
+/// The plan with an elimination drawn for each of its chains, frames, closed loops, and for the mass matrix.
+fn eliminated(single: &Plan, rng: &mut Rng) -> Plan {
+    let mut plan = single.clone();
+    plan.matrix_depth = rng.below(plan.nodes.len() + 1);
+    for run in parallel_runs(single) {
+        let non_rotating = rng.chance(0.5);
+        run.iter().for_each(|&i| plan.nodes[i].elimination.non_rotating = non_rotating);
+    }
+    for chain in tip_chains(single) {
+        let from_ground = plan.nodes[chain[0]].parent.is_none();
+        random_chain(chain.len(), from_ground, rng).apply(&mut plan, &chain);
+    }
+    let accumulates = rng.chance(0.5);
+    for i in single.constraints.iter().flat_map(|c| c.cycle()) {
+        if plan.nodes[i].kind.nv() == 1 {
+            plan.nodes[i].elimination.accumulates_momentum = accumulates;
+        }
+    }
+    plan
+}
+
+/// An elimination for a chain of `len` joints; `from_ground` tells whether it starts there.
+fn random_chain(len: usize, from_ground: bool, rng: &mut Rng) -> ChainElimination {
+    let base = if rng.chance(0.3) { len - 1 } else { rng.below(len) };
+    let split = match from_ground {
+        true if rng.chance(0.3) => base,
+        true if rng.chance(0.4) => rng.below(base + 1),
+        _ => 0,
+    };
+    let accumulating = split + rng.below(len - split + 1);
+    let before_joint = (0..len).map(|_| rng.chance(0.5)).collect();
+    ChainElimination { split, base, before_joint, accumulating, rolled: false }
+}
