@@ -6,6 +6,7 @@ pub use crate::error::GenerateError;
 use crate::model::Model;
 pub use crate::options::{Arithmetic, Options, Precision, RolledCode};
 pub use crate::output::{InputArray, Output, OutputProgram};
+use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::Counts;
 pub use crate::trace::{chosen_frames, trace};
@@ -30,7 +31,14 @@ pub struct Generated {
 /// code (a freedom without inertia, which the checks cannot see where parameters are involved).
 pub fn generate(model: &Model, options: &Options) -> Result<Generated, GenerateError> {
     let options = &options.of_model(!model.constraints.is_empty());
-    let plan = &search::plan(model, options.searches());
+    generate_from(&search::plan(model, options.searches()), options)
+}
+
+/// Generates code with the eliminations of a plan; [`Options::plan`] has no part in it.
+///
+/// # Errors
+/// The same as of [`generate`].
+pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, GenerateError> {
     let programs =
         options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
     let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();

@@ -3,10 +3,8 @@
 use mbd_codegen::model::{
     Constraint, ConstraintKind, JointKind, JointMotion, LoopKind, Model, Mount, Param, Placement, Rotation, Value,
 };
-use mbd_codegen::options::RolledCode;
-use mbd_codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use mbd_codegen::options::DEFAULT_SNAP;
 use mbd_codegen::plan::Plan;
-use mbd_codegen::search;
 use mbd_runtime::spatial::{add3, dot3, scale3, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
@@ -117,7 +115,7 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
     if distribution.planar {
         flatten(&mut tree, &mut rng);
     }
-    let open = search::plan(&tree, PLAIN);
+    let open = Plan::new(&tree, DEFAULT_SNAP);
     let mut state = random_state(&open, own);
     let mut frames = vec![FrameState::ground(); open.frames.len()];
     state.interpreter(&open).frames(&state.q, &state.v, &mut frames);
@@ -141,14 +139,6 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
     Some(LoopSystem { seed, model, open, state })
 }
 
-/// Elimination one joint at a time: a reference must not depend on the search for an elimination.
-const PLAIN: PlanOptions = PlanOptions {
-    snap: DEFAULT_SNAP,
-    elimination: EliminationStrategy::Single,
-    accelerations: false,
-    mass_matrix: false,
-    rolled: RolledCode::Never,
-};
 
 /// A row of unit length depends on other rows if less than this remains of it after their elimination.
 const RANK: f64 = 1e-7;

@@ -1,7 +1,7 @@
 //! Plans with eliminations drawn at random: what the search would find, layouts that no search picks, and none of its time.
 
 use mbd_codegen::model::Model;
-use mbd_codegen::options::{EliminationStrategy, PlanOptions, RolledCode};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions, RolledCode, DEFAULT_SNAP};
 use mbd_codegen::plan::{parallel_runs, tip_chains, ChainElimination, Plan};
 use mbd_codegen::search;
 
@@ -9,7 +9,7 @@ use crate::random::Rng;
 
 /// A plan whose freedoms are eliminated one by one or together, at random.
 pub fn random_plan(model: &Model, seed: u64) -> Plan {
-    random_plan_snapped(model, PlanOptions::default().snap, seed)
+    random_plan_snapped(model, DEFAULT_SNAP, seed)
 }
 
 /// The same with [`PlanOptions::snap`] given, rad.

@@ -1,13 +1,13 @@
 //! The interpreter and the integrators allocate when they are made, never afterwards.
 
 use allocation_counter::measure;
-use mbd_codegen::search;
 use mbd_runtime::integrate::{
     Ab6, Abm8, Direction, EnergyProjection, Events, Gauss12FixedPoint, ImplicitMidpoint, Outcome, Radau5, Rk4, Rodas5P,
     Solver, Step, StepError, Stepper, Tolerances, Tsit5, VariableAdams, Verner9, Watch,
 };
 use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::Interpreter;
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 
@@ -19,7 +19,7 @@ fn the_counter_counts() {
 #[test]
 fn nothing_is_allocated_after_construction() {
     for seed in 0..200 {
-        let plan = search::plan(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
+        let plan = random_plan(&random_model(seed, &Distribution::everything(seed, 8)), seed);
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let (nq, nv) = (plan.dims.nq, plan.dims.nv);
@@ -77,7 +77,7 @@ impl Events<Interpreter<f64>, 2> for Back {
 fn nor_do_runs_with_events_allocate() {
     fn run<M: Stepper<Interpreter<f64>>>(seed: u64, method: impl Fn(&Interpreter<f64>) -> M) {
         let distribution = Distribution { bodies: (3, 4), armature: 0.5, ..Distribution::default() };
-        let plan = search::plan(&random_model(seed, &distribution), Default::default());
+        let plan = random_plan(&random_model(seed, &distribution), seed);
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
@@ -119,7 +119,7 @@ fn second_step<M: Stepper<Interpreter<f64>>>(i: &mut Interpreter<f64>, mut metho
 #[test]
 fn implicit_steps_allocate_nothing() {
     for seed in 0..40 {
-        let plan = search::plan(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
+        let plan = random_plan(&random_model(seed, &Distribution::everything(seed, 8)), seed);
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; plan.dims.nv];
@@ -138,7 +138,7 @@ fn implicit_steps_allocate_nothing() {
 #[test]
 fn multistep_methods_allocate_nothing() {
     for seed in 0..20 {
-        let plan = search::plan(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
+        let plan = random_plan(&random_model(seed, &Distribution::everything(seed, 8)), seed);
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let (mut q, mut p) = (s.q.clone(), vec![0.0; plan.dims.nv]);

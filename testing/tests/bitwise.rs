@@ -8,11 +8,12 @@ mod common;
 use std::collections::HashMap;
 
 use common::Emitted;
-use mbd_codegen::generate::{generate, Arithmetic, Options, Output};
+use mbd_codegen::generate::{generate_from, Arithmetic, Options, Output};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::search;
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
 use mbd_runtime::{Interpreter, System};
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
@@ -39,8 +40,12 @@ impl Case {
             efforts: rng.chance(0.8),
             ..Options::default()
         };
-        let plan = search::plan(&model, options.plan);
-        let source = generate(&model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
+        // Every tenth is laid out by the search.
+        let plan = match seed % 10 {
+            0 => search::plan(&model, options.searches()),
+            _ => random_plan(&model, seed),
+        };
+        let source = generate_from(&plan, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         Case { seed, plan, efforts: options.efforts, derivatives, emitted: Emitted::parse(&source) }
     }
 

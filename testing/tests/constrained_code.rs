@@ -8,13 +8,14 @@ mod common;
 use std::collections::HashMap;
 
 use common::Emitted;
-use mbd_codegen::generate::{generate, Arithmetic, Options, Output};
+use mbd_codegen::generate::{generate, generate_from, Arithmetic, Options, Output};
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::search;
 use mbd_codegen::{GenerateError, RolledCode};
 use mbd_runtime::{Accelerated, Constrained, Dual, Interpreter, Scalar, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::Rng;
 use mbd_testing::state::State;
 
@@ -49,9 +50,13 @@ impl Case {
         let mut options =
             Options { arithmetic: Arithmetic::Exact, outputs, efforts: rng.chance(0.7), ..Options::default() };
         options.plan.rolled = RolledCode::Never;
-        let plan = search::plan(&system.model, options.searches());
+        // Every fifth is laid out by the search.
+        let plan = match seed % 5 {
+            0 => search::plan(&system.model, options.searches()),
+            _ => random_plan(&system.model, seed),
+        };
         system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
-        let source = generate(&system.model, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
+        let source = generate_from(&plan, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         let mut state = system.state;
         if !options.efforts {
             state.tau.fill(0.0);

@@ -10,6 +10,7 @@ use mbd_codegen::search;
 use mbd_runtime::constrained::CoordinatePartition;
 use mbd_runtime::{Accelerated, Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
+use mbd_testing::eliminations::random_plan_snapped;
 use mbd_testing::random::Distribution;
 use mbd_testing::state::State;
 use mbd_testing::substituted;
@@ -151,15 +152,9 @@ fn parameters_of_constraints_are_as_good_as_constants() {
         let distribution = LoopKnobs { tree: Distribution { params: 0.4, ..distribution.tree }, ..distribution };
         let Some(c) = apart(seed, random_loops(seed, &distribution)) else { continue };
         met += 1;
-        let options = PlanOptions {
-            snap: 0.0,
-            elimination: EliminationStrategy::Single,
-            accelerations: false,
-            ..PlanOptions::default()
-        };
         let s = &c.system.state;
-        let ours = results(&search::plan(&c.system.model, options), s, c.p.as_slice());
-        let plain = search::plan(&substituted(&c.system.model, &s.params), options);
+        let ours = results(&random_plan_snapped(&c.system.model, 0.0, seed), s, c.p.as_slice());
+        let plain = random_plan_snapped(&substituted(&c.system.model, &s.params), 0.0, seed + SYSTEMS);
         let s = State { params: Vec::new(), ..s.clone() };
         let d = difference(&ours, &results(&plain, &s, c.p.as_slice()));
         assert!(d < 1e-10, "seed {seed}: {d:e}");

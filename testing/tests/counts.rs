@@ -3,6 +3,7 @@
 use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
 use mbd_codegen::search;
 use mbd_codegen::symbolic::Counts;
 use mbd_codegen::{Arithmetic, Options, Output};
@@ -110,7 +111,7 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
 fn efforts_cost_one_addition_each() {
     for seed in 0..100 {
         let model = random_model(seed, &Distribution::everything(seed, 6));
-        let nv = search::plan(&model, Options::default().plan).dims.nv;
+        let nv = Plan::new(&model, 0.0).dims.nv;
         let [with, without] = [true, false].map(|efforts| program(&model, Output::Rates, efforts).counts());
         assert!(with.additions <= without.additions + nv, "seed {seed}");
         assert_eq!((with.multiplications, with.divisions), (without.multiplications, without.divisions), "seed {seed}");

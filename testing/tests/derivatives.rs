@@ -3,7 +3,7 @@
 //! The reference runs the sweep for the rates (another factorisation, other formulas) on `q + ε N(q) e_k` and `p + ε e_k`.
 
 use mbd_codegen::model::{Model, Value};
-use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::options::{PlanOptions, DEFAULT_SNAP};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::search;
@@ -11,6 +11,7 @@ use mbd_runtime::sweep::{Derivatives, MomentumDerivatives, Sweeps};
 use mbd_runtime::tree::Kind;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Interpreter, System};
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
@@ -37,16 +38,15 @@ struct Case {
 impl Case {
     /// A tree whose freedoms are eliminated in one of the ways there are.
     fn new(seed: u64) -> Case {
-        Case::formed(seed, EliminationStrategy::ALL[seed as usize % 3])
+        let model = Case::model(seed);
+        Case::of(random_plan(&model, seed), seed)
     }
 
-    fn formed(seed: u64, forms: EliminationStrategy) -> Case {
-        let model = random_model(seed, &Distribution::everything(seed, [3, 5, 8, 14][seed as usize % 4]));
-        Case::of_model(&model, seed, forms)
+    fn model(seed: u64) -> Model {
+        random_model(seed, &Distribution::everything(seed, [3, 5, 8, 14][seed as usize % 4]))
     }
 
-    fn of_model(model: &Model, seed: u64, forms: EliminationStrategy) -> Case {
-        let plan = search::plan(model, PlanOptions { elimination: forms, ..PlanOptions::default() });
+    fn of(plan: Plan, seed: u64) -> Case {
         let s = random_state(&plan, seed);
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; plan.dims.nv];
@@ -184,7 +184,7 @@ fn conservative_trees_with_coordinate_rates_are_canonical() {
         let mut model = random_model(seed, &Distribution::everything(seed, 6));
         model.wrenches.clear();
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
-        let plan = search::plan(&model, Default::default());
+        let plan = random_plan(&model, seed);
         if plan.tree::<f64>(&plan.default_params()).nodes.iter().any(|n| n.kind.nv() > 1) {
             continue;
         }
@@ -232,7 +232,10 @@ fn forms_do_not_matter() {
     let mut met = [0; 6];
     let mut worst = 0.0_f64;
     for seed in 0..TREES / 2 {
-        let [c, others @ ..] = EliminationStrategy::ALL.map(|forms| Case::formed(seed, forms));
+        let model = Case::model(seed);
+        let [c, others @ ..] =
+            [Plan::new(&model, DEFAULT_SNAP), random_plan(&model, seed), random_plan(&model, seed + TREES)]
+                .map(|plan| Case::of(plan, seed));
         for other in &others {
             let ours = [&c.d.v, &c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq, &c.d.dpd_dp];
             let theirs = [&other.d.v, &other.d.pd, &other.d.dv_dq, &other.d.dv_dp, &other.d.dpd_dq, &other.d.dpd_dp];
@@ -259,9 +262,10 @@ fn forms_do_not_matter() {
         let model = read::model(file, &text, &ImportOptions { base: Base::Fixed, gravity: None })
             .unwrap_or_else(|findings| panic!("{findings}"))
             .model;
+        let fastest = search::plan(&model, PlanOptions::default());
         for seed in 0..20 {
-            let [a, b] = [EliminationStrategy::Fastest, EliminationStrategy::Single]
-                .map(|forms| Case::of_model(&model, seed, forms));
+            let plans = [fastest.clone(), Plan::new(&model, DEFAULT_SNAP)];
+            let [a, b] = plans.map(|plan| Case::of(plan, seed));
             let [ours, theirs] = [&a, &b].map(|c| [&c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq]);
             for (ours, theirs) in ours.into_iter().zip(theirs) {
                 worst = worst.max(a.worst(file, ours, theirs));

@@ -1,14 +1,13 @@
 //! The same mechanism described in two ways moves in one way.
 
 use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
-use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
-use mbd_codegen::search;
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Source;
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Interpreter;
+use mbd_testing::eliminations::{random_plan, random_plan_snapped};
 use mbd_testing::newton::joint_rates;
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{random_state, State};
@@ -80,9 +79,9 @@ fn parameters_are_as_good_as_constants() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
         let model = random_model(seed, &Distribution { params: 0.4, ..Distribution::everything(seed, 8) });
-        let plan = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let plan = random_plan_snapped(&model, 0.0, seed);
         let s = random_state(&plan, seed);
-        let plain = search::plan(&substituted(&model, &s.params), PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let plain = random_plan_snapped(&substituted(&model, &s.params), 0.0, seed + TREES);
         let mut s2 = s.clone();
         s2.params.clear();
         worst = worst.max(compare(seed, &model, &results(&plan, &s), &results(&plain, &s2), 1e-11));
@@ -96,7 +95,7 @@ fn regrouped_trees_move_as_described_ones() {
     let mut worst = 0.0_f64;
     for seed in 0..TREES {
         let model = random_model(seed, &Distribution::everything(seed, 8));
-        let plan = search::plan(&model, PlanOptions::default());
+        let plan = random_plan(&model, seed);
         let s = random_state(&plan, seed);
         let regrouped = results(&plan, &s);
         let tree = plan.tree(&s.params);
@@ -141,7 +140,7 @@ fn mimics_are_projections_of_free_joints() {
     let (mut worst, mut seen) = (0.0_f64, 0);
     for seed in 0..2 * TREES {
         let model = random_model(seed, &Distribution { mimic: 0.7, ..Distribution::everything(seed, 8) });
-        let plan = search::plan(&model, PlanOptions::default());
+        let plan = random_plan(&model, seed);
         seen += usize::from(!plan.unknowns.is_empty());
         let s = random_state(&plan, seed);
         let mut released = model.clone();
@@ -150,7 +149,7 @@ fn mimics_are_projections_of_free_joints() {
                 joint.motion = JointMotion::Free;
             }
         }
-        let free = search::plan(&released, PlanOptions::default());
+        let free = random_plan(&released, seed + TREES);
         let n = free.dims.nv;
         let at = |v: &[f64], drive: &[f64]| on_free(&free, &joint_rates(&plan, &s.params, v, drive));
         let mut s_free = s.clone();
@@ -243,8 +242,8 @@ fn snapping_changes_no_more_than_the_angles() {
                 *angle = Value::Const(value(*angle, &[]) + rng.around(OFF));
             }
         }
-        let snapped = search::plan(&model, PlanOptions::default());
-        let exact = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+        let snapped = random_plan(&model, seed);
+        let exact = random_plan_snapped(&model, 0.0, seed);
         noticed += usize::from(!snapped.notices.is_empty());
         assert!(exact.notices.is_empty(), "seed {seed}: {:?}", exact.notices);
         let s = random_state(&exact, seed);
@@ -269,7 +268,7 @@ fn coupled_pendulums_on_the_ground_feel_gravity() {
     let acceleration = |text: &str| {
         let read =
             read::model("pendulum.toml", text, &Default::default()).unwrap_or_else(|findings| panic!("{findings}"));
-        let plan = search::plan(&read.model, PlanOptions::default());
+        let plan = Plan::new(&read.model, 0.0);
         let mut i: Interpreter<f64> = plan.interpreter(&[]);
         let mut a = [0.0];
         i.accelerations(&[0.4], &[0.7], &mut a);

@@ -1,16 +1,15 @@
 //! Penalties in place of multipliers: rows give way by `σ/α`, and less the larger the weight.
 
-use mbd_codegen::options::PlanOptions;
-use mbd_codegen::search;
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
+use mbd_testing::eliminations::random_plan;
 
 #[test]
 fn rows_give_way_as_their_weight_says() {
     let mut looked = 0;
     for seed in 0..40 {
         let system = random_loops(seed, &LoopKnobs::plain());
-        let plan = search::plan(&system.model, PlanOptions::default());
+        let plan = random_plan(&system.model, seed);
         let params = plan.default_params();
         let tree = plan.tree(&params);
         if tree.constraints.is_empty() || tree.dims.drive_v > 0 {

@@ -266,7 +266,7 @@ impl PlanConstraint {
     }
 
     /// Nodes whose freedoms it binds.
-    pub(crate) fn cycle(&self) -> Vec<usize> {
+    pub fn cycle(&self) -> Vec<usize> {
         self.bond.cycle()
     }
 

@@ -1,10 +1,10 @@
 //! Random trees of everything in a random state, with their motion.
 
 use mbd_codegen::plan::Plan;
-use mbd_codegen::search;
 use mbd_runtime::spatial::{cross, Motion};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::{Dual, Interpreter, System};
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::newton;
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
@@ -30,7 +30,7 @@ pub struct Case {
 
 impl Case {
     pub fn new(seed: u64) -> Case {
-        let plan = search::plan(&random_model(seed, &Distribution::everything(seed, 8)), Default::default());
+        let plan = random_plan(&random_model(seed, &Distribution::everything(seed, 8)), seed);
         let s = random_state(&plan, seed);
         Case::of(seed, plan, s)
     }

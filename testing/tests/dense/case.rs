@@ -1,10 +1,9 @@
 //! Random systems in a state, and what is compared of them.
 
-use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
-use mbd_codegen::search;
 use mbd_runtime::{Constrained, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
+use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::{Distribution, Rng};
 
 use super::{Matrix, Truth, Vector};
@@ -42,16 +41,7 @@ pub fn system(seed: u64) -> LoopSystem {
 }
 
 pub fn plan_of(system: &LoopSystem, seed: u64) -> Plan {
-    // Most as they stand; some as the search lays them out.
-    let forms = if seed.is_multiple_of(7) {
-        EliminationStrategy::ALL[seed as usize / 7 % 3]
-    } else {
-        EliminationStrategy::Single
-    };
-    let searched = forms != EliminationStrategy::Single;
-    let options =
-        PlanOptions { elimination: forms, accelerations: searched, mass_matrix: false, ..PlanOptions::default() };
-    search::plan(&system.model, options)
+    random_plan(&system.model, seed)
 }
 
 impl Case {
