@@ -139,7 +139,6 @@ fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSy
     Some(LoopSystem { seed, model, open, state })
 }
 
-
 /// A row of unit length depends on other rows if less than this remains of it after their elimination.
 const RANK: f64 = 1e-7;
 
