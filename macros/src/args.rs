@@ -1,4 +1,4 @@
-//! Arguments of the macro: `key = value` pairs, each understood by itself so that all errors come at once.
+//! Arguments of the macro: `key = value` pairs, each parsed separately, so that all errors are reported at once.
 
 use mbd_codegen::import::words::{did_you_mean, list, quote};
 use mbd_codegen::import::Base;
@@ -9,7 +9,7 @@ use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 use crate::literal;
 use crate::message::{Message, Place};
 
-/// Where the description stands.
+/// Source of the description.
 #[derive(Clone, Debug)]
 pub enum Source {
     /// In a file.
@@ -20,7 +20,7 @@ pub enum Source {
     Urdf(String),
 }
 
-/// Name of the type and what stands before it.
+/// Name of the type, with attributes and visibility.
 #[derive(Clone, Debug)]
 pub struct Name {
     /// Attributes.
@@ -31,7 +31,7 @@ pub struct Name {
     pub ident: Ident,
 }
 
-/// All arguments, as far as they could be understood.
+/// All arguments that could be parsed.
 #[derive(Clone, Debug, Default)]
 pub struct Args {
     /// The description, and the literal that states it.
@@ -44,7 +44,7 @@ pub struct Args {
     pub gravity: Option<[f64; 3]>,
     /// Frames by name.
     pub frames: Vec<(String, Place)>,
-    /// What goes to the generator as it is.
+    /// Options that are passed to the generator unchanged.
     pub options: Options,
     /// Path of the runtime crate.
     pub runtime: Option<TokenStream>,
@@ -76,7 +76,7 @@ fn segments(tokens: Vec<TokenTree>) -> Vec<Vec<TokenTree>> {
     tokens.split(comma).filter(|s| !s.is_empty()).map(<[TokenTree]>::to_vec).collect()
 }
 
-/// Tokens without the invisible groups that a surrounding `macro_rules!` puts around its fragments.
+/// Tokens without the invisible groups that a surrounding `macro_rules!` adds to its fragments.
 fn visible(tokens: TokenStream) -> Vec<TokenTree> {
     let mut out = Vec::new();
     for token in tokens {
@@ -120,7 +120,7 @@ pub fn parse(input: TokenStream, errors: &mut Vec<Message>) -> Args {
         seen.push(word);
     }
     let given = |keys: &[&str]| keys.iter().any(|k| seen.iter().any(|s| s == k));
-    // What is missing may be what is misspelt: one message is enough then.
+    // A missing argument may be a misspelt one, for which there is a message already.
     let unnamed = errors.len() > clean;
     if !unnamed && !given(&["path", "toml", "urdf"]) {
         let help = format!("add `path = \"...\"`, {EXAMPLE}, or `toml = \"...\"` with the description itself");

@@ -1,4 +1,4 @@
-//! From the arguments to the expansion.
+//! Expansion of the macro.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,8 @@ use crate::args::{self, Args, Name, Source};
 use crate::message::{Message, Place};
 use crate::stub;
 
-/// Stands for the path of the runtime until the text has become tokens: a path like `$crate::runtime` has none.
+/// Placeholder for the path of the runtime, until the text has been parsed into tokens: a path like `$crate::runtime`
+/// cannot be written as text.
 const RUNTIME: &str = "__mbd_runtime";
 
 /// The expansion of `mbd_model! { input }`.
@@ -55,9 +56,9 @@ pub fn expand(input: TokenStream) -> TokenStream {
     out
 }
 
-/// A description and where it came from.
+/// A description and its source.
 struct Text {
-    /// What the findings call it, the format as its extension.
+    /// Its name in findings; the extension is the format.
     label: String,
     /// The description.
     text: String,
@@ -126,20 +127,20 @@ impl Text {
 
     fn load(&self, args: &Args) -> (Option<Model>, Vec<Diagnostic>) {
         let base = args.base.map_or(Base::default(), |(base, _)| base);
-        // Said at the argument itself.
+        // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
         let (model, findings) = load(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
         (model, findings.0)
     }
 
-    /// Has the compiler look at the file again when it changes.
+    /// Makes the compiler read the file again when it changes.
     fn tracked(&self) -> TokenStream {
         let path = self.file.as_deref().and_then(Path::to_str).map(|p| Literal::string(p).to_string());
         let text = path.map(|p| format!("const _: &[u8] = ::core::include_bytes!({p});"));
         text.and_then(|t| t.parse().ok()).unwrap_or_default()
     }
 
-    /// A macro has no warnings of its own; the use of something deprecated is one, with a text.
+    /// A macro cannot issue warnings; the use of a deprecated item is a warning with a text.
     fn warnings(&self, findings: &[Diagnostic]) -> TokenStream {
         let mut out = TokenStream::new();
         for d in findings.iter().filter(|d| d.severity == Severity::Warning) {
@@ -160,7 +161,7 @@ impl Text {
     }
 }
 
-/// Makes errors of the findings, and checks the arguments that depend on the model.
+/// Converts findings to errors, and checks the arguments that depend on the model.
 fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut Args, errors: &mut Vec<Message>) {
     if let (true, Some((Base::Floating | Base::Planar, place))) = (text.is_toml(), args.base) {
         let help = "leave `base` out; in the description the joints to `ground` say how the model is attached";
@@ -170,7 +171,7 @@ fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut
         let (message, help) = text.shown(d);
         errors.push(Message::new(text.place, message, help));
     }
-    // Whoever names frames wants them.
+    // Naming frames requests the output `frames`.
     if !args.frames.is_empty() && !args.options.outputs.iter().any(|output| output.spec().of_frames()) {
         args.options.outputs.push(Output::Frames);
     }

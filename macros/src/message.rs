@@ -2,7 +2,7 @@
 
 use proc_macro2::{Delimiter, Group, Ident, Literal, Punct, Spacing, Span, TokenStream, TokenTree};
 
-/// The first and the last token that something is said about.
+/// The first and the last token to which a message refers.
 #[derive(Clone, Copy, Debug)]
 pub struct Place(pub Span, pub Span);
 
@@ -22,7 +22,7 @@ impl From<Span> for Place {
     }
 }
 
-/// One error: what, where, what to do.
+/// One error: what is wrong, where, and what to do.
 #[derive(Clone, Debug)]
 pub struct Message {
     /// Tokens that are underlined.

@@ -1,4 +1,4 @@
-//! What stands in for a type that could not be made, so that its uses add no errors of their own.
+//! A substitute for a type that could not be generated, so that its uses cause no further errors.
 
 use mbd_codegen::output::{Array, Field, Output, Sizes, Spec, COORDINATE_RATES, FIELDS};
 use mbd_codegen::Options;

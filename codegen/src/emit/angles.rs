@@ -25,12 +25,12 @@ pub fn nodes(op: &Op) -> impl Iterator<Item = u32> {
     op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None })
 }
 
-/// What is computed before the sines and cosines, and what after them.
+/// Division of a program into the part before its sines and cosines and the part after them.
 #[derive(Default)]
 pub struct Angles {
-    /// Angles that follow from inputs by sums and products.
+    /// Angles that depend on inputs by sums and products only.
     pub early: Pairs,
-    /// The others.
+    /// The other angles.
     pub late: Pairs,
     /// Nodes that early angles need.
     pub before: BTreeSet<u32>,
@@ -39,9 +39,9 @@ pub struct Angles {
 }
 
 impl Angles {
-    /// Of a program.
+    /// Divides a program.
     pub fn new(program: &Program) -> Angles {
-        // Nodes that do not follow from inputs by sums and products.
+        // Nodes that do not depend on inputs by sums and products only.
         let mut involved = BTreeSet::new();
         for (id, op, _) in &program.steps {
             let functions = matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_));

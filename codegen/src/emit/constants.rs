@@ -11,7 +11,7 @@ use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
 
-/// Constants on their way into the source.
+/// Writer of constants.
 struct Constants<'a> {
     out: &'a mut String,
 }
@@ -54,7 +54,7 @@ pub fn constants(out: &mut String, plan: &Plan, options: &Options, frames: &[usi
     indices(&mut constants, plan, options, frames);
 }
 
-/// Rows of the constraints, and where their entries stand.
+/// Rows of the constraints, and the places of their entries.
 fn row_constants(constants: &mut Constants, plan: &Plan, options: &Options, rows: &[Row]) {
     let (rt, columns) = (&options.runtime, plan.entry_columns());
     constants.one("Number of rows of the constraints.", "ROWS", "usize", &rows.len().to_string());

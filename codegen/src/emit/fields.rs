@@ -15,12 +15,12 @@ pub struct Field {
     pub name: &'static str,
     /// Lengths, the outermost first.
     pub dims: Vec<usize>,
-    /// What the constructor puts there.
+    /// Initial value in the constructor.
     value: String,
     doc: &'static str,
 }
 
-/// Fields that are there.
+/// The fields of a type.
 pub fn fields(plan: &Plan, sizes: &Sizes) -> Vec<Field> {
     let present = FIELDS.into_iter().filter(|field| field.array.len(sizes) > 0);
     let field = present.map(|field| {
@@ -48,7 +48,7 @@ pub fn neutral(plan: &Plan, drives: bool) -> String {
     format!("[{}]", numbers.join(", "))
 }
 
-/// The type with its fields; entries are of a type.
+/// The type with its fields, whose entries have type `entry`.
 pub fn type_definition(out: &mut String, ty: &str, fields: &[Field], entry: &str) {
     let _ = writeln!(out, "#[derive(Clone, Debug, PartialEq)]\n#[rustfmt::skip]\npub struct {ty} {{");
     for Field { name, dims, doc, .. } in fields {

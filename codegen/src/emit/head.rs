@@ -1,4 +1,4 @@
-//! What every function begins with, and what every body is written with.
+//! The head of every function, and the writer of statements for every body.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -9,25 +9,25 @@ use crate::options::{Arithmetic, Options};
 use crate::output::InputArray;
 use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
 
-/// Statements up to which a function is inlined: small kernels melt into the caller's loop.
+/// Largest number of statements of a function that is inlined, so that small kernels become part of the caller's loop.
 const INLINED: usize = 300;
 
 /// A function and its kernel before their bodies are written.
 pub struct Head<'a> {
-    /// How code is generated.
+    /// Options of the generator.
     pub options: &'a Options,
     /// Number of the kernel.
     pub id: usize,
     /// The function.
     pub signature: &'a Signature,
-    /// What the kernel reads and writes.
+    /// Arrays that the kernel reads and writes.
     pub ports: &'a [Port],
-    /// Arrays that the inputs of the program stand in.
+    /// Arrays of the program's inputs.
     pub inputs: &'a [InputArray],
 }
 
 impl Head<'_> {
-    /// Whether the kernel computes what the target computes best; otherwise the same everywhere.
+    /// Whether the kernel uses the best arithmetic of the target; otherwise it gives the same bits everywhere.
     fn chooses(&self) -> bool {
         self.options.arithmetic == Arithmetic::Fast
     }
@@ -72,7 +72,7 @@ impl Head<'_> {
         self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
     }
 
-    /// A kernel's own array.
+    /// A local array of the kernel.
     pub fn rows(&self, n: usize) -> String {
         format!("{}::kernel::Rows([[0.0; LANES]; {n}])", self.options.runtime)
     }
@@ -136,7 +136,7 @@ impl Head<'_> {
     }
 }
 
-/// The array that an input stands in, and its number there.
+/// The array of an input, and its index there.
 pub fn locate(inputs: &[InputArray], mut k: usize) -> (&InputArray, usize) {
     for array in inputs {
         if k < array.len() {
@@ -152,7 +152,7 @@ pub fn tuple(items: &[String]) -> String {
     items.iter().fold("(".to_string(), |all, item| format!("{all}{item}, ")).trim_end().to_string() + ")"
 }
 
-/// `operations: additions, multiplications, divisions`, and what is counted apart.
+/// `operations: additions, multiplications, divisions`, and the operations that are counted separately.
 pub fn count_line(c: &crate::symbolic::Counts) -> Option<String> {
     (c.total() + c.sincos + c.roots > 0).then(|| {
         format!(

@@ -1,4 +1,4 @@
-//! Many states at once: the type with lanes, batches, and the kernels' way to both.
+//! Many states at once: the type with lanes, batches, and the kernels for both.
 
 use std::fmt::Write;
 
@@ -15,14 +15,14 @@ pub struct Kernel<'a> {
     pub id: usize,
     /// Its signature.
     pub signature: &'a Signature,
-    /// What its kernel reads and writes.
+    /// Arrays that its kernel reads and writes.
     pub ports: Vec<Port>,
 }
 
 const ALLOWED: &str =
     "#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]";
 
-/// Lanes of a batch: two vectors of 32 bytes, one of 64.
+/// Lanes of a batch: two vectors of 32 bytes, or one of 64.
 fn width(options: &Options) -> usize {
     match options.precision {
         Precision::F64 => 8,
@@ -118,7 +118,7 @@ pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel
     let (rt, t, width) = (&options.runtime, options.precision.name(), width(options));
     let Some(kernel) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
     let (arguments, given, _) = columns(plan, options);
-    // The columns are what the kernel calls by the same names; everything else is the same for all states.
+    // The columns have the names of the kernel's arrays; everything else is the same for all states.
     let ports = kernel.ports.iter().map(|p| match p.name {
         "q" | "p" | "tau" | "qd" | "pd" => p.name.to_string(),
         _ => p.argument(),

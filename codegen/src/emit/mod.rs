@@ -24,11 +24,11 @@ use signature::Signature;
 
 pub use names::{identifier, quantity};
 
-/// What the source is made from.
+/// Input of the emission.
 pub struct Input<'a> {
     /// The mechanism.
     pub plan: &'a Plan,
-    /// How code is generated.
+    /// Options of the generator.
     pub options: &'a Options,
     /// Chosen frames, as indices into the plan's.
     pub frames: &'a [usize],
@@ -36,7 +36,8 @@ pub struct Input<'a> {
     pub sizes: Sizes,
 }
 
-/// Source of one type with a function for each program, and of the runtime's traits that they make possible.
+/// Source of one type with a function for each program, and implementations of the runtime's traits for which it has the
+/// functions.
 pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates: &OutputProgram<Code>) -> String {
     let Input { plan, options, .. } = *input;
     let mut out = String::new();

@@ -1,4 +1,4 @@
-//! Numbers as they are written.
+//! Number literals.
 
 use crate::options::Precision;
 

@@ -1,11 +1,11 @@
-//! What a generated function takes and gives, and what its kernel reads and writes: everything printed of it is printed from
-//! here.
+//! Arguments and results of a generated function, and the arrays that its kernel reads and writes. Signatures are
+//! printed from these types only.
 
 use std::collections::BTreeSet;
 
 use crate::output::{Array, InputArray, Sizes, Spec};
 
-/// Where an array stands in a function.
+/// Role of an array in a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     /// An argument that is read.
@@ -14,7 +14,7 @@ enum Place {
     Written,
     /// A field of the type.
     Field,
-    /// What the function returns.
+    /// The returned value.
     Returned,
 }
 
@@ -55,7 +55,7 @@ impl Port {
         }
     }
 
-    /// As a reference to what a kernel has access to.
+    /// Type of the reference through which a kernel has access to it.
     pub fn reference(&self, ty: &str) -> String {
         format!("&{}{ty}", self.mutable())
     }
@@ -71,7 +71,7 @@ impl Port {
         format!("{}: {}", self.name, self.reference(&ty))
     }
 
-    /// How the function hands it to the kernel, as a flat list.
+    /// Expression by which the function passes it to the kernel, as a flat slice.
     pub fn argument(&self) -> String {
         let flat = |place: &str, word: &str| {
             format!("{place}{}", format!(".as_flattened{word}()").repeat(self.dims.len().saturating_sub(1)))
@@ -94,12 +94,12 @@ pub struct Signature {
     pub doc: Vec<&'static str>,
     /// Arguments after `&self`, in order.
     pub arguments: Vec<Port>,
-    /// What it returns.
+    /// Returned arrays.
     pub returned: Option<Port>,
 }
 
 impl Signature {
-    /// Of a row of the table, for one model.
+    /// The signature of an output for one model.
     pub fn new(spec: &Spec, sizes: &Sizes) -> Signature {
         let ports =
             |arrays: &[Array], place| arrays.iter().map(move |a| Port::new(a, sizes, place)).collect::<Vec<_>>();

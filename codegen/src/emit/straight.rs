@@ -1,9 +1,9 @@
 //! Straight-line bodies: one statement for each operation, in a loop over lanes.
 //!
-//! One text serves one state and many: the compiler drops a loop of one turn, and makes vector instructions of a longer
-//! one. For that the body has no calls that it cannot inline: angles come first, and their sines and cosines are computed
-//! together, before the loop. No function is split: compile time grows in proportion to the number of statements, and parts
-//! would hand their values over in memory.
+//! The same code serves one state and many: the compiler removes a loop with one iteration, and vectorises a longer
+//! one. The body must therefore not contain calls that cannot be inlined: angles come first, and their sines and
+//! cosines are computed together before the loop. Functions are not split: compile time is proportional to the number
+//! of statements, and parts would pass their values through memory.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -62,7 +62,7 @@ impl<'a> Straight<'a> {
         let _ = writeln!(out, "    }}");
     }
 
-    /// Sines and cosines of all angles that are known from the start.
+    /// Sines and cosines of all angles that depend on inputs only.
     fn write_sines(&self, out: &mut String) {
         let n = self.angles.early.len();
         if n == 0 {
@@ -77,12 +77,12 @@ impl<'a> Straight<'a> {
         let _ = writeln!(out, "        let (sines, cosines) = {};", self.head.sines_and_cosines("angles", n));
     }
 
-    /// Those of the program's steps that are in a set, in order. Many are written in blocks that hand on what is needed
-    /// behind them: each `let` is a scope inside the one before it, and debug information of thousands of them is deeper
-    /// than the compiler's stack.
+    /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the
+    /// values that are needed after them: each `let` is a scope inside the one before it, and debug information of
+    /// thousands of them is deeper than the compiler's stack.
     fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
         let mut late = self.angles.late.clone();
-        // Only the loop over lanes has its inputs copied.
+        // Inputs are copied for the loop over lanes only.
         let given = match lanes {
             true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
             false => BTreeMap::new(),
@@ -93,7 +93,7 @@ impl<'a> Straight<'a> {
         if statements.len() <= chunk {
             return self.write_statements(out, &statements, lanes, "            ");
         }
-        // What is used at last, and in which chunk.
+        // The chunk in which each value is used last.
         let mut last: BTreeMap<u32, usize> = BTreeMap::new();
         for (k, statement) in statements.iter().enumerate() {
             last.extend(statement.uses.iter().map(|id| (*id, k / chunk)));
@@ -150,7 +150,7 @@ impl<'a> Straight<'a> {
         if let Some(k) = self.angles.early.keys().position(|a| a == angle) {
             return own(format!("let {name} = {row}[{k}][l];"), Vec::new());
         }
-        // The first of a pair to be met stands for both.
+        // The first one of a pair represents both.
         let pair = late.remove(angle)?;
         let names = pair.map(|id| id.map_or("_", |id| self.names[&id].as_str()));
         let text = self.head.sine_and_cosine(names, &self.names[angle]);
@@ -167,7 +167,7 @@ impl<'a> Straight<'a> {
     }
 
     /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
-    /// point to, and the compiler makes vector instructions of it without asking at run time what overlaps.
+    /// point to, and the compiler vectorises it without run-time checks for overlap.
     fn write_given(&self, out: &mut String) {
         let n = self.given().count();
         if n > 0 {
@@ -179,7 +179,7 @@ impl<'a> Straight<'a> {
         }
     }
 
-    /// Results are gathered in an array before they are handed over.
+    /// Results are collected in an array before they are written to the arguments.
     fn write_results(&self, out: &mut String) {
         for (k, result) in self.program.outputs.iter().enumerate() {
             let value = self.head.value(result, &self.names);

@@ -9,7 +9,7 @@ use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
 
-/// Types of the arguments, and what implementations are written to.
+/// Writer of implementations, and the types of their arguments.
 struct Writer<'a> {
     out: &'a mut String,
     options: &'a Options,
@@ -37,7 +37,7 @@ impl Writer<'_> {
     }
 }
 
-/// All that the outputs make possible; nothing without the rates.
+/// All implementations for which the type has the functions; none without the rates.
 pub fn traits(out: &mut String, plan: &Plan, options: &Options) {
     let t = options.precision.name();
     let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[{t}; {n}]"));

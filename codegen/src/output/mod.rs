@@ -1,5 +1,4 @@
-//! What generated code can compute: one table, which options, tracing, rolled code, emission, the macro, the command and the
-//! documentation read.
+//! The table of outputs, which options, tracing, rolled code, emission, the macro, the command and the documentation read.
 
 mod program;
 mod spec;
@@ -83,9 +82,9 @@ outputs! {
         .searched(Search::Accelerations);
     /// Mass matrix, by rows.
     MassMatrix = Spec::new("mass_matrix", &[Q], &[square("m")]).searched(Search::MassMatrix);
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     Frames = Spec::new("frames", &[Q, V], &[
         Array::new("rotation", &[Frames, Const(3), Const(3)]),
         Array::new("position", &[Frames, Const(3)]),
@@ -132,8 +131,8 @@ outputs! {
         Array::new("freed", &[Nv]),
         Array::new("sigma", &[Rows]),
     ]).only(WithConstraints);
-    /// Residuals `φ(q)` of the constraints, Newton's step onto the closed positions, and its pivots.
-    /// The step is `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`; the pivots are those of `Φ M⁻¹Φᵀ`, zero where a row was left out as redundant.
+    /// Residuals `φ(q)` of the constraints, Newton's step onto the closed positions, and its pivots. The step is `δq =
+    /// −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`; the pivots are those of `Φ M⁻¹Φᵀ`, zero where a row was left out as redundant.
     PositionCorrection = Spec::new("position_correction", &[Q], &[
         Array::new("residual", &[Rows]),
         Array::new("dq", &[Nv]),
@@ -145,8 +144,8 @@ outputs! {
 }
 
 impl Output {
-    /// What is computed unless something else is asked for. Models with constraints then also get the outputs that only they
-    /// have.
+    /// What is computed unless something else is asked for. Models with constraints then also get the outputs that only
+    /// they have.
     pub const DEFAULT: &'static [Output] = &[Output::Rates, Output::Momenta, Output::Energy];
 
     /// Those of models with (or without) constraints.

@@ -1,12 +1,11 @@
-//! A program and what it is called with.
+//! A program with its input arrays.
 
 use super::{Array, Sizes, Spec};
 
-/// One array of numbers that generated code is called with; its numbers are inputs of the program, numbered through all
-/// arrays.
+/// One array of inputs of generated code. Its entries are inputs of the program, numbered consecutively over all arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputArray {
-    /// Its name: of an argument, `q`, or of a field of the generated type, `tau`.
+    /// Name of the argument (`q`) or of the field of the generated type (`tau`).
     pub name: &'static str,
     /// Whether it is a field.
     pub field: bool,
@@ -31,14 +30,14 @@ impl InputArray {
     }
 }
 
-/// The program of one output, straight-line or rolled, and what it is called with.
+/// The program of one output, straight-line or rolled, and its input arrays.
 #[derive(Clone, Debug)]
 pub struct OutputProgram<P> {
     /// What it computes.
     pub spec: &'static Spec,
-    /// Input arrays, numbered through.
+    /// Input arrays, with consecutively numbered entries.
     pub inputs: Vec<InputArray>,
-    /// What computes it.
+    /// The program.
     pub program: P,
 }
 

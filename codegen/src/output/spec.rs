@@ -1,4 +1,4 @@
-//! What is known of an output: the arrays that its function takes and gives, and what it asks of the model and of the search.
+//! The specification of an output: arguments and results of its function, the models that have it, the search that it uses.
 
 /// A dimension of an array. A model gives it a number: [`Sizes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +129,7 @@ impl Array {
     }
 }
 
-/// What is given to every function beside its arguments: a field of the generated type, which is there where it has entries.
+/// An input of every function besides its arguments: a field of the generated type, which exists if it has entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// The array.
@@ -144,7 +144,7 @@ impl Field {
     }
 }
 
-/// Which models have an output.
+/// The models that have an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Availability {
     /// Every model.
@@ -155,7 +155,7 @@ pub enum Availability {
     WithoutConstraints,
 }
 
-/// The search for eliminations that an output profits from.
+/// The search for eliminations that an output uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
     /// That of every model, which makes the rates cheap.
@@ -166,23 +166,23 @@ pub enum Search {
     MassMatrix,
 }
 
-/// Everything that is known of an output.
+/// The specification of an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Spec {
     /// Name of the generated function, and of the output in options.
     pub name: &'static str,
-    /// What the function computes: a line that stands for itself, then details.
+    /// Description of the function: one self-contained line, then details.
     pub(super) doc: &'static str,
-    /// What the function is given: the coordinates, then momenta or velocities, then accelerations.
+    /// Arguments of the function: the coordinates, then momenta or velocities, then accelerations.
     pub inputs: &'static [Array],
-    /// What the function gives, in order.
+    /// Results of the function, in order.
     pub results: &'static [Array],
     /// Whether the one result is returned; otherwise results are written to arguments.
     pub returned: bool,
-    /// Which models have it.
+    /// The models that have it.
     pub availability: Availability,
-    /// Which search it profits from.
+    /// The search that it uses.
     pub search: Search,
 }
 

@@ -1,16 +1,16 @@
-//! The table in words: help of the command, documentation of the macro.
+//! The table of outputs as text: help of the command, documentation of the macro.
 
 use std::fmt::Write;
 
 use super::{Availability, Output, Spec};
 
-/// Names with commas between.
+/// Names separated by commas.
 fn names<'a>(names: impl Iterator<Item = &'a str>) -> String {
     names.collect::<Vec<_>>().join(", ")
 }
 
 impl Spec {
-    /// What goes in and what comes out: `(q, p) -> qd, pd`.
+    /// Arguments and results: `(q, p) -> qd, pd`.
     pub fn arrow(&self) -> String {
         let [inputs, results] = [self.inputs, self.results].map(|arrays| names(arrays.iter().map(|array| array.name)));
         format!("({inputs}) -> {results}")
