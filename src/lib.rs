@@ -62,6 +62,8 @@ pub use mbd_runtime as runtime;
 /// | `outputs = [rates, energy]` | what to compute, of the outputs below | `[rates, momenta, energy]`, and what only mechanisms with loops or couplings have where there are some |
 /// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |
 /// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `fast` |
+/// | `elimination = fewest` | how joints are eliminated: `fastest` by the cost model, with the `fewest` operations, or each joint by itself, `single` | `fastest` |
+/// | `rolled = never` | loops over like links: where they gain (`auto`), wherever links repeat (`always`), or `never` | `auto` |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |
 /// | `gravity = [0.0, 0.0, -1.62]` | in ground axes, m/s², instead of that of the file | the file's; of URDF `[0, 0, -9.81]` |
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |

@@ -38,8 +38,10 @@ struct Entry {
     gravity: Option<[f64; 3]>,
     scalar: Option<String>,
     arithmetic: Option<String>,
-    forms: Option<String>,
-    loops: Option<String>,
+    #[serde(alias = "forms")]
+    elimination: Option<String>,
+    #[serde(alias = "loops")]
+    rolled: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -91,7 +93,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
-                    `base`, `gravity`, `scalar`, `arithmetic`, `forms`, `loops`, `efforts`, `frames`, `snap`, `chunk`";
+                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `efforts`, `frames`, `snap`, `chunk`";
 
 /// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -102,57 +104,35 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         return Err(wrong("the name of the file must be a module's, such as `robot.rs`".into()));
     }
     let group = |name: &String| Output::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
-    let base = match entry.base.as_deref() {
-        None | Some("fixed") => Base::Fixed,
-        Some("floating") => Base::Floating,
-        Some("planar") => Base::Planar,
-        Some(other) => return Err(wrong(format!("`{other}` is no base"))),
-    };
-    let precision = match entry.scalar.as_deref() {
-        None | Some("f64") => Precision::F64,
-        Some("f32") => Precision::F32,
-        Some(other) => return Err(wrong(format!("`{other}` is no number type"))),
-    };
     let default = Options::default();
-    let arithmetic = match entry.arithmetic.as_deref() {
-        None => default.arithmetic,
-        Some("exact") => Arithmetic::Exact,
-        Some("fast") => Arithmetic::Fast,
-        Some(other) => return Err(wrong(format!("`{other}` is no arithmetic"))),
-    };
-    let forms = match entry.forms.as_deref() {
-        None => EliminationStrategy::default(),
-        Some(name) => *EliminationStrategy::ALL
-            .iter()
-            .find(|f| f.name() == name)
-            .ok_or_else(|| wrong(format!("`{name}` is no form")))?,
-    };
-    let loops = match entry.loops.as_deref() {
-        None => RolledCode::default(),
-        Some(name) => {
-            let found = RolledCode::ALL.iter().find(|l| l.name() == name);
-            *found.ok_or_else(|| wrong(format!("`loops` is auto, always or never, not `{name}`")))?
-        }
-    };
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
-        precision,
-        arithmetic,
+        precision: choice("scalar", &entry.scalar, Precision::from_name).map_err(wrong)?,
+        arithmetic: choice("arithmetic", &entry.arithmetic, Arithmetic::from_name).map_err(wrong)?,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
         plan: PlanOptions {
             snap: entry.snap.unwrap_or(DEFAULT_SNAP),
-            elimination: forms,
-            rolled: loops,
+            elimination: choice("elimination", &entry.elimination, EliminationStrategy::from_name).map_err(wrong)?,
+            rolled: choice("rolled", &entry.rolled, RolledCode::from_name).map_err(wrong)?,
             ..PlanOptions::default()
         },
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),
     };
+    let base = choice("base", &entry.base, Base::from_name).map_err(wrong)?;
     let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
     Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
+}
+
+/// The value of a word in the manifest, the default where there is none.
+fn choice<T: Default>(key: &str, word: &Option<String>, from_name: fn(&str) -> Option<T>) -> Result<T, String> {
+    match word {
+        None => Ok(T::default()),
+        Some(word) => from_name(word).ok_or_else(|| format!("`{key}` cannot be `{word}`")),
+    }
 }
 
 /// Module name of a file, if its name is a valid one.

@@ -1,6 +1,7 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
 pub mod check;
+mod choice;
 pub mod code;
 pub mod diag;
 pub mod emit;

@@ -1,97 +1,50 @@
 //! Options of the generator.
 
+use crate::choice::choice;
 use crate::output::{Output, Search};
 
-/// Number type of the generated code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// `f64`.
-    F64,
-    /// `f32`.
-    F32,
-}
-
-impl Precision {
-    /// Its name in Rust.
-    pub fn name(self) -> &'static str {
-        match self {
-            Precision::F64 => "f64",
-            Precision::F32 => "f32",
-        }
+choice! {
+    /// Number type of the generated code.
+    pub enum Precision {
+        /// Double precision.
+        F64 = "f64",
+        /// Single precision.
+        F32 = "f32",
     }
 }
 
-/// Arithmetic of the generated code.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Arithmetic {
-    /// The operations of the sweeps unchanged, which give the bits of the interpreter.
-    Exact,
-    /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger errors.
-    #[default]
-    Fast,
-}
-
-impl Arithmetic {
-    /// Its name in options.
-    pub fn name(self) -> &'static str {
-        match self {
-            Arithmetic::Exact => "exact",
-            Arithmetic::Fast => "fast",
-        }
+choice! {
+    /// Arithmetic of the generated code.
+    pub enum Arithmetic {
+        /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger errors.
+        Fast = "fast",
+        /// The operations of the sweeps unchanged, which give the bits of the interpreter.
+        Exact = "exact",
     }
 }
 
-/// Where the generator writes rolled code (loops over like links).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum RolledCode {
-    /// For runs of like links that are long enough to be faster, branch by branch.
-    #[default]
-    Auto,
-    /// Wherever links repeat.
-    Always,
-    /// Nowhere: straight-line code throughout.
-    Never,
-}
-
-impl RolledCode {
-    /// All of them.
-    pub const ALL: [RolledCode; 3] = [RolledCode::Auto, RolledCode::Always, RolledCode::Never];
-
-    /// Its name in options.
-    pub fn name(self) -> &'static str {
-        match self {
-            RolledCode::Auto => "auto",
-            RolledCode::Always => "always",
-            RolledCode::Never => "never",
-        }
+choice! {
+    /// Where the generator writes rolled code (loops over like links).
+    pub enum RolledCode {
+        /// For runs of like links that are long enough to be faster, branch by branch.
+        Auto = "auto",
+        /// Wherever links repeat.
+        Always = "always",
+        /// Nowhere: straight-line code throughout.
+        Never = "never",
     }
 }
 
-/// Strategy by which the elimination of the joints is chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum EliminationStrategy {
-    /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of
-    /// those whose rounding errors are not much larger than those of one joint at a time.
-    #[default]
-    Fastest,
-    /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding errors.
-    Fewest,
-    /// One joint at a time.
-    Single,
-}
-
-impl EliminationStrategy {
-    /// All of them.
-    pub const ALL: [EliminationStrategy; 3] =
-        [EliminationStrategy::Fastest, EliminationStrategy::Fewest, EliminationStrategy::Single];
-
-    /// Its name in options.
-    pub fn name(self) -> &'static str {
-        match self {
-            EliminationStrategy::Fastest => "fastest",
-            EliminationStrategy::Fewest => "fewest",
-            EliminationStrategy::Single => "single",
-        }
+choice! {
+    /// Strategy by which the elimination of the joints is chosen.
+    pub enum EliminationStrategy {
+        /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of
+        /// those whose rounding errors are not much larger than those of one joint at a time.
+        Fastest = "fastest",
+        /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding errors.
+        Fewest = "fewest",
+        /// One joint at a time.
+        Single = "single",
     }
 }
 

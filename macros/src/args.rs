@@ -56,8 +56,8 @@ const KEYS: [&str; 15] = [
     "outputs",
     "scalar",
     "arithmetic",
-    "forms",
-    "loops",
+    "elimination",
+    "rolled",
     "base",
     "gravity",
     "efforts",
@@ -150,24 +150,21 @@ impl Args {
             "name" => self.name = Some(name(value)?),
             "outputs" => self.options.outputs = outputs(value)?,
             "scalar" => {
-                let choices = [("f64", Precision::F64), ("f32", Precision::F32)];
-                self.options.precision = choice("scalar", value, &choices)?;
+                self.options.precision = choice("scalar", value, &Precision::ALL.map(|p| (p.name(), p)))?;
             }
             "arithmetic" => {
-                let choices = [Arithmetic::Exact, Arithmetic::Fast].map(|a| (a.name(), a));
-                self.options.arithmetic = choice("arithmetic", value, &choices)?;
+                self.options.arithmetic = choice("arithmetic", value, &Arithmetic::ALL.map(|a| (a.name(), a)))?;
             }
-            "forms" => {
-                let choices = EliminationStrategy::ALL.map(|f| (f.name(), f));
-                self.options.plan.elimination = choice("forms", value, &choices)?;
+            // The second words are those of before 0.1.
+            "elimination" | "forms" => {
+                let choices = EliminationStrategy::ALL.map(|e| (e.name(), e));
+                self.options.plan.elimination = choice(&word, value, &choices)?;
             }
-            "loops" => {
-                let choices = RolledCode::ALL.map(|l| (l.name(), l));
-                self.options.plan.rolled = choice("loops", value, &choices)?;
+            "rolled" | "loops" => {
+                self.options.plan.rolled = choice(&word, value, &RolledCode::ALL.map(|r| (r.name(), r)))?;
             }
             "base" => {
-                let choices = [("fixed", Base::Fixed), ("floating", Base::Floating), ("planar", Base::Planar)];
-                self.base = Some((choice("base", value, &choices)?, place(value)));
+                self.base = Some((choice("base", value, &Base::ALL.map(|b| (b.name(), b)))?, place(value)));
             }
             "gravity" => self.gravity = Some(gravity(value)?),
             "efforts" => self.options.efforts = choice("efforts", value, &[("true", true), ("false", false)])?,

@@ -14,6 +14,13 @@ use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, 
 
 pub use values::type_name;
 
+/// Parser of an option whose values the library lists.
+macro_rules! choice {
+    ($choice:ty) => {
+        one_of(<$choice>::ALL.map(|c| (c, c.name(), c.meaning())))
+    };
+}
+
 const ABOUT: &str = "Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 
 A model (`.toml`, or `.urdf` of a robot) is a tree of rigid bodies and joints. Its state is q, the coordinates, and p, the
@@ -63,8 +70,8 @@ pub enum Command {
 #[derive(Args, Clone, Copy)]
 pub struct ImportArgs {
     /// How a URDF's root hangs on the ground; a TOML model says so itself
-    #[arg(long, value_enum, default_value_t = BaseArg::Fixed)]
-    pub base: BaseArg,
+    #[arg(long, value_parser = choice!(Base), default_value = Base::default().name())]
+    pub base: Base,
     /// Gravity in ground axes, m/s², instead of the file's; a URDF states none and gets 0,0,-9.81
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
     pub gravity: Option<[f64; 3]>,
@@ -73,12 +80,7 @@ pub struct ImportArgs {
 impl ImportArgs {
     /// As the readers take it.
     pub fn import(&self) -> ImportOptions {
-        let base = match self.base {
-            BaseArg::Fixed => Base::Fixed,
-            BaseArg::Floating => Base::Floating,
-            BaseArg::Planar => Base::Planar,
-        };
-        ImportOptions { base, gravity: self.gravity }
+        ImportOptions { base: self.base, gravity: self.gravity }
     }
 }
 
@@ -94,17 +96,6 @@ pub struct ModelArgs {
     pub wrenches: Vec<String>,
 }
 
-/// Attachment of the root.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum BaseArg {
-    /// Welded to the ground
-    Fixed,
-    /// Free in space, seven coordinates
-    Floating,
-    /// Sliding and turning on the ground's x-y plane
-    Planar,
-}
-
 /// What code is generated.
 #[derive(Args)]
 pub struct CodeArgs {
@@ -112,18 +103,17 @@ pub struct CodeArgs {
     #[arg(long, long_help = output::help(), value_delimiter = ',', value_parser = outputs, value_name = "LIST", default_value = "rates,momenta,energy")]
     pub outputs: Vec<OutputList>,
     /// Number type
-    #[arg(long, value_enum, default_value_t = ScalarArg::F64)]
-    pub scalar: ScalarArg,
+    #[arg(long, value_parser = choice!(Precision), default_value = Precision::default().name())]
+    pub scalar: Precision,
     /// Whether operations may be rewritten for speed, or give the interpreter's bits
-    #[arg(long, value_enum, default_value_t = ArithmeticArg::of(Arithmetic::default()))]
-    pub arithmetic: ArithmeticArg,
-    /// How joints are eliminated: in the form that is fastest by the cost model, in the one with the fewest operations, or
-    /// one by one. `mbd count` shows the candidates
-    #[arg(long, value_enum, default_value_t = EliminationArg::Fastest)]
-    pub forms: EliminationArg,
-    /// Loops over runs of like links, or straight-line code
-    #[arg(long, value_enum, default_value_t = RolledArg::Auto)]
-    pub loops: RolledArg,
+    #[arg(long, value_parser = choice!(Arithmetic), default_value = Arithmetic::default().name())]
+    pub arithmetic: Arithmetic,
+    /// How joints are eliminated; `mbd count` shows the candidates
+    #[arg(long, alias = "forms", value_parser = choice!(EliminationStrategy), default_value = EliminationStrategy::default().name())]
+    pub elimination: EliminationStrategy,
+    /// Where generated code is rolled: a loop over like links instead of straight-line code
+    #[arg(long, alias = "loops", value_parser = choice!(RolledCode), default_value = RolledCode::default().name())]
+    pub rolled: RolledCode,
     /// No joint forces: they are zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -167,101 +157,18 @@ impl CodeArgs {
         Options {
             type_name: self.name.clone().unwrap_or_else(|| camel_case(model)),
             outputs: self.groups(),
-            precision: self.scalar.precision(),
+            precision: self.scalar,
             efforts: !self.no_efforts,
             frames: self.frames.clone(),
             plan: PlanOptions {
                 snap: self.snap,
-                elimination: self.forms.forms(),
-                rolled: self.loops.loops(),
+                elimination: self.elimination,
+                rolled: self.rolled,
                 ..PlanOptions::default()
             },
             chunk: self.chunk as usize,
-            arithmetic: self.arithmetic.arithmetic(),
+            arithmetic: self.arithmetic,
             ..Options::default()
-        }
-    }
-}
-
-/// Elimination.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum EliminationArg {
-    /// Least time for one state
-    Fastest,
-    /// Fewest operations
-    Fewest,
-    /// One by one
-    Single,
-}
-
-impl EliminationArg {
-    fn forms(self) -> EliminationStrategy {
-        match self {
-            EliminationArg::Fastest => EliminationStrategy::Fastest,
-            EliminationArg::Fewest => EliminationStrategy::Fewest,
-            EliminationArg::Single => EliminationStrategy::Single,
-        }
-    }
-}
-
-/// Rewriting of generated code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ArithmeticArg {
-    /// The interpreter's operations, bit for bit
-    Exact,
-    /// Fewer operations, in an order that processors like; errors are no larger
-    Fast,
-}
-
-impl ArithmeticArg {
-    fn of(arithmetic: Arithmetic) -> ArithmeticArg {
-        match arithmetic {
-            Arithmetic::Exact => ArithmeticArg::Exact,
-            Arithmetic::Fast => ArithmeticArg::Fast,
-        }
-    }
-
-    fn arithmetic(self) -> Arithmetic {
-        match self {
-            ArithmeticArg::Exact => Arithmetic::Exact,
-            ArithmeticArg::Fast => Arithmetic::Fast,
-        }
-    }
-}
-
-/// Loops in generated code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum RolledArg {
-    /// Where a run of like links is long enough to gain by it
-    Auto,
-    /// Wherever links repeat
-    Always,
-    /// Straight-line code throughout
-    Never,
-}
-
-impl RolledArg {
-    fn loops(self) -> RolledCode {
-        match self {
-            RolledArg::Auto => RolledCode::Auto,
-            RolledArg::Always => RolledCode::Always,
-            RolledArg::Never => RolledCode::Never,
-        }
-    }
-}
-
-/// Number type of generated code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ScalarArg {
-    F64,
-    F32,
-}
-
-impl ScalarArg {
-    fn precision(self) -> Precision {
-        match self {
-            ScalarArg::F64 => Precision::F64,
-            ScalarArg::F32 => Precision::F32,
         }
     }
 }

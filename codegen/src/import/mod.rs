@@ -6,16 +6,18 @@ pub mod toml;
 pub mod urdf;
 pub mod words;
 
-/// How the root of a robot that states none is attached to the ground.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Base {
-    /// Welded to the ground.
-    #[default]
-    Fixed,
-    /// Free in space.
-    Floating,
-    /// Sliding on the ground's x-y plane and turning about z.
-    Planar,
+use crate::choice::choice;
+
+choice! {
+    /// How the root of a robot that states none is attached to the ground.
+    pub enum Base {
+        /// The root is welded to the ground.
+        Fixed = "fixed",
+        /// The root is free in space, with seven coordinates.
+        Floating = "floating",
+        /// The root slides on the ground's x-y plane and turns about z.
+        Planar = "planar",
+    }
 }
 
 /// What a file does not say, or what is to be changed about it.
