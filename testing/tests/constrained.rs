@@ -4,11 +4,12 @@
 use mbd_codegen::import::toml::read;
 use mbd_codegen::model::Model;
 use mbd_codegen::search;
+use mbd_runtime::catalogue;
 use mbd_runtime::constrained::{
     close, complete, Closing, CoordinatePartition, Effort, OpenAndClosed, Projection, RadauIndex2, Rattle, Repartition,
     Stabilisation, WithPostStep,
 };
-use mbd_runtime::integrate::{catalogue, Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
+use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
 type Mechanism = Interpreter<f64>;

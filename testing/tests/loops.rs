@@ -5,7 +5,7 @@
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
-use mbd_codegen::rolled::{looped, RolledProgram};
+use mbd_codegen::rolled::{rolled, RolledProgram};
 use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::Constrained;
@@ -52,7 +52,7 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     let mut nodes = 0;
     let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
     for &group in Output::ALL {
-        let Some(program) = looped(&plan, group, options) else { continue };
+        let Some(program) = rolled(&plan, group, options) else { continue };
         nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
         let results = program.program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
         let expected = match group {
@@ -173,7 +173,7 @@ fn closed_chains() {
         }
         let plan = search::plan(&model, options.plan);
         for group in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
-            let looped = looped(&plan, group, &options).is_some();
+            let looped = rolled(&plan, group, &options).is_some();
             assert!(looped, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);
         }
         assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
