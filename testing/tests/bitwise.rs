@@ -128,7 +128,7 @@ impl Case {
         i.velocities(&s.q, &p, &mut v);
         self.compare("velocities", &run(Output::Velocities)["v"], &v);
         let (kinetic, potential) = i.energy(&s.q, &p);
-        self.compare("energy", &run(Output::Energy)["result"], &[kinetic, potential]);
+        self.compare("energy", &run(Output::Energy)["energy"], &[kinetic, potential]);
         let mut a = vec![0.0; nv];
         i.accelerations(&s.q, &s.v, &mut a);
         self.compare("accelerations", &run(Output::Accelerations)["a"], &a);
@@ -151,7 +151,7 @@ impl Case {
         i.jacobians(&s.q, &mut jacobians);
         self.compare("jacobians", &run(Output::Jacobians)["jacobian"], &jacobians);
         i.bias_accelerations(&s.q, &s.v, &mut drifts);
-        self.compare("bias_accelerations", &run(Output::BiasAccelerations)["drift"], &drifts.concat());
+        self.compare("bias_accelerations", &run(Output::BiasAccelerations)["bias"], &drifts.concat());
         if self.derivatives {
             self.compare_derivatives(&s, &p, &mut i, &inputs);
         }

@@ -105,7 +105,7 @@ impl Case {
         i.momenta(&s.q, &s.v, &mut v);
         self.compare("momenta", &run(Output::Momenta)["p"], &v);
         let (kinetic, potential) = i.energy(&s.q, &self.p);
-        self.compare("energy", &run(Output::Energy)["result"], &[kinetic, potential]);
+        self.compare("energy", &run(Output::Energy)["energy"], &[kinetic, potential]);
         i.generalized_accelerations(&s.q, &s.v, &mut v);
         self.compare("accelerations", &run(Output::Accelerations)["a"], &v);
         let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];

@@ -257,7 +257,7 @@ fn the_systems_have_everything() {
         note("drive", any(&|j| model.joints[j].motion == JointMotion::Prescribed));
         note("mimic", any(&|j| matches!(model.joints[j].motion, JointMotion::Mimic { .. })));
         let led = |j: usize| {
-            let follows = |m: &Motion| matches!(m, JointMotion::Mimic { leader, .. } if *leader == j);
+            let follows = |m: &JointMotion| matches!(m, JointMotion::Mimic { leader, .. } if *leader == j);
             model.joints.iter().any(|joint| follows(&joint.motion))
         };
         note("leader", any(&led));

@@ -1,4 +1,4 @@
-//! Arguments of all commands, and the help that teaches them.
+//! Arguments of all commands, and their help.
 
 mod values;
 
@@ -23,11 +23,11 @@ macro_rules! choice {
 
 const ABOUT: &str = "Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 
-A model (`.toml`, or `.urdf` of a robot) is a tree of rigid bodies and joints. Its state is q, the coordinates, and p, the
-momenta; mbd turns it into straight-line Rust that computes (q, p) -> (q', p') and whatever else is asked for, and skips what
-the scene does not need. The same equations also run without any generated code, in the interpreter.
+A model (`.toml`, or `.urdf` of a robot) describes rigid bodies, joints and constraints. Its state consists of the coordinates
+q and the momenta p. mbd generates straight-line Rust that computes (q, p) -> (q', p') and other outputs on request; what the
+model does not need costs nothing. An interpreter runs the same equations without generated code.
 
-Without a command, mbd takes you on a tour of a real robot; it takes a few seconds and writes mbd-tour.svg.";
+Without a command, mbd shows a tour with a real robot, which takes a few seconds and writes mbd-tour.svg.";
 
 const EXAMPLES: &str = "Examples:
   mbd                                                 the tour
@@ -36,7 +36,7 @@ const EXAMPLES: &str = "Examples:
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
   mbd simulate models/double_pendulum.toml            ten seconds, as CSV and as a picture
   mbd eval robot.urdf --input states.json             numbers out, to compare with other programs
-  mbd explain robot.urdf --after frames               what the generator saw
+  mbd explain robot.urdf --after frames               intermediate results of the generator
 
 Findings, notices and progress go to standard error, results to standard output.
 Exit status: 0 done, 1 a finding or a failure, 2 wrong arguments.";
@@ -49,89 +49,89 @@ pub struct Arguments {
     pub command: Option<Command>,
 }
 
-/// What to do.
+/// The command to run.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Read models and say what is wrong with them, or what is in them
+    /// Read models, and report what is wrong with them or what they contain
     Check(CheckArgs),
     /// Count the operations of every output, sweep by sweep
     Count(CountArgs),
-    /// Generate Rust
+    /// Generate Rust code
     Generate(GenerateArgs),
     /// Evaluate states from a JSON file with the interpreter
     Eval(EvalArgs),
     /// Simulate with the interpreter; write a CSV file and a plot
     Simulate(SimulateArgs),
-    /// Show what the generator made of a model on the way
+    /// Show intermediate results of the generator
     Explain(ExplainArgs),
 }
 
-/// How the file is read.
+/// Options of the readers.
 #[derive(Args, Clone, Copy)]
 pub struct ImportArgs {
-    /// How a URDF's root hangs on the ground; a TOML model says so itself
+    /// Connection of a URDF's root to the ground; a TOML model states it itself
     #[arg(long, value_parser = choice!(Base), default_value = Base::default().name())]
     pub base: Base,
-    /// Gravity in ground axes, m/s², instead of the file's; a URDF states none and gets 0,0,-9.81
+    /// Gravity in ground axes, m/s², in place of that of the file; a URDF has 0,0,-9.81
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
     pub gravity: Option<[f64; 3]>,
 }
 
 impl ImportArgs {
-    /// As the readers take it.
+    /// Options for the readers.
     pub fn import(&self) -> ImportOptions {
         ImportOptions { base: self.base, gravity: self.gravity }
     }
 }
 
-/// A model and how it is read.
+/// A model and the options of its reader.
 #[derive(Args)]
 pub struct ModelArgs {
     /// Description of the mechanism, `.toml` or `.urdf`
     pub model: PathBuf,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Bodies on which an external wrench acts, in body axes, beside those the model names; with commas between
+    /// Bodies on which external wrenches act, in body axes, in addition to those of the model; separated by commas
     #[arg(long = "wrench", value_name = "LIST", value_delimiter = ',')]
     pub wrenches: Vec<String>,
 }
 
-/// What code is generated.
+/// Options of the generated code.
 #[derive(Args)]
 pub struct CodeArgs {
-    /// What to compute, with commas between, or `all`
+    /// Outputs to compute, separated by commas, or `all`
     #[arg(long, long_help = output::help(), value_delimiter = ',', value_parser = outputs, value_name = "LIST", default_value = "rates,momenta,energy")]
     pub outputs: Vec<OutputList>,
     /// Number type
     #[arg(long, value_parser = choice!(Precision), default_value = Precision::default().name())]
     pub scalar: Precision,
-    /// Whether operations may be rewritten for speed, or give the interpreter's bits
+    /// Arithmetic: the interpreter's bits, or operations that are rewritten for speed
     #[arg(long, value_parser = choice!(Arithmetic), default_value = Arithmetic::default().name())]
     pub arithmetic: Arithmetic,
-    /// How joints are eliminated; `mbd count` shows the candidates
+    /// Strategy of elimination; `mbd count` shows the candidates
     #[arg(long, alias = "forms", value_parser = choice!(EliminationStrategy), default_value = EliminationStrategy::default().name())]
     pub elimination: EliminationStrategy,
-    /// Where generated code is rolled: a loop over like links instead of straight-line code
+    /// Where code is rolled: a loop over like links in place of straight-line code
     #[arg(long, alias = "loops", value_parser = choice!(RolledCode), default_value = RolledCode::default().name())]
     pub rolled: RolledCode,
-    /// No joint forces: they are zero and cost nothing
+    /// Without joint forces, which are then zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
     /// Name of the generated type [default: from the name of the model]
     #[arg(long, value_name = "TYPE", value_parser = type_name)]
     pub name: Option<String>,
-    /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Each change is told
+    /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Changes are reported
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
     pub snap: f64,
-    /// Frames and bodies of outputs that have a result for each frame, with commas between [default: all]
+    /// Frames and bodies of outputs that have a result for each frame, separated by commas [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
-    /// Longer bodies are written in blocks of this many statements
+    /// Largest number of statements in one block of the generated code
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
     pub chunk: u32,
 }
 
-/// One item of `--outputs`: a group, or all of them.
+/// One item of `--outputs`: an output, or all of them.
 #[derive(Clone)]
 pub struct OutputList(pub Vec<Output>);
 
@@ -152,7 +152,7 @@ impl CodeArgs {
         self.options("").searches()
     }
 
-    /// As the generator takes it; `model` is the name of the model.
+    /// Options for the generator; `model` is the name of the model.
     pub fn options(&self, model: &str) -> Options {
         Options {
             type_name: self.name.clone().unwrap_or_else(|| camel_case(model)),
@@ -176,10 +176,10 @@ impl CodeArgs {
 /// `mbd check`.
 #[derive(Args)]
 #[command(
-    after_help = "Every finding names file, line and column and says what to do; all findings of a file come at once.
+    after_help = "Every finding states file, line and column and what to do. All findings of a file are reported at once.
 
-With --generated, every file that manifest.toml in that directory lists is generated anew and compared with what is there:
-put it into your continuous integration, so that generated code never falls behind its model."
+With --generated, every file that is listed in manifest.toml of that directory is generated again and compared with the
+existing file. In continuous integration, this ensures that generated code agrees with its model."
 )]
 pub struct CheckArgs {
     /// Descriptions of mechanisms, `.toml` or `.urdf`
@@ -190,7 +190,7 @@ pub struct CheckArgs {
     /// Check the generated files of a directory with a manifest.toml instead
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "generated", conflicts_with = "models")]
     pub generated: Option<PathBuf>,
-    /// Write what --generated finds missing or stale
+    /// Write the files that --generated finds missing or different
     #[arg(long, requires = "generated")]
     pub update: bool,
 }
@@ -198,8 +198,8 @@ pub struct CheckArgs {
 /// `mbd count`.
 #[derive(Args)]
 #[command(
-    after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine stand
-apart. Below each output stand the sweeps it consists of; what a sweep shares with an earlier one is counted there.
+    after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine are
+counted separately. The sweeps of each output are listed below it; operations that a sweep shares with an earlier one are counted there.
 For serial chains of three or more pins on a fixed base, published formulas stand beside."
 )]
 pub struct CountArgs {
@@ -207,10 +207,10 @@ pub struct CountArgs {
     pub model: ModelArgs,
     #[command(flatten)]
     pub code: CodeArgs,
-    /// Show every elimination form that was tried, not only the best of each branch
+    /// Show every elimination that was tried, not only the best of each branch
     #[arg(long)]
     pub candidates: bool,
-    /// The same as JSON
+    /// Print JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -218,8 +218,8 @@ pub struct CountArgs {
 /// `mbd generate`.
 #[derive(Args)]
 #[command(
-    after_help = "The code depends on the runtime alone: no allocation, no std. Its header says where every coordinate stands and what each
-function costs. The same model and options give the same bytes everywhere.
+    after_help = "The code depends on the runtime alone: no allocation, no std. Its header lists the order of the state and the operations
+of each function. The same model and options give the same bytes everywhere.
 
 In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
 file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."
@@ -232,12 +232,12 @@ pub struct GenerateArgs {
     /// Path of the runtime in the generated code
     #[arg(long, value_name = "PATH", default_value = DEFAULT_RUNTIME, value_parser = rust_path)]
     pub runtime: String,
-    /// File to write instead of standard output
+    /// File to write in place of standard output
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }
 
-/// Where a user of the crate `multibody` finds the runtime.
+/// Path of the runtime for users of the crate `multibody`.
 pub const DEFAULT_RUNTIME: &str = "::multibody::runtime";
 
 /// `mbd eval`.
@@ -245,25 +245,25 @@ pub const DEFAULT_RUNTIME: &str = "::multibody::runtime";
 #[command(after_help = "Input:   {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..]}, ..]}
 Output:  {\"states\": [{\"p\": [..], \"qd\": [..], \"pd\": [..], \"qdd\": [..], \"kinetic\": T, \"potential\": V, \"M\": [[..], ..]}, ..]}
 
-`tau` may be left out (zeros). docs/eval-json.md describes further inputs (wrenches, prescribed motions, gravity,
-parameters), the layouts, and every output. Unlike the other commands, eval takes all numbers of the file exactly as they
-stand (--snap 0), for comparison with programs that do the same.")]
+`tau` is optional (zeros). docs/eval-json.md describes further inputs (wrenches, prescribed motions, gravity,
+parameters), the layouts, and every output. In contrast to the other commands, eval takes all numbers of the file
+exactly (--snap 0), for comparison with programs that do the same.")]
 pub struct EvalArgs {
     #[command(flatten)]
     pub model: ModelArgs,
     /// States, JSON; `-` for standard input
     #[arg(short, long, value_name = "FILE")]
     pub input: PathBuf,
-    /// Order and form of the numbers, in and out
+    /// Order and representation of the numbers in input and output
     #[arg(long, value_enum, default_value_t = LayoutArg::Mbd)]
     pub layout: LayoutArg,
-    /// What to compute, with commas between: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all]
+    /// Outputs, separated by commas: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Angles this close to right angles are taken as exact, rad
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
     pub snap: f64,
-    /// File to write instead of standard output
+    /// File to write in place of standard output
     #[arg(short = 'o', long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }
@@ -275,7 +275,7 @@ pub enum LayoutArg {
     Mbd,
     /// Pinocchio's: children in alphabetical order; continuous and planar joints as cosine and sine
     Pinocchio,
-    /// MuJoCo's: quaternions w, x, y, z; linear velocity of a floating base in outer axes
+    /// MuJoCo's: quaternions w, x, y, z; linear velocity of a floating base in ground axes
     Mujoco,
 }
 
@@ -309,20 +309,20 @@ pub enum Quantity {
 /// `mbd simulate`.
 #[derive(Args)]
 #[command(
-    after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints stay where they are, dampers and springs of the
+    after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints are at rest, dampers and springs of the
 model act.
 
 Steps are chosen by their error (--tolerance) with Verner's method of order 9, unless --method says otherwise; with --step
-they are all the same, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
+they are fixed, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
 equal times, between the steps by dense output.
 
-The start, unless --q and --v say otherwise: single angles 0.3 and -0.3 rad in turn, single slides 0.05 m, planar, ball and
+The start, unless --q and --v say otherwise: angles 0.3 and -0.3 rad in turn, displacements 0.05 m, planar, spherical and
 floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
-neutral where it states none; loops are closed from there (from --q, if given) without moving what is `held`. Velocities then
-follow from those of the `held` joints; where none is held they become the nearest that the loops allow.
+neutral where it states none; loops are closed from there (from --q, if given) without moving `held` joints. Velocities then
+follow from those of the `held` joints; where none is held, they are the nearest ones that satisfy the constraints.
 
-Without dampers the energy must stay what it is: its change is an error of the simulation, and is printed relative to the
-largest kinetic energy met. It tells of a bad run, not of a good one: the error of the motion may be larger."
+Without dampers the energy is constant. Its change is an error of the simulation, and is printed relative to the largest
+kinetic energy. A large change shows a bad run, but a small one does not prove a good run: the error of the motion may be larger."
 )]
 pub struct SimulateArgs {
     #[command(flatten)]
@@ -333,26 +333,26 @@ pub struct SimulateArgs {
     /// Method [default: verner9, with --step rk4]
     #[arg(long, value_name = "NAME", value_parser = methods())]
     pub method: Option<String>,
-    /// Error that a step may have, rad or m; of momenta relative to their size [default: 1e-9]
+    /// Allowed error of a step, rad or m; for momenta relative to their size [default: 1e-9]
     #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "step")]
     pub tolerance: Option<f64>,
     /// Choose steps by the errors of the coordinates alone, not of the momenta
     #[arg(long, conflicts_with = "step")]
     pub partial: bool,
-    /// Put every step back on the energy of the start; for motion that neither gains nor loses any. The error of the motion
-    /// hardly changes
+    /// Project every step onto the energy of the start, for motion that neither gains nor loses energy. The error of the
+    /// motion hardly changes
     #[arg(long)]
     pub project: bool,
-    /// Step, s, always the same; shortened if the time is no multiple of it
+    /// Fixed step, s; shortened if the time is not a multiple of it
     #[arg(long, value_name = "S", value_parser = positive)]
     pub step: Option<f64>,
-    /// Initial coordinates, with commas between
+    /// Initial coordinates, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub q: Option<Vec<f64>>,
-    /// Initial velocities, with commas between
+    /// Initial velocities, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub v: Option<Vec<f64>>,
-    /// Leave the dampers of the model out
+    /// Leave out the dampers of the model
     #[arg(long)]
     pub no_damping: bool,
     /// Angles this close to right angles are taken as exact, rad
@@ -373,13 +373,13 @@ pub struct SimulateArgs {
     /// How loops are kept closed
     #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
     pub hold: Stabilisation,
-    /// Picture of the motion to write, an SVG: the mechanism at several instants, the last one darkest
+    /// SVG picture of the motion to write: the mechanism at several instants, the last one darkest
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
     /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
     pub view: Option<[f64; 3]>,
-    /// Bodies or frames whose paths are drawn, with commas between
+    /// Bodies or frames whose paths are drawn, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
     pub trace: Vec<String>,
     /// Number of instants that are drawn
@@ -390,13 +390,13 @@ pub struct SimulateArgs {
 /// `mbd explain`.
 #[derive(Args)]
 #[command(
-    after_help = "frames    the tree the sweeps run on: which bodies have been merged, the screws from joint to joint, the zeros in the inertias
-trace     operations the sweeps made on symbols, and how many of them any output needs
-simplify  the program itself, one operation a line, under the body and quantity it belongs to
+    after_help = "frames    the tree on which the sweeps run: merged bodies, screws from joint to joint, zeros of the inertias
+trace     operations that the sweeps made on symbols, and the number of them that an output needs
+simplify  the program, one operation per line, under its body and quantity
 schedule  its order: parts, values alive at once, longest chain of operations
 
-Rewriting happens while the sweeps run (0 + x, 1 x, 0 x, signs, constants, equal operations), so that what a sweep makes is
-simplified already: `trace` counts the operations that survived this, and `simplify` shows those that are also needed."
+Operations are simplified while the sweeps run (0 + x, 1 x, 0 x, signs, constants, equal operations): `trace` counts the
+operations after this simplification, and `simplify` shows those that are also needed."
 )]
 pub struct ExplainArgs {
     #[command(flatten)]

@@ -72,7 +72,7 @@ impl Emitted {
     }
 
     /// Runs a kernel: arrays in by the names of arguments (`q`, `tau`), flat; arrays out by the names of the `&mut`
-    /// arguments; a returned array is called `result`.
+    /// arguments; a returned array has the name of the result.
     pub fn run(&self, name: &str, inputs: &HashMap<String, Vec<f64>>) -> HashMap<String, Vec<f64>> {
         let f = &self.functions[name];
         // Not zero: what is read before it is written must show.
