@@ -317,7 +317,7 @@ pub enum Bond<S> {
 pub struct Constraint<S> {
     /// What it binds.
     pub bond: Bond<S>,
-    /// Its place among [`Tree::shared`], one for each row.
+    /// Its place among [`Tree::unknowns`], one for each row.
     pub slots: Vec<usize>,
     /// Its first row among all.
     pub first: usize,

@@ -124,7 +124,7 @@ pub struct Factor<S> {
     pub unknown_pivots: Vec<Pivot<S>>,
     /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
     pub columns: Vec<Force<S>>,
-    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Node::screws`] asks for it, at
+    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Elimination::screws`] asks for it, at
     /// `g · nodes + i`.
     pub screws: Vec<Motion<S>>,
     /// Inertia between shared coordinates, while they are open.

@@ -149,7 +149,7 @@ pub struct PlanConstraint {
     pub name: String,
     /// What it binds.
     pub bond: PlanBond,
-    /// Its place among [`Plan::shared`], one for each row.
+    /// Its place among [`Plan::unknowns`], one for each row.
     pub slots: Vec<usize>,
     /// Its first row.
     pub first: usize,

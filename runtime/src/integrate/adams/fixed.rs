@@ -34,8 +34,9 @@ const SAME: f64 = 1e-6;
 /// An Adams method of order `K`, 1 to 12, with fixed steps; with `CORRECT` a predictor and a corrector.
 ///
 /// The first `K − 1` steps extrapolate the midpoint rule to order `K` or one more, with `⌈K/2⌉²` evaluations and the
-/// one at the start; so do those after a change of the step, and [`Stepper::step`] after a state that is not the one it
-/// gave. A jump of the joint forces reduces the order for `K` steps; call [`Stepper::begin`] where this matters.
+/// one at the start; so do those after a change of the step, and [`Stepper::step`](crate::integrate::Stepper::step)
+/// after a state that is not the one it gave. A jump of the joint forces reduces the order for `K` steps; call
+/// [`Stepper::begin`](crate::integrate::Stepper::begin) where this matters.
 #[derive(Clone, Debug)]
 pub struct Adams<Y: System, const K: usize, const CORRECT: bool> {
     history: History<Y, K>,
