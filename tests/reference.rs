@@ -168,7 +168,7 @@ fn set_drives(plan: &Plan, data: &Value, state: &Value, interpreter: &mut Interp
         if drive["kind"] == "planar" {
             position = vec![position[0], position[1], position[3].atan2(position[2])];
         }
-        let inputs = &mut interpreter;
+        let inputs = &mut *interpreter;
         for (to, key) in [(&mut inputs.drive_v, "v"), (&mut inputs.drive_a, "a")] {
             let rates = numbers(&given[key]);
             to[v..v + rates.len()].copy_from_slice(&rates);
