@@ -377,7 +377,7 @@ pub struct Dims {
 }
 
 impl<S> Tree<S> {
-    /// Whether number `g` of [`Tree::shared`] is a row of one of the constraints.
+    /// Whether number `g` of [`Tree::unknowns`] is a row of one of the constraints.
     pub fn is_slot(&self, g: usize) -> bool {
         self.constraints.iter().any(|c| c.slots.contains(&g))
     }
