@@ -1577,7 +1577,6 @@ impl Chain100 {
                 let link100_t33 = link100_t31 - link100_t32;
                 let tau_0 = tau.get(0, l);
                 let kept_16 = kept[16][l];
-                // link100: coordinate rates
                 let link100_t34 = tau_0 + kept_16;
                 let tau_99 = tau.get(99, l);
                 let link100_t35 = tau_99 - link100_t33;
@@ -2409,7 +2408,7 @@ impl Chain100 {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
+        let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 15]);
         let mut rows0 = [[[0.0; LANES]; 14]; 49];
         {
             let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
@@ -2430,6 +2429,18 @@ impl Chain100 {
                 rows0[k][2] = sines1[k];
                 rows0[k][3] = cosines1[k];
             }
+        }
+        {
+            let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+            for l in 0..LANES {
+                let q_99 = q.get(99, l);
+                // link100: sine and cosine, rotation
+                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
+                results[0][l] = link100_sin;
+                results[1][l] = link100_cos;
+            }
+            kept[0] = results[0];
+            kept[1] = results[1];
         }
         {
             let mut carried0 = [0.0; LANES];
@@ -2544,41 +2555,40 @@ impl Chain100 {
                 row[12] = results[14];
                 row[13] = results[15];
             }
-            kept[0] = carried0;
-            kept[1] = carried1;
-            kept[2] = carried2;
-            kept[3] = carried3;
-            kept[4] = carried4;
-            kept[5] = carried5;
+            kept[2] = carried0;
+            kept[3] = carried1;
+            kept[4] = carried2;
+            kept[5] = carried3;
+            kept[6] = carried4;
+            kept[7] = carried5;
         }
         {
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
             for l in 0..LANES {
-                let q_99 = q.get(99, l);
-                // link100: sine and cosine, rotation
-                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
-                let kept_5 = kept[5][l];
+                let kept_7 = kept[7][l];
                 // link100: velocity and joint rate (4.40)
-                let link100_t0 = 0.03 * kept_5;
-                let kept_1 = kept[1][l];
-                let link100_minus_hat_z = kept_1 + link100_t0;
-                let kept_4 = kept[4][l];
-                let link100_t1 = 0.03 * kept_4;
-                let kept_2 = kept[2][l];
-                let link100_t2 = kept_2 + link100_t1;
-                let link100_t3 = link100_cos * link100_t2;
-                let kept_0 = kept[0][l];
-                let link100_t4 = kept_0 * link100_sin;
-                let link100_hat_y = link100_t3 - link100_t4;
+                let link100_t0 = 0.03 * kept_7;
                 let kept_3 = kept[3][l];
-                let link100_t5 = kept_3 * link100_cos;
-                let link100_t6 = kept_5 * link100_sin;
+                let link100_minus_hat_z = kept_3 + link100_t0;
+                let kept_6 = kept[6][l];
+                let link100_t1 = 0.03 * kept_6;
+                let kept_4 = kept[4][l];
+                let link100_t2 = kept_4 + link100_t1;
+                let kept_1 = kept[1][l];
+                let link100_t3 = kept_1 * link100_t2;
+                let kept_0 = kept[0][l];
+                let kept_2 = kept[2][l];
+                let link100_t4 = kept_0 * kept_2;
+                let link100_hat_y = link100_t3 - link100_t4;
+                let kept_5 = kept[5][l];
+                let link100_t5 = kept_1 * kept_5;
+                let link100_t6 = kept_0 * kept_7;
                 let link100_hat_rx = link100_t5 + link100_t6;
-                let link100_t7 = kept_5 * link100_cos;
-                let link100_t8 = kept_3 * link100_sin;
+                let link100_t7 = kept_1 * kept_7;
+                let link100_t8 = kept_0 * kept_5;
                 let link100_hat_ry = link100_t7 - link100_t8;
                 let v_99 = v.get(99, l);
-                let link100_omega_rz = v_99 + kept_4;
+                let link100_omega_rz = v_99 + kept_6;
                 let v_0 = v.get(0, l);
                 // link1: momentum
                 let link1_t0 = 0.003558400000000002 * v_0;
@@ -2590,13 +2600,13 @@ impl Chain100 {
                 let link100_p_ry = 0.0003 * link100_minus_hat_z;
                 let link100_t10 = 0.0003 * link100_hat_y;
                 let link100_p_rz = link100_t9 + link100_t10;
-                let link100_t11 = link100_sin * link100_p_y;
-                let link100_t12 = link100_cos * link100_p_y;
-                let link100_t13 = link100_cos * link100_minus_p_rx;
-                let link100_t14 = link100_sin * link100_p_ry;
+                let link100_t11 = kept_0 * link100_p_y;
+                let link100_t12 = kept_1 * link100_p_y;
+                let link100_t13 = kept_1 * link100_minus_p_rx;
+                let link100_t14 = kept_0 * link100_p_ry;
                 let link100_t15 = link100_t13 + link100_t14;
-                let link100_t16 = link100_sin * link100_minus_p_rx;
-                let link100_t17 = link100_cos * link100_p_ry;
+                let link100_t16 = kept_0 * link100_minus_p_rx;
+                let link100_t17 = kept_1 * link100_p_ry;
                 let link100_t18 = link100_t16 - link100_t17;
                 let link100_t19 = 0.03 * link100_t12;
                 let link100_t20 = link100_p_rz + link100_t19;
@@ -2612,27 +2622,27 @@ impl Chain100 {
                 results[7][l] = link100_t22;
             }
             p.give(99, &results[0]);
-            kept[6] = results[1];
-            kept[7] = results[2];
-            kept[8] = results[3];
-            kept[9] = results[4];
-            kept[10] = results[5];
-            kept[11] = results[6];
-            kept[12] = results[7];
+            kept[8] = results[1];
+            kept[9] = results[2];
+            kept[10] = results[3];
+            kept[11] = results[4];
+            kept[12] = results[5];
+            kept[13] = results[6];
+            kept[14] = results[7];
         }
         {
             let mut carried0 = [0.0; LANES];
-            for l in 0..LANES { carried0[l] = -kept[8][l]; }
+            for l in 0..LANES { carried0[l] = -kept[10][l]; }
             let mut carried1 = [0.0; LANES];
-            for l in 0..LANES { carried1[l] = kept[7][l]; }
+            for l in 0..LANES { carried1[l] = kept[9][l]; }
             let mut carried2 = [0.0; LANES];
-            for l in 0..LANES { carried2[l] = kept[9][l]; }
+            for l in 0..LANES { carried2[l] = kept[11][l]; }
             let mut carried3 = [0.0; LANES];
-            for l in 0..LANES { carried3[l] = -kept[10][l]; }
+            for l in 0..LANES { carried3[l] = -kept[12][l]; }
             let mut carried4 = [0.0; LANES];
-            for l in 0..LANES { carried4[l] = kept[11][l]; }
+            for l in 0..LANES { carried4[l] = kept[13][l]; }
             let mut carried5 = [0.0; LANES];
-            for l in 0..LANES { carried5[l] = -kept[12][l]; }
+            for l in 0..LANES { carried5[l] = -kept[14][l]; }
             for k in (0..49).rev() {
                 let row = &mut rows0[k];
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
@@ -2717,15 +2727,15 @@ impl Chain100 {
                 p.give(1 + 2 * k, &results[6]);
                 p.give(2 + 2 * k, &results[7]);
             }
-            kept[5] = carried5;
+            kept[7] = carried5;
         }
         {
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
             for l in 0..LANES {
-                let kept_6 = kept[6][l];
-                let kept_5 = kept[5][l];
+                let kept_8 = kept[8][l];
+                let kept_7 = kept[7][l];
                 // link100: momentum
-                let link1_p_rz = kept_6 + kept_5;
+                let link1_p_rz = kept_8 + kept_7;
                 results[0][l] = link1_p_rz;
             }
             p.give(0, &results[0]);

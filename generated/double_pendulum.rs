@@ -568,9 +568,9 @@ impl DoublePendulum {
         m.give(3, &results[3]);
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     /// 12 operations: 6 additions, 6 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 2], v: &[f64; 2], rotation: &mut [[[f64; 3]; 3]; 3], position: &mut [[f64; 3]; 3], velocity: &mut [[f64; 6]; 3]) {
@@ -1236,9 +1236,9 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     #[inline]
     pub fn frames(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], rotation: &mut [[[[f64; LANES]; 3]; 3]; 3], position: &mut [[[f64; LANES]; 3]; 3], velocity: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));

@@ -2521,9 +2521,9 @@ impl Satellite {
         m.give(35, &results[35]);
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     /// 123 operations: 57 additions, 66 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 7], v: &[f64; 6], rotation: &mut [[[f64; 3]; 3]; 3], position: &mut [[f64; 3]; 3], velocity: &mut [[f64; 6]; 3]) {
@@ -4235,9 +4235,9 @@ impl<const LANES: usize> SatelliteLanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<Satellite, 6, LANES, f64, _>((&self.drive_q, m.as_flattened_mut(),));
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     #[inline]
     pub fn frames(&self, q: &[[f64; LANES]; 7], v: &[[f64; LANES]; 6], rotation: &mut [[[[f64; LANES]; 3]; 3]; 3], position: &mut [[[f64; LANES]; 3]; 3], velocity: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<Satellite, 7, LANES, f64, _>((q, v, &self.drive_q, &self.drive_v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));

@@ -1199,9 +1199,9 @@ impl SphericalPendulum {
         m.give(15, &results[15]);
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     /// 88 operations: 36 additions, 52 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn frames(&self, q: &[f64; 5], v: &[f64; 4], rotation: &mut [[[f64; 3]; 3]; 2], position: &mut [[f64; 3]; 2], velocity: &mut [[f64; 6]; 2]) {
@@ -2200,9 +2200,9 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 6, LANES, f64, _>((q, m.as_flattened_mut(),));
     }
 
-    /// Rotation, position and velocity of frames.
-    /// The rotation takes components in the frame's axes to ground axes; the position is that of the origin in the ground, m;
-    /// the velocity is `[linear; angular]`, m/s and rad/s, in the frame's axes.
+    /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
+    /// position is that of the origin in the ground, m; the velocity is `[linear; angular]`, m/s and rad/s, in the
+    /// frame's axes.
     #[inline]
     pub fn frames(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], rotation: &mut [[[[f64; LANES]; 3]; 3]; 2], position: &mut [[[f64; LANES]; 3]; 2], velocity: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 7, LANES, f64, _>((q, v, rotation.as_flattened_mut().as_flattened_mut(), position.as_flattened_mut(), velocity.as_flattened_mut(),));

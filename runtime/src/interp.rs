@@ -1,4 +1,4 @@
-//! The interpreter: the sweeps run directly on numbers, for any tree.
+//! The interpreter: it runs the sweeps directly on numbers, for any tree.
 
 mod directions;
 
@@ -32,8 +32,8 @@ macro_rules! inputs {
 }
 use inputs;
 
-/// Runs the sweeps on numbers. Allocates when it is made, never afterwards, but for room for derivatives, which is made
-/// when it is first needed.
+/// Runs the sweeps on numbers. It allocates when it is made and not afterwards, except for the memory of derivatives,
+/// which is allocated when it is first needed.
 ///
 /// All calls take slices in the order of the state; a slice of another length than [`Tree::dims`] says is a programming
 /// error and panics.

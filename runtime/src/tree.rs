@@ -1,8 +1,8 @@
-//! The mechanism as the sweeps see it: a tree of nodes whose constants are scalars of any kind.
+//! The mechanism in the form on which the sweeps run: a tree of nodes whose constants are scalars of any type.
 //!
-//! A node is one joint and the rigid body behind it. Joints whose motion splits into independent turns and slides
-//! (universal, cylindrical) are two nodes with a massless body between; all others keep a constant motion subspace `E`
-//! in the node frame, and turn about or slide along its z axis.
+//! A node is one joint and the rigid body that it carries. Joints whose motion consists of independent rotations and
+//! translations (universal, cylindrical) are two nodes with a massless body between them. All other joints have a constant
+//! motion subspace `E` in the node frame; rotations are about, and translations along, its z axis.
 
 mod elimination;
 mod map;
@@ -14,19 +14,19 @@ use crate::Scalar;
 
 pub use elimination::Elimination;
 
-/// What a node's joint can do, seen in the node frame.
+/// The motion of a node's joint, in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind<S> {
-    /// Turn about z.
+    /// Rotation about z.
     Revolute,
-    /// Slide along z.
+    /// Translation along z.
     Prismatic,
-    /// Turn about z with a slide of `pitch` m per radian.
+    /// Rotation about z with a translation of `pitch` m per radian.
     Helical {
         /// Metres per radian.
         pitch: S,
     },
-    /// Slides along x and y of the outer axes, then a turn about z; velocities in the axes of the node.
+    /// Translations along x and y of the parent's axes, then a rotation about z; velocities in the axes of the node.
     Planar,
     /// Any rotation, by a unit quaternion; velocities in the axes of the node.
     Spherical,
@@ -35,7 +35,7 @@ pub enum Kind<S> {
 }
 
 impl<S: Copy> Kind<S> {
-    /// Coordinates the node reads.
+    /// Number of coordinates of the node.
     pub fn nq(&self) -> usize {
         match self {
             Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => 1,
@@ -45,7 +45,7 @@ impl<S: Copy> Kind<S> {
         }
     }
 
-    /// Freedoms.
+    /// Number of degrees of freedom.
     pub fn nv(&self) -> usize {
         match self {
             Kind::Spherical => 3,
@@ -66,7 +66,7 @@ impl<S: Copy> Kind<S> {
         }
     }
 
-    /// Coordinates a linear spring can act on.
+    /// Number of coordinates on which a linear spring can act.
     pub fn springs(&self) -> usize {
         match self {
             Kind::Spherical | Kind::Floating => 0,
@@ -118,7 +118,7 @@ impl<S: Scalar> Freedom<S> {
     }
 }
 
-/// Where a node's coordinates and velocities come from; indices of the first ones.
+/// Source of a node's coordinates and velocities, with the indices of the first ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Coordinates and velocities of the state.
@@ -137,7 +137,7 @@ pub enum Source {
     },
 }
 
-/// Passive elements of one freedom.
+/// Passive elements of one degree of freedom.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passive<S> {
     /// Viscous damping, N m s/rad or N s/m.
@@ -150,32 +150,32 @@ pub struct Passive<S> {
     pub armature: S,
 }
 
-/// A joint and the rigid body behind it.
+/// A joint and the rigid body that it carries.
 #[derive(Clone, Debug)]
 pub struct Node<S> {
     /// Parent node, `None` for the ground. Parents come before children.
     pub parent: Option<usize>,
-    /// Constant steps from the parent frame to the joint.
+    /// Constant transforms from the parent frame to the joint.
     pub place: Vec<ElementaryTransform<S>>,
     /// Joint.
     pub kind: Kind<S>,
     /// Coordinates.
     pub source: Source,
-    /// `coordinate = ratio · source + offset`, one-freedom nodes only.
+    /// `coordinate = ratio · source + offset`, for nodes with one degree of freedom only.
     pub ratio: S,
     /// Constant added to the coordinate of the source (a mimic's offset).
     pub offset: S,
-    /// Constant turn from the coordinate to the angle of the node frame.
+    /// Constant rotation, rad, from the coordinate to the angle of the node frame.
     pub phase: S,
-    /// Further turn by this many right angles, exact.
+    /// Additional rotation by this number of right angles, exact.
     pub quarter: u8,
-    /// Constant slide added along the joint axis, m.
+    /// Constant displacement along the joint axis, m.
     pub slide: S,
     /// Inertia of the bodies that move with the node, in its frame.
     pub inertia: RigidInertia<S>,
-    /// Passive elements, one for each freedom.
+    /// Passive elements, one entry for each degree of freedom.
     pub passive: Vec<Passive<S>>,
-    /// How its freedoms are eliminated.
+    /// Elimination of its degrees of freedom.
     pub elimination: Elimination,
 }
 
@@ -208,7 +208,7 @@ pub struct TreeWrench<S> {
     pub path: Vec<usize>,
 }
 
-/// What a column that stays open while the backward sweep goes on inward stands for.
+/// The unknown of a column that is carried past its own joint in the sweep from tip to base.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unknown {
     /// A coordinate, by its velocity index: shared by several joints, or solved at another node.
@@ -227,28 +227,28 @@ impl Unknown {
     }
 }
 
-/// What two frames on bodies may not do to one another. `z` and so on are axes of the frames, `first` and `second`; rows stand in
-/// the axes and at the origin of the second one.
+/// Kinds of constraints between two frames on bodies. `x`, `y`, `z` are axes of the first or the second frame; rows are
+/// components in the axes and at the origin of the second frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Closure<S> {
-    /// Leaves a turn about z.
+    /// Allows a rotation about z.
     Revolute,
-    /// Leaves a slide along z.
+    /// Allows a translation along z.
     Prismatic,
-    /// Leaves both.
+    /// Allows both.
     Cylindrical,
-    /// Leaves a screw about z.
+    /// Allows a screw motion about z.
     Helical {
         /// Metres per radian.
         pitch: S,
     },
-    /// Leaves turns about x of the first and y of the second frame.
+    /// Allows rotations about x of the first and y of the second frame.
     Universal,
-    /// Leaves slides along x and y and a turn about z.
+    /// Allows translations along x and y and a rotation about z.
     Planar,
-    /// Leaves all rotations.
+    /// Allows all rotations.
     Spherical,
-    /// Leaves nothing.
+    /// Allows no motion.
     Fixed,
     /// Keeps the origins at a distance.
     Distance {
@@ -286,7 +286,7 @@ pub enum Closure<S> {
 /// A constraint between two frames on bodies.
 #[derive(Clone, Debug)]
 pub struct Cut<S> {
-    /// What it binds.
+    /// The frames or joints that it connects.
     pub closure: Closure<S>,
     /// First frame, `A`.
     pub a: TreeFrame<S>,
@@ -298,7 +298,7 @@ pub struct Cut<S> {
     pub path_b: Vec<usize>,
 }
 
-/// What a constraint binds.
+/// The two frames or the joints that a constraint connects.
 #[derive(Clone, Debug)]
 pub enum Bond<S> {
     /// Two frames.
@@ -315,7 +315,7 @@ pub enum Bond<S> {
 /// Rows of `Φ v = b` that belong together.
 #[derive(Clone, Debug)]
 pub struct Constraint<S> {
-    /// What it binds.
+    /// The frames or joints that it connects.
     pub bond: Bond<S>,
     /// Its place among [`Tree::unknowns`], one for each row.
     pub slots: Vec<usize>,
@@ -323,9 +323,10 @@ pub struct Constraint<S> {
     pub first: usize,
     /// Velocities that it binds, in ascending order.
     pub velocities: Vec<usize>,
-    /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s.
+    /// Rate at which position errors decay (Baumgarte), 1/s.
     pub decay: Option<S>,
-    /// What the rows give way by, `Φ v = b + μ σ`, in place of being held: the penalty method with the weight `1/μ`.
+    /// Compliance `μ` of the rows in `Φ v = b + μ σ`: the penalty method with the weight `1/μ`, in place of exact
+    /// constraints.
     pub compliance: Option<S>,
 }
 
@@ -346,7 +347,7 @@ pub struct Tree<S> {
     pub wrenches: Vec<TreeWrench<S>>,
     /// Loops and couplings.
     pub constraints: Vec<Constraint<S>>,
-    /// Part of the diagonal of `Φ M⁻¹Φᵀ` below which what is left of a row counts as redundant.
+    /// Fraction of a row's diagonal entry of `Φ M⁻¹Φᵀ`; a row of which less remains counts as redundant.
     pub tolerance: S,
     /// Frames of interest: first that of every joint's child body, in joint order, then the others.
     pub frames: Vec<TreeFrame<S>>,
@@ -354,7 +355,7 @@ pub struct Tree<S> {
     pub joint_nodes: Vec<usize>,
     /// Nodes with fewer ancestors than this are the inner ones of the mass matrix: their screws are carried outward.
     pub matrix_depth: usize,
-    /// The same mechanism with its freedoms eliminated in another way, where accelerations come cheaper by it.
+    /// The same mechanism with another elimination, where that one needs fewer operations for accelerations.
     pub accelerations: Option<alloc::boxed::Box<Tree<S>>>,
 }
 
@@ -376,16 +377,17 @@ pub struct Dims {
 }
 
 impl<S> Tree<S> {
-    /// Whether number `g` of [`Tree::shared`] is a row of one of the constraints.
+    /// Whether number `g` of [`Tree::unknowns`] is a row of one of the constraints.
     pub fn is_slot(&self, g: usize) -> bool {
         self.constraints.iter().any(|c| c.slots.contains(&g))
     }
 }
 
 impl<S: Scalar> Tree<S> {
-    /// The same mechanism with penalties in place of multipliers: momenta `σ = α (Φ v + ω φ)` with the weight `α` in kg (of
-    /// turns kg m²) and `ω` in 1/s. That is Bayo's method on the level of velocities, without the integral of the positions'
-    /// errors (Bayo and others 1988; C.7 of the thesis). Rows hold to `σ/α` only, and none is ever redundant.
+    /// The same mechanism with penalties in place of multipliers: momenta `σ = α (Φ v + ω φ)` with the weight `α` in kg
+    /// (for rotations kg m²) and `ω` in 1/s. That is Bayo's method on the level of velocities, without the integral of
+    /// the positions' errors (Bayo and others 1988; C.7 of the thesis). Rows hold to `σ/α` only, and none is ever
+    /// redundant.
     pub fn penalised(&self, weight: S, rate: S) -> Tree<S> {
         let mut tree = self.clone();
         let other = tree.accelerations.as_deref_mut();
@@ -407,11 +409,12 @@ impl<S: Scalar> Tree<S> {
         self.accelerations.as_deref().unwrap_or(self)
     }
 
-    /// The same mechanism with fewer non-zero inertial parameters: what a joint cannot tell from inertia of its parent
-    /// is moved there, from the tips inward (Khalil and Kleinfinger's base parameters). Past a pin goes all that is
-    /// symmetric about its axis `{m, m c_z, (J_yy, J_yy, 0)}`, past a slider the rotational inertia, past a spherical
-    /// joint the mass. Motion, momenta and energies are unchanged; wrenches inside the joints are not, so reactions
-    /// must come from the original.
+    /// The same mechanism with fewer non-zero inertial parameters. Inertia of a body that has the same effect as
+    /// inertia of its parent is moved to the parent, from the tips to the base (Khalil and Kleinfinger's base
+    /// parameters). Through a revolute joint this is all inertia that is symmetric about its axis, `{m, m c_z, (J_yy,
+    /// J_yy, 0)}`, through a prismatic joint the rotational inertia, through a spherical joint the mass. Motion,
+    /// momenta and energies are unchanged; wrenches inside the joints are not, so reactions must come from the
+    /// original.
     pub fn regrouped(&self) -> Tree<S> {
         let mut tree = self.clone();
         if let Some(other) = &mut tree.accelerations {
@@ -432,7 +435,8 @@ impl<S: Scalar> Tree<S> {
                 }
                 Kind::Helical { .. } | Kind::Planar | Kind::Floating => continue,
             };
-            // Invariant under the joint's own motion, so only the constant steps count. The slide of a pin shifts it.
+            // The inertia is invariant under the joint's own motion, so that only the constant transforms count. The
+            // displacement along the axis of a revolute joint shifts it.
             let z = crate::spatial::Axis::Z;
             let mut m = moved.articulated();
             match tree.nodes[i].kind {
@@ -453,7 +457,7 @@ impl<S: Scalar> Tree<S> {
     }
 }
 
-/// The constant turn of a slider about its axis.
+/// The constant rotation of a prismatic joint about its axis.
 fn phase_step<S: Scalar>(node: &Node<S>) -> ElementaryTransform<S> {
     let (s, c) = quarter_turn(node.phase.sin_cos(), node.quarter);
     ElementaryTransform::Turn { axis: crate::spatial::Axis::Z, c, s }

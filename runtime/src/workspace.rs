@@ -1,4 +1,5 @@
-//! Everything a sweep computes, one slot for each node or freedom, with its symbol in `algorithm` notation.
+//! Everything that the sweeps compute, one entry for each node or degree of freedom, with the symbols of
+//! [`notation`](crate::notation).
 
 use alloc::collections::BTreeSet;
 use alloc::vec;
@@ -15,20 +16,20 @@ pub struct Poses<S> {
     pub joint: Vec<JointSteps<S>>,
     /// Joint coordinates of nodes a spring can act on, three slots each: `ratio · source + offset`.
     pub coordinates: Vec<[S; 3]>,
-    /// Of nodes whose frames do not turn: how the body stands in its frame, and its inertia there.
+    /// For nodes with non-rotating frames: orientation of the body in its frame, and its inertia there.
     pub body: Vec<TurnedBody<S>>,
 }
 
-/// A body in a frame that does not turn with it.
+/// A body in a non-rotating frame.
 #[derive(Clone, Copy, Debug)]
 pub struct TurnedBody<S> {
-    /// Angle about z, rad, less the right angles.
+    /// Angle about z, rad, without the right angles.
     pub angle: S,
-    /// Right angles to be added.
+    /// Number of right angles to be added.
     pub quarter: u8,
-    /// Cosine of both together.
+    /// Cosine of the sum.
     pub c: S,
-    /// Sine of both together.
+    /// Sine of the sum.
     pub s: S,
     /// Inertia in the frame.
     pub inertia: RigidInertia<S>,
@@ -42,13 +43,13 @@ impl<S: Scalar> Poses<S> {
 }
 
 impl<S: Scalar> TurnedBody<S> {
-    /// From the frame to the body's axes.
+    /// The transform from the frame to the body's axes.
     pub fn step(&self) -> ElementaryTransform<S> {
         ElementaryTransform::Turn { axis: crate::spatial::Axis::Z, c: self.c, s: self.s }
     }
 }
 
-/// At most four steps, kept in place.
+/// At most four elementary transforms, stored in place.
 #[derive(Clone, Copy, Debug)]
 pub struct JointSteps<S> {
     steps: [ElementaryTransform<S>; 4],
@@ -57,7 +58,7 @@ pub struct JointSteps<S> {
 }
 
 impl<S: Scalar> JointSteps<S> {
-    /// No steps.
+    /// No transforms.
     pub fn new() -> Self {
         JointSteps {
             steps: [ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4],
@@ -66,29 +67,29 @@ impl<S: Scalar> JointSteps<S> {
         }
     }
 
-    /// Replaces the steps; those beyond four are dropped.
+    /// Replaces the transforms; there are at most four.
     pub fn set(&mut self, steps: &[ElementaryTransform<S>]) {
         self.set_with(0, steps);
     }
 
-    /// The same where the first `placing` steps stand for the constant placement.
+    /// The same, where the first `placing` transforms represent the constant placement.
     pub fn set_with(&mut self, placing: usize, steps: &[ElementaryTransform<S>]) {
         self.placing = placing;
         self.len = steps.len().min(4);
         self.steps[..self.len].copy_from_slice(&steps[..self.len]);
     }
 
-    /// The steps, parent to child.
+    /// The transforms, from parent to child.
     pub fn get(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.len]
     }
 
-    /// Those that stand for the constant placement.
+    /// The transforms of the constant placement.
     pub fn placing(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.placing.min(self.len)]
     }
 
-    /// The joint's own.
+    /// The transforms of the joint's motion.
     pub fn own(&self) -> &[ElementaryTransform<S>] {
         &self.steps[self.placing.min(self.len)..self.len]
     }
@@ -124,8 +125,8 @@ pub struct Factor<S> {
     pub unknown_pivots: Vec<Pivot<S>>,
     /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
     pub columns: Vec<Force<S>>,
-    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Elimination::screws`] asks for it, at
-    /// `g · nodes + i`.
+    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Elimination::screws`] asks for
+    /// it, at `g · nodes + i`.
     pub screws: Vec<Motion<S>>,
     /// Inertia between shared coordinates, while they are open.
     pub gram: Vec<S>,
@@ -145,9 +146,9 @@ pub struct Factor<S> {
 pub struct RowState<S> {
     /// `E_c` at the second frame, in its axes.
     pub e: Force<S>,
-    /// What it is at the node of the first frame, with its sign.
+    /// The wrench at the node of the first frame, with its sign.
     pub at_a: Force<S>,
-    /// What it is at the node of the second frame.
+    /// The wrench at the node of the second frame.
     pub at_b: Force<S>,
     /// Residual of the position, m or rad; zero where there is none.
     pub residual: S,
@@ -168,7 +169,7 @@ pub struct Constraints<S> {
     pub relative: Vec<Relative<S>>,
     /// Rows.
     pub rows: Vec<RowState<S>>,
-    /// `b`, velocity level, or what takes its place among accelerations.
+    /// `b` for velocities, or the right-hand sides for accelerations.
     pub rhs: Vec<S>,
     /// Multipliers, row by row: `σ` or `λ`.
     pub multipliers: Vec<S>,
@@ -185,7 +186,7 @@ pub struct Relative<S> {
     pub d: Vec3<S>,
 }
 
-/// Rates (or accelerations) and what leads to them.
+/// Rates (or accelerations) and their intermediate results.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
     /// `D'_i`.
@@ -234,7 +235,7 @@ pub struct Newton<S> {
     pub reference: Vec<S>,
 }
 
-/// All of it.
+/// The whole workspace.
 #[derive(Clone, Debug)]
 pub struct Workspace<S> {
     /// First freedom of every node, and their number at the end.
@@ -268,7 +269,7 @@ pub struct Workspace<S> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Room for a tree: the only allocation there is.
+    /// Allocates memory for a tree; nothing is allocated later.
     pub fn new(tree: &Tree<S>) -> Self {
         let n = tree.nodes.len();
         let g = tree.unknowns.len().max(tree.for_accelerations().unknowns.len());

@@ -1,4 +1,4 @@
-//! `mbd eval`: numbers out, through the interpreter. `docs/eval-json.md` describes both sides.
+//! `mbd eval`: evaluates states with the interpreter. `docs/eval-json.md` describes input and output.
 
 mod input;
 mod outer;
@@ -17,7 +17,7 @@ use super::{loops, source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;
 
-/// One state's results; what was not asked for is left out.
+/// The results of one state; outputs that were not requested are left out.
 #[derive(Default, Serialize)]
 struct Results {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,7 +45,7 @@ struct Results {
 }
 
 impl Results {
-    /// First output that is not finite.
+    /// The first output that is not finite.
     fn not_finite(&self) -> Option<&'static str> {
         let bad = |list: &Option<Vec<f64>>| list.iter().flatten().any(|x| !x.is_finite());
         let bad_number = |x: Option<f64>| x.is_some_and(|x| !x.is_finite());
@@ -66,7 +66,7 @@ impl Results {
     }
 }
 
-/// Reads states, evaluates, writes.
+/// Runs `mbd eval`.
 pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, PlanOptions { snap: args.snap, ..PlanOptions::default() })?;
     let outer = Outer::new(&plan, args.layout);
@@ -101,12 +101,12 @@ fn standard_input() -> Outcome<String> {
     Ok(text)
 }
 
-/// JSON of all results, one state a line; or the state that has none, and why.
+/// The JSON of all results, one state a line; or the first state without results, with the reason.
 fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) -> Result<String, (usize, Failure)> {
-    // Parameters of the file, not the defaults of the model.
+    // The parameters of the file replace the defaults of the model.
     let params = &inputs.params;
     let mut interpreter = plan.interpreter(params);
-    // What is not solved for exists without inertia; nothing else does.
+    // Without inertia, only outputs that do not solve for velocities or accelerations exist.
     let unsolved = |w: &Quantity| {
         matches!(w, Quantity::Momenta | Quantity::MassMatrix | Quantity::Bias | Quantity::InverseDynamics)
     };
@@ -125,7 +125,7 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
             let what = format!("the result `{key}` is not finite");
             return Err((k, Failure::new(what, "look for very large numbers in the input")));
         }
-        // Finite numbers and fixed keys always make a text.
+        // Finite numbers and fixed keys can always be serialised.
         lines.push(serde_json::to_string(&results).unwrap_or_default());
     }
     Ok(format!("{{\"states\": [\n{}\n]}}\n", lines.join(",\n")))

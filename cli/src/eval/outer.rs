@@ -1,4 +1,4 @@
-//! States as the file has them: another program's order and form.
+//! The layout of the states in the file: the order and representation of another program ("there").
 
 use multibody::codegen::model::JointMotion;
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
@@ -19,13 +19,13 @@ pub struct Outer {
     pub v_names: Vec<String>,
 }
 
-/// Numbers there that must have unit length: first index, number, joint.
+/// Numbers in the file that must have unit length together.
 pub struct Unit {
-    /// First of them.
+    /// Index of the first number.
     pub at: usize,
-    /// How many.
+    /// How many numbers.
     pub len: usize,
-    /// What they are, for messages.
+    /// Description for messages.
     pub what: String,
 }
 
@@ -55,9 +55,9 @@ impl Outer {
         outer
     }
 
-    /// The prescribed joints, which are given in this program's own layout always.
+    /// The prescribed joints, which are always given in this program's own layout.
     pub fn drives(plan: &Plan) -> Outer {
-        // The same plan with the prescribed joints for its state.
+        // The same plan with the prescribed joints as its state.
         let mut model = plan.model.clone();
         for joint in &mut model.joints {
             joint.motion = match joint.motion {
@@ -99,8 +99,8 @@ impl Outer {
         there
     }
 
-    /// Time derivative of velocities or momenta `x`, from here to there. Where the other program takes the linear part of
-    /// a floating joint in outer axes, `d/dt (R x) = R (ẋ + ω × x)`.
+    /// Time derivative of velocities or momenta `x`, from here to there. If the other program takes the linear part of
+    /// a floating joint in the parent's axes, `d/dt (R x) = R (ẋ + ω × x)`.
     pub fn derivative(&self, q: &[f64], v: &[f64], x: &[f64], xd: &[f64]) -> Vec<f64> {
         let mut turned = xd.to_vec();
         for part in self.layout.parts.iter().filter(|p| p.form == Form::FloatingWorld) {
@@ -133,11 +133,11 @@ impl Outer {
         let n = self.v_names.len();
         let rows: Vec<Vec<f64>> = m.chunks(n.max(1)).map(|row| self.velocities(q, row)).collect();
         let columns = (0..n).map(|k| rows.iter().map(|row| row[k]).collect::<Vec<_>>());
-        // Columns of a symmetric matrix are its rows.
+        // The columns of a symmetric matrix are its rows.
         columns.map(|column| self.velocities(q, &column)).collect()
     }
 
-    /// What must have unit length there.
+    /// The numbers that must have unit length in the file.
     pub fn units(&self) -> Vec<Unit> {
         let unit = |part: &Part| {
             let at = part.q.1;
@@ -164,7 +164,7 @@ fn own(plan: &Plan) -> Layout {
     Layout { parts: parts.collect() }
 }
 
-/// Names there of the coordinates of one joint, from those here.
+/// Names of the coordinates of one joint in the other layout, from those in this one.
 fn names(form: Form, here: &[String]) -> Vec<String> {
     let turned = |angle: &String| {
         let stem = angle.trim_end_matches(".angle");

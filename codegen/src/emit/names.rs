@@ -14,7 +14,7 @@ pub fn constant(name: &str) -> String {
     identifier(name).to_ascii_uppercase()
 }
 
-/// What a comment says of a quantity.
+/// Description of a quantity for comments.
 pub fn quantity(q: Quantity) -> &'static str {
     match q {
         Quantity::Pose => "sine and cosine, rotation",
@@ -43,7 +43,7 @@ pub fn heading(plan: &Plan, (node, what): Label) -> String {
     format!("{}: {}", node.map_or("ground", |i| plan.nodes[i].name.as_str()), quantity(what))
 }
 
-/// What stands behind the body: `m_xx`, `v`.
+/// The part of a name after the body: `m_xx`, `v`.
 fn component(Name { minus, letter, entry, .. }: &Name) -> String {
     let minus = if *minus { "minus_" } else { "" };
     match entry {
@@ -63,7 +63,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// Names of a program's values, all different. A value that the sweeps have named is called after its body, its letter
+    /// Names of a program's values, all different. A value that the sweeps have named is named after its body, its letter
     /// and its component, `link5_m_xx`, further ones of that name `link5_m_xx_2`; sums and products on the way to such
     /// values are numbered, `link5_t0`. `body` is the name of a body, `input` that of an input.
     pub fn of(
@@ -80,7 +80,7 @@ impl Names {
                 (Op::Cos(_), _) => self.unique(format!("{}_cos", body(*node))),
                 (_, Some(name)) => self.unique(match name.entry {
                     Entry::Axes(_) => format!("{}_{}", body(name.node), component(&name)),
-                    // Results are not of one body.
+                    // Results do not belong to one body.
                     Entry::Number(_) | Entry::Pair(..) => component(&name),
                 }),
                 (_, None) => self.numbered(format!("{}_t", body(*node)), 0),

@@ -1,5 +1,5 @@
-//! Rolled programs: numbers between blocks in `kept`, what a run keeps from pass to pass in one row for each turn, its
-//! constants in a table. Every block is a loop over lanes, as in straight-line code.
+//! Rolled programs: numbers between blocks in `kept`, numbers that a run stores from pass to pass in one row for each
+//! iteration, its constants in a table. Every block is a loop over lanes, as in straight-line code.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -13,7 +13,7 @@ use crate::plan::Plan;
 use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
 use crate::symbolic::{Op, ProgramResult};
 
-/// Bytes that the rows of eight lanes may take on the stack; beyond, lanes are computed one after the other.
+/// Largest size of the rows of eight lanes on the stack, bytes. If they are larger, lanes are computed one after the other.
 const ROWS: usize = 1 << 19;
 
 /// Writes the function of a rolled program.
@@ -26,7 +26,7 @@ pub struct RolledWriter<'a> {
 }
 
 impl<'a> RolledWriter<'a> {
-    /// Of one program.
+    /// A writer for one program.
     pub fn new(plan: &'a Plan, program: &'a RolledProgram, head: Head<'a>) -> Self {
         let bytes = match head.options.precision {
             Precision::F64 => 64,
@@ -36,7 +36,7 @@ impl<'a> RolledWriter<'a> {
         RolledWriter { plan, program, head, one_by_one: rows * bytes > ROWS }
     }
 
-    /// Lane in inputs and results.
+    /// Index of the lane in inputs and results.
     fn lane(&self) -> &'static str {
         if self.one_by_one {
             "lane"
@@ -142,7 +142,7 @@ impl<'a> RolledWriter<'a> {
         }
     }
 
-    /// Sines and cosines of all turns together.
+    /// Sines and cosines of all iterations together.
     fn sines(&self, out: &mut String, block: &Block, repeat: &Repeat) {
         let (run, turns) = (repeat.run, self.program.loops[repeat.run].table.len());
         let names = self.names(block);
@@ -180,7 +180,8 @@ impl<'a> RolledWriter<'a> {
         let _ = writeln!(out, "            }}");
     }
 
-    /// Statements and results, of one turn in a loop. Results are gathered first, as in straight-line code.
+    /// Statements and results, in a loop those of one iteration. Results are first collected in an array, as in
+    /// straight-line code.
     fn body(&self, out: &mut String, block: &Block, indent: &str) {
         let names = self.names(block);
         let n = block.outputs.len();
@@ -193,7 +194,7 @@ impl<'a> RolledWriter<'a> {
         for (id, op, label) in &block.program.steps {
             let text = match op {
                 Op::Sin(a) | Op::Cos(a) => {
-                    // The first of a pair to be met stands for both.
+                    // The first one of a pair represents both.
                     let Some(pair) = late.remove(a) else { continue };
                     let pair = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
                     self.head.sine_and_cosine(pair, &names[a])
@@ -227,7 +228,7 @@ impl<'a> RolledWriter<'a> {
         }
     }
 
-    /// Names of a block's values; in loops, after the place of the link in its turn.
+    /// Names of a block's values; in loops they contain the place of the link in its iteration.
     fn names(&self, block: &Block) -> BTreeMap<u32, String> {
         let body = |node: Option<usize>| match (node, &block.repeat) {
             (None, _) => "ground".to_string(),
@@ -262,7 +263,7 @@ impl<'a> RolledWriter<'a> {
     }
 }
 
-/// What is added to a number at turn 0 to have that of turn `k`.
+/// The offset of an index in iteration `k` from that in iteration 0.
 fn of_turn(stride: usize) -> String {
     match stride {
         1 => " + k".to_string(),

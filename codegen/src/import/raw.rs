@@ -1,8 +1,8 @@
 //! What a reader hands to the checks: the model with names instead of indices and the place of everything.
 //!
-//! A reader fills this in and reports what its format forbids (unknown keys, wrong types, numbers that are not finite); everything about
-//! the mechanism itself (names, tree, physics) is judged by `check`, the same for all formats. What a reader has
-//! reported already stands here as [`RawValue::Invalid`] or `None`, so that nothing is reported twice.
+//! A reader fills this in and reports what its format forbids (unknown keys, wrong types, numbers that are not finite);
+//! everything about the mechanism itself (names, tree, physics) is judged by `check`, the same for all formats. What a
+//! reader has reported already stands here as [`RawValue::Invalid`] or `None`, so that nothing is reported twice.
 
 use super::source::{Span, Spanned};
 use crate::model::{JointSpec, LoopSpec, WrenchAxes};
@@ -71,10 +71,10 @@ pub struct RawBody {
     pub inertia_axes: Option<RawRotation>,
 }
 
-/// One number for every freedom, or one per freedom.
+/// One number for all degrees of freedom, or one for each.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RawFreedoms {
-    /// The same for all.
+    /// The same number for all.
     All(RawNumber),
     /// One per freedom, in the order of the velocities.
     Each(Spanned<Vec<RawNumber>>),
@@ -102,7 +102,7 @@ pub struct RawMimic {
     pub offset: Option<RawNumber>,
 }
 
-/// A joint. Entries the type has no use for are reported by the checks; a reader whose format always writes them leaves them out.
+/// A joint. The checks report entries that its type does not use; a reader whose format always has them leaves them out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawJoint {
     /// Name.
@@ -135,9 +135,9 @@ pub struct RawJoint {
     pub motion: RawMotion,
     /// Coupling to another joint.
     pub mimic: Option<RawMimic>,
-    /// Coordinates that the closing of loops begins with.
+    /// Coordinates from which loops are closed.
     pub start: Option<RawFreedoms>,
-    /// Whether they stay as they are when loops are closed.
+    /// Whether they do not change when loops are closed.
     pub held: Option<Spanned<bool>>,
 }
 
@@ -192,8 +192,8 @@ pub struct RawLoop {
     pub between: Option<[Spanned<String>; 2]>,
     /// Directions by their keys; those that are missing have the defaults of the type.
     pub directions: Vec<(&'static str, Spanned<[f64; 3]>)>,
-    /// Numbers by their keys: a pitch (m/rad), a length or radius (m); the rate at which errors of the positions decay (1/s), 0 where
-    /// there is none.
+    /// Numbers by their keys: a pitch (m/rad), a length or radius (m); the rate at which errors of the positions decay
+    /// (1/s), 0 where there is none.
     pub numbers: Vec<(&'static str, RawNumber)>,
     /// Coefficients of velocity and angular velocity.
     pub row: Option<Spanned<[RawNumber; 6]>>,
@@ -220,7 +220,7 @@ pub struct RawCoupling {
     pub joints: Option<Spanned<Vec<Spanned<String>>>>,
     /// Factor of each; `None` where it was reported already.
     pub ratios: Option<Spanned<Vec<RawNumber>>>,
-    /// What the sum is; 0 where `None`.
+    /// Value of the sum; 0 where `None`.
     pub offset: Option<RawNumber>,
     /// Rate at which errors of the positions decay, 1/s; 0 where `None`.
     pub decay: Option<RawNumber>,
@@ -236,7 +236,7 @@ pub enum RawConstraint {
 }
 
 impl RawConstraint {
-    /// What it is called in messages.
+    /// Its name in messages.
     pub fn kind(&self) -> &'static str {
         match self {
             RawConstraint::Loop(_) => "loop",
@@ -292,15 +292,16 @@ pub struct RawModel {
     pub wrenches: Vec<RawWrench>,
     /// Loops and couplings, in file order.
     pub constraints: Vec<RawConstraint>,
-    /// A body or joint had to be left out and was reported: unknown names and loose bodies are then no news.
+    /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
+    /// reported again.
     pub incomplete: bool,
-    /// The file was written for other programs: what nature forbids but the equations survive is then a warning, and the model's
-    /// name is made usable.
+    /// Whether the file was written for other programs. Values that are physically impossible but do not break the
+    /// equations are then warnings, and the model's name is made valid.
     pub lenient: bool,
 }
 
 impl RawModel {
-    /// Nothing yet.
+    /// An empty model.
     pub fn empty() -> Self {
         RawModel {
             name: None,

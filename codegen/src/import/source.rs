@@ -30,7 +30,7 @@ impl From<std::ops::Range<usize>> for Span {
     }
 }
 
-/// A value and where it stands.
+/// A value and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spanned<T> {
     /// The value.
@@ -55,7 +55,7 @@ pub struct SourceMap<'a> {
 }
 
 impl<'a> SourceMap<'a> {
-    /// Notes where the lines of `text` start.
+    /// Finds the starts of the lines of `text`.
     pub fn new(text: &'a str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(k, _)| k + 1)).collect();
         SourceMap { text, lines }
@@ -66,7 +66,8 @@ impl<'a> SourceMap<'a> {
         self.lines.partition_point(|&start| start <= offset.min(self.text.len()))
     }
 
-    /// Line and column (in characters), both from 1. Offsets past the end or inside a character are moved back to where there is something.
+    /// Line and column (in characters), both from 1. Offsets past the end or inside a character are moved back to the
+    /// last character.
     pub fn position(&self, offset: usize) -> (usize, usize) {
         let mut offset = offset.min(self.text.len());
         while !self.text.is_char_boundary(offset) {
@@ -87,7 +88,7 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// None yet; `file` as the caller named it.
+    /// A collector without findings; `file` is the name that the caller gave.
     pub fn new(file: &str, text: &'a str) -> Self {
         Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new() }
     }
@@ -105,7 +106,7 @@ impl<'a> Findings<'a> {
         });
     }
 
-    /// Adds an error: nothing can be made of the file.
+    /// Adds an error: the file cannot be used.
     pub fn error(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
         self.add(Severity::Error, span, message, help);
     }
@@ -115,7 +116,7 @@ impl<'a> Findings<'a> {
         self.add(Severity::Warning, span, message, help);
     }
 
-    /// Adds a notice: something was changed on the way.
+    /// Adds a notice: the reader changed something.
     pub fn notice(&mut self, span: Span, message: impl Into<String>) {
         self.add(Severity::Notice, span, message, "");
     }
@@ -143,7 +144,7 @@ impl<'a> Findings<'a> {
     }
 }
 
-/// Control characters escaped: a finding is one line, whatever stands in the file.
+/// Escapes control characters, so that a finding is always one line.
 fn one_line(text: String) -> String {
     if !text.contains(char::is_control) {
         return text;

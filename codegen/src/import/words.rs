@@ -30,7 +30,7 @@ pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     }
 }
 
-/// The candidate closest to `word`, if one is close enough to be what was meant.
+/// The candidate closest to `word`, if one is close enough.
 pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     const LONGEST: usize = 64;
     let word: Vec<char> = word.chars().take(LONGEST + 1).flat_map(char::to_lowercase).collect();
@@ -45,9 +45,9 @@ pub fn closest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
             continue;
         }
         let d = distance(&word, &other);
-        // A word with nothing in common is no suggestion, however short.
+        // A word without a common letter is no suggestion, even if it is short.
         let plausible = d <= limit && d < word.len().max(other.len());
-        // Swapped letters are likelier than others.
+        // Swapped letters are more likely than other mistakes.
         let rank = (d, sorted(&word) != sorted(&other));
         if plausible && best.is_none_or(|(b, _)| rank < b) {
             best = Some((rank, candidate));
@@ -62,7 +62,7 @@ fn sorted(word: &[char]) -> Vec<char> {
     letters
 }
 
-/// The closest candidate as help, or else `otherwise`.
+/// Help text with the closest candidate; without one, `otherwise`.
 pub fn did_you_mean<'a>(
     word: &str,
     candidates: impl IntoIterator<Item = &'a str>,

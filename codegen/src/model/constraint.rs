@@ -18,44 +18,44 @@ pub struct Mount {
     pub placement: Placement,
 }
 
-/// What a loop holds together, first frame and second frame. Axes stand in the axes of both frames, any length but zero.
+/// Kinds of loops between a first and a second frame. Axes are given in both frames, with any length but zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LoopKind {
-    /// Leaves one rotation, as a revolute joint would.
+    /// Allows one rotation, as a revolute joint would.
     Revolute {
         /// Axis of rotation.
         axis: [f64; 3],
     },
-    /// Leaves one translation.
+    /// Allows one translation.
     Prismatic {
         /// Direction of the translation.
         axis: [f64; 3],
     },
-    /// Leaves a translation along and a rotation about one axis.
+    /// Allows a translation along and a rotation about one axis.
     Cylindrical {
         /// The axis.
         axis: [f64; 3],
     },
-    /// Leaves a screw motion.
+    /// Allows a screw motion.
     Helical {
         /// The axis.
         axis: [f64; 3],
         /// Metres per radian.
         pitch: Value,
     },
-    /// Leaves rotations about `axes[0]`, fixed in the first frame, and `axes[1]`, fixed in the second; at right angles.
+    /// Allows rotations about `axes[0]`, fixed in the first frame, and `axes[1]`, fixed in the second; at right angles.
     Universal {
         /// Both axes.
         axes: [[f64; 3]; 2],
     },
-    /// Leaves two translations across a normal and a rotation about it.
+    /// Allows two translations across a normal and a rotation about it.
     Planar {
         /// Normal of the plane.
         normal: [f64; 3],
     },
-    /// Leaves all rotations: the origins coincide.
+    /// Allows all rotations: the origins coincide.
     Spherical,
-    /// Leaves nothing.
+    /// Allows no motion.
     Fixed,
     /// The origins stay at a distance: a massless rod with spherical ends.
     Distance {
@@ -108,7 +108,7 @@ pub enum LoopKind {
     },
 }
 
-/// The frames of a loop in which a direction stands.
+/// The frames of a loop in which a direction is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stands {
     /// In the first.
@@ -143,11 +143,11 @@ pub struct LoopNumbers {
     pub row: [Value; 6],
 }
 
-/// All that tells one kind of loop from another.
+/// The properties of a kind of loop.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct LoopSpec {
-    /// What it is called.
+    /// Its words.
     pub words: Words,
     /// Directions it takes.
     pub directions: &'static [Direction],
@@ -155,7 +155,7 @@ pub struct LoopSpec {
     pub number: Option<&'static str>,
     /// Units of the residuals of its rows.
     pub rows: &'static [Unit],
-    /// Whether it binds positions, whose errors can be made to decay.
+    /// Whether it constrains positions, whose errors can decay.
     pub positions: bool,
     /// The kind with these numbers.
     pub make: fn(LoopNumbers) -> LoopKind,
@@ -179,7 +179,7 @@ const fn normal(stands: Stands) -> Direction {
     direction("normal", stands)
 }
 
-/// What a loop shares with the joint that would hold its frames likewise.
+/// Properties that a loop has in common with the joint of the same kind.
 const fn like(joint: &JointSpec) -> LoopSpec {
     LoopSpec { words: joint.words, ..PLAIN }
 }
@@ -297,7 +297,7 @@ pub static LOOPS: [LoopSpec; 16] = [
     },
 ];
 
-/// Kinds of loops are told apart by their words.
+/// Kinds of loops are equal if their words are.
 impl PartialEq for LoopSpec {
     fn eq(&self, other: &LoopSpec) -> bool {
         self.words == other.words
@@ -318,7 +318,7 @@ impl LoopSpec {
 }
 
 impl LoopKind {
-    /// What distinguishes its kind.
+    /// Properties of its kind.
     pub fn spec(&self) -> &'static LoopSpec {
         let index = match self {
             LoopKind::Revolute { .. } => 0,
@@ -377,7 +377,7 @@ impl LoopKind {
         }
     }
 
-    /// The constraint as the sweeps know it, between frames that are turned as its directions want.
+    /// The constraint in the form that the sweeps use, between frames that are rotated according to its directions.
     pub fn closure(&self) -> Closure<Value> {
         match *self {
             LoopKind::Revolute { .. } => Closure::Revolute,
@@ -400,21 +400,21 @@ impl LoopKind {
     }
 }
 
-/// What a constraint binds.
-// A model has few of them, and they are read as they stand.
+/// The bodies or joints that a constraint connects.
+// A model has few of them, so that their size does not matter.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum ConstraintKind {
     /// Two bodies.
     Loop {
-        /// How.
+        /// Kind of the loop.
         kind: LoopKind,
         /// First frame.
         first: Mount,
         /// Second frame.
         second: Mount,
     },
-    /// Joints of one freedom: `Σ ratio · q = offset`.
+    /// Joints with one degree of freedom each: `Σ ratio · q = offset`.
     Coupling {
         /// Joint index and ratio; every joint once, free, not a mimic.
         terms: Vec<(usize, Value)>,
@@ -428,11 +428,11 @@ pub enum ConstraintKind {
 pub struct Constraint {
     /// Name, unique among the constraints.
     pub name: String,
-    /// What it binds.
+    /// The bodies or joints that it connects.
     pub kind: ConstraintKind,
-    /// Rate at which errors of the positions are made to decay (Baumgarte), 1/s; zero: not at all.
+    /// Rate at which position errors decay (Baumgarte), 1/s; with zero they do not decay.
     pub decay: Value,
-    /// Where it is described.
+    /// Place of its description.
     pub origin: Origin,
 }
 

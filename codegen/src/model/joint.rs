@@ -1,7 +1,7 @@
 //! Joints, and the one table of their kinds: readers, checks, plan, emission and documents take what they need from it.
 //!
-//! A new kind is a variant of [`JointKind`] with its [`JointSpec`] in this file. Unless it splits into elementary joints that exist,
-//! it also needs its sweep ([`mbd_runtime::tree::Kind`]).
+//! A new kind is a variant of [`JointKind`] with its [`JointSpec`] in this file. Unless it splits into elementary
+//! joints that exist, it also needs its sweep ([`mbd_runtime::tree::Kind`]).
 
 use mbd_runtime::layout::Form;
 use mbd_runtime::system::LieGroup;
@@ -9,7 +9,7 @@ use mbd_runtime::tree::Kind;
 
 use super::{Origin, Placement, Unit, Value, Words};
 
-/// What a joint lets its child do. Axes are in the child frame, any length but zero.
+/// Kinds of joints by the motion that they allow. Axes are in the child frame, of any length but zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointKind {
     /// One rotation.
@@ -55,7 +55,7 @@ pub enum JointKind {
 /// One coordinate of a kind of joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coordinate {
-    /// Name behind that of the joint; empty where the joint has one coordinate.
+    /// Name, appended to that of the joint; empty where the joint has one coordinate.
     pub name: &'static str,
     /// Unit.
     pub unit: Unit,
@@ -64,7 +64,7 @@ pub struct Coordinate {
 /// One velocity of a kind of joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Freedom {
-    /// Name behind that of the joint; empty where the joint has one velocity.
+    /// Name, appended to that of the joint; empty where the joint has one velocity.
     pub name: &'static str,
     /// Unit of its integral over time.
     pub unit: Unit,
@@ -72,11 +72,11 @@ pub struct Freedom {
     pub direction: &'static str,
 }
 
-/// All that tells one kind of joint from another.
+/// The properties of a kind of joint.
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct JointSpec {
-    /// What it is called.
+    /// Its words.
     pub words: Words,
     /// Words in URDF files.
     pub urdf: &'static [&'static str],
@@ -248,7 +248,7 @@ pub(crate) const FLOATING: JointSpec = JointSpec {
 pub static JOINTS: [JointSpec; 9] =
     [REVOLUTE, PRISMATIC, CYLINDRICAL, HELICAL, UNIVERSAL, PLANAR, SPHERICAL, FLOATING, FIXED];
 
-/// Kinds of joints are told apart by their words.
+/// Kinds of joints are equal if their words are.
 impl PartialEq for JointSpec {
     fn eq(&self, other: &JointSpec) -> bool {
         self.words == other.words
@@ -301,7 +301,7 @@ impl JointSpec {
 }
 
 impl JointKind {
-    /// What distinguishes its kind.
+    /// Properties of its kind.
     pub fn spec(&self) -> &'static JointSpec {
         match self {
             JointKind::Revolute { .. } => &REVOLUTE,
@@ -368,14 +368,15 @@ impl JointKind {
     }
 }
 
-/// Where a joint's coordinates come from.
+/// Source of a joint's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointMotion {
     /// From the state.
     Free,
     /// From inputs: position, rate and acceleration (a rheonomic drive).
     Prescribed,
-    /// `q = ratio q_leader + offset`, both joints of one freedom; `leader` is a joint index and may itself mimic.
+    /// `q = ratio q_leader + offset`, both joints have one degree of freedom; `leader` is a joint index and may itself
+    /// mimic.
     Mimic {
         /// Index of the leading joint.
         leader: usize,
@@ -386,7 +387,7 @@ pub enum JointMotion {
     },
 }
 
-/// A joint and its passive elements; vectors hold one entry per freedom.
+/// A joint and its passive elements; vectors have one entry for each degree of freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// Name, unique among the joints.
@@ -403,15 +404,15 @@ pub struct Joint {
     pub unbounded: bool,
     /// Source of the coordinates.
     pub motion: JointMotion,
-    /// Viscous damping per freedom, N m s/rad or N s/m.
+    /// Viscous damping for each degree of freedom, N m s/rad or N s/m.
     pub damping: Vec<Value>,
-    /// Spring stiffness per freedom, N m/rad or N/m.
+    /// Spring stiffness for each degree of freedom, N m/rad or N/m.
     pub stiffness: Vec<Value>,
     /// Rest position per freedom of the springs, rad or m.
     pub rest: Vec<Value>,
-    /// Reflected rotor inertia per freedom, kg m² or kg.
+    /// Reflected rotor inertia for each degree of freedom, kg m² or kg.
     pub armature: Vec<Value>,
-    /// Where it is described.
+    /// Place of its description.
     pub origin: Origin,
 }
 

@@ -12,7 +12,7 @@ pub use constraint::{Constraint, ConstraintKind, Direction, LoopKind, LoopNumber
 pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR};
 
-/// Where in its file a part of the description stands. It takes no part in comparisons: two models are equal if they describe
+/// Place of a part of the description in its file. It is ignored in comparisons: two models are equal if they describe
 /// the same mechanism.
 #[derive(Clone, Debug, Default)]
 pub struct Origin {
@@ -40,7 +40,7 @@ impl fmt::Display for Origin {
     }
 }
 
-/// What a kind of joint or loop is called.
+/// Words for a kind of joint or loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
     /// Word in models, messages and generated code.
@@ -61,7 +61,7 @@ impl Words {
         self.word == text || self.aliases.contains(&text)
     }
 
-    /// Whether it is meant by a word in lower case, readable or not.
+    /// Whether a word in lower case means this kind, even if models may not use the word.
     pub fn mean(&self, lower: &str) -> bool {
         self.are_read(lower) || self.foreign.contains(&lower)
     }
@@ -77,7 +77,7 @@ impl Words {
     }
 }
 
-/// What a coordinate, or the residual of a constraint, measures.
+/// Unit of a coordinate or of the residual of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// A length, m.
@@ -99,7 +99,7 @@ impl Unit {
     }
 }
 
-/// A number of the description: folded into the code, or an argument of it.
+/// A number of the description: a constant, or a run-time parameter of the code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// Known when the code is generated.
@@ -152,7 +152,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// The frame itself.
+    /// The identity.
     pub const IDENTITY: Placement = Placement { xyz: [Value::ZERO; 3], rotation: Rotation::NONE };
 }
 
@@ -220,18 +220,19 @@ pub enum Gravity {
     Input,
 }
 
-/// Where the closing of loops begins: coordinates of one joint.
+/// Start of the closing of loops: coordinates of one joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Joint index, free.
     pub joint: usize,
     /// Its coordinates.
     pub q: Vec<f64>,
-    /// Whether they stay as they are when loops are closed.
+    /// Whether they do not change when loops are closed.
     pub held: bool,
 }
 
-/// A checked tree: `joints` is depth first, every body is the child of exactly one joint, parents come first, mimic chains end.
+/// A checked tree: `joints` is depth first, every body is the child of exactly one joint, parents come first, mimic
+/// chains end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// Name, an identifier.
@@ -250,6 +251,6 @@ pub struct Model {
     pub wrenches: Vec<Wrench>,
     /// Loops and couplings, in file order.
     pub constraints: Vec<Constraint>,
-    /// Coordinates to begin with, where they are not neutral.
+    /// Initial coordinates, where they are not neutral.
     pub starts: Vec<Start>,
 }

@@ -14,7 +14,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 }
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// Sets the variable steps of every joint from the coordinates of the state and of the drives.
+    /// Sets the variable transforms of every joint from the coordinates of the state and of the drives.
     pub(super) fn articulate(&self, q: &[S], drive_q: &[S], w: &mut Poses<S>) {
         for i in 0..self.tree.nodes.len() {
             self.articulate_node(i, q, drive_q, w);

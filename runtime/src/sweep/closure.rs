@@ -44,7 +44,7 @@ impl<S: Scalar> Relative<S> {
         Force { lin: back(f.lin), ang: back(add3(f.ang, cross(self.d, f.lin))) }
     }
 
-    /// With its derivative where `B` moves by `rel` against `A`, both in components of `B`.
+    /// The same with its derivative, where `B` moves with `rel` relative to `A`, both in components of `B`.
     pub(super) fn moving(&self, rel: &Motion<S>) -> Relative<Dual<S>> {
         let mut out =
             Relative { turn: self.turn.map(|row| row.map(|x| Dual::new(x, S::zero()))), d: [Dual::zero(); 3] };
@@ -84,7 +84,7 @@ impl<S: Copy> Closure<S> {
         }
     }
 
-    /// Whether it leaves what a joint would: the motions of a group.
+    /// Whether the motions that the constraint allows form a group, as those of a joint do.
     pub fn is_joint(&self) -> bool {
         use Closure::{Cylindrical, Fixed, Helical, Planar, Prismatic, Revolute, Spherical};
         matches!(self, Revolute | Prismatic | Cylindrical | Helical { .. } | Planar | Spherical | Fixed)
@@ -92,7 +92,7 @@ impl<S: Copy> Closure<S> {
 }
 
 impl<S: Scalar> Closure<S> {
-    /// Whether the rows are constants.
+    /// Whether the rows are constant.
     pub(super) fn constant(&self) -> bool {
         !matches!(
             self,
@@ -162,7 +162,7 @@ impl<S: Scalar> Closure<S> {
         add3(at.d, scale3(-dot3(z, at.d), z))
     }
 
-    /// Where what rolls touches the plane, from the origin of `B`.
+    /// Contact point of the rolling body and the plane, from the origin of `B`, m.
     fn contact(&self, at: &Relative<S>) -> Vec3<S> {
         let n = at.axis(2);
         match self {
@@ -180,7 +180,7 @@ impl<S: Scalar> Closure<S> {
     pub(super) fn residuals(&self, at: &Relative<S>) -> [S; 6] {
         let half = S::constant(0.5);
         let [x, z, d] = [at.axis(0), at.axis(2), at.d];
-        // Twice the tangent of half the angle: a sine would call frames closed that are turned over as well.
+        // Twice the tangent of half the angle; a sine would be zero for frames that are rotated by 180° too.
         let tangent = |cosine: S| S::constant(2.0) / (S::one() + cosine);
         let (tilt, spin) = (tangent(z[2]), tangent(x[0]));
         let small = [d[0], d[1], d[2], tilt * z[1], -(tilt * z[0]), -(spin * x[1])];
@@ -188,7 +188,7 @@ impl<S: Scalar> Closure<S> {
         for (out, &k) in out.iter_mut().zip(self.components()) {
             *out = small[k];
         }
-        // Where `d` is not to vanish, its components change with a tilt as well, which is not what the rows say.
+        // Where `d` need not be zero, a tilt changes its components too; the rows do not contain this change.
         if let Closure::Prismatic | Closure::Cylindrical | Closure::Helical { .. } = self {
             (out[0], out[1]) = (d[0] - d[2] * z[0], d[1] - d[2] * z[1]);
         }
@@ -213,7 +213,7 @@ impl<S: Scalar> Closure<S> {
         out
     }
 
-    /// Rates of the components of `E_c` where `B` moves by `rel` against `A`; zero where they are constants.
+    /// Rates of the components of `E_c`, where `B` moves with `rel` relative to `A`; zero where they are constant.
     pub(super) fn direction_rates(&self, at: &Relative<S>, rel: &Motion<S>) -> [Force<S>; 6] {
         if self.constant() {
             return [Force::zero(); 6];

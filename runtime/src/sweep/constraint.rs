@@ -1,10 +1,10 @@
 //! Loops, couplings, rolling: the multipliers `σ` of the constraints are further unknowns of the sweeps.
 //!
-//! Momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). A multiplier's column `D^σ` starts as the wrench of its row at the
-//! two bodies that it binds, stays open through the sweep from tip to base like that of a shared coordinate, and is eliminated where
-//! its bodies' paths have met: `M v + Φᵀσ = p⁺`, `Φ v = b` is one symmetric system, and this is its elimination in the order of
-//! the tree. Where the paths have met the columns are no longer zero, although the wrenches cancel there: so they cannot
-//! stop there before they are eliminated.
+//! Momenta are the augmented ones, `p⁺ = M v + Φᵀσ` (5.7). A multiplier's column `D^σ` starts as the wrench of its row
+//! at the two bodies that it binds, stays open through the sweep from tip to base like that of a shared coordinate, and
+//! is eliminated where its bodies' paths have met: `M v + Φᵀσ = p⁺`, `Φ v = b` is one symmetric system, and this is its
+//! elimination in the order of the tree. Where the paths have met the columns are no longer zero, although the wrenches
+//! cancel there: so they cannot stop there before they are eliminated.
 
 use super::pass::{each_node, visit_force, Sweep, SweepDirection};
 use super::{Quantity, Sweeps, Trace};
@@ -24,9 +24,9 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
-    /// Whether it is a joint to the ground whose rows are constants in the axes of the body. The motions that such a joint
-    /// leaves free form a group, so `Ω × E_c` does no work on any of them. It changes nothing but the multiplier `σ`, which is
-    /// a gauge variable, and need not be computed.
+    /// Whether it is a joint to the ground whose rows are constants in the axes of the body. The motions that such a
+    /// joint leaves free form a group, so `Ω × E_c` does no work on any of them. It changes nothing but the multiplier
+    /// `σ`, which is a gauge variable, and need not be computed.
     fn gauge(&self) -> bool {
         let held = self.decay.is_none() && self.compliance.is_none();
         matches!(&self.bond, Bond::Cut(cut) if held && cut.a.node.is_none() && cut.closure.is_joint())
@@ -111,7 +111,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
         ..Sweep::idle(SweepDirection::BaseToTip)
     };
 
-    /// Momenta freed of the multipliers, `p⁺ − Φᵀσ`, after the velocities.
+    /// Momenta without the multipliers, `p⁺ − Φᵀσ`, after the velocities.
     pub(super) const FREED_MOMENTA: Self = Sweep {
         begin: |cx| {
             cx.results.p.copy_from_slice(cx.given.second);
@@ -142,8 +142,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Rows of the constraints and `b` of each from its decay, the paths of the cuts being known that [`Sweeps::reach_node`]
-    /// has followed.
+    /// Rows of the constraints and `b` of each from its decay, the paths of the cuts being known that
+    /// [`Sweeps::reach_node`] has followed.
     fn set_rows(&self, w: &mut Workspace<S>, all: bool) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Constraint);
@@ -197,7 +197,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         (node(&cut.a, a), node(&cut.b, *f))
     }
 
-    /// Columns `D^σ` where they begin.
+    /// Columns `D^σ` at the nodes where they start.
     pub(super) fn seed_columns(&self, rows: &[crate::workspace::RowState<S>], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         for constraint in &self.tree.constraints {
@@ -233,10 +233,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sum
     }
 
-    /// Reciprocal pivot of row `r`, the unknown `g`: negative, or zero where the row is redundant. It is redundant if what is
-    /// left of its diagonal is too small a part of the diagonal at first (the row follows from rows before it) or of the
-    /// diagonals of all rows of its constraint (its bodies cannot move along it). Where the bodies can move along none of the
-    /// rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1 kg m² would give.
+    /// Reciprocal pivot of row `r`, the unknown `g`: negative, or zero where the row is redundant. It is redundant if
+    /// what is left of its diagonal is too small a part of the diagonal at first (the row follows from rows before it)
+    /// or of the diagonals of all rows of its constraint (its bodies cannot move along it). Where the bodies can move
+    /// along none of the rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1
+    /// kg m² would give.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
@@ -245,7 +246,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         -(-f.gram[g * ng + g]).reciprocal_above(floor)
     }
 
-    /// What row `r` gives way by for its multiplier.
+    /// Compliance of row `r`.
     pub(super) fn compliance(&self, r: usize) -> S {
         // Eliminations are tried on parts of a tree, which have rows of constraints that are not their own.
         let own = self.tree.constraints.iter().find(|c| c.range().contains(&r));
@@ -309,8 +310,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Columns of the rows where they begin, times multipliers: momenta `D^σ σ`, or wrenches that bodies need against those of
-    /// the constraints; added to [`Workspace::force`].
+    /// Columns of the rows where they begin, times multipliers: momenta `D^σ σ`, or wrenches that bodies need against
+    /// those of the constraints; added to [`Workspace::force`].
     pub(super) fn add_seeds(&self, w: &mut Workspace<S>) {
         for constraint in &self.tree.constraints {
             let Bond::Cut(cut) = &constraint.bond else { continue };
@@ -331,8 +332,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.on_body(&w.poses, frame).fold(outer, |m, step| step.motion(&m))
     }
 
-    /// Before the first [`Sweeps::freed_node`], after the velocities: the negative of the multipliers, and what they are at the
-    /// ends of cuts.
+    /// Before the first [`Sweeps::freed_node`], after the velocities: the negative multipliers, and their wrenches at
+    /// the ends of cuts.
     fn freed_begin(&self, w: &mut Workspace<S>) {
         self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
         w.constraints.multipliers.iter_mut().for_each(|x| *x = -*x);
@@ -414,7 +415,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Right-hand sides that take the residuals away.
+    /// Right-hand sides that remove the residuals.
     pub(super) fn aim_at_closed(&self, w: &mut Workspace<S>) {
         for (b, row) in w.constraints.rhs.iter_mut().zip(&w.constraints.rows) {
             *b = -row.residual;
@@ -425,7 +426,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
         let ng = self.tree.unknowns.len();
         for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
-            // Zero where the pivot was not taken: x · (ρ x).
+            // The product x · (ρ x) is zero where the row was left out.
             let x = w.factor.gram[g * ng + g];
             pivots[r] = x * (w.factor.unknown_pivots[g].rho * -x);
         }

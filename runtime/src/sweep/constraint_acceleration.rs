@@ -1,4 +1,5 @@
-//! Constraints on accelerations: what their rows ask for beside a reference motion, and the multipliers `λ`.
+//! Constraints on accelerations: the right-hand sides of their rows relative to a reference motion, and the multipliers
+//! `λ`.
 
 use super::constraint::difference;
 use super::pass::Sweep;
@@ -9,7 +10,8 @@ use crate::workspace::Workspace;
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweep<S, T> {
-    /// What the rows ask for beside a reference motion, after [`Sweep::NEWTON`], from the velocities of all nodes.
+    /// Right-hand sides of the rows relative to a reference motion, after [`Sweep::NEWTON`], from the velocities of all
+    /// nodes.
     pub(super) const ROW_ACCELERATIONS: Self = Sweep {
         needed: |tree| !tree.constraints.is_empty(),
         rolls: |_| false,
@@ -19,7 +21,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 }
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// What the accelerations of a reference motion leave to be done by the rows, in
+    /// Right-hand sides of the rows that the accelerations of a reference motion leave, in
     /// [`crate::workspace::Constraints::rhs`]: the negative of `Eᵀ dΩ_rel/dt + ĖᵀΩ_rel`, and Baumgarte's terms.
     fn row_accelerations(&self, u: &Inputs<S>, w: &mut Workspace<S>) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Jacobians of frames, and their bias accelerations, which are what is left of the frames' accelerations at `v̇ = 0`.
+//! Jacobians of frames, and their bias accelerations: the accelerations of the frames at `v̇ = 0`.
 
 use super::newton::ClassicMotion;
 use super::{Quantity, Sweeps, Trace};
@@ -45,7 +45,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 }
 
-/// Velocity of a frame that stands at `(rot, pos)` in a node, in the frame's axes, per rate of a freedom of the node.
+/// Velocity of a frame at the pose `(rot, pos)` in a node, in the frame's axes, for a unit rate of a degree of freedom
+/// of the node.
 fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
     // Rᵀ e × r, row a of R being Rᵀ e_a.
     let turned = |k: usize| {
@@ -60,7 +61,7 @@ fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
     [lin[0], lin[1], lin[2], ang[0], ang[1], ang[2]]
 }
 
-/// Puts a step before the pose `(rot, pos)`.
+/// Applies a transform before the pose `(rot, pos)`.
 fn before<S: Scalar>(step: &ElementaryTransform<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
     if let ElementaryTransform::Shift { axis, r } = step {
         let (_, _, n) = axis.cyclic();

@@ -1,9 +1,9 @@
-//! The equations of Newton and Euler, body by body: the motion of every frame from base to tip, and the wrench that its body
-//! needs for that motion.
+//! The equations of Newton and Euler, body by body: the motion of every frame from base to tip, and the wrench that its
+//! body needs for that motion.
 //!
-//! The acceleration of a frame's origin is the second derivative of its position as a vector, not a spatial acceleration. No
-//! linear velocity is formed: an origin `r` away accelerates by `B r` more, `B = α× + ω×ω×`, and the bodies' own wrenches are
-//! made of the entries of `B`.
+//! The acceleration of a frame's origin is the second derivative of its position as a vector, not a spatial
+//! acceleration. No linear velocity is formed: an origin `r` away accelerates by `B r` more, `B = α× + ω×ω×`, and the
+//! bodies' own wrenches are made of the entries of `B`.
 
 use super::pass::{each_node, Sweep};
 use super::{name, Inputs, Quantity, Sweeps, Trace};
@@ -15,12 +15,13 @@ use crate::Scalar;
 /// Accelerations of the state's velocities in a sweep after Newton and Euler.
 #[derive(Clone, Copy, Debug)]
 pub enum Accelerations<'a, S> {
-    /// All zero.
+    /// All accelerations are zero.
     Zero,
-    /// These.
+    /// The given accelerations.
     Given(&'a [S]),
-    /// For every freedom the value that makes the acceleration of its body along it zero, which leaves the fewest operations;
-    /// zero for coordinates that joints share. Kept in [`Newton::reference`](crate::workspace::Newton::reference).
+    /// For every freedom the value that makes the acceleration of its body along it zero, which leaves the fewest
+    /// operations; zero for coordinates that joints share. Kept in
+    /// [`Newton::reference`](crate::workspace::Newton::reference).
     Chosen,
 }
 
@@ -58,7 +59,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Velocity);
         let mut m = self.classic_motion(node.parent, u, w);
         self.place(i).iter().chain(w.poses.joint[i].placing()).for_each(|step| m.carry(step));
-        // A slide along the axis of a turn is made after it, where `B` is that of the body.
+        // A translation along the axis of a rotation is applied after it, where `B` is that of the body.
         let steps = w.poses.joint[i].own();
         let late = match node.kind {
             Kind::Revolute | Kind::Helical { .. } => Some(0),
@@ -126,7 +127,7 @@ pub(super) struct ClassicMotion<S> {
 }
 
 impl<S: Scalar> ClassicMotion<S> {
-    /// On to the next frame, fixed to this one.
+    /// Motion of a frame that is fixed to this one.
     pub(super) fn carry(&mut self, step: &ElementaryTransform<S>) {
         match step {
             ElementaryTransform::Shift { axis, r } => {

@@ -150,7 +150,7 @@ impl<S: Scalar, T: Trace> SweepList<S, T, 5> {
 }
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// What sweeps over this tree work on.
+    /// The data on which sweeps over this tree work.
     fn context<'b>(
         &'b self,
         given: &'b Arguments<'b, S>,
@@ -180,7 +180,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's origin;
-    /// what is welded to the ground does not count.
+    /// bodies that are fixed to the ground do not count.
     pub fn energy(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) -> (S, S) {
         let mut energy = [S::zero(); 2];
         self.context(&Arguments::new(q, p, u), w, Results { v, energy: &mut energy, ..Results::none() })
@@ -240,7 +240,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.context(&given, w, Results { wrenches: out, ..Results::none() }).run(SweepList::REACTIONS);
     }
 
-    /// Velocities and multipliers `σ` of a state, and momenta freed of them: `M v = p⁺ − Φᵀσ`.
+    /// Velocities and multipliers `σ` of a state, and the projected momenta `M v = p⁺ − Φᵀσ`.
     pub fn project_momenta(
         &self,
         q: &[S],
@@ -255,8 +255,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.context(&Arguments::new(q, p, u), w, results).run(SweepList::PROJECT_MOMENTA);
     }
 
-    /// Newton's step onto the closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`, with the residuals
-    /// `φ` and the pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
+    /// One step of Newton's method towards closed positions, least in the metric of `M`: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`,
+    /// with the residuals `φ` and the pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
     pub fn position_correction(
         &self,
         q: &[S],
@@ -330,7 +330,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// `J̇ v` and its like for each of `frames`: acceleration `[linear; angular]` at `v̇ = 0`, prescribed accelerations
     /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in ground
-    /// axes the frame accelerates by `R (J v̇ + drift)`.
+    /// axes the frame accelerates by `R (J v̇ + bias)`.
     pub fn bias_accelerations<'b>(
         &self,
         q: &[S],

@@ -1,5 +1,5 @@
 //! What a sweep is: a function of one node, the direction in which the nodes are visited, and what the visit of a node
-//! leaves for its neighbours. [`outputs`](super::outputs) lists the sweeps of every output.
+//! leaves for its neighbours. `outputs.rs` lists the sweeps of every output.
 //!
 //! A tree runs the sweeps of a list one after the other. Rolled code visits each node of a chain once for several sweeps
 //! together, in a [`Pass`]; [`passes`] says which sweeps share one. Both run the same functions in the same order, so they
@@ -29,7 +29,7 @@ pub struct Arguments<'a, S> {
     pub q: &'a [S],
     /// Momenta `p` or velocities `v`, whichever the output takes, one for each velocity.
     pub second: &'a [S],
-    /// Accelerations of the velocities that [`Sweep::NEWTON`] starts from.
+    /// Accelerations of the velocities that `Sweep::NEWTON` starts from.
     pub accelerations: Accelerations<'a, S>,
     /// Everything else that is given with a call.
     pub inputs: Inputs<'a, S>,
@@ -172,7 +172,7 @@ pub(super) use each_node;
 
 /// An output as a list of sweeps, in order.
 pub struct SweepList<S, T, const N: usize> {
-    /// The sweeps, run after the joints' steps are known ([`Sweeps::articulate`]).
+    /// The sweeps, run after the joints' steps are known (`Sweeps::articulate`).
     pub sweeps: [Sweep<S, T>; N],
     /// Runs after the last sweep and completes the results.
     pub finish: fn(&mut Context<'_, S, T>),

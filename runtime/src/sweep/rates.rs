@@ -58,8 +58,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         w.force[parent] = w.force[parent].plus(&out);
     }
 
-    /// `ṗ_i` (4.36) without `τ`, added to `pd`. `P*` is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of it is
-    /// needed.
+    /// `ṗ_i` (4.36) without `τ`, added to `pd`. `P*` is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of
+    /// it is needed.
     fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
@@ -108,7 +108,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let pull = |k: usize| node.passive[k].stiffness * (w.poses.coordinate(i, k) - node.passive[k].rest);
         match node.kind {
             Kind::Spherical | Kind::Floating => damper,
-            // The springs of a planar joint act in the outer axes.
+            // The springs of a planar joint act in the parent's axes.
             Kind::Planar if k < 2 => damper - w.poses.joint[i].get()[2].vector([pull(0), pull(1), S::zero()])[k],
             _ => damper - pull(k),
         }

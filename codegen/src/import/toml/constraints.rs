@@ -12,7 +12,7 @@ use crate::model::{LoopSpec, Unit as Measures, FLOATING, LOOPS};
 
 const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
 
-/// What is written as a coupling.
+/// The entry of a coupling.
 const COUPLINGS: [&str; 4] = ["coupling", "gear", "gears", "rack"];
 
 /// All loops and couplings, in the order of the file.

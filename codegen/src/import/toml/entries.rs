@@ -39,7 +39,7 @@ const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let all_known = table.reject_unknown(BODY, "a body", findings);
     let name = table.required_text("name", findings);
-    // A misspelt mass is not a missing one.
+    // A misspelt mass is reported as misspelt, and not as missing.
     let unread = (!all_known).then(|| Spanned::new(RawValue::Invalid, table.span));
     let mass = table.number("mass", Unit::Plain, findings).or(unread);
     let com = table.vec3("com", Unit::Plain, findings);
@@ -110,11 +110,11 @@ fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
 /// Unit of each coordinate, for degrees.
 fn units(kind: Option<&JointSpec>) -> Vec<Unit> {
     let known = kind.filter(|spec| spec.has_springs());
-    // An unknown type is one finding; its units are not another.
+    // An unknown type is one finding; its units must not be another.
     known.map_or(vec![Unit::Angle], |spec| spec.coordinates.iter().map(|c| Unit::of(c.unit)).collect())
 }
 
-/// Coordinates to begin with; `units` are those of the coordinates where they have any.
+/// Initial coordinates; `units` are those of the coordinates where they have any.
 fn start(table: &Table, kind: Option<&JointSpec>, units: &[Unit], findings: &mut Findings) -> Option<RawFreedoms> {
     let value = table.raw("start")?;
     let quaternion = kind.is_some_and(|spec| spec.quaternion().is_some());
@@ -133,7 +133,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let name = table.required_text("name", findings);
     let kind = kind(&table, &JOINTS, |spec| &spec.words, |_| None, findings);
     let child = table.required_text("child", findings);
-    // Without its joint a body would look loose.
+    // Without its joint, the body would be reported as having none.
     raw.incomplete |= child.is_none() || name.is_none();
     let units = units(kind.as_ref().map(|k| k.value));
     let units = &units[..];

@@ -7,17 +7,17 @@ use super::super::raw::{RawFreedoms, RawNumber, RawValue, RawVec3};
 use super::super::source::{Findings, Span, Spanned};
 use super::table::{type_name, Table};
 
-/// Whether degrees may stand here.
+/// Whether a number may be in degrees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unit {
-    /// An angle: they may.
+    /// An angle, which may.
     Angle,
     /// Anything else.
     Plain,
 }
 
 impl Unit {
-    /// For what measures `unit`.
+    /// The one for numbers with `unit`.
     pub(super) fn of(unit: crate::model::Unit) -> Unit {
         match unit {
             crate::model::Unit::Radian => Unit::Angle,
@@ -214,7 +214,7 @@ pub(super) fn direction(value: &Toml<DeValue>, what: &str, findings: &mut Findin
     fine.then(|| Spanned::new(out, list.span))
 }
 
-/// One number for all freedoms or a list with one for each; `units` per freedom.
+/// One number for all degrees of freedom or a list with one for each, with one of `units` for each.
 pub(super) fn freedoms(
     value: &Toml<DeValue>,
     units: &[Unit],
@@ -237,13 +237,13 @@ pub(super) fn freedoms(
 
 /// Numbers under a key.
 impl Table<'_> {
-    /// A number, if the key is there.
+    /// A number, if the key exists.
     pub(super) fn number(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawNumber> {
         let value = self.raw(key)?;
         Some(number(value, unit, &format!("{}`{key}`", self.prefix()), findings))
     }
 
-    /// Three numbers, if the key is there; invalid ones where something else is there.
+    /// Three numbers, if the key exists; invalid ones where something else is there.
     pub(super) fn vec3(&self, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawVec3> {
         let value = self.raw(key)?;
         let span: Span = value.span().into();

@@ -5,14 +5,14 @@ use ::toml::de::{DeString, DeTable, DeValue};
 use super::super::source::{Findings, Span, Spanned};
 use super::super::words::{did_you_mean, list, quote};
 
-/// A table, its place, and how to name it in a message (empty for the document itself).
+/// A table, its place, and its name in messages (empty for the document itself).
 pub(super) struct Table<'t> {
     table: &'t DeTable<'t>,
     pub(super) span: Span,
     pub(super) what: String,
 }
 
-/// What a value is called in a message.
+/// Name of a value in a message.
 pub(super) fn type_name(value: &DeValue) -> &'static str {
     match value {
         DeValue::String(_) => "text",
@@ -86,7 +86,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Text, if the key is there and text.
+    /// Text, if the key exists and is text.
     pub(super) fn text(&self, key: &str, findings: &mut Findings) -> Option<Spanned<String>> {
         match self.get(key)? {
             (span, DeValue::String(s)) => Some(Spanned::new(s.to_string(), span)),
@@ -97,7 +97,7 @@ impl<'t> Table<'t> {
         }
     }
 
-    /// Text that has to be there.
+    /// Text that is required.
     pub(super) fn required_text(&self, key: &str, findings: &mut Findings) -> Option<Spanned<String>> {
         if !self.has(key) {
             self.missing(key, &format!("`{key} = \"...\"`"), findings);
@@ -116,7 +116,7 @@ impl<'t> Table<'t> {
         found.map(|k| Spanned::new(k, text.span))
     }
 
-    /// A list of texts, if the key is there and one; `example` is what to write.
+    /// A list of texts, if the key exists and is one; `example` is what to write.
     pub(super) fn texts(
         &self,
         key: &str,
@@ -141,7 +141,7 @@ impl<'t> Table<'t> {
         (texts.len() == items.len()).then(|| Spanned::new(texts, span))
     }
 
-    /// Yes or no, if the key is there and such.
+    /// A boolean, if the key exists and is one.
     pub(super) fn flag(&self, key: &str, findings: &mut Findings) -> Option<Spanned<bool>> {
         match self.get(key)? {
             (span, DeValue::Boolean(yes)) => Some(Spanned::new(*yes, span)),
@@ -192,7 +192,7 @@ impl<'t> Table<'t> {
         tables
     }
 
-    /// The entry under a key as it stands.
+    /// The entry under a key, unchanged.
     pub(super) fn raw(&self, key: &str) -> Option<&'t ::toml::Spanned<DeValue<'t>>> {
         self.table.get(key)
     }

@@ -1,4 +1,4 @@
-//! `joint`: what lets a link move against its parent.
+//! `joint`: connects a link to its parent.
 
 use super::link::read_origin;
 use super::xml::{place, Reader};
@@ -9,7 +9,7 @@ use crate::import::words::{did_you_mean, quote};
 use crate::model::{JointSpec, JOINTS};
 use roxmltree::Node;
 
-/// What may stand in a `joint` and has nothing to do with its free motion.
+/// Elements of a `joint` that have no effect on its free motion.
 const IGNORED: [(&str, &str); 3] = [
     ("limit", "`limit` is not used: joints move without stops, torques without bounds"),
     ("safety_controller", "`safety_controller` is not used"),

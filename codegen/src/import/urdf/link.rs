@@ -6,10 +6,10 @@ use crate::import::source::{Span, Spanned};
 use crate::import::words::quote;
 use roxmltree::Node;
 
-/// Message for all that only can be seen or touched.
+/// Message for elements that only concern appearance and contact.
 pub(super) const SHAPES: &str = "shapes and colours (`visual`, `collision`, `material`) are not used";
 
-/// What may stand in a `link` and has nothing to do with its motion.
+/// Elements of a `link` that have no effect on its motion.
 const IGNORED: [(&str, &str); 5] = [
     ("visual", SHAPES),
     ("collision", SHAPES),
@@ -29,7 +29,7 @@ pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawBody> {
     Some(RawBody { name: name?, mass, com, inertia, inertia_axes })
 }
 
-/// What an `inertial` says; nothing of it for a link without mass.
+/// Reads an `inertial`; it is ignored for a link without mass.
 #[derive(Default)]
 struct Inertial {
     mass: Option<RawNumber>,

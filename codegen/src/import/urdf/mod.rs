@@ -1,7 +1,8 @@
 //! The URDF reader: `robot` files of links and joints, as robot makers publish them.
 //!
-//! Every element and attribute is used, named in a finding, or an error. What has nothing to do with the free motion (shapes, limits,
-//! extensions of simulators) is counted, one notice per kind; what is unknown is a warning. Macros, entities and other formats are errors.
+//! Every element and attribute is used, named in a finding, or an error. Elements without effect on the free motion
+//! (shapes, limits, extensions of simulators) are counted, with one notice for each kind; unknown elements are
+//! warnings. Macros, entities and other formats are errors.
 
 mod joint;
 mod link;
@@ -21,7 +22,7 @@ use std::collections::HashSet;
 use unused::Tally;
 use xml::{place, shown, syntax_error, Reader};
 
-/// What may stand in a `robot` and has nothing to do with its motion.
+/// Elements of a `robot` that have no effect on its motion.
 const IGNORED: [(&str, &str); 6] = [
     ("material", link::SHAPES),
     ("gazebo", "`gazebo` is not used, even where it speaks of physics"),
@@ -33,8 +34,9 @@ const IGNORED: [(&str, &str); 6] = [
 
 /// Reads a model without checking the mechanism; `None` where the text is no robot.
 ///
-/// The root link hangs on the ground by the joint `root_joint`, of the kind `options.base` asks for. Links stay bodies and fixed joints
-/// stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes `ground_link`.
+/// The joint `root_joint`, of the kind in `options.base`, connects the root link to the ground. Links stay bodies and
+/// fixed joints stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes
+/// `ground_link`.
 pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
     let document = match Document::parse(text) {
         Ok(document) => document,
@@ -97,7 +99,7 @@ fn push_or_note<T>(list: &mut Vec<T>, item: Option<T>, incomplete: &mut bool) {
     }
 }
 
-/// Gives a link called `ground` another name, and the joints that speak of it.
+/// Renames a link called `ground`, also in the joints that refer to it.
 fn rename_ground(reader: &mut Reader, raw: &mut RawModel) {
     let taken: HashSet<&str> = raw.bodies.iter().map(|b| b.name.value.as_str()).collect();
     if !taken.contains("ground") {
@@ -115,7 +117,7 @@ fn rename_ground(reader: &mut Reader, raw: &mut RawModel) {
     }
 }
 
-/// `wanted`, with as many `_` behind it as make it new.
+/// `wanted`, with as many `_` appended as make it unique.
 fn free_name(wanted: &str, taken: &HashSet<&str>) -> String {
     let mut name = wanted.to_string();
     while taken.contains(name.as_str()) {
@@ -124,7 +126,7 @@ fn free_name(wanted: &str, taken: &HashSet<&str>) -> String {
     name
 }
 
-/// Hangs the root link on the ground, by the joint that Pinocchio calls `root_joint`.
+/// Connects the root link to the ground by the joint that Pinocchio calls `root_joint`.
 fn add_base(reader: &mut Reader, raw: &mut RawModel, base: Base) {
     let names: HashSet<&str> = raw.bodies.iter().map(|b| b.name.value.as_str()).collect();
     let children: HashSet<&str> = raw.joints.iter().filter_map(|j| Some(j.child.as_ref()?.value.as_str())).collect();
@@ -153,7 +155,8 @@ fn add_base(reader: &mut Reader, raw: &mut RawModel, base: Base) {
     let mut joints = Vec::with_capacity(raw.joints.len() + roots.len());
     for (k, root) in roots.iter().enumerate() {
         let span = root.name.span;
-        // Only the first is the base; the others, an error already, hang there so that the rest of the checks can be made.
+        // Only the first one is the base. The others are an error already; they are connected to the ground so that the
+        // other checks can run.
         let (name, kind) =
             if k == 0 { (name.clone(), kind) } else { (free_name(&format!("{name}_{k}"), &taken), &FIXED) };
         joints.push(RawJoint::new(Spanned::new(name, span), Some(Spanned::new(kind, span)), Some(root.name.clone())));

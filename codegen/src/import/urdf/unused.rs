@@ -1,4 +1,4 @@
-//! Findings of which a real robot has dozens: one line per kind, at the first place, with their number.
+//! Findings that occur dozens of times in real robots: one line for each kind, at the first place, with their number.
 
 use crate::diag::Severity;
 use crate::import::source::{Findings, Span};

@@ -1,4 +1,4 @@
-//! From XML to attributes and numbers with their places. Nothing here knows what a robot is.
+//! Reads attributes and numbers with their places from XML. Nothing here is specific to robots.
 
 use super::unused::Tally;
 use crate::diag::Severity;
@@ -7,11 +7,11 @@ use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::{did_you_mean, quote};
 use roxmltree::{Error, Node};
 
-/// What is collected while reading.
+/// Findings that are collected while reading.
 pub(super) struct Reader<'f, 'a> {
     /// Findings, one by one.
     pub findings: &'f mut Findings<'a>,
-    /// Findings that come in dozens.
+    /// Findings that are counted by kind.
     pub tally: Tally,
 }
 
@@ -21,7 +21,7 @@ pub(super) fn place(node: Node) -> Span {
     Span::new(start, start + 1 + node.tag_name().name().len())
 }
 
-/// How an element is called in messages: with its prefix, if it has one.
+/// Name of an element in messages, with its prefix, if it has one.
 pub(super) fn shown<'a>(node: Node<'a, '_>) -> &'a str {
     let text = &node.document().input_text()[node.range()];
     let end = text.char_indices().skip(1).find(|(_, c)| c.is_whitespace() || matches!(c, '/' | '>'));
@@ -35,8 +35,8 @@ fn is_own(node: Node) -> bool {
 }
 
 impl Reader<'_, '_> {
-    /// Sorts the child elements of `node`: those named in `used` are returned in file order, those in `ignored` are counted with the
-    /// message that stands there, all others are warned about, as is text between them.
+    /// Sorts the child elements of `node`: those named in `used` are returned in file order, those in `ignored` are
+    /// counted with the message that stands there, all others are warned about, as is text between them.
     pub fn children<'x, 'i>(
         &mut self,
         node: Node<'x, 'i>,

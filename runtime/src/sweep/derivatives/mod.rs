@@ -1,9 +1,10 @@
 //! Exact derivatives of the rates `(q, p, τ) → (v, ṗ)`, by sweeps over pairs of joints on one path.
 //!
-//! **Definition.** Column `k` of a derivative with respect to `q` is the derivative along `q̇ = N(q) e_k`, the direction in
-//! which velocity `k` alone moves the coordinates: the ordinary partial derivative where coordinates are angles and slides,
-//! the derivative with respect to a small displacement in body axes (`q ⊕ ξ`) for planar, spherical and floating joints. Rows
-//! are velocities and momentum rates. All blocks are `nv × nv`. `∂v/∂τ = 0` and `∂ṗ/∂τ = 1`.
+//! **Definition.** Column `k` of a derivative with respect to `q` is the derivative along `q̇ = N(q) e_k`, the
+//! direction in which velocity `k` alone moves the coordinates: the ordinary partial derivative where coordinates are
+//! angles and displacements, the derivative with respect to a small displacement in body axes (`q ⊕ ξ`) for planar,
+//! spherical and floating joints. Rows are velocities and momentum rates. All blocks are `nv × nv`. `∂v/∂τ = 0` and
+//! `∂ṗ/∂τ = 1`.
 //!
 //! **Method.** At given velocities let `B = ∂p/∂q`, `C = ∂ṗ/∂q`, both by spatial algebra: with `s` the axis of a freedom,
 //! `ψ = Ω̂ × s`, `I*` the composite inertia, `P*` the momentum and `γ` gravity as a motion, and for every freedom `a` the
@@ -88,8 +89,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 }
 
-/// Whether the axis of a node is the same before and behind its own motion: then its columns are taken before it, where
-/// they need not be turned.
+/// Whether the axis of a node is the same before and after its own motion. Its columns are then taken before it, where
+/// they need not be rotated.
 fn single<S: Scalar>(node: &Node<S>) -> bool {
     node.kind.nv() == 1
 }

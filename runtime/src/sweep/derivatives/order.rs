@@ -14,11 +14,11 @@ use crate::Scalar;
 /// How two velocities are coupled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Meeting {
-    /// One is on the other's path.
+    /// One velocity is on the path of the other.
     Path,
-    /// Through the common path of both, by this entry of [`Order::across`].
+    /// They are coupled through the common path of both, by this entry of [`Order::across`].
     Branch(u32),
-    /// Not at all.
+    /// They are not coupled.
     Apart,
 }
 

@@ -246,7 +246,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 Kind::Spherical | Kind::Floating => {}
                 Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => take(0, 0, node.ratio * node.ratio * k(0)),
                 Kind::Planar => {
-                    // The springs act in the outer axes, the freedoms in those of the node.
+                    // The springs act in the parent's axes, the degrees of freedom in those of the node.
                     let turn = w.poses.joint[i].get()[2];
                     let o = S::zero();
                     for b in 0..2 {
@@ -272,7 +272,8 @@ pub(super) fn add<S: Scalar>(to: &mut S, x: S) {
     *to = *to + x;
 }
 
-/// `(z × I − I z×) Ω̂` with `z` the unit turn: what a turn of the bodies, but not of their motion, adds to the momentum.
+/// `(z × I − I z×) Ω̂` with `z` the unit rotation: the change of the momentum when the bodies are rotated, but not
+/// their motion.
 fn turned_momentum<S: Scalar>(m: &RigidInertia<S>, hat: &Motion<S>) -> Force<S> {
     let ([cx, cy, _], j, v, w) = (m.moment, &m.inertia, hat.lin, hat.ang);
     let (twice, across) = (j[1] + j[1], j[0] - j[3]);

@@ -49,7 +49,7 @@ pub struct ParameterDerivatives<S> {
 }
 
 impl<S: Scalar> ParameterDerivatives<S> {
-    /// Room for a tree.
+    /// Allocates memory for a tree.
     pub fn new(tree: &Tree<Dual<S>>) -> Self {
         let (d, o) = (tree.dims, Dual::zero());
         let list = |n: usize| vec![o; n];
@@ -64,7 +64,7 @@ impl<S: Scalar> ParameterDerivatives<S> {
         }
     }
 
-    /// `sweeps` is over the varied tree, regrouped or not, `gravity` varies with it; `u.gravity` is not looked at. `at` has
+    /// `sweeps` is over the varied tree, regrouped or not, `gravity` varies with it; `u.gravity` is not used. `at` has
     /// been computed for the same `q` and inputs.
     pub fn compute<T: Trace>(
         &mut self,

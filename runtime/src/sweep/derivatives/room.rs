@@ -1,4 +1,4 @@
-//! Results of the derivatives, and room for what leads to them.
+//! Results of the derivatives, and memory for their intermediate results.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -40,7 +40,7 @@ pub struct Derivatives<S> {
     pub(super) list: Vec<S>,
     /// Which velocities are coupled, and how.
     pub(super) order: Order,
-    /// What carries rows from the common path to a branch.
+    /// Coefficients that carry rows from the common path to a branch.
     pub(super) across: Vec<S>,
     /// Whether the momentum of the node is summed over the columns of its subtree.
     pub(super) summed: Vec<bool>,
@@ -82,7 +82,7 @@ pub struct MomentumDerivatives<S> {
 }
 
 impl<S: Scalar> MomentumDerivatives<S> {
-    /// Room for a tree: the only allocation there is.
+    /// Allocates memory for a tree; nothing is allocated later.
     pub fn new(tree: &Tree<S>) -> Self {
         let (o, nv) = (S::zero(), tree.dims.nv);
         let (list, square) = (|| vec![o; nv], || vec![o; nv * nv]);
@@ -98,7 +98,7 @@ impl<S: Scalar> MomentumDerivatives<S> {
 }
 
 impl<S: Scalar> Derivatives<S> {
-    /// Room for a tree: the only allocation there is.
+    /// Allocates memory for a tree; nothing is allocated later.
     pub fn new(tree: &Tree<S>) -> Self {
         let (nodes, nv) = (tree.nodes.len(), tree.dims.nv);
         let freedoms = tree.nodes.iter().map(|n| n.kind.nv()).sum::<usize>();
@@ -132,7 +132,7 @@ impl<S: Scalar> Derivatives<S> {
         }
     }
 
-    /// Clears what is summed up.
+    /// Sets all sums to zero.
     pub(super) fn begin(&mut self) {
         let o = S::zero();
         for list in [&mut self.l, &mut self.b, &mut self.pd, &mut self.dpd_dq] {

@@ -1,4 +1,4 @@
-//! External wrenches: those in axes of the ground do not turn with the body, those in axes of a frame do.
+//! External wrenches: those in axes of the ground do not rotate with the body, those in axes of a frame do.
 
 use super::pairs::add;
 use super::{velocity, Derivatives};
@@ -29,7 +29,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             for l in 0..there.kind.nv() {
                 let sb = self.axis_at(wrench, inner, l, w);
                 add(&mut d.pd[b + l], there.ratio * f.dot(&sb));
-                // What the wrench lacks of turning with the body.
+                // The wrench in ground axes does not rotate with the body; this is the difference.
                 let lag = Force { lin: cross(sb.ang, f.lin), ang: cross(sb.ang, f.ang) };
                 for (outer, &i) in wrench.path.iter().enumerate() {
                     let here = &self.tree.nodes[i];
