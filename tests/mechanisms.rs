@@ -6,8 +6,9 @@ use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
+use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
-use multibody::runtime::integrate::{catalogue, Step, Tolerances};
+use multibody::runtime::integrate::{Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
 

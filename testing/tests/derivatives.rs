@@ -282,7 +282,7 @@ fn forms_do_not_matter() {
 fn the_trees_have_everything() {
     let mut met = [0; 10];
     for seed in 0..TREES {
-        let c = Case::formed(seed, EliminationStrategy::Single);
+        let c = Case::new(seed);
         for node in &c.i.tree().nodes {
             met[match node.kind {
                 Kind::Revolute => 0,

@@ -5,7 +5,7 @@
 
 use mbd_codegen::model::JointKind;
 use mbd_runtime::spatial::cross;
-use mbd_runtime::sweep::Sweeps;
+use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::tree::{Kind, Source};
 use mbd_runtime::workspace::Workspace;
 use mbd_testing::eliminations::random_plan;
@@ -255,8 +255,9 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
         let tree = plan.tree(&s.params).regrouped();
         let mut w = Workspace::new(&tree);
         let sweeps = Sweeps { tree: &tree, trace: &() };
-        sweeps.articulate(&s.q, &s.drive[0], &mut w.poses);
-        sweeps.factor(&w.poses, &w.first, &w.constraints.rows, &mut w.factor);
+        let [drive_q, drive_v, drive_a] = s.drive.each_ref().map(|drive| &drive[..]);
+        let inputs = Inputs { tau: &[], drive_q, drive_v, drive_a, wrenches: &[], gravity: [0.0; 3] };
+        sweeps.factor(&s.q, &inputs, &mut w);
         for (i, node) in tree.nodes.iter().enumerate() {
             if node.elimination.unknown.is_some() || matches!(node.source, Source::Drive { .. }) {
                 continue;

@@ -281,7 +281,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Articulated inertia with all freedoms and unknowns eliminated.
-    pub(crate) fn factor(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
+    pub fn factor(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
         let given = Arguments::new(q, &[], u);
         let mut cx = self.context(&given, w, Results::none());
         cx.articulate();
