@@ -30,7 +30,7 @@ fn check_tells_what_is_sound() {
     let lines: Vec<&str> = out(&output).lines().collect();
     assert_eq!(
         lines[0],
-        "models/satellite.toml: sound: 3 bodies, 3 joints (1 floating, 2 pin), nq 7, nv 6, mass 138 kg, \
+        "models/satellite.toml: sound: 3 bodies, 3 joints (1 floating, 2 revolute), nq 7, nv 6, mass 138 kg, \
          prescribed joints: 2, external wrenches: 1"
     );
     assert!(lines[1].contains("joints that follow others: 1"), "{}", lines[1]);

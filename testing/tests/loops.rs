@@ -102,7 +102,7 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
             assert!(same && a.is_finite(), "seed {seed}: {group:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
         }
         let straight = trace(&plan, group, options).map(|g| g.program.counts().total()).unwrap_or_default();
-        let more = program.counts().total();
+        let more = program.program.counts().total();
         assert!(
             more >= straight,
             "seed {seed}: {group:?}: loops have {more} operations, straight-line code {straight}"

@@ -34,7 +34,8 @@ pub enum Stabilisation {
 pub struct Effort {
     /// Largest number of iterations at the end of a step.
     pub iterations: u32,
-    /// Residual, m and rad, below which positions are not corrected.
+    /// Residual, m and rad, below which positions are not corrected. With 0, all iterations are always done, and the last
+    /// residual is not judged.
     pub tolerance: f64,
 }
 
@@ -271,7 +272,7 @@ where
             if !size.is_finite() {
                 return Err(ConstraintError::NotFinite { index: at });
             }
-            if size.to_f64() <= tolerance {
+            if tolerance > 0.0 && size.to_f64() <= tolerance {
                 return Ok(());
             }
             finite(room.v.as_ref())?;
@@ -279,6 +280,9 @@ where
                 return Ok(());
             }
             Chart::displace(system, &mut room.v, q);
+        }
+        if tolerance <= 0.0 {
+            return Ok(());
         }
         // All iterations are used. The residual is round-off, or the step was too large.
         system.constraint_residuals(q, &mut room.residual, &mut room.entries);
