@@ -1,8 +1,6 @@
 //! Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 //!
-//! [`mbd_model!`] turns the description of a mechanism, a TOML or URDF file, into a type with straight-line functions while
-//! your program compiles. The same generator is in `codegen` for build scripts; [`runtime`] has the integrators, and an
-//! interpreter for models that are known at run time only. [`prelude`] brings what most programs use.
+#![doc = include_str!("../docs/guide.md")]
 //!
 //! # Features
 //! | feature | default | adds |

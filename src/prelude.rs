@@ -11,7 +11,7 @@ pub use crate::codegen::read::{self, load, Base, ImportOptions};
 #[cfg(feature = "codegen")]
 pub use crate::codegen::{options::PlanOptions, plan::Plan, search};
 
-pub use crate::runtime::constrained::{close, Closing, Stabilisation};
+pub use crate::runtime::constrained::{close, Closing, Effort, Projection, Stabilisation, WithPostStep};
 pub use crate::runtime::integrate::{
     ImplicitMidpoint, Radau5, Rk4, Solver, Step, StepError, Stepper, Tolerances, Verner9,
 };

@@ -1,0 +1,21 @@
+//! A robot whose code `build.rs` has generated falls for a second.
+//!
+//! `cargo run --release -p mbd-example-build-script`
+
+use multibody::prelude::*;
+
+include!(concat!(env!("OUT_DIR"), "/iiwa.rs"));
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arm = Iiwa::new();
+    let (mut q, mut p) = (arm.neutral(), arm.zero_momenta());
+    q[1] = 0.5;
+    let start: f64 = arm.energy(&q, &p).iter().sum();
+    let mut rk4 = Rk4::new(&arm);
+    for k in 0..1000 {
+        rk4.step(&mut arm, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p)?;
+    }
+    let lost = (arm.energy(&q, &p).iter().sum::<f64>() - start).abs();
+    println!("after 1 s: {q:.3?}; the energy is off by {lost:.1e} J");
+    Ok(())
+}

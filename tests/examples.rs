@@ -1,0 +1,39 @@
+//! The programs of `examples/` run; each of them asserts what it shows.
+
+#[path = "../examples/arm_control.rs"]
+mod arm_control;
+#[path = "../examples/batch.rs"]
+mod batch;
+#[path = "../examples/closed_loop.rs"]
+mod closed_loop;
+#[path = "../examples/lqr.rs"]
+mod lqr;
+#[path = "../examples/pendulum.rs"]
+mod pendulum;
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+#[test]
+fn a_pendulum_keeps_its_energy() -> Outcome {
+    pendulum::main()
+}
+
+#[test]
+fn an_arm_is_held_and_follows_a_path() -> Outcome {
+    arm_control::main()
+}
+
+#[test]
+fn a_pole_is_balanced() -> Outcome {
+    lqr::main()
+}
+
+#[test]
+fn many_arms_fall_at_once() -> Outcome {
+    batch::main()
+}
+
+#[test]
+fn a_linkage_stays_closed() -> Outcome {
+    closed_loop::main()
+}
