@@ -138,6 +138,7 @@ where
         }
     }
 
+    #[inline]
     fn factor(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
         if I::DERIVATIVES && self.factored != h {
             self.factored = Y::Scalar::zero();

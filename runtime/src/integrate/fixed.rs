@@ -49,6 +49,7 @@ where
         self.method.begin();
     }
 
+    #[inline]
     fn attempt(
         &mut self,
         step: &mut Attempt<Y>,

@@ -57,6 +57,7 @@ where
 
     /// The error of an implicit step whose matrix has no pivot in a column: the rate at the start shows whether the
     /// rates or the matrix are the cause.
+    #[inline(always)]
     pub(super) fn singular(rate: &Point<Y>, t: Y::Scalar, h: Y::Scalar, column: usize) -> StepError {
         match rate.not_finite() {
             Some(index) => StepError::NotFinite { time: t.to_f64(), index },
@@ -304,11 +305,13 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), StepError> {
-        self.resume(system, t, q, p)?;
-        self.attempt(system, t, h, None)?;
         if S::MULTISTEP {
+            self.resume(system, t, q, p)?;
+            self.attempt(system, t, h, None)?;
             self.accept(system, t, h)?;
         } else {
+            self.begin(system, t, q, p)?;
+            self.attempt(system, t, h, None)?;
             self.step.field.advance(system, t, &self.step.delta)?;
         }
         self.step.field.store(system, q, p);
