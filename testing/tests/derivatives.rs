@@ -243,7 +243,7 @@ fn forms_do_not_matter() {
                 worst = worst.max(c.worst("another form", a, b));
             }
         }
-        for node in [&c, &others[0]].into_iter().flat_map(|c| &c.i.tree().nodes) {
+        for node in [&c].into_iter().chain(&others).flat_map(|c| &c.i.tree().nodes) {
             let forms = [
                 node.elimination.deferred,
                 node.elimination.before_joint,
