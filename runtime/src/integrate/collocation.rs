@@ -88,6 +88,8 @@ where
     T: Formula<S>,
     I: Iteration<Y, S>,
 {
+    // A call writes it in place; inlined, it would be built beside and copied: twice the stack.
+    #[inline(never)]
     fn new(system: &Y) -> Self {
         let tableau = T::TABLEAU;
         let point = || Point::zero(system);
@@ -144,7 +146,7 @@ where
             self.factored = Y::Scalar::zero();
             step.statistics.factorisations += 1;
             if let Err(column) = self.iteration.factor(h) {
-                self.start_rate(step, system, t);
+                step.start_rate(system, t, &mut self.first);
                 return Err(Attempt::singular(&self.first, t, h, column));
             }
             self.factored = h;
@@ -152,9 +154,9 @@ where
         Ok(())
     }
 
-    /// Stages of the linearised equations.
+    /// Stages of the linearised equations, after [`Collocation::linearise`].
     fn linear(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
-        self.start_rate(step, system, t);
+        step.start_rate(system, t, &mut self.first);
         for (z, c) in self.z.iter_mut().zip(&self.c) {
             z.copy_from(&self.first);
             z.scale(h * *c);

@@ -25,6 +25,7 @@ where
     Y::Scalar: Real,
 {
     /// This method with exactly `n` iterations a step, for real time.
+    #[inline(always)]
     pub fn with_iterations(self, n: u32) -> Integrator<Y, FixedIterations<Collocation<Y, T, I, S>>> {
         self.map(|method| FixedIterations { method, n })
     }

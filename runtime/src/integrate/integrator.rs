@@ -29,6 +29,19 @@ where
     Y: System,
     Y::Scalar: Real,
 {
+    /// Nothing is known yet. A call writes it in place; inlined, it would be built beside and copied: twice the stack.
+    #[inline(never)]
+    fn new(system: &Y, compensated: bool) -> Self {
+        Attempt {
+            field: Field::new(system, compensated),
+            delta: Point::zero(system),
+            end: Point::zero(system),
+            start_known: false,
+            end_known: false,
+            statistics: Statistics::default(),
+        }
+    }
+
     /// Evaluates the rate at the start of the step into `rate`, unless that is known.
     pub fn start_rate(&mut self, system: &mut Y, t: Y::Scalar, rate: &mut Point<Y>) {
         if !self.start_known {
@@ -163,24 +176,18 @@ where
     Y::Scalar: Real,
 {
     /// A method made of a scheme, for one system; with `compensated` as [`Integrator::compensated`].
+    #[inline(always)]
     pub fn from_scheme(system: &Y, scheme: S, compensated: bool) -> Self {
-        let step = Attempt {
-            field: Field::new(system, compensated),
-            delta: Point::zero(system),
-            end: Point::zero(system),
-            start_known: false,
-            end_known: false,
-            statistics: Statistics::default(),
-        };
-        Integrator { step, scheme }
+        Integrator { step: Attempt::new(system, compensated), scheme }
     }
 
     /// Makes it for one system.
+    #[inline(always)]
     pub fn new(system: &Y) -> Self
     where
         S: FromSystem<Y>,
     {
-        Self::from_scheme(system, S::new(system), false)
+        Integrator { step: Attempt::new(system, false), scheme: S::new(system) }
     }
 
     /// The method with compensated sums: the rounding error of a step is added to the next step, except for
@@ -189,7 +196,7 @@ where
     where
         S: FromSystem<Y>,
     {
-        Self::from_scheme(system, S::new(system), true)
+        Integrator { step: Attempt::new(system, true), scheme: S::new(system) }
     }
 
     /// The scheme.
@@ -198,6 +205,7 @@ where
     }
 
     /// This method with another scheme in place of its own.
+    #[inline(always)]
     pub(crate) fn map<T>(self, scheme: impl FnOnce(S) -> T) -> Integrator<Y, T> {
         Integrator { step: self.step, scheme: scheme(self.scheme) }
     }

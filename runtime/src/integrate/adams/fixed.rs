@@ -63,6 +63,8 @@ where
     Y: System,
     Y::Scalar: Real,
 {
+    // A call writes it in place; inlined, it would be built beside and copied: twice the stack.
+    #[inline(never)]
     fn new(system: &Y) -> Self {
         Adams {
             history: History::new(system),
