@@ -1,0 +1,232 @@
+//! The loop form of long chains against the interpreter.
+//!
+//! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
+
+use mbd_codegen::generate::{trace, OutputProgram};
+use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::rolled::{rolled, RolledProgram};
+use mbd_codegen::search;
+use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
+use mbd_runtime::Constrained;
+use mbd_testing::chains::{general, planar};
+use mbd_testing::random::{random_model, Distribution, Rng};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+
+/// Inputs of a program in order.
+fn inputs(program: &OutputProgram<RolledProgram>, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
+    let mut all = Vec::new();
+    for array in &program.inputs {
+        match array.name {
+            "q" => all.extend(&s.q),
+            "p" => all.extend(p),
+            "v" => all.extend(&s.v),
+            "a" => all.extend(a),
+            "tau" => all.extend(&s.tau),
+            "drive_q" => all.extend(&s.drive[0]),
+            "drive_v" => all.extend(&s.drive[1]),
+            "drive_a" => all.extend(&s.drive[2]),
+            "params" => all.extend(&s.params),
+            "gravity" => all.extend(&s.gravity),
+            "wrenches" => assert_eq!(array.len(), 0),
+            other => panic!("no input is named {other}"),
+        }
+    }
+    all
+}
+
+/// Compares every group that has loops; gives the number of nodes in loops.
+fn compare(model: &Model, seed: u64, options: &Options) -> usize {
+    let plan = search::plan(model, options.plan);
+    let mut s = random_state(&plan, seed);
+    if !options.efforts {
+        s.tau.fill(0.0);
+    }
+    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let mut i = s.interpreter(&plan);
+    let (mut p, mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+    i.momenta(&s.q, &s.v, &mut p);
+    let mut a = vec![0.0; nv];
+    i.accelerations(&s.q, &s.v, &mut a);
+    let mut nodes = 0;
+    let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
+    for &group in Output::ALL {
+        let Some(program) = rolled(&plan, group, options) else { continue };
+        nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
+        let results = program.program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
+        let expected = match group {
+            Output::Rates => {
+                i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
+                [qd.as_slice(), &pd].concat()
+            }
+            Output::Velocities => {
+                i.velocities(&s.q, &p, &mut v);
+                v.clone()
+            }
+            Output::Momenta => p.clone(),
+            Output::Accelerations => a.clone(),
+            Output::InverseDynamics => {
+                i.inverse_dynamics(&s.q, &s.v, &a, &mut v);
+                v.clone()
+            }
+            Output::Bias => {
+                i.bias(&s.q, &s.v, &mut v);
+                v.clone()
+            }
+            Output::ProjectMomenta => {
+                let mut freed = p.clone();
+                i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
+                [v.as_slice(), &freed, &rows].concat()
+            }
+            Output::PositionCorrection => {
+                i.position_correction(&s.q, &mut rows, &mut v, &mut pivots);
+                [rows.as_slice(), &v, &pivots].concat()
+            }
+            _ => {
+                let (kinetic, potential) = i.energy(&s.q, &p);
+                vec![kinetic, potential]
+            }
+        };
+        assert_eq!(results.len(), expected.len());
+        if options.arithmetic == Arithmetic::Fast {
+            // Some hundred roundings and their growth through an inertia whose condition is below 1e3 in chains this
+            // short, against the largest of the results.
+            let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            assert!(off <= 1e-11 * size, "seed {seed}: {group:?} is {off:e} off, size {size:e}\n{}", to_toml(model));
+            continue;
+        }
+        for (k, (a, b)) in results.iter().zip(&expected).enumerate() {
+            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
+            assert!(same && a.is_finite(), "seed {seed}: {group:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
+        }
+        let straight = trace(&plan, group, options).map(|g| g.program.counts().total()).unwrap_or_default();
+        let more = program.program.counts().total();
+        assert!(
+            more >= straight,
+            "seed {seed}: {group:?}: loops have {more} operations, straight-line code {straight}"
+        );
+    }
+    nodes
+}
+
+fn forced(seed: u64) -> Options {
+    let mut rng = Rng::new(seed, 9);
+    // Blocks at the tips stay straight-line and leave little for loops in short chains.
+    let forms = rng.pick(&[
+        EliminationStrategy::Single,
+        EliminationStrategy::Single,
+        EliminationStrategy::Fewest,
+        EliminationStrategy::Fastest,
+    ]);
+    Options {
+        arithmetic: Arithmetic::Exact,
+        efforts: rng.chance(0.7),
+        plan: PlanOptions { elimination: forms, rolled: RolledCode::Always, ..PlanOptions::default() },
+        ..Options::default()
+    }
+}
+
+#[test]
+fn chains_of_pins() {
+    for seed in 0..30 {
+        let n = 5 + seed as usize % 25;
+        let distribution = Distribution { bodies: (n, n), taper: 1.0, ..Distribution::default() };
+        let nodes = compare(&random_model(seed, &distribution), seed, &forced(seed));
+        assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+    }
+}
+
+/// Chains whose tips are held by the ground, in space and in a plane, equal links among them: columns of the rows are carried
+/// through the turns.
+#[test]
+fn closed_chains() {
+    let kinds = [
+        LoopKind::Spherical,
+        LoopKind::Revolute { axis: [0.2, 0.0, 1.0] },
+        LoopKind::Planar { normal: [0.0, 0.0, 1.0] },
+        LoopKind::Fixed,
+        LoopKind::Helical { axis: [1.0, 0.0, 0.0], pitch: Value::Const(0.3) },
+    ];
+    for seed in 0..20 {
+        let n = 8 + seed as usize % 7;
+        let mut model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
+        let at = |x: f64| Placement { xyz: [x, 0.3 - x, 0.1].map(Value::Const), rotation: Rotation::NONE };
+        let (ground, tip) = (
+            Mount { body: None, placement: at(0.4) },
+            Mount { body: Some(model.joints[n - 1].child), placement: at(0.2) },
+        );
+        let [first, second] = if seed % 3 == 0 { [ground, tip] } else { [tip, ground] };
+        let kind = ConstraintKind::Loop { kind: kinds[seed as usize % 5], first, second };
+        let decay = if seed % 4 == 0 { Value::Const(5.0) } else { Value::ZERO };
+        model.constraints.push(Constraint::new("loop", kind, decay));
+        let mut options = forced(seed);
+        // Frames that do not turn keep their nodes out of loops.
+        if options.plan.elimination == EliminationStrategy::Fewest {
+            options.plan.elimination = EliminationStrategy::Single;
+        }
+        let nodes = compare(&model, seed, &options);
+        if seed % 4 == 0 {
+            // With a decay the rows ask for the pose of the tip, and pull at the joints: straight-line code.
+            continue;
+        }
+        let plan = search::plan(&model, options.plan);
+        for group in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
+            let is_rolled = rolled(&plan, group, &options).is_some();
+            assert!(is_rolled, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);
+        }
+        assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+        options.arithmetic = Arithmetic::Fast;
+        compare(&model, seed, &options);
+    }
+}
+
+#[test]
+fn rewritten_chains() {
+    for seed in 0..12 {
+        let n = 16 + seed as usize;
+        let distribution = Distribution {
+            bodies: (n, n),
+            taper: 1.0,
+            skew: if seed % 2 == 0 { 1.0 } else { 0.0 },
+            ..Distribution::default()
+        };
+        let options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
+        compare(&random_model(seed, &distribution), seed, &options);
+    }
+}
+
+#[test]
+fn trees_of_everything() {
+    let mut nodes = 0;
+    for seed in 0..300 {
+        let all = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6 + seed as usize % 20) };
+        // Parameters, followers and drives keep their nodes out of loops.
+        let plain = Distribution { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
+        let distribution = if seed % 3 == 0 { all } else { plain };
+        nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
+    }
+    assert!(nodes > 150, "only {nodes} nodes were in loops");
+}
+
+#[test]
+fn chains_of_one_kind() {
+    let mut nodes = 0;
+    for seed in 0..120 {
+        let mut kinds = [0.0; 9];
+        kinds[seed as usize % 8] = 1.0;
+        let n = 4 + seed as usize % 9;
+        let distribution = Distribution {
+            wrenches: 0.0,
+            mimic: 0.0,
+            prescribed: 0.0,
+            bodies: (n, n),
+            branching: 0.1,
+            kinds,
+            ..Distribution::everything(seed, n)
+        };
+        nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
+    }
+    assert!(nodes > 200, "only {nodes} nodes were in loops");
+}
