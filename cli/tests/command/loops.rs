@@ -1,13 +1,13 @@
 //! The command on models with loops: closing, what is said where they do not close, simulation, pictures, evaluation.
 
-use crate::run::{bad, err, folder, good, out, run, run_in};
+use crate::run::{bad, err, files, folder, good, out, run, run_in, ROOT};
 use serde_json::Value;
 
 const FOURBAR: &str = include_str!("../../../models/mechanisms/fourbar.toml");
 
 /// Path of a shipped mechanism.
 fn shipped(name: &str) -> String {
-    format!("{}/models/mechanisms/{name}.toml", command::ROOT)
+    format!("{}/models/mechanisms/{name}.toml", ROOT)
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn loops_that_do_not_close() {
         format!("far.toml:{line}:8: error: loop `closing_pin` does not close: what is left is 1.852e-1 m after ");
     bad(run_in(&folder, &["check", "far.toml"]), &[&place, "rank ", "help: look at lengths"]);
     bad(run_in(&folder, &["simulate", "far.toml"]), &[&place]);
-    assert_eq!(command::files(&folder), ["far.toml"]);
+    assert_eq!(files(&folder), ["far.toml"]);
     // It closes, but not with the crank where it is held.
     write("held.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.75, 0, 0]"));
     bad(run_in(&folder, &["check", "held.toml"]), &["does not close", "help: with no joint `held` all is met"]);

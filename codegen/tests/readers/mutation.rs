@@ -2,7 +2,7 @@
 
 use mbd_codegen::read::{self, ImportOptions};
 
-use crate::mutate::Mutator;
+use crate::mutate::{self, Mutator};
 
 fn survive(file: &str, seeds: &[String], rounds: u64) {
     let mut with_model = 0;
