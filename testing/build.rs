@@ -1,4 +1,4 @@
-//! Generates code for random trees, which `tests/compiled.rs` includes: the way a user's build script goes.
+//! Generates code for random trees, which `tests/code/compiled.rs` includes: the way a user's build script goes.
 
 use std::fmt::Write;
 use std::path::PathBuf;

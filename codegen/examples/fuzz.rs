@@ -7,7 +7,7 @@
 //! Inputs that panic, take longer than a second, or give neither model nor error are written to the folder of `--save` (default
 //! `target/fuzz`) and named by their seed; the exit status is 1 if there were any. A seed gives the same input as long as the corpus stays the same.
 
-#[path = "../tests/mutate/mod.rs"]
+#[path = "../tests/readers/mutate.rs"]
 mod mutate;
 
 use std::panic::{catch_unwind, set_hook, AssertUnwindSafe};

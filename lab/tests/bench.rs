@@ -1,7 +1,7 @@
 //! The benches of the integrators, on a small choice of scenes.
 #![cfg(feature = "generated")]
 
-#[path = "../../cli/tests/command/mod.rs"]
+#[path = "../../cli/tests/command/run.rs"]
 mod command;
 
 use command::{bad, folder, good, out, read, run, run_in};

@@ -1,25 +1,28 @@
 //! The thesis's biped by every way of computing it, and the command that repeats its experiments.
 
 mod biped;
-#[path = "../../../cli/tests/command/mod.rs"]
-mod command;
+#[allow(dead_code)]
+#[path = "../../../cli/tests/command/documented.rs"]
+mod documented;
+#[path = "../../../cli/tests/command/run.rs"]
+mod run;
 
 use std::path::Path;
 
 use biped::{absolute, relative, Biped, Vector};
-use command::{files, folder, good, out, read, run_in};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::constrained::CoordinatePartition;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
 use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
+use run::{files, folder, good, out, read, run_in};
 
 const END: f64 = 0.85;
 
 /// The model as it is shipped, closed.
 fn shipped() -> (Interpreter<f64>, Vec<f64>) {
-    let text = read(Path::new(command::ROOT), "models/biped.toml");
+    let text = read(Path::new(run::ROOT), "models/biped.toml");
     let (model, findings) = read::load("biped.toml", &text, &ImportOptions::default());
     assert!(findings.0.is_empty(), "{findings}");
     let model = model.expect("a model");

@@ -1,0 +1,352 @@
+//! The command `mbd`, run as a program.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::documented::agrees_with_pages;
+use crate::run::*;
+
+#[test]
+fn help_teaches() {
+    let output = good(run(&["--help"]));
+    for word in ["tour", "check", "count", "generate", "eval", "simulate", "explain", "Exit status"] {
+        assert!(out(&output).contains(word), "{word}");
+    }
+    for command in ["check", "count", "generate", "eval", "simulate", "explain"] {
+        let output = good(run(&[command, "--help"]));
+        assert!(out(&output).contains("--gravity"), "{command}");
+    }
+    assert_eq!(run(&["chekc"]).status.code(), Some(2));
+    let output = run(&["generate", "models/ur5.urdf", "--outputs", "rates,momemta"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(err(&output).contains("did you mean `momenta`?"), "{}", err(&output));
+    assert_eq!(run(&["count", "models/ur5.urdf", "--gravity", "1,2"]).status.code(), Some(2));
+}
+
+#[test]
+fn check_tells_what_is_sound() {
+    let output = good(run(&["check", "models/satellite.toml", "models/panda.urdf"]));
+    let lines: Vec<&str> = out(&output).lines().collect();
+    assert_eq!(
+        lines[0],
+        "models/satellite.toml: sound: 3 bodies, 3 joints (1 floating, 2 revolute), nq 7, nv 6, mass 138 kg, \
+         prescribed joints: 2, external wrenches: 1"
+    );
+    assert!(lines[1].contains("joints that follow others: 1"), "{}", lines[1]);
+    assert!(err(&output).contains("models/panda.urdf:28:5: notice:"), "{}", err(&output));
+    let floating = good(run(&["check", "models/solo12.urdf", "--base", "floating"]));
+    assert!(out(&floating).contains("nq 19, nv 18"), "{}", out(&floating));
+}
+
+#[test]
+fn check_tells_all_findings() {
+    let file = "codegen/tests/broken/toml/tree_unknown_names.toml";
+    let expected = std::fs::read_to_string(format!("{ROOT}/codegen/tests/broken/toml/tree_unknown_names.txt"));
+    let findings = expected.expect("the findings").lines().filter(|l| l.contains(": error: ")).count();
+    let output = run(&["check", file]);
+    let found = err(&output).lines().filter(|l| l.starts_with(&format!("{file}:")) && l.contains(": error: ")).count();
+    assert!(findings > 1 && found == findings, "{findings} expected, {found} found");
+    bad(output, &[]);
+    // A sound model beside it is still told.
+    let both = run(&["check", file, "models/ur5.urdf"]);
+    assert_eq!(both.status.code(), Some(1));
+    assert!(out(&both).contains("models/ur5.urdf: sound"), "{}", out(&both));
+}
+
+#[test]
+fn files_that_cannot_be_read() {
+    bad(run(&["check", "models/urf5.urdf"]), &["cannot read `models/urf5.urdf`", "did you mean `ur5.urdf`?"]);
+    bad(run(&["count", "models"]), &["cannot read `models`"]);
+    let folder = folder("unreadable");
+    std::fs::write(folder.join("latin.toml"), b"name = 'a'\n# \xe9\n").expect("a file");
+    bad(run_in(&folder, &["check", "latin.toml"]), &["latin.toml:2:3: error: not UTF-8 text"]);
+}
+
+#[test]
+fn counts() {
+    let output = good(run(&["count", "models/chain6.toml", "--outputs", "all", "--json"]));
+    let value = json_of(&output);
+    assert_eq!(value["published"][0]["operations"], 363 * 6 - 475);
+    let outputs = value["outputs"].as_array().expect("outputs");
+    assert_eq!(outputs.len(), multibody::codegen::Output::available(false).count());
+    for output in outputs {
+        for key in ["total", "additions", "multiplications", "divisions", "square_roots", "sine_cosine_pairs"] {
+            let sweeps = output["sweeps"].as_array().expect("sweeps");
+            let sum: u64 = sweeps.iter().map(|s| s[key].as_u64().expect("a number")).sum();
+            assert_eq!(output[key], sum, "{} {key}", output["output"]);
+        }
+    }
+    let total = outputs[0]["total"].as_u64().expect("a number");
+    assert!(total < 363 * 6 - 475, "{total} operations");
+    let table = good(run(&["count", "models/chain6.toml"]));
+    assert!(out(&table).contains("363n - 475") && out(&table).contains(&total.to_string()), "{}", out(&table));
+    // The formulas hold for serial chains of pins on the ground alone.
+    for other in [&["count", "models/panda.urdf"][..], &["count", "models/ur5.urdf", "--base", "floating"]] {
+        let output = good(run(other));
+        assert!(!out(&output).contains("363n"), "{}", out(&output));
+    }
+    // What is not there costs nothing.
+    let rates = |more: &[&str]| {
+        let arguments = [&["count", "models/ur5.urdf", "--outputs", "rates", "--json"], more].concat();
+        json_of(&good(run(&arguments)))["outputs"][0]["total"].as_u64().expect("a number")
+    };
+    assert!(rates(&["--gravity", "0,0,0"]) < rates(&[]));
+    assert!(rates(&["--no-efforts"]) < rates(&[]));
+}
+
+#[test]
+fn generates_the_same_bytes() {
+    let folder = folder("generate");
+    let model = format!("{ROOT}/models/ur5.urdf");
+    let printed = good(run(&["generate", "models/ur5.urdf", "--outputs", "rates,energy", "--name", "Arm"]));
+    assert!(out(&printed).contains("pub struct Arm {") && out(&printed).contains("from models/ur5.urdf."));
+    let written = |name: &str| {
+        let arguments = ["generate", &model, "--outputs", "rates,energy", "--name", "Arm", "-o", name];
+        assert_eq!(out(&good(run_in(&folder, &arguments))), "");
+        read(&folder, name)
+    };
+    let (a, b) = (written("a.rs"), written("b.rs"));
+    assert_eq!(a, b);
+    // An absolute path shows as the name of the file.
+    assert!(!a.contains(ROOT));
+    assert_eq!(a.replace("from ur5.urdf.", "from models/ur5.urdf."), out(&printed));
+    assert_eq!(files(&folder), ["a.rs", "b.rs"]);
+    let single =
+        good(run(&["generate", "models/double_pendulum.toml", "--scalar", "f32", "--runtime", "::mbd_runtime"]));
+    assert!(out(&single).contains("[f32; 2]") && out(&single).contains("::mbd_runtime::System for DoublePendulum"));
+}
+
+#[test]
+fn failures_leave_files_alone() {
+    let folder = folder("failures");
+    write(&folder, "old.rs", "as it was");
+    let broken = format!("{ROOT}/codegen/tests/broken/toml/tree_cycle.toml");
+    bad(run_in(&folder, &["generate", &broken, "-o", "old.rs"]), &["tree_cycle.toml:"]);
+    let model = format!("{ROOT}/models/ur5.urdf");
+    let unknown = ["generate", &model, "--outputs", "frames", "--frames", "nose", "-o", "old.rs"];
+    bad(run_in(&folder, &unknown), &["no frame or body is named `nose`"]);
+    bad(run_in(&folder, &["generate", &model, "-o", "none/new.rs"]), &["cannot write `none/new.rs`"]);
+    bad(run_in(&folder, &["generate", &model, "-o", "."]), &["cannot write `.`"]);
+    assert_eq!(files(&folder), ["old.rs"]);
+    assert_eq!(read(&folder, "old.rs"), "as it was");
+}
+
+/// Columns of a table: names, then rows of numbers.
+fn columns(table: &str) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut lines = table.lines();
+    let names: Vec<String> = lines.next().expect("names").split(',').map(String::from).collect();
+    let rows = lines.map(|l| l.split(',').map(|x| x.parse().expect("a number")).collect());
+    let rows: Vec<Vec<f64>> = rows.collect();
+    assert!(rows.iter().all(|r| r.len() == names.len()));
+    (names, rows)
+}
+
+#[test]
+fn simulates() {
+    let folder = folder("simulate");
+    let model = format!("{ROOT}/models/double_pendulum.toml");
+    let output = good(run_in(&folder, &["simulate", &model, "--time", "2", "--every", "0.1"]));
+    assert_eq!(files(&folder), ["double_pendulum.csv", "double_pendulum.svg"]);
+    let (names, rows) = columns(&read(&folder, "double_pendulum.csv"));
+    assert_eq!((names.len(), rows.len()), (1 + 2 + 2 + 2 + 3, 21));
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row[0] - 0.1 * k as f64).abs() < 1e-12, "{}", row[0]);
+        let (energy, start) = (row[row.len() - 1], rows[0][row.len() - 1]);
+        // The tolerance is 1e-9, the energy a few J.
+        assert!((energy - start).abs() < 1e-7, "{energy} {start}");
+    }
+    let picture = read(&folder, "double_pendulum.svg");
+    assert!(picture.starts_with("<svg") && picture.trim_end().ends_with("</svg>"));
+    assert!(picture.contains("time [s]") && picture.contains("angle [rad]"));
+    for text in ["by verner9", "tolerance 1e-9", "energy error", "work: ", "rejected", "time: ", "rates", "(21 rows)"] {
+        assert!(out(&output).contains(text), "{text}:\n{}", out(&output));
+    }
+    let start =
+        ["simulate", &model, "--q", "0.1,-0.2", "--v", "-1,0", "--time", "0.01", "--csv", "a.csv", "--svg", "a.svg"];
+    good(run_in(&folder, &start));
+    assert!(read(&folder, "a.csv").lines().nth(1).expect("a row").starts_with("0,0.1,-0.2,-1,"));
+    // Ten seconds, a thousand rows and that of the start.
+    good(run_in(&folder, &["simulate", &model]));
+    let (_, rows) = columns(&read(&folder, "double_pendulum.csv"));
+    assert_eq!((rows.len(), rows[1000][0]), (1001, 10.0));
+}
+
+#[test]
+fn simulates_on_the_energy_of_the_start() {
+    let folder = folder("simulate_project");
+    let model = format!("{ROOT}/models/double_pendulum.toml");
+    let energies = |more: &[&str]| -> Vec<f64> {
+        let arguments = [&["simulate", &model, "--time", "5", "--rows", "50", "--step", "0.01"], more].concat();
+        good(run_in(&folder, &arguments));
+        let (_, rows) = columns(&read(&folder, "double_pendulum.csv"));
+        rows.iter().map(|row| row[row.len() - 1]).collect()
+    };
+    let drift = |energies: &[f64]| energies.iter().map(|e| (e - energies[0]).abs()).fold(0.0, f64::max);
+    let (free, kept) = (drift(&energies(&[])), drift(&energies(&["--project"])));
+    // Rows stand where steps end. Energies are some tens of joules: their rounding.
+    assert!(kept < 1e-13 && free > 1e3 * kept, "{kept:e} {free:e}");
+    let damped = format!("{ROOT}/models/chain100.toml");
+    bad(run_in(&folder, &["simulate", &damped, "--project"]), &["dampers", "--no-damping"]);
+}
+
+#[test]
+fn simulates_by_any_method() {
+    let folder = folder("simulate_methods");
+    let ball = format!("{ROOT}/models/spherical_pendulum.toml");
+    let run = |more: &[&str]| {
+        let arguments =
+            [&["simulate", &ball, "--time", "1", "--rows", "7", "--csv", "a.csv", "--svg", "a.svg"], more].concat();
+        let output = good(run_in(&folder, &arguments));
+        (columns(&read(&folder, "a.csv")).1, out(&output).to_string())
+    };
+    let (reference, _) = run(&["--tolerance", "1e-12"]);
+    assert_eq!(reference.len(), 8);
+    let apart = |rows: &[Vec<f64>]| {
+        let pairs = rows.iter().flatten().zip(reference.iter().flatten());
+        pairs.fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
+    };
+    for method in multibody::runtime::catalogue::entries() {
+        let low = method.title.contains("order 2") || method.title.contains("Euler");
+        let (rows, text) = run(&["--method", method.name, "--step", "0.002"]);
+        println!("{}: {:.1e}", method.name, apart(&rows));
+        // Of order one and two: a step of 2 ms, rates of some tens.
+        assert!(apart(&rows) < if low { 1.0 } else { 1e-5 }, "{}: {:e}", method.name, apart(&rows));
+        assert!(text.contains(&format!("by {} ({}), steps of 0.002 s", method.name, method.title)), "{text}");
+        assert!(text.contains("work: 500 steps, 0 more rejected"), "{text}");
+        if method.adaptive {
+            let (rows, text) = run(&["--method", method.name, "--tolerance", "1e-8"]);
+            assert!(apart(&rows) < 1e-5, "{}: {:e}", method.name, apart(&rows));
+            assert!(text.contains("tolerance 1e-8"), "{text}");
+        } else {
+            let arguments = ["simulate", &ball, "--method", method.name];
+            bad(run_in(&folder, &arguments), &["estimates no error", "give --step"]);
+        }
+    }
+    let (rows, text) = run(&["--partial"]);
+    assert!(apart(&rows) < 1e-6 && text.contains("tolerance of coordinates 1e-9"), "{text}");
+    // With a step and nothing else, as it has always been.
+    assert!(run(&["--step", "0.01"]).1.contains("by rk4"));
+}
+
+#[test]
+fn failed_simulations_write_nothing() {
+    let folder = folder("simulate_failures");
+    let model = format!("{ROOT}/models/double_pendulum.toml");
+    let simulate = |more: &[&str]| run_in(&folder, &[&["simulate", &model], more].concat());
+    bad(
+        simulate(&["--v", "1e8,1e8", "--step", "1"]),
+        &["the simulation failed", "is not finite in the step from t = ", "lower --step", "nothing was written"],
+    );
+    bad(
+        simulate(&["--v", "1e200,1e200"]),
+        &["the simulation failed", "from t = 0 s", "`elbow`", "--v", "nothing was written"],
+    );
+    bad(simulate(&["--q", "1"]), &["--q has 1 numbers, expected 2", "in order: "]);
+    bad(simulate(&["--csv", "a", "--svg", "a"]), &["both to be written to `a`"]);
+    bad(simulate(&["--step", "1e-12"]), &["steps are too many"]);
+    bad(simulate(&["--every", "1e-12"]), &["rows are too many"]);
+    // Known before the work begins, and neither of the two is written.
+    bad(simulate(&["--time", "1e9", "--svg", "none/a.svg"]), &["cannot write `none/a.svg`"]);
+    bad(simulate(&["--time", "1e9", "--csv", "."]), &["cannot write `.`"]);
+    for wrong in [
+        &["--time", "-1"][..],
+        &["--q", "nan,0"],
+        &["--method", "rk5"],
+        &["--tolerance", "0"],
+        &["--step", "0.1", "--tolerance", "1e-6"],
+        &["--rows", "0"],
+        &["--rows", "5", "--every", "1"],
+    ] {
+        assert_eq!(simulate(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+    assert!(err(&simulate(&["--method", "dop"])).contains("dop853"));
+    assert!(files(&folder).is_empty(), "{:?}", files(&folder));
+}
+
+#[test]
+fn explains() {
+    for (stage, texts) in [
+        ("frames", &["way: Rx(-90°)", "zero in it:", "Vanished:"][..]),
+        ("trace", &["made", "needed"]),
+        ("simplify", &["= sin(q[", "results, in order"]),
+        ("schedule", &["values alive at once", "longest chain"]),
+    ] {
+        let output = good(run(&["explain", "models/ur5.urdf", "--after", stage, "--outputs", "rates"]));
+        for text in texts {
+            assert!(out(&output).contains(text), "{stage}: {text}");
+        }
+    }
+    for model in ["panda.urdf", "satellite.toml", "spherical_pendulum.toml", "chain6.toml"] {
+        good(run(&["explain", &format!("models/{model}")]));
+    }
+}
+
+#[test]
+fn committed_code_is_fresh() {
+    good(run(&["check", "--generated"]));
+    good(run(&["check", "--generated", "cli/tour"]));
+    assert_eq!(read(Path::new(ROOT), "cli/tour/ur5.urdf"), read(Path::new(ROOT), "models/ur5.urdf"), "copied anew");
+}
+
+#[test]
+fn stale_code_is_found_and_mended() {
+    let root = folder("stale");
+    let models = root.join("models");
+    let folder = root.join("generated");
+    std::fs::create_dir_all(&models).expect("a directory");
+    std::fs::create_dir_all(&folder).expect("a directory");
+    std::fs::copy(format!("{ROOT}/models/double_pendulum.toml"), models.join("double_pendulum.toml")).expect("a copy");
+    let manifest =
+        "[[file]]\nfile = \"pendulum.rs\"\nmodel = \"../models/double_pendulum.toml\"\ntype = \"Pendulum\"\n\
+                    outputs = [\"rates\"]\n";
+    write(&folder, "manifest.toml", manifest);
+    bad(run_in(&root, &["check", "--generated"]), &["pendulum.rs: error: the file is missing", "--update"]);
+    good(run_in(&root, &["check", "--generated", "--update"]));
+    good(run_in(&root, &["check", "--generated", "generated"]));
+    let fresh = read(&folder, "pendulum.rs");
+    assert!(fresh.contains("from models/double_pendulum.toml."), "{}", &fresh[..200]);
+    write(&folder, "pendulum.rs", &fresh.replacen("pub const NQ: usize = 2", "pub const NQ: usize = 3", 1));
+    let line = fresh.lines().position(|l| l.contains("const NQ")).expect("the line") + 1;
+    let place = format!("pendulum.rs:{line}:1: error: stale: `pub const NQ: usize = 3;` should be");
+    bad(run_in(&root, &["check", "--generated"]), &[&place]);
+    good(run_in(&root, &["check", "--generated", "--update"]));
+    assert_eq!(read(&folder, "pendulum.rs"), fresh);
+    write(&folder, "stray.rs", "");
+    bad(run_in(&root, &["check", "--generated"]), &["stray.rs: error: not in manifest.toml"]);
+    std::fs::remove_file(folder.join("stray.rs")).expect("removed");
+    write(&folder, "manifest.toml", &manifest.replace("[\"rates\"]", "[\"rate\"]"));
+    bad(run_in(&root, &["check", "--generated"]), &["`pendulum.rs`: `rate` is no output"]);
+    write(&folder, "manifest.toml", &manifest.replace("model = \"../models/double_pendulum.toml\"\n", ""));
+    bad(run_in(&root, &["check", "--generated"]), &["manifest.toml:1:1: error: missing field `model`"]);
+    write(&folder, "manifest.toml", &manifest.replace("outputs", "outptus"));
+    bad(run_in(&root, &["check", "--generated"]), &["manifest.toml:5:1: error: unknown field `outptus`"]);
+}
+
+#[test]
+fn the_tour() {
+    let folder = folder("tour");
+    let output = good(run_in(&folder, &[]));
+    assert_eq!(files(&folder), ["mbd-tour.svg"]);
+    assert_eq!(agrees_with_pages(&[], out(&output)), 1, "the README shows it");
+}
+
+#[test]
+fn nobody_listens() {
+    let folder = folder("pipe");
+    for arguments in
+        [&["explain", "models/panda.urdf", "--after", "simplify"][..], &["--help"], &["check", "models/ur5.urdf"]]
+    {
+        let errors = std::fs::File::create(folder.join("stderr")).expect("a file");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_mbd"))
+            .current_dir(ROOT)
+            .args(arguments)
+            .stdout(Stdio::piped())
+            .stderr(errors)
+            .spawn()
+            .expect("mbd runs");
+        drop(child.stdout.take());
+        let status = child.wait().expect("mbd ends");
+        assert!(status.success(), "{arguments:?}: {status}");
+        assert!(!read(&folder, "stderr").contains("panicked"), "{}", read(&folder, "stderr"));
+    }
+}

@@ -1,0 +1,139 @@
+//! The command on models with loops: closing, what is said where they do not close, simulation, pictures, evaluation.
+
+use crate::run::{bad, err, files, folder, good, out, run, run_in, ROOT};
+use serde_json::Value;
+
+const FOURBAR: &str = include_str!("../../../models/mechanisms/fourbar.toml");
+
+/// Path of a shipped mechanism.
+fn shipped(name: &str) -> String {
+    format!("{}/models/mechanisms/{name}.toml", ROOT)
+}
+
+#[test]
+fn check_tells_rank_and_mobility() {
+    let output = good(run(&["check", "models/mechanisms/strandbeest_leg.toml", "models/mechanisms/stewart.toml"]));
+    let lines: Vec<&str> = out(&output).lines().collect();
+    assert!(
+        lines[0].contains("3 loops: closed in ") && lines[0].ends_with("15 rows, 6 independent, mobility 1"),
+        "{lines:?}"
+    );
+    assert!(lines[1].ends_with("18 rows, 18 independent, mobility 6"), "{lines:?}");
+    let line = 1 + include_str!("../../../models/mechanisms/strandbeest_leg.toml")
+        .lines()
+        .position(|l| l == "name = \"middle\"")
+        .expect("it");
+    let note = format!("strandbeest_leg.toml:{line}:8: note: loop `middle`: 5 rows, rank 2: 3 follow from the rest");
+    assert!(err(&output).contains(&note), "{}", err(&output));
+}
+
+#[test]
+fn loops_that_do_not_close() {
+    let folder = folder("loops_open");
+    let line = 1 + FOURBAR.lines().position(|l| l == "name = \"closing_pin\"").expect("it");
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file");
+    // From the end of the crank, held at 60 degrees, to the other pivot it is further than the other two bars reach:
+    // hypot(0.9 - 0.15 cos 60°, 0.15 sin 60°) - 0.65 = 0.1852.
+    write("far.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.9, 0, 0]"));
+    let place =
+        format!("far.toml:{line}:8: error: loop `closing_pin` does not close: what is left is 1.852e-1 m after ");
+    bad(run_in(&folder, &["check", "far.toml"]), &[&place, "rank ", "help: look at lengths"]);
+    bad(run_in(&folder, &["simulate", "far.toml"]), &[&place]);
+    assert_eq!(files(&folder), ["far.toml"]);
+    // It closes, but not with the crank where it is held.
+    write("held.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.75, 0, 0]"));
+    bad(run_in(&folder, &["check", "held.toml"]), &["does not close", "help: with no joint `held` all is met"]);
+}
+
+/// Two wheels and couplings of them.
+fn gears(couplings: &[(&str, [f64; 2], f64)]) -> String {
+    let mut text = String::new();
+    for name in ["a", "b"] {
+        text += &format!("[[body]]\nname = \"{name}\"\nmass = 1\ninertia = [1, 1, 1]\n");
+        text += &format!("[[joint]]\nname = \"j{name}\"\ntype = \"revolute\"\nchild = \"{name}\"\n");
+    }
+    for (name, ratios, offset) in couplings {
+        text += &format!(
+            "[[coupling]]\nname = \"{name}\"\njoints = [\"ja\", \"jb\"]\nratios = {ratios:?}\noffset = {offset}\n"
+        );
+    }
+    text
+}
+
+#[test]
+fn couplings_that_contradict_or_repeat_or_lock() {
+    let folder = folder("loops_gears");
+    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file");
+    write("contradict.toml", &gears(&[("gear", [1.0, 2.0], 0.0), ("belt", [2.0, 4.0], 0.1)]));
+    // Least squares of φ₁ = x, φ₂ = 2x − 0.1: x = 0.04, 0.04 and −0.02 are left.
+    let texts = [
+        "coupling `gear` cannot be met: what is left is 4.000e-2 rad",
+        "coupling `belt` cannot be met: what is left is 2.000e-2 rad",
+        "(rank 1 of 2 rows)",
+    ];
+    bad(run_in(&folder, &["check", "contradict.toml"]), &texts);
+    write("repeat.toml", &gears(&[("gear", [1.0, 2.0], 0.0), ("belt", [2.0, 4.0], 0.0)]));
+    let output = good(run_in(&folder, &["check", "repeat.toml"]));
+    assert!(err(&output).contains("note: coupling `belt`: 1 row, rank 0: 1 follows from the rest"), "{}", err(&output));
+    assert!(out(&output).contains("mobility 1"), "{}", out(&output));
+    write("lock.toml", &gears(&[("gear", [1.0, 2.0], 0.0), ("belt", [2.0, 1.0], 0.0)]));
+    let output = good(run_in(&folder, &["check", "lock.toml"]));
+    assert!(err(&output).contains("warning: nothing can move"), "{}", err(&output));
+}
+
+#[test]
+fn simulates_and_draws() {
+    let folder = folder("loops_simulate");
+    let model = shipped("fourbar");
+    let arguments =
+        ["simulate", &model, "--time", "0.2", "--v", "8,0,0", "--picture", "a.svg", "--trace", "coupler_point"];
+    let output = good(run_in(&folder, &arguments));
+    let text = out(&output);
+    for part in ["loops: closed in ", "mobility 1", "drift: loops open by up to ", "closed again to ", "energy error: "]
+    {
+        assert!(text.contains(part), "`{part}` is not in:\n{text}");
+    }
+    let picture = std::fs::read_to_string(folder.join("a.svg")).expect("the picture");
+    assert!(picture.starts_with("<svg ") && picture.ends_with("</svg>\n") && !picture.contains("NaN"));
+    assert_eq!(picture.matches("<g opacity").count(), 9);
+    // What is held keeps its velocity, the others follow.
+    let table = std::fs::read_to_string(folder.join("fourbar.csv")).expect("the table");
+    let first: Vec<&str> = table.lines().nth(1).expect("a row").split(',').collect();
+    let number = |k: usize| first[k].parse::<f64>().expect("a number");
+    assert!((number(4) - 8.0).abs() < 1e-12 && number(5).abs() > 0.1, "{first:?}");
+    // Drift that nobody removes is told as such.
+    let output = good(run_in(&folder, &["simulate", &model, "--time", "0.2", "--step", "0.005", "--hold", "none"]));
+    assert!(out(&output).contains("--hold says how they are kept closed"), "{}", out(&output));
+    bad(run_in(&folder, &["simulate", &model, "--project"]), &["--project does not keep loops closed"]);
+    let unknown = ["simulate", &model, "--picture", "b.svg", "--trace", "coupler_pont"];
+    bad(run_in(&folder, &unknown), &["no body or frame is named `coupler_pont`", "coupler_point"]);
+}
+
+#[test]
+fn evaluates() {
+    let folder = folder("loops_eval");
+    let model = shipped("fourbar");
+    good(run_in(&folder, &["simulate", &model, "--time", "0.01", "--rows", "1", "--v", "8,0,0"]));
+    let table = std::fs::read_to_string(folder.join("fourbar.csv")).expect("the table");
+    let row: Vec<f64> = table.lines().nth(1).expect("a row").split(',').map(|x| x.parse().expect("a number")).collect();
+    let state = serde_json::json!({"states": [{"q": row[1..4], "v": row[4..7]}, {"q": [0, 0.1, 0.3], "v": [1, 1, 1]}]});
+    std::fs::write(folder.join("states.json"), state.to_string()).expect("a file");
+    let output = good(run_in(&folder, &["eval", &model, "--input", "states.json"]));
+    let results: Value = serde_json::from_str(out(&output)).expect("JSON");
+    let list = |key: &str| -> Vec<f64> {
+        results["states"][0][key].as_array().expect("a list").iter().map(|x| x.as_f64().expect("a number")).collect()
+    };
+    let (phi, lambda) = (list("phi"), list("lambda"));
+    assert!(phi.len() == 5 && phi.iter().all(|x| x.abs() < 1e-12), "{phi:?}");
+    // Two forces in the plane of the bars; the three rows that follow from the rest carry nothing.
+    assert_eq!(lambda.iter().filter(|x| x.abs() > 1e-9).count(), 2, "{lambda:?}");
+    // The power of loops is none: v · (M v̇ + h) = −(Φv) · λ = 0, against terms of some watts.
+    let (v, a, h) = (&row[4..7], list("qdd"), list("h"));
+    let m: Vec<Vec<f64>> = serde_json::from_value(results["states"][0]["M"].clone()).expect("a matrix");
+    let power: f64 = (0..3).map(|i| v[i] * (h[i] + (0..3).map(|k| m[i][k] * a[k]).sum::<f64>())).sum();
+    assert!(power.abs() < 1e-10, "{power}");
+    let messages = err(&output);
+    assert!(!messages.contains("states[0]"), "{messages}");
+    assert!(messages.contains("states[1]: warning: `q` leaves loop `closing_pin` open by "), "{messages}");
+    assert!(messages.contains("states[1]: warning: `v` breaks loop `closing_pin` by "), "{messages}");
+}

@@ -1,0 +1,7 @@
+//! The command `mbd`, run as a program.
+
+mod commands;
+mod documented;
+mod eval;
+mod loops;
+mod run;

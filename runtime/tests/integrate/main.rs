@@ -1,0 +1,8 @@
+//! Methods of integration on small systems that are written down by hand.
+
+mod constrained;
+mod events;
+mod multistep;
+mod schemes;
+mod solver;
+mod systems;

@@ -1,0 +1,232 @@
+//! Generated code of mechanisms with loops and couplings equals the interpreter bit for bit.
+//!
+//! As in `bitwise.rs` what is compared is the emitted text. Derivatives are compared with the interpreter run on numbers with
+//! derivatives.
+
+use std::collections::HashMap;
+
+use crate::emitted::Emitted;
+use mbd_codegen::generate::{generate, generate_from, Arithmetic, Options, Output};
+use mbd_codegen::model::{Gravity, Value};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
+use mbd_codegen::{GenerateError, RolledCode};
+use mbd_runtime::{Accelerated, Constrained, Dual, Interpreter, Scalar, System};
+use mbd_testing::closed::{random_loops, LoopKnobs};
+use mbd_testing::eliminations::random_plan;
+use mbd_testing::random::Rng;
+use mbd_testing::state::State;
+
+type Arrays = HashMap<String, Vec<f64>>;
+
+struct Case {
+    seed: u64,
+    plan: Plan,
+    state: State,
+    p: Vec<f64>,
+    emitted: Emitted,
+    derivatives: bool,
+}
+
+impl Case {
+    fn new(seed: u64) -> Option<Case> {
+        let system = random_loops(seed, &LoopKnobs::everything(seed, [3, 4, 6, 8][seed as usize % 4]));
+        let mut rng = Rng::new(seed, 8);
+        let derivatives = seed.is_multiple_of(4);
+        let mut outputs = vec![
+            Output::Rates,
+            Output::Momenta,
+            Output::Energy,
+            Output::Velocities,
+            Output::Accelerations,
+            Output::Reactions,
+        ];
+        outputs.extend(Output::available(true).filter(|output| !output.spec().available(false)));
+        if derivatives {
+            outputs.extend([Output::Derivatives, Output::ParameterDerivatives]);
+        }
+        let mut options =
+            Options { arithmetic: Arithmetic::Exact, outputs, efforts: rng.chance(0.7), ..Options::default() };
+        options.plan.rolled = RolledCode::Never;
+        // Every fifth is laid out by the search.
+        let plan = match seed % 5 {
+            0 => search::plan(&system.model, options.searches()),
+            _ => random_plan(&system.model, seed),
+        };
+        system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
+        let source = generate_from(&plan, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
+        let mut state = system.state;
+        if !options.efforts {
+            state.tau.fill(0.0);
+        }
+        let p = (0..plan.dims.nv).map(|_| rng.around(2.0)).collect();
+        Some(Case { seed, plan, state, p, emitted: Emitted::parse(&source), derivatives })
+    }
+
+    fn inputs(&self) -> Arrays {
+        let s = &self.state;
+        let fields = [
+            ("q", s.q.clone()),
+            ("p", self.p.clone()),
+            ("v", s.v.clone()),
+            ("tau", s.tau.clone()),
+            ("drive_q", s.drive[0].clone()),
+            ("drive_v", s.drive[1].clone()),
+            ("drive_a", s.drive[2].clone()),
+            ("wrenches", s.wrenches.concat()),
+            ("params", s.params.clone()),
+            ("gravity", s.gravity.to_vec()),
+        ];
+        fields.into_iter().map(|(name, a)| (name.to_string(), a)).collect()
+    }
+
+    fn compare(&self, what: &str, emitted: &[f64], interpreted: &[f64]) {
+        assert_eq!(emitted.len(), interpreted.len(), "seed {}: {what}", self.seed);
+        for (k, (a, b)) in emitted.iter().zip(interpreted).enumerate() {
+            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
+            assert!(a.is_finite() && b.is_finite(), "seed {}: {what}[{k}] is {a} and {b}", self.seed);
+            assert!(same, "seed {}: {what}[{k}]: emitted {a:e}, interpreted {b:e}", self.seed);
+        }
+    }
+
+    fn check(&self) {
+        let (s, inputs) = (&self.state, self.inputs());
+        let run = |group: Output| self.emitted.run(group.name(), &inputs);
+        let mut i = s.interpreter(&self.plan);
+        let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
+        let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        i.rates(&s.q, &self.p, &mut v, &mut qd, &mut pd);
+        let rates = run(Output::Rates);
+        self.compare("qd", &rates["qd"], &qd);
+        self.compare("pd", &rates["pd"], &pd);
+        self.compare("velocities", &run(Output::Velocities)["v"], &v);
+        i.momenta(&s.q, &s.v, &mut v);
+        self.compare("momenta", &run(Output::Momenta)["p"], &v);
+        let (kinetic, potential) = i.energy(&s.q, &self.p);
+        self.compare("energy", &run(Output::Energy)["energy"], &[kinetic, potential]);
+        i.generalized_accelerations(&s.q, &s.v, &mut v);
+        self.compare("accelerations", &run(Output::Accelerations)["a"], &v);
+        let mut wrenches = vec![[0.0; 6]; self.plan.joint_nodes.len()];
+        i.reactions(&s.q, &s.v, &mut v, &mut wrenches);
+        self.compare("reactions", &run(Output::Reactions)["reactions"], &wrenches.concat());
+        let (mut rows, mut entries) = (i.zero_rows(), i.zero_entries());
+        i.constraint_residuals(&s.q, &mut rows, &mut entries);
+        let closure = run(Output::ConstraintResiduals);
+        self.compare("residual", &closure["residual"], &rows);
+        self.compare("jacobian", &closure["jacobian"], &entries);
+        let mut freed = self.p.clone();
+        i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
+        let settle = run(Output::ProjectMomenta);
+        self.compare("settled v", &settle["v"], &v);
+        self.compare("freed", &settle["freed"], &freed);
+        self.compare("sigma", &settle["sigma"], &rows);
+        let mut pivots = i.zero_rows();
+        i.position_correction(&s.q, &mut rows, &mut v, &mut pivots);
+        let correction = run(Output::PositionCorrection);
+        self.compare("residual of the correction", &correction["residual"], &rows);
+        self.compare("dq", &correction["dq"], &v);
+        self.compare("pivots", &correction["pivots"], &pivots);
+        i.multipliers(0.0, &s.q, &s.v, &mut rows);
+        self.compare("lambda", &run(Output::Multipliers)["lambda"], &rows);
+        if self.derivatives {
+            self.compare_derivatives(&inputs, [&rates["qd"], &rates["pd"]]);
+        }
+    }
+
+    /// Rates on numbers with derivatives: velocities and momentum rates.
+    fn along(&self, q: &[Dual<f64>], p: &[Dual<f64>], params: &[Dual<f64>]) -> [Vec<Dual<f64>>; 2] {
+        let s = &self.state;
+        let gravity = match self.plan.model.gravity {
+            Gravity::Input => s.gravity.map(Dual::constant),
+            Gravity::Constant(g) => g.map(|v| match v {
+                Value::Const(x) => Dual::constant(x),
+                Value::Param(k) => params[k],
+            }),
+        };
+        let mut i = Interpreter::new(self.plan.tree(params), gravity);
+        let fixed = |x: &[f64]| x.iter().map(|x| Dual::constant(*x)).collect::<Vec<Dual<f64>>>();
+        i.tau = fixed(&s.tau);
+        [i.drive_q, i.drive_v, i.drive_a] = s.drive.each_ref().map(|x| fixed(x));
+        i.wrenches = s.wrenches.iter().map(|w| w.map(Dual::constant)).collect();
+        let zeros = |n| vec![Dual::zero(); n];
+        let (mut v, mut qd, mut pd) = (zeros(q.len()), zeros(q.len()), zeros(p.len()));
+        v.truncate(p.len());
+        i.rates(q, p, &mut v, &mut qd, &mut pd);
+        [v, pd]
+    }
+
+    fn compare_derivatives(&self, inputs: &Arrays, [_, pd]: [&Vec<f64>; 2]) {
+        let s = &self.state;
+        let fixed = |x: &[f64]| x.iter().map(|x| Dual::constant(*x)).collect::<Vec<Dual<f64>>>();
+        let moving = |x: &[f64], way: &[f64]| x.iter().zip(way).map(|(x, d)| Dual::new(*x, *d)).collect::<Vec<_>>();
+        let unit = |n: usize, k: usize| (0..n).map(|j| f64::from(u8::from(j == k))).collect::<Vec<f64>>();
+        let (q, p, params) = (fixed(&s.q), fixed(&self.p), fixed(&s.params));
+        let (nq, nv, np) = (s.q.len(), s.v.len(), s.params.len());
+        let given = self.emitted.run(Output::Derivatives.name(), inputs);
+        self.compare("pd beside derivatives", &given["pd"], pd);
+        let column =
+            |name: &str, k: usize, n: usize| given[name].iter().skip(k).step_by(n).copied().collect::<Vec<_>>();
+        let du = |x: &[Dual<f64>]| x.iter().map(|x| x.du).collect::<Vec<f64>>();
+        let i = s.interpreter(&self.plan);
+        for k in 0..nv {
+            let mut way = vec![0.0; nq];
+            i.coordinate_rates(&s.q, &unit(nv, k), &mut way);
+            let [v, pd] = self.along(&moving(&s.q, &way), &p, &params);
+            self.compare("dv_dq", &column("dv_dq", k, nv), &du(&v));
+            self.compare("dpd_dq", &column("dpd_dq", k, nv), &du(&pd));
+            let [v, pd] = self.along(&q, &moving(&self.p, &unit(nv, k)), &params);
+            self.compare("dv_dp", &column("dv_dp", k, nv), &du(&v));
+            self.compare("dpd_dp", &column("dpd_dp", k, nv), &du(&pd));
+        }
+        let given = self.emitted.run(Output::ParameterDerivatives.name(), inputs);
+        for k in 0..np {
+            let [v, pd] = self.along(&q, &p, &moving(&s.params, &unit(np, k)));
+            let column = |name: &str| given[name].iter().skip(k).step_by(np).copied().collect::<Vec<_>>();
+            self.compare("dv_dparams", &column("dv_dparams"), &du(&v));
+            self.compare("dpd_dparams", &column("dpd_dparams"), &du(&pd));
+        }
+    }
+}
+
+/// Mechanisms whose flattened trees have a freedom without inertia are left out: no code can be made for them.
+fn batch(seeds: std::ops::Range<u64>) {
+    let mut left_out = 0;
+    for seed in seeds.clone() {
+        match Case::new(seed) {
+            Some(case) => case.check(),
+            None => left_out += 1,
+        }
+    }
+    assert!(left_out <= seeds.count() / 10, "{left_out} left out");
+}
+
+// Two tests, so that cores have something to do.
+
+#[test]
+fn mechanisms_0_to_24() {
+    batch(0..25);
+}
+
+#[test]
+fn mechanisms_25_to_49() {
+    batch(25..50);
+}
+
+/// Constraints by default and with everything, and not for trees.
+#[test]
+fn outputs_follow_the_model() {
+    let closed = random_loops(1, &LoopKnobs::plain()).model;
+    let open = mbd_codegen::model::Model { constraints: Vec::new(), ..closed.clone() };
+    let traits = |model, outputs| {
+        let options = Options { outputs, ..Options::default() };
+        generate(model, &options).map(|g| g.source.contains("::Constrained for Model"))
+    };
+    assert_eq!(traits(&closed, Output::DEFAULT.to_vec()), Ok(true));
+    assert_eq!(traits(&closed, Output::available(false).collect()), Ok(true));
+    assert_eq!(traits(&closed, vec![Output::Rates]), Ok(false));
+    assert_eq!(traits(&open, Output::available(false).collect()), Ok(false));
+    let (output, model) = (Output::ProjectMomenta, open.name.clone());
+    assert_eq!(traits(&open, vec![output]), Err(GenerateError::OutputNeedsConstraints { output, model }));
+    let (output, model) = (Output::MomentumDerivatives, closed.name.clone());
+    assert_eq!(traits(&closed, vec![output]), Err(GenerateError::OutputLacksConstraints { output, model }));
+}

@@ -1,0 +1,12 @@
+//! Generated code: the bits of the interpreter, operation counts, rounding errors, vector instructions.
+
+mod assembly;
+mod bitwise;
+mod compiled;
+mod constrained;
+mod counts;
+mod eliminations;
+mod emitted;
+mod rewriting;
+mod rolled;
+mod wide;

@@ -1,0 +1,11 @@
+//! Methods of integration on interpreted mechanisms: orders, what they keep, constraints, allocations.
+
+mod allocations;
+mod constrained;
+mod free_motion;
+mod microcontroller;
+mod orders;
+mod precision;
+#[allow(dead_code)]
+#[path = "../code/wide.rs"]
+mod wide;

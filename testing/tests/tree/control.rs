@@ -1,0 +1,166 @@
+//! What controllers ask for, on random trees of everything: inverse dynamics, bias forces, Jacobians and drifts of frames.
+
+use mbd_codegen::model::JointKind;
+use mbd_runtime::sweep::FrameState;
+use mbd_testing::random::Rng;
+use mbd_testing::{newton, value};
+
+use crate::cases::*;
+
+/// Random accelerations, which no joint forces of the case belong to.
+fn any_accelerations(c: &Case) -> Vec<f64> {
+    let mut rng = Rng::new(c.seed, 9);
+    c.a.iter().map(|_| rng.around(4.0)).collect()
+}
+
+#[test]
+fn inverse_dynamics_undoes_accelerations() {
+    all("tau(a(tau)) = tau", |c| {
+        let (mut tau, mut h) = (c.a.clone(), c.a.clone());
+        c.i.inverse_dynamics(&c.s.q, &c.s.v, &c.a, &mut tau);
+        c.i.bias(&c.s.q, &c.s.v, &mut h);
+        c.near("tau", &tau, &c.s.tau, largest(&h).max(largest(&c.a)))
+    });
+}
+
+/// No solution of equations on either side: the tolerance is that of a few sweeps.
+#[test]
+fn inverse_dynamics_is_mass_and_bias() {
+    all("M a + h = tau(a)", |c| {
+        let nv = c.plan.dims.nv;
+        let a = any_accelerations(c);
+        let (mut m, mut h, mut tau) = (vec![0.0; nv * nv], vec![0.0; nv], vec![0.0; nv]);
+        c.i.mass_matrix(&c.s.q, &mut m);
+        c.i.bias(&c.s.q, &c.s.v, &mut h);
+        c.i.inverse_dynamics(&c.s.q, &c.s.v, &a, &mut tau);
+        let sum: Vec<f64> = (0..nv).map(|i| h[i] + (0..nv).map(|k| m[i * nv + k] * a[k]).sum::<f64>()).collect();
+        c.near_within("tau", &tau, &sum, largest(&h), 1e-12)
+    });
+}
+
+/// `τ = d/dt p(q, v) − ṗ(q, p, τ = 0)` for any `v̇`: other sweeps, another principle.
+#[test]
+fn inverse_dynamics_is_the_change_of_momentum() {
+    all("tau(a) = d/dt p - pd(0)", |c| {
+        c.a = any_accelerations(c);
+        let (nq, nv) = (c.plan.dims.nq, c.plan.dims.nv);
+        let mut tau = vec![0.0; nv];
+        c.i.inverse_dynamics(&c.s.q, &c.s.v, &c.a, &mut tau);
+        let (mut i, q) = c.dual();
+        let mut p = vec![D::default(); nv];
+        i.momenta(&q, &c.dual_v(), &mut p);
+        let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
+        c.i.tau.fill(0.0);
+        c.i.rates(&c.s.q, &c.p, &mut v, &mut qd, &mut pd);
+        let other: Vec<f64> = p.iter().zip(&pd).map(|(p, pd)| p.du - pd).collect();
+        c.near("tau", &tau, &other, largest(&pd))
+    });
+}
+
+/// Virtual power of what the bodies need, rotors, dampers and springs, body by body from the motion of frames.
+#[test]
+fn inverse_dynamics_is_what_newton_and_euler_ask_for() {
+    all("tau(a) against virtual power of the bodies", |c| {
+        c.a = any_accelerations(c);
+        let nv = c.plan.dims.nv;
+        let mut tau = vec![0.0; nv];
+        c.i.inverse_dynamics(&c.s.q, &c.s.v, &c.a, &mut tau);
+        let needed = needed(c, &c.bodies());
+        let none = vec![0.0; c.plan.dims.drive_v];
+        let mut size = 1.0_f64;
+        let mut other = vec![0.0; nv];
+        for (k, sum) in other.iter_mut().enumerate() {
+            let unit: Vec<f64> = (0..nv).map(|j| f64::from(u8::from(j == k))).collect();
+            for (at, [f, n]) in c.bodies_at(&unit, &none).iter().zip(&needed) {
+                let turn = |x: [f64; 3]| at.rotation.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2]);
+                let (v, w, r) = (turn(at.velocity.lin), turn(at.velocity.ang), at.position);
+                for i in 0..3 {
+                    let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+                    // The point of the body at the origin of the ground moves with v + r × w.
+                    let terms = [f[i] * v[i], f[i] * (r[a] * w[b] - r[b] * w[a]), n[i] * w[i]];
+                    size = terms.iter().fold(size, |m, x| m.max(x.abs()));
+                    *sum += terms.iter().sum::<f64>();
+                }
+            }
+            *sum += joints(c, &unit);
+        }
+        c.near("tau", &tau, &other, size)
+    });
+}
+
+/// Power of rotors, dampers and springs at the rates `unit` of the state alone.
+fn joints(c: &Case, unit: &[f64]) -> f64 {
+    let (model, params, s) = (&c.plan.model, &c.s.params, &c.s);
+    let none = vec![0.0; c.plan.dims.drive_v];
+    let virtual_rates = newton::joint_rates(&c.plan, params, unit, &none);
+    let rates = newton::joint_rates(&c.plan, params, &s.v, &s.drive[1]);
+    let accelerations = newton::joint_rates(&c.plan, params, &c.a, &s.drive[2]);
+    let positions = newton::joint_coordinates(&c.plan, params, &s.q, &s.drive[0]);
+    let mut power = 0.0;
+    for (j, joint) in model.joints.iter().enumerate() {
+        let mut along = virtual_rates[j].clone();
+        for k in 0..along.len() {
+            let rotor = value(joint.armature[k], params) * accelerations[j][k];
+            power += along[k] * (rotor + value(joint.damping[k], params) * rates[j][k]);
+        }
+        match joint.kind {
+            JointKind::Spherical | JointKind::Floating => continue,
+            JointKind::Planar { .. } => {
+                let (s, c) = positions[j][2].sin_cos();
+                (along[0], along[1]) = (c * along[0] - s * along[1], s * along[0] + c * along[1]);
+            }
+            _ => {}
+        }
+        for k in 0..along.len() {
+            let stretch = positions[j][k] - value(joint.rest[k], params);
+            power += along[k] * value(joint.stiffness[k], params) * stretch;
+        }
+    }
+    power
+}
+
+#[test]
+fn jacobians_take_velocities_to_those_of_frames() {
+    all("J v = velocity of the frame", |c| {
+        let (nv, n) = (c.plan.dims.nv, c.plan.frames.len());
+        let mut jacobians = vec![0.0; 6 * nv * n];
+        c.i.jacobians(&c.s.q, &mut jacobians);
+        c.i.drive_v.fill(0.0);
+        let mut frames = vec![FrameState::ground(); n];
+        c.i.frames(&c.s.q, &c.s.v, &mut frames);
+        let ours: Vec<f64> = match nv {
+            0 => vec![0.0; 6 * n],
+            nv => jacobians.chunks(nv).map(|row| row.iter().zip(&c.s.v).map(|(j, v)| j * v).sum()).collect(),
+        };
+        let theirs: Vec<f64> = frames.iter().flat_map(|f| [f.velocity.lin, f.velocity.ang].concat()).collect();
+        c.near_within("J v", &ours, &theirs, 1.0, 1e-13)
+    });
+}
+
+/// `R (J v̇ + drift)` is the derivative of the frame's velocity in ground axes, prescribed motions included.
+#[test]
+fn drifts_complete_the_accelerations_of_frames() {
+    all("R (J a + drift) = d/dt (R velocity)", |c| {
+        c.a = any_accelerations(c);
+        let (nv, n) = (c.plan.dims.nv, c.plan.frames.len());
+        let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
+        c.i.jacobians(&c.s.q, &mut jacobians);
+        c.i.bias_accelerations(&c.s.q, &c.s.v, &mut drifts);
+        let (mut i, q) = c.dual();
+        let mut frames = vec![FrameState::ground(); n];
+        i.frames(&q, &c.dual_v(), &mut frames);
+        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        for (k, frame) in frames.iter().enumerate() {
+            let row = |r: usize| &jacobians[(6 * k + r) * nv..(6 * k + r + 1) * nv];
+            let along = |r: usize| row(r).iter().zip(&c.a).map(|(j, a)| j * a).sum::<f64>() + drifts[k][r];
+            ours.extend(turn(frame, std::array::from_fn(along)));
+            ours.extend(turn(frame, std::array::from_fn(|r| along(r + 3))));
+            for part in [frame.velocity.lin, frame.velocity.ang] {
+                theirs.extend(
+                    frame.rotation.map(|row| (0..3).map(|k| row[k] * part[k]).fold(D::default(), |s, x| s + x).du),
+                );
+            }
+        }
+        c.near_within("acceleration", &ours, &theirs, 1.0, 1e-12)
+    });
+}

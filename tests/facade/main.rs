@@ -1,0 +1,10 @@
+//! The library as its users see it: generated types, committed code, shipped models, reference data.
+
+mod batch;
+mod committed;
+mod counts;
+mod derivatives;
+mod macro_errors;
+pub mod macro_model;
+mod mechanisms;
+mod reference;
