@@ -66,6 +66,7 @@ where
     B: PostStep<Y>,
 {
     /// Puts a post-step around a method.
+    #[inline(always)]
     pub fn new(system: &Y, method: M, post_step: B) -> Self {
         let state = || (system.neutral(), system.zero_momenta());
         WithPostStep {

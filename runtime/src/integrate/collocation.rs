@@ -88,7 +88,7 @@ where
     T: Formula<S>,
     I: Iteration<Y, S>,
 {
-    // A call writes it in place; inlined, it would be built beside and copied: twice the stack.
+    // Large: a call writes it in its place, where inlined code would copy it there.
     #[inline(never)]
     fn new(system: &Y) -> Self {
         let tableau = T::TABLEAU;

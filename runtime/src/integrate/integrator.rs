@@ -29,8 +29,9 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// Nothing is known yet. A call writes it in place; inlined, it would be built beside and copied: twice the stack.
-    #[inline(never)]
+    /// Nothing is known yet. Inlined, as are all constructors around it: otherwise the parts are built beside the whole and
+    /// copied, and take up twice the stack.
+    #[inline(always)]
     fn new(system: &Y, compensated: bool) -> Self {
         Attempt {
             field: Field::new(system, compensated),
@@ -192,6 +193,7 @@ where
 
     /// The method with compensated sums: the rounding error of a step is added to the next step, except for
     /// quaternions. This helps where steps are small relative to the precision, above all in `f32`.
+    #[inline(always)]
     pub fn compensated(system: &Y) -> Self
     where
         S: FromSystem<Y>,

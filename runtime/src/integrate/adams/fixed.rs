@@ -63,7 +63,7 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    // A call writes it in place; inlined, it would be built beside and copied: twice the stack.
+    // Large: a call writes it in its place, where inlined code would copy it there.
     #[inline(never)]
     fn new(system: &Y) -> Self {
         Adams {
