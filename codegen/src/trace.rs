@@ -251,6 +251,9 @@ impl<'g> Run<'_, 'g> {
                 [*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp] = directional.derivatives();
             }
             (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) => {
+            (Output::Centroidal, [center, matrix, bias]) => {
+                Sweeps { tree: self.physical, trace }.centroidal(q, second, u, w, center, matrix, bias);
+            }
                 let mut d = Derivatives::new(tree);
                 sweeps.derivatives(q, second, u, w, &mut d);
                 (*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp) = (d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);

@@ -212,6 +212,14 @@ impl<S: Scalar> Interpreter<S> {
     }
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
+    /// `(q, v) →` centre of mass in the ground (3 numbers, m), centroidal momentum matrix `A` (`6 × nv`, row by row) and bias
+    /// (6 numbers): the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, is `A v`, and
+    /// changes at the rate `A v̇ + bias`. Prescribed rates add to the momentum; prescribed accelerations are in the bias.
+    pub fn centroidal(&mut self, q: &[S], v: &[S], center: &mut [S], matrix: &mut [S], bias: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.physical, trace: &() };
+        sweeps.centroidal(q, v, &inputs!(self), &mut self.work, center, matrix, bias);
+    }
+
     pub fn momentum_derivatives(&mut self, q: &[S], v: &[S], d: &mut Derivatives<S>, out: &mut MomentumDerivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.momentum_derivatives(q, v, &inputs!(self), &mut self.work, d, out);

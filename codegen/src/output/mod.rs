@@ -109,6 +109,14 @@ outputs! {
     Derivatives = Spec::new("derivatives", &[Q, P], &[
         V, PD, square("dv_dq"), square("dv_dp"), square("dpd_dq"), square("dpd_dp"),
     ]);
+    /// Centre of mass in the ground, m, centroidal momentum matrix `A`, and its bias.
+    /// `A v` is the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, kg m/s and kg m²/s;
+    /// it changes at the rate `A v̇ + bias`. Bodies fixed to the ground and rotor inertias do not count.
+    Centroidal = Spec::new("centroidal", &[Q, V], &[
+        Array::new("center", &[Const(3)]),
+        Array::new("matrix", &[Const(6), Nv]),
+        Array::new("bias", &[Const(6)]),
+    ]);
     /// Momenta, their rates at `v̇ = 0`, and derivatives of both with respect to `q` and `v`, by rows.
     /// Columns with respect to `q` are as in `derivatives`. `∂p/∂v` is the mass matrix.
     MomentumDerivatives = Spec::new("momentum_derivatives", &[Q, V], &[

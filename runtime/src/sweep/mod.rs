@@ -12,6 +12,7 @@
 
 mod acceleration;
 mod articulate;
+mod centroidal;
 mod closure;
 mod constraint;
 mod constraint_acceleration;

@@ -153,6 +153,13 @@ impl Case {
         if self.derivatives {
             self.compare_derivatives(&s, &p, &mut i, &inputs);
         }
+        let (mut center, mut matrix, mut bias) = ([0.0; 3], vec![0.0; 6 * nv], [0.0; 6]);
+        i.centroidal(&s.q, &s.v, &mut center, &mut matrix, &mut bias);
+        let emitted = run(Output::Centroidal);
+        let ours: [(&str, &[f64]); 3] = [("center", &center), ("matrix", &matrix), ("bias", &bias)];
+        for (name, ours) in ours {
+            self.compare(&format!("centroidal {name}"), &emitted[name], ours);
+        }
         let mut frames = vec![FrameState::ground(); n];
         i.frames(&s.q, &s.v, &mut frames);
         let all = |f: &dyn Fn(&FrameState<f64>) -> Vec<f64>| frames.iter().flat_map(f).collect::<Vec<f64>>();

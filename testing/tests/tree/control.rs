@@ -1,6 +1,7 @@
 //! What controllers ask for, on random trees of everything: inverse dynamics, bias forces, Jacobians and drifts of frames.
 
 use mbd_codegen::model::JointKind;
+use mbd_runtime::spatial::{add3, cross};
 use mbd_runtime::sweep::FrameState;
 use mbd_testing::random::Rng;
 use mbd_testing::{newton, value};
@@ -162,5 +163,51 @@ fn drifts_complete_the_accelerations_of_frames() {
             }
         }
         c.near_within("acceleration", &ours, &theirs, 1.0, 1e-12)
+    });
+}
+
+/// Centre of mass, momentum of the state's velocities about it and rate of all momentum, body by body from the motion of frames.
+#[test]
+fn centroidal_momentum_is_that_of_the_bodies() {
+    all("A v and A a + bias against the bodies' momenta", |c| {
+        let nv = c.plan.dims.nv;
+        let (mut center, mut matrix, mut bias) = ([0.0; 3], vec![0.0; 6 * nv], [0.0; 6]);
+        c.i.centroidal(&c.s.q, &c.s.v, &mut center, &mut matrix, &mut bias);
+        let none = vec![0.0; c.plan.dims.drive_v];
+        let v = c.s.v.clone();
+        let (slow, moving) = (c.bodies_at(&v, &none), c.bodies());
+        let (model, params) = (&c.plan.model, &c.s.params);
+        let (mut mass, mut moment) = (0.0, [0.0; 3]);
+        let (mut momentum, mut rate) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
+        for (k, frame) in newton::body_frames(&c.plan).into_iter().enumerate() {
+            if c.plan.frames[frame].node.is_none() {
+                continue;
+            }
+            let (m, at) = newton::mass_centre(model, params, k, &slow[k]);
+            mass += m;
+            moment = add3(moment, at.map(|x| m * x));
+            let now = newton::momentum(model, params, k, &slow[k]);
+            let change = newton::momentum(model, params, k, &moving[k]).map(|x| x.map(|x| x.du));
+            momentum = [0, 1].map(|half| add3(momentum[half], now[half]));
+            rate = [0, 1].map(|half| add3(rate[half], change[half]));
+        }
+        // Rotors alone may resist: without mass the centre is put at the origin.
+        let other = moment.map(|x| if mass > 0.0 { x / mass } else { 0.0 });
+        let about = |[lin, ang]: [[f64; 3]; 2]| {
+            let arm = cross(other, lin);
+            [lin, std::array::from_fn(|k| ang[k] - arm[k])].concat()
+        };
+        let times = |x: &[f64]| {
+            let row = |k: usize| (0..nv).map(|j| matrix[k * nv + j] * x[j]).sum::<f64>();
+            (0..6).map(row).collect::<Vec<f64>>()
+        };
+        let ours: Vec<f64> = times(&c.a).iter().zip(bias).map(|(a, b)| a + b).collect();
+        let size = rate.concat().iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+        let errors = [
+            c.near("center", &center, &other, 1.0),
+            c.near("momentum", &times(&v), &about(momentum), largest(&momentum.concat())),
+            c.near("rate", &ours, &about(rate), size.max(largest(&bias))),
+        ];
+        largest(&errors)
     });
 }
