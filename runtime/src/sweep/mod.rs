@@ -30,6 +30,7 @@ mod newton;
 mod outputs;
 pub mod pass;
 mod rates;
+mod regressor;
 mod solve;
 
 pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
