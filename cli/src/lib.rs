@@ -9,6 +9,7 @@ mod count;
 mod eval;
 mod explain;
 mod generate;
+mod identifiable;
 mod loops;
 mod motion;
 mod output;
@@ -92,5 +93,6 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Eval(a)) => eval::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
+        Some(Command::Identifiable(a)) => identifiable::run(&a, out),
     }
 }

@@ -120,6 +120,7 @@ pub(crate) fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
         rows: dims.rows,
         entries: plan.entry_columns().len(),
         params: plan.model.params.len(),
+        parameters: plan.parameter_names().len(),
         efforts: if options.efforts { dims.nv } else { 0 },
         drive_q: dims.drive_q,
         drive_v: dims.drive_v,
@@ -241,11 +242,17 @@ impl<'g> Run<'_, 'g> {
             }
             (Output::InverseDynamics, [tau]) => sweeps.inverse_dynamics(q, second, third, u, w, tau),
             (Output::Bias, [h]) => sweeps.bias(q, second, u, w, h),
+            (Output::Regressor, [y]) => {
+                Sweeps { tree: self.physical, trace }.regressor(q, second, third, u, w, y);
+            }
             (Output::Jacobians, [jacobian]) => sweeps.jacobians(q, u, w, self.frames(), jacobian),
             (Output::BiasAccelerations, [bias]) => {
                 let mut out = vec![[Expr::zero(); 6]; self.frames.len()];
                 sweeps.bias_accelerations(q, second, u, w, self.frames().zip(&mut out));
                 *bias = out.concat();
+            }
+            (Output::Centroidal, [center, matrix, bias]) => {
+                Sweeps { tree: self.physical, trace }.centroidal(q, second, u, w, center, matrix, bias);
             }
             (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) if constrained => {
                 [*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp] = directional.derivatives();

@@ -24,20 +24,7 @@ pub fn source(options: &Options) -> String {
     let (name, rt) = (&options.type_name, &options.runtime);
     let t = options.precision.name();
     let array = format!("[{t}; {LENGTH}]");
-    let sizes = Sizes {
-        nq: LENGTH,
-        nv: LENGTH,
-        rows: LENGTH,
-        entries: LENGTH,
-        params: LENGTH,
-        efforts: LENGTH,
-        drive_q: LENGTH,
-        drive_v: LENGTH,
-        wrenches: LENGTH,
-        gravity: 3,
-        joints: LENGTH,
-        frames: LENGTH,
-    };
+    let sizes = Sizes { gravity: 3, ..Sizes::uniform(LENGTH) };
     let nested = |array: &Array, entry: &str| {
         array.lengths(&sizes).iter().rev().fold(entry.to_string(), |inner, n| format!("[{inner}; {n}]"))
     };

@@ -181,6 +181,13 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.inverse_dynamics(q, v, a, &inputs!(self), &mut self.work, tau);
     }
 
+    /// Regressor `Y` of the joint forces, `(q, v, v̇) → Y` with `τ = Y π`, row by row: one row for each velocity, one column for
+    /// each of [`Tree::dynamic_parameters`]. Springs, rotor inertias and external wrenches are not in it.
+    pub fn regressor(&mut self, q: &[S], v: &[S], a: &[S], out: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.physical, trace: &() };
+        sweeps.regressor(q, v, a, &inputs!(self), &mut self.work, out);
+    }
+
     /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`: products of velocities, prescribed accelerations and gravity, less
     /// springs, dampers and external wrenches.
     pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
@@ -203,6 +210,14 @@ impl<S: Scalar> Interpreter<S> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
         sweeps.bias_accelerations(q, v, &inputs!(self), &mut self.work, frames);
+    }
+
+    /// `(q, v) →` centre of mass in the ground (3 numbers, m), centroidal momentum matrix `A` (`6 × nv`, row by row) and bias
+    /// (6 numbers): the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, is `A v`, and
+    /// changes at the rate `A v̇ + bias`. Prescribed rates add to the momentum; prescribed accelerations are in the bias.
+    pub fn centroidal(&mut self, q: &[S], v: &[S], center: &mut [S], matrix: &mut [S], bias: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.physical, trace: &() };
+        sweeps.centroidal(q, v, &inputs!(self), &mut self.work, center, matrix, bias);
     }
 
     /// `q → M`, `nv × nv`, row by row.

@@ -359,6 +359,9 @@ pub struct Tree<S> {
     pub accelerations: Option<alloc::boxed::Box<Tree<S>>>,
 }
 
+/// Number of inertial parameters of a body.
+pub const INERTIAL_PARAMETERS: usize = 10;
+
 /// Dimensions of a mechanism.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Dims {
@@ -396,6 +399,32 @@ impl<S: Scalar> Tree<S> {
             (constraint.compliance, constraint.decay) = (Some(S::one() / weight), Some(rate));
         }
         tree
+    }
+
+    /// Number of columns of the regressor: ten inertial parameters of every moving joint's child body, with what is fixed to it,
+    /// a damping and a dry friction of every velocity.
+    pub fn regressor_columns(&self) -> usize {
+        self.joint_nodes.len() * INERTIAL_PARAMETERS + 2 * self.dims.nv
+    }
+
+    /// The dynamic parameters `π` of the [regressor](crate::sweep::Sweeps::regressor), of a tree that was not regrouped: for
+    /// every moving joint, in joint order, [`RigidInertia::parameters`] of its child body with what is fixed to it, at the
+    /// child's frame; the damping of every velocity, N m s or N s/m; the dry friction of every velocity, N m or N, which is
+    /// zero in a model.
+    pub fn dynamic_parameters(&self) -> Vec<S> {
+        let mut damping = alloc::vec![S::zero(); 2 * self.dims.nv];
+        for node in &self.nodes {
+            let Source::State { v, .. } = node.source else { continue };
+            for (entry, passive) in damping[v..].iter_mut().zip(&node.passive) {
+                *entry = *entry + node.ratio * node.ratio * passive.damping;
+            }
+        }
+        let inertial = self.frames.iter().take(self.joint_nodes.len()).flat_map(|frame| {
+            let at_node = frame.node.map_or(RigidInertia::zero(), |i| self.nodes[i].inertia).articulated();
+            let m = frame.place.iter().fold(at_node, |m, step| step.inverse().inertia(&m));
+            RigidInertia::from_articulated(&m).parameters()
+        });
+        inertial.chain(damping).collect()
     }
 
     /// Whether node `i` is less than [`Tree::matrix_depth`] nodes away from the ground.

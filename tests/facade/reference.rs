@@ -1,4 +1,5 @@
-//! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames and reactions of nineteen mechanisms (`tests/reference/README.md`).
+//! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames, reactions and centroidal quantities of nineteen mechanisms
+//! (`tests/reference/README.md`).
 
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::state_layout;
@@ -29,11 +30,17 @@ struct Case {
     interpreter: Interpreter<f64>,
 }
 
+/// A file of the reference data.
+fn data(name: &str) -> Value {
+    let path = format!("{}/tests/reference/{name}.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(path).expect("the reference data");
+    serde_json::from_str(&text).expect("JSON")
+}
+
 impl Case {
     fn read(name: &str) -> Case {
         let root = env!("CARGO_MANIFEST_DIR");
-        let text = std::fs::read_to_string(format!("{root}/tests/reference/{name}.json")).expect("the reference data");
-        let data: Value = serde_json::from_str(&text).expect("JSON");
+        let data = data(name);
         let file = data["file"].as_str().expect("a file");
         let base = match data["base"].as_str().expect("a base") {
             "floating" => Base::Floating,
@@ -102,7 +109,8 @@ fn check(name: &str) {
     let (nq, nv) = (plan.dims.nq, plan.dims.nv);
     let (their_nq, their_nv) = layout.sizes();
     let mut worst = Worst(Vec::new());
-    for state in data["states"].as_array().expect("states") {
+    let centroidal = &self::data("centroidal")["systems"][&name];
+    for (k, state) in data["states"].as_array().expect("states").iter().enumerate() {
         let (mut q, mut v, mut tau) = (vec![0.0; nq], vec![0.0; nv], vec![0.0; nv]);
         layout.q_from(&numbers(&state["q"]), &mut q);
         layout.v_from(&q, &numbers(&state["v"]), &mut v);
@@ -148,6 +156,14 @@ fn check(name: &str) {
         let columns: Vec<Vec<f64>> =
             (0..their_nv).map(|k| ours(&rows.iter().map(|r| r[k]).collect::<Vec<_>>())).collect();
         worst.compare("M", &columns.concat(), &numbers(&state["M"]));
+        if let Some(given) = centroidal.get(k) {
+            let (mut center, mut matrix, mut bias) = ([0.0; 3], vec![0.0; 6 * nv], [0.0; 6]);
+            interpreter.centroidal(&q, &v, &mut center, &mut matrix, &mut bias);
+            worst.compare("center of mass", &center, &numbers(&given["center"]));
+            let rows: Vec<Vec<f64>> = matrix.chunks(nv.max(1)).map(&ours).collect();
+            worst.compare("centroidal matrix", &rows.concat(), &numbers(&given["matrix"]));
+            worst.compare("centroidal bias", &bias, &numbers(&given["bias"]));
+        }
         compare_frames(&plan, &data, state, &mut interpreter, (&q, &v), &mut worst);
         compare_reactions(&plan, &data, state, &mut interpreter, (&q, &v), &mut worst);
     }
@@ -249,6 +265,18 @@ robots!(
     mixed_tree,
     driven_tree,
 );
+
+/// The names in the file of centroidal quantities are those of mechanisms above.
+#[test]
+fn centroidal_quantities_are_compared() {
+    let all = data("centroidal");
+    let systems = all["systems"].as_object().expect("systems");
+    let states: usize = systems.values().map(|states| states.as_array().expect("states").len()).sum();
+    assert_eq!((systems.len(), states), (11, 33));
+    for name in systems.keys() {
+        assert!(Case::read(name).data["states"].as_array().is_some_and(|states| states.len() >= 3), "{name}");
+    }
+}
 
 #[test]
 fn neutral_states_are_on_the_manifold() {

@@ -59,6 +59,10 @@ class Numbers:
         return pin.Inertia(mass, com, turn @ matrix @ turn.T)
 
 
+# Kinds of joints whose name in the data is not that of the format.
+KINDS = {"revolute": "pin", "prismatic": "slider"}
+
+
 def unit(x):
     return x / np.linalg.norm(x)
 
@@ -101,6 +105,8 @@ class Builder:
         self.params = self.table.get("params", {}) | params
         self.numbers = Numbers(self.params)
         self.model = pin.Model()
+        for joint in self.table["joint"]:
+            joint["type"] = KINDS.get(joint["type"], joint["type"])
         self.bodies = {body["name"]: body for body in self.table["body"]}
         self.at = {"ground": (0, pin.SE3.Identity())}
         self.joints, self.links = [], {}

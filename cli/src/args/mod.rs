@@ -64,6 +64,8 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Show intermediate results of the generator
     Explain(ExplainArgs),
+    /// Name the combinations of masses and inertias that a motion can identify
+    Identifiable(IdentifiableArgs),
 }
 
 /// Options of the readers.
@@ -406,6 +408,13 @@ pub struct ExplainArgs {
     pub after: Stage,
     #[command(flatten)]
     pub code: CodeArgs,
+}
+
+/// Arguments of `mbd identifiable`.
+#[derive(Args)]
+pub struct IdentifiableArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
 }
 
 /// Stage of the generator.

@@ -98,6 +98,15 @@ fn indices(constants: &mut Constants, plan: &Plan, options: &Options, frames: &[
             constants.index("FRAME", "frame", &plan.frames[frame].name, k);
         }
     }
+    if options.outputs.contains(&Output::Regressor) {
+        let names: Vec<String> = plan.parameter_names().iter().map(|n| format!("{n:?}")).collect();
+        constants.list(
+            "Names of the parameters, in the order of the columns of `y`.",
+            "REGRESSOR",
+            "&'static str",
+            &names,
+        );
+    }
     if options.outputs.contains(&Output::Reactions) {
         for (k, &node) in plan.joint_nodes.iter().enumerate() {
             let joint = plan.nodes[node].joint.0;

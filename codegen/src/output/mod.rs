@@ -9,7 +9,9 @@ pub use spec::{Array, Availability, Dim, Field, Search, Sizes, Spec};
 pub use text::{help, table};
 
 use Availability::{WithConstraints, WithoutConstraints};
-use Dim::{Const, DriveQ, DriveV, Efforts, Entries, Frames, Gravity, Joints, Nq, Nv, Params, Rows, Wrenches};
+use Dim::{
+    Const, DriveQ, DriveV, Efforts, Entries, Frames, Gravity, Joints, Nq, Nv, Parameters, Params, Rows, Wrenches,
+};
 
 const Q: Array = Array::new("q", &[Nq]);
 const V: Array = Array::new("v", &[Nv]);
@@ -96,6 +98,10 @@ outputs! {
     /// Bias forces `h`, with `M v̇ + h = τ`.
     /// They are velocity products and gravity, less springs, dampers and external wrenches.
     Bias = Spec::new("bias", &[Q, V], &[Array::new("h", &[Nv])]);
+    /// Regressor `Y` of the joint forces: `τ = Y π`, by rows.
+    /// The columns are ten inertial parameters of every moving body, then a damping and a dry friction for every velocity
+    /// (`REGRESSOR`). Springs, rotor inertias and external wrenches are not in it.
+    Regressor = Spec::new("regressor", &[Q, V, A], &[Array::new("y", &[Nv, Parameters])]);
     /// Jacobians `J` of frames.
     /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     Jacobians = Spec::new("jacobians", &[Q], &[Array::new("jacobian", &[Frames, Const(6), Nv])]);
@@ -103,6 +109,14 @@ outputs! {
     /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
     /// frame.
     BiasAccelerations = Spec::new("bias_accelerations", &[Q, V], &[Array::new("bias", &[Frames, Const(6)])]);
+    /// Centre of mass in the ground, m, centroidal momentum matrix `A`, and its bias.
+    /// `A v` is the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, kg m/s and kg m²/s;
+    /// it changes at the rate `A v̇ + bias`. Bodies fixed to the ground and rotor inertias do not count.
+    Centroidal = Spec::new("centroidal", &[Q, V], &[
+        Array::new("center", &[Const(3)]),
+        Array::new("matrix", &[Const(6), Nv]),
+        Array::new("bias", &[Const(6)]),
+    ]);
     /// Velocities, momentum rates, and their derivatives with respect to `q` and `p`, by rows.
     /// Column `k` with respect to `q` is the derivative along `q̇ = N(q) e_k`: for angles and displacements the partial
     /// derivative. Joint forces add to `ṗ`: `∂ṗ/∂tau = 1`.

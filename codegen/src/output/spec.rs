@@ -1,107 +1,77 @@
 //! The specification of an output: arguments and results of its function, the models that have it, the search that it uses.
 
-/// A dimension of an array. A model gives it a number: [`Sizes`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Dim {
-    /// Number of coordinates.
-    Nq,
-    /// Number of velocities, momenta, joint forces.
-    Nv,
-    /// Number of joints with reactions.
-    Joints,
-    /// Number of chosen frames.
-    Frames,
-    /// Number of rows of the constraints.
-    Rows,
-    /// Number of entries of the constraints' Jacobian that can be other than zero.
-    Entries,
-    /// Number of run-time parameters.
-    Params,
-    /// Number of joint forces that are inputs.
-    Efforts,
-    /// Number of prescribed positions.
-    DriveQ,
-    /// Number of prescribed rates.
-    DriveV,
-    /// Number of external wrenches.
-    Wrenches,
-    /// Three where gravity is an input.
-    Gravity,
-    /// The same for every model.
-    Const(usize),
-}
-
-impl Dim {
-    /// As documentation writes it: `NV`, `6`.
-    pub fn text(self) -> String {
-        let word = match self {
-            Dim::Nq => "NQ",
-            Dim::Nv => "NV",
-            Dim::Joints => "JOINTS",
-            Dim::Frames => "FRAMES",
-            Dim::Rows => "ROWS",
-            Dim::Entries => "ENTRIES",
-            Dim::Params => "PARAMS",
-            Dim::Efforts => "EFFORTS",
-            Dim::DriveQ => "DRIVE_Q",
-            Dim::DriveV => "DRIVE_V",
-            Dim::Wrenches => "WRENCHES",
-            Dim::Gravity => "GRAVITY",
-            Dim::Const(n) => return n.to_string(),
-        };
-        word.to_string()
-    }
-}
-
-/// The numbers behind [`Dim`] for one model and the frames that were chosen.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sizes {
-    /// [`Dim::Nq`].
-    pub nq: usize,
-    /// [`Dim::Nv`].
-    pub nv: usize,
-    /// [`Dim::Joints`].
-    pub joints: usize,
-    /// [`Dim::Frames`].
-    pub frames: usize,
-    /// [`Dim::Rows`].
-    pub rows: usize,
-    /// [`Dim::Entries`].
-    pub entries: usize,
-    /// [`Dim::Params`].
-    pub params: usize,
-    /// [`Dim::Efforts`].
-    pub efforts: usize,
-    /// [`Dim::DriveQ`].
-    pub drive_q: usize,
-    /// [`Dim::DriveV`].
-    pub drive_v: usize,
-    /// [`Dim::Wrenches`].
-    pub wrenches: usize,
-    /// [`Dim::Gravity`].
-    pub gravity: usize,
-}
-
-impl Sizes {
-    /// The number of a dimension.
-    pub fn of(&self, dim: Dim) -> usize {
-        match dim {
-            Dim::Nq => self.nq,
-            Dim::Nv => self.nv,
-            Dim::Joints => self.joints,
-            Dim::Frames => self.frames,
-            Dim::Rows => self.rows,
-            Dim::Entries => self.entries,
-            Dim::Params => self.params,
-            Dim::Efforts => self.efforts,
-            Dim::DriveQ => self.drive_q,
-            Dim::DriveV => self.drive_v,
-            Dim::Wrenches => self.wrenches,
-            Dim::Gravity => self.gravity,
-            Dim::Const(n) => n,
+/// The dimensions and the numbers behind them, from one list.
+macro_rules! dimensions {
+    ($(#[doc = $doc:literal] $dim:ident, $size:ident, $text:literal;)+) => {
+        /// A dimension of an array. A model gives it a number: [`Sizes`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum Dim {
+            $(#[doc = $doc] $dim,)+
+            /// The same for every model.
+            Const(usize),
         }
-    }
+
+        impl Dim {
+            /// As documentation writes it: `NV`, `6`.
+            pub fn text(self) -> String {
+                match self {
+                    $(Dim::$dim => $text.to_string(),)+
+                    Dim::Const(n) => n.to_string(),
+                }
+            }
+        }
+
+        /// The numbers behind [`Dim`] for one model and the frames that were chosen.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub struct Sizes {
+            $(#[doc = $doc] pub $size: usize,)+
+        }
+
+        impl Sizes {
+            /// The same number everywhere.
+            pub fn uniform(n: usize) -> Sizes {
+                Sizes { $($size: n,)+ }
+            }
+
+            /// The number of a dimension.
+            pub fn of(&self, dim: Dim) -> usize {
+                match dim {
+                    $(Dim::$dim => self.$size,)+
+                    Dim::Const(n) => n,
+                }
+            }
+        }
+    };
+}
+
+dimensions! {
+    /// Number of coordinates.
+    Nq, nq, "NQ";
+    /// Number of velocities, momenta, joint forces.
+    Nv, nv, "NV";
+    /// Number of joints with reactions.
+    Joints, joints, "JOINTS";
+    /// Number of chosen frames.
+    Frames, frames, "FRAMES";
+    /// Number of rows of the constraints.
+    Rows, rows, "ROWS";
+    /// Number of entries of the constraints' Jacobian that can be other than zero.
+    Entries, entries, "ENTRIES";
+    /// Number of run-time parameters.
+    Params, params, "PARAMS";
+    /// Number of dynamic parameters, the columns of the regressor.
+    Parameters, parameters, "PARAMETERS";
+    /// Number of joint forces that are inputs.
+    Efforts, efforts, "EFFORTS";
+    /// Number of prescribed positions.
+    DriveQ, drive_q, "DRIVE_Q";
+    /// Number of prescribed rates.
+    DriveV, drive_v, "DRIVE_V";
+    /// Number of external wrenches.
+    Wrenches, wrenches, "WRENCHES";
+    /// Three where gravity is an input.
+    Gravity, gravity, "GRAVITY";
 }
 
 /// An argument of a generated function, an array: its name and its lengths, the outermost first.

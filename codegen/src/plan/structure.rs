@@ -1,7 +1,7 @@
 //! The structure of a mechanism: nodes, frames, wrenches, constraints. Numbers stay [`Value`]s.
 
 use mbd_runtime::spatial::{Axis, Mat3};
-use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes};
+use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes, INERTIAL_PARAMETERS};
 
 use crate::model::{JointSpec, LoopKind, Model, Param, Value};
 
@@ -183,6 +183,17 @@ impl Plan {
     /// Names of the velocities (momenta, joint forces), in state order.
     pub fn velocity_names(&self) -> Vec<String> {
         self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
+    }
+
+    /// Names of the dynamic parameters, the columns of the regressor: `forearm.m`, `forearm.mx` (first moment), `forearm.ixx`
+    /// (inertia at the frame of the body) and so on, `elbow.damping`, `elbow.friction`.
+    pub fn parameter_names(&self) -> Vec<String> {
+        const INERTIAL: [&str; INERTIAL_PARAMETERS] = ["m", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz"];
+        let bodies = self.frames.iter().take(self.joint_nodes.len());
+        let inertial = bodies.flat_map(|body| INERTIAL.map(|part| format!("{}.{part}", body.name)));
+        let velocities = self.velocity_names();
+        let friction = ["damping", "friction"];
+        inertial.chain(friction.iter().flat_map(|part| velocities.iter().map(move |v| format!("{v}.{part}")))).collect()
     }
 
     fn state_names(&self, parts: fn(&JointSpec) -> Vec<&'static str>) -> Vec<String> {

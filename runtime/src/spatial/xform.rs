@@ -190,6 +190,17 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
+    /// The transform from the child to the parent.
+    pub fn inverse(&self) -> Self {
+        match self {
+            ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis: *axis, c: *c, s: -*s },
+            ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis: *axis, r: -*r },
+            ElementaryTransform::Rotate(r) => {
+                ElementaryTransform::Rotate(core::array::from_fn(|i| core::array::from_fn(|k| r[k][i])))
+            }
+        }
+    }
+
     /// Inertia `Xᵀ M X` at the parent frame, of `M` given at the child frame.
     pub fn inertia(&self, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
         match self {

@@ -8,10 +8,21 @@ use crate::workspace::Workspace;
 use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
-    /// One of [`Sweeps::jacobians`], after the articulation. The frame's pose is carried inward from node to node: only
-    /// its ancestors are met, and each turns three axes and one arm.
+    /// One of [`Sweeps::jacobians`], after the articulation.
     pub(super) fn jacobian(&self, frame: &TreeFrame<S>, w: &Workspace<S>, out: &mut [S]) {
         out.fill(S::zero());
+        self.jacobian_columns(frame, w, |v, column| {
+            for (c, x) in column.into_iter().enumerate() {
+                let entry = &mut out[c * self.tree.dims.nv + v];
+                *entry = *entry + x;
+            }
+        });
+    }
+
+    /// Calls `add` with the number of a velocity and what it adds to its column of the Jacobian, for every freedom inboard of
+    /// a frame. The frame's pose is carried inward from node to node: only its ancestors are met, and each turns three axes
+    /// and one arm.
+    pub(super) fn jacobian_columns(&self, frame: &TreeFrame<S>, w: &Workspace<S>, mut add: impl FnMut(usize, [S; 6])) {
         let (o, one) = (S::zero(), S::one());
         self.trace.at(frame.node, Quantity::Jacobian);
         let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
@@ -22,11 +33,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let node = &self.tree.nodes[i];
             if let Source::State { v, .. } = node.source {
                 for k in 0..node.kind.nv() {
-                    let column = column(&node.kind.axis(k), &rot, pos);
-                    for (c, x) in column.into_iter().enumerate() {
-                        let entry = &mut out[c * self.tree.dims.nv + v + k];
-                        *entry = *entry + node.ratio * x;
-                    }
+                    add(v + k, column(&node.kind.axis(k), &rot, pos).map(|x| node.ratio * x));
                 }
             }
             self.steps(&w.poses, i).rev().for_each(|step| before(step, &mut rot, &mut pos));
@@ -34,12 +41,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Acceleration `[linear; angular]` of a frame in its own axes, after [`Sweep::NEWTON`](super::pass::Sweep::NEWTON).
-    pub(super) fn frame_acceleration(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> [S; 6] {
-        let Some(i) = frame.node else { return [S::zero(); 6] };
+    /// Motion of a frame in its own axes, after [`Sweep::NEWTON`](super::pass::Sweep::NEWTON); `None` on the ground.
+    pub(super) fn classic_frame_motion(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> Option<ClassicMotion<S>> {
+        let i = frame.node?;
         self.trace.at(Some(i), Quantity::Acceleration);
         let mut m = ClassicMotion { spin: w.newton.spin[i], alpha: w.newton.alpha[i], accel: w.newton.accel[i] };
         self.on_body(&w.poses, frame).for_each(|step| m.carry(&step));
+        Some(m)
+    }
+
+    /// Acceleration `[linear; angular]` of a frame in its own axes, after [`Sweep::NEWTON`](super::pass::Sweep::NEWTON).
+    pub(super) fn frame_acceleration(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> [S; 6] {
+        let Some(m) = self.classic_frame_motion(frame, w) else { return [S::zero(); 6] };
         let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);
         [ax, ay, az, bx, by, bz]
     }

@@ -28,17 +28,21 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                     self.matrix_column(i, k, v + k, w, out);
                 }
             }
-            if let Some(p) = node.parent {
-                let composite = w.factor.m[i];
-                let carried = self.steps(&w.poses, i).rev().fold(composite, |m, step| step.inertia(&m));
-                w.factor.m[p] = w.factor.m[p].plus(&carried);
-            }
+            self.add_composite(i, w);
         }
         for a in 0..nv {
             for b in 0..a {
                 out[a * nv + b] = out[b * nv + a];
             }
         }
+    }
+
+    /// Adds the composite inertia of node `i` to that of its parent, after its children.
+    pub(super) fn add_composite(&self, i: usize, w: &mut Workspace<S>) {
+        let Some(p) = self.tree.nodes[i].parent else { return };
+        let composite = w.factor.m[i];
+        let carried = self.steps(&w.poses, i).rev().fold(composite, |m, step| step.inertia(&m));
+        w.factor.m[p] = w.factor.m[p].plus(&carried);
     }
 
     /// Screws of the inner nodes' freedoms at node `i`, if its parent is an inner node.

@@ -12,6 +12,7 @@
 
 mod acceleration;
 mod articulate;
+mod centroidal;
 mod closure;
 mod constraint;
 mod constraint_acceleration;
@@ -29,6 +30,7 @@ mod newton;
 mod outputs;
 pub mod pass;
 mod rates;
+mod regressor;
 mod solve;
 
 pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};

@@ -185,7 +185,7 @@ impl<S: Scalar> ClassicMotion<S> {
     }
 
     /// `[m a + B s; s × a + J α + ω × J ω]`, the products of the spin formed once and grouped by the entries of `J`.
-    fn wrench(&self, body: &RigidInertia<S>) -> Force<S> {
+    pub(super) fn wrench(&self, body: &RigidInertia<S>) -> Force<S> {
         let ([x, y, z], [ax, ay, az], a) = (self.spin, self.alpha, self.accel);
         let (m, s, [jxx, jxy, jxz, jyy, jyz, jzz]) = (body.mass, body.moment, body.inertia);
         let (xx, yy, zz, xy, xz, yz) = (x * x, y * y, z * z, x * y, x * z, y * z);

@@ -151,7 +151,7 @@ impl<S: Scalar, T: Trace> SweepList<S, T, 5> {
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// The data on which sweeps over this tree work.
-    fn context<'b>(
+    pub(super) fn context<'b>(
         &'b self,
         given: &'b Arguments<'b, S>,
         w: &'b mut Workspace<S>,

@@ -143,6 +143,9 @@ impl Case {
         given.insert("a".to_string(), a.clone());
         let emitted = self.emitted.run(Output::InverseDynamics.name(), &given);
         self.compare("inverse dynamics", &emitted["tau"], &tau);
+        let mut y = vec![0.0; nv * i.tree().regressor_columns()];
+        i.regressor(&s.q, &s.v, &a, &mut y);
+        self.compare("regressor", &self.emitted.run(Output::Regressor.name(), &given)["y"], &y);
         i.bias(&s.q, &s.v, &mut h);
         self.compare("bias", &run(Output::Bias)["h"], &h);
         let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
@@ -150,6 +153,13 @@ impl Case {
         self.compare("jacobians", &run(Output::Jacobians)["jacobian"], &jacobians);
         i.bias_accelerations(&s.q, &s.v, &mut drifts);
         self.compare("bias_accelerations", &run(Output::BiasAccelerations)["bias"], &drifts.concat());
+        let (mut center, mut matrix, mut bias) = ([0.0; 3], vec![0.0; 6 * nv], [0.0; 6]);
+        i.centroidal(&s.q, &s.v, &mut center, &mut matrix, &mut bias);
+        let emitted = run(Output::Centroidal);
+        let ours: [(&str, &[f64]); 3] = [("center", &center), ("matrix", &matrix), ("bias", &bias)];
+        for (name, ours) in ours {
+            self.compare(&format!("centroidal {name}"), &emitted[name], ours);
+        }
         if self.derivatives {
             self.compare_derivatives(&s, &p, &mut i, &inputs);
         }

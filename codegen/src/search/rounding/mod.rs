@@ -8,18 +8,17 @@
 //! rewriting changes the error little with every elimination, and it would take longer than everything else.
 
 mod lanes;
-mod state;
 
 use std::ops::{Range, RangeInclusive};
 
 use mbd_runtime::{Interpreter, Scalar};
 
 use self::lanes::{run, LANES};
-use self::state::State;
 use super::evaluation::options;
 use super::wide::Wide;
 use crate::output::{InputArray, Output};
 use crate::plan::Plan;
+use crate::sample::State;
 use crate::symbolic::Program;
 use crate::trace::trace;
 
@@ -99,7 +98,7 @@ impl ErrorEstimator {
             for (lane, state) in states.iter_mut().enumerate() {
                 state.p = p.iter().map(|p| p[lane]).collect();
             }
-            let exact = states.each_ref().map(|state| state.exact(plan, output, &mut interpreter));
+            let exact = states.each_ref().map(|state| exact(plan, output, state, &mut interpreter));
             estimator.samples.push(Sample { inputs: inputs(&states, &single.inputs), exact });
         }
         estimator.articulated = estimator.errors(&single.program);
@@ -144,6 +143,21 @@ fn error(results: &[[f64; LANES]], lane: usize, exact: &[Wide]) -> Option<f64> {
     }
     // Exact results, whose error has no logarithm, count as a quarter of a rounding.
     exact.iter().all(|x| x.0.hi().is_finite()).then(|| (off / size).max(FLOOR / 8.0))
+}
+
+/// The results that programs should give, in double-double numbers.
+fn exact(plan: &Plan, output: Output, state: &State, interpreter: &mut Interpreter<Wide>) -> Vec<Wide> {
+    let d = plan.dims;
+    state.set_inputs(plan, interpreter, options(output).efforts);
+    let wide = |x: &[f64]| x.iter().map(|x| Wide::constant(*x)).collect::<Vec<Wide>>();
+    let zeros = |n: usize| vec![Wide::zero(); n];
+    let (mut v, mut qd, mut pd) = (zeros(d.nv), zeros(d.nq), zeros(d.nv));
+    if output == Output::Accelerations {
+        interpreter.accelerations(&wide(&state.q), &wide(&state.v), &mut v);
+        return v;
+    }
+    interpreter.rates(&wide(&state.q), &wide(&state.p), &mut v, &mut qd, &mut pd);
+    [qd, pd].concat()
 }
 
 /// Inputs of a program in their order, in some states.

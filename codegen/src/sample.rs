@@ -1,18 +1,17 @@
-//! States in which rounding errors are measured.
+//! Random states in which plans are tried out. They are the same on every machine.
 
 use mbd_runtime::tree::Source;
 use mbd_runtime::{Interpreter, Scalar};
 
-use super::super::evaluation::options;
-use super::super::wide::Wide;
 use crate::model::{Coordinate, Gravity, Unit};
-use crate::output::Output;
 use crate::plan::Plan;
 
 /// A random state. Momenta belong to the velocities once they are set.
 pub struct State {
-    q: Vec<f64>,
-    v: Vec<f64>,
+    /// Coordinates; quaternions are of unit length.
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub v: Vec<f64>,
     /// Momenta.
     pub p: Vec<f64>,
     drive_q: Vec<f64>,
@@ -52,37 +51,28 @@ impl State {
             "params" => self.params.clone(),
             "drive_v" => random(self.seed, 3, len, 1.5),
             "gravity" => random(self.seed, 4, len, 9.0),
+            "a" => random(self.seed, 6, len, 3.0),
             _ => random(self.seed, 5, len, 3.0),
         }
     }
 
-    /// The results that programs should give, in double-double numbers.
-    pub fn exact(&self, plan: &Plan, output: Output, interpreter: &mut Interpreter<Wide>) -> Vec<Wide> {
+    /// Sets everything that is given to an interpreter beside the state, with joint forces or without.
+    pub fn set_inputs<S: Scalar>(&self, plan: &Plan, interpreter: &mut Interpreter<S>, efforts: bool) {
         let d = plan.dims;
-        let wide = |x: Vec<f64>| x.into_iter().map(Wide::constant).collect::<Vec<Wide>>();
-        let input = |name: &str, len: usize| wide(self.input(name, len));
-        let inputs = &mut *interpreter;
-        if options(output).efforts {
-            inputs.tau = input("tau", d.nv);
+        let input = |name: &str, len: usize| self.input(name, len).into_iter().map(S::constant).collect::<Vec<S>>();
+        if efforts {
+            interpreter.tau = input("tau", d.nv);
         }
-        inputs.drive_q = input("drive_q", d.drive_q);
-        inputs.drive_v = input("drive_v", d.drive_v);
-        inputs.drive_a = input("drive_a", d.drive_v);
+        interpreter.drive_q = input("drive_q", d.drive_q);
+        interpreter.drive_v = input("drive_v", d.drive_v);
+        interpreter.drive_a = input("drive_a", d.drive_v);
         let wrenches = input("wrenches", 6 * d.wrenches);
-        inputs.wrenches = wrenches.chunks_exact(6).map(|w| std::array::from_fn(|k| w[k])).collect();
+        interpreter.wrenches = wrenches.chunks_exact(6).map(|w| std::array::from_fn(|k| w[k])).collect();
         let gravity = match plan.model.gravity {
             Gravity::Input => self.input("gravity", 3),
             Gravity::Constant(_) => plan.gravity(&self.params).to_vec(),
         };
-        inputs.gravity = std::array::from_fn(|k| Wide::constant(gravity[k]));
-        let zeros = |n: usize| vec![Wide::zero(); n];
-        let (mut v, mut qd, mut pd) = (zeros(d.nv), zeros(d.nq), zeros(d.nv));
-        if output == Output::Accelerations {
-            interpreter.accelerations(&wide(self.q.clone()), &wide(self.v.clone()), &mut v);
-            return v;
-        }
-        interpreter.rates(&wide(self.q.clone()), &wide(self.p.clone()), &mut v, &mut qd, &mut pd);
-        [qd, pd].concat()
+        interpreter.gravity = std::array::from_fn(|k| S::constant(gravity[k]));
     }
 }
 
