@@ -215,7 +215,7 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
     let rates = counts.iter().find(|c| c.group == Output::Rates);
     let (Some(n), Some(rates)) = (chain_of_pins(plan), rates) else { return Ok(()) };
     let ours = rates.counts.total();
-    writeln!(out, "\nForward dynamics of {n} pins in a row, beside published formulas (upper bounds for any such chain, whereas the")?;
+    writeln!(out, "\nForward dynamics of {n} revolute joints in a row, beside published formulas (upper bounds for any such chain, whereas the")?;
     writeln!(out, "structure of this one is used; models/chain6.toml is a chain without any):")?;
     writeln!(out, "  {:<36}{:>12}{:>8}", "this model, rates", "", ours)?;
     for rival in &RIVALS {

@@ -38,9 +38,9 @@ impl Rival {
 /// Number of bodies if the formulas apply: a serial chain of at least three free revolute joints on the ground.
 pub fn chain_of_pins(plan: &Plan) -> Option<usize> {
     let serial = plan.nodes.iter().enumerate().all(|(k, node)| node.parent == k.checked_sub(1));
-    let pins = plan.model.joints.iter().all(|j| {
+    let revolute = plan.model.joints.iter().all(|j| {
         let pin = matches!(j.kind, JointKind::Revolute { .. }) && j.motion == JointMotion::Free;
         pin || j.kind == JointKind::Fixed
     });
-    (serial && pins && plan.nodes.len() >= 3).then_some(plan.nodes.len())
+    (serial && revolute && plan.nodes.len() >= 3).then_some(plan.nodes.len())
 }

@@ -22,7 +22,8 @@ pub struct BaseParameter {
     pub others: Vec<(usize, f64)>,
 }
 
-/// The parameters of a mechanism, sorted by what a motion tells about them. With its `Display` it names them.
+/// The parameters of a mechanism, sorted by what a motion tells about them. Its `Display` names the base parameters, one to a
+/// line, with factors of six decimals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identifiable {
     /// Names of all dynamic parameters, [`Plan::parameter_names`].
@@ -146,7 +147,7 @@ impl fmt::Display for Identifiable {
             write!(f, "{}", self.names[*parameter])?;
             for (other, factor) in others {
                 let sign = if *factor < 0.0 { '-' } else { '+' };
-                match factor.abs() {
+                match (factor.abs() * 1e6).round() / 1e6 {
                     1.0 => write!(f, " {sign} {}", self.names[*other])?,
                     size => write!(f, " {sign} {size} {}", self.names[*other])?,
                 }

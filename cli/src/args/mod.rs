@@ -202,7 +202,7 @@ pub struct CheckArgs {
 #[command(
     after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine are
 counted separately. The sweeps of each output are listed below it; operations that a sweep shares with an earlier one are counted there.
-For serial chains of three or more pins on a fixed base, published formulas stand beside."
+For serial chains of three or more revolute joints on a fixed base, published formulas stand beside."
 )]
 pub struct CountArgs {
     #[command(flatten)]

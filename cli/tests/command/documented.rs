@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use crate::run::{err, folder, out, run_in, IS_LAB, ROOT};
+use crate::run::{err, folder, out, run_in, HAS_SCENES, IS_LAB, ROOT};
 
 /// Commands that take longer than a test may, by a part of them.
 const LONG: [&str; 1] = ["models/chain100.toml"];
@@ -41,7 +41,7 @@ impl Shown {
         let is_lab = cargo.contains(&"mbd-lab");
         let other_package = cargo.contains(&"-p") && !is_lab;
         let generated = cargo.contains(&"generated");
-        let built = !generated || cfg!(feature = "generated");
+        let built = !generated || HAS_SCENES;
         (is_lab == IS_LAB && !other_package && built).then(|| arguments.to_vec())
     }
 

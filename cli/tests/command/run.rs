@@ -15,6 +15,10 @@ const PROGRAM: &str = match (option_env!("CARGO_BIN_EXE_mbd"), option_env!("CARG
     (None, None) => panic!("the tests of a command stand in its crate"),
 };
 
+/// Whether the program has the generated scenes; only that of the experiments can.
+#[allow(unexpected_cfgs)]
+pub const HAS_SCENES: bool = cfg!(feature = "generated");
+
 /// Whether the program is that of the experiments.
 pub const IS_LAB: bool = option_env!("CARGO_BIN_EXE_mbd-lab").is_some();
 

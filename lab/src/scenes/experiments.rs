@@ -34,7 +34,7 @@ pub fn closed(n: usize, kind: &str, crosswise: bool) -> String {
 
 /// Open chain of `n` links with revolute joints about z and y in turn.
 pub fn crosswise(n: usize) -> String {
-    let comment = format!("Open chain of {n} equal links, pins about z and y in turn (thesis 7.2).");
+    let comment = format!("Open chain of {n} equal links, revolute joints about z and y in turn (thesis 7.2).");
     chain(&format!("crosswise{n}"), &comment, n, |i| if i % 2 == 1 { Z } else { Y }, None)
 }
 
@@ -77,7 +77,7 @@ fn turn(axes: &mut [[f64; 3]; 3], about_z: bool, angle: f64) {
 
 /// Lengths of a four-bar, m: crank, coupler, rocker, and the distance of its two joints on the ground or on the bar that carries it.
 const FOUR_BAR: [f64; 4] = [0.1, 0.2, 0.2, 0.2];
-/// Angles of the three bars from the line of the pins at the start; solved for the crank's, rad.
+/// Angles of the three bars from the line of the joints on the ground at the start; solved for the crank's, rad.
 const CRANK: f64 = 1.0;
 
 /// Angles of coupler and rocker at the start.

@@ -125,12 +125,12 @@ impl<S: Real> Scene<S> {
 /// Revolute joints and a prismatic one; a spherical joint and revolute joints; a floating tree with a planar and a
 /// spherical joint.
 pub fn three<S: Real>() -> [Scene<S>; 3] {
-    let pins = chain(&[Kind::Revolute, Kind::Prismatic, Kind::Revolute], 40.0, 0.0);
+    let mixed = chain(&[Kind::Revolute, Kind::Prismatic, Kind::Revolute], 40.0, 0.0);
     let ball = chain(&[Kind::Spherical, Kind::Revolute], 5.0, 0.0);
     let mut free = chain(&[Kind::Floating, Kind::Planar], 5.0, 0.0);
     joint(&mut free, 1, Kind::Spherical, 0.0, 0.0);
     [
-        Scene::new("pins and a slider", pins, gravity(), 1),
+        Scene::new("revolute and prismatic", mixed, gravity(), 1),
         Scene::new("spherical and pin", ball, gravity(), 2),
         Scene::new("floating, planar, spherical", free, gravity(), 3),
     ]
