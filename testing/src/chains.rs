@@ -71,7 +71,7 @@ pub fn ill_conditioned() -> Vec<(String, Model)> {
         let tip = |factor: f64| move |k: f64| if k == 1.0 { factor } else { 1.0 };
         let power = |base: f64| move |k: f64| base.powf(k);
         let (chain, flat) = (|| general(seed, n), || planar(seed, n));
-        let mut add = |name: &str, model: Model| all.push((format!("{n} pins, {name}"), model));
+        let mut add = |name: &str, model: Model| all.push((format!("{n} revolute joints, {name}"), model));
         add("tip 10³ times as heavy", weigh(chain(), tip(1e3)));
         add("tip 10⁶ times as heavy", weigh(chain(), tip(1e6)));
         add("tip 10⁶ times as light", weigh(chain(), tip(1e-6)));
@@ -83,8 +83,11 @@ pub fn ill_conditioned() -> Vec<(String, Model)> {
         add("planar, tip 10⁶ times as heavy", weigh(flat(), tip(1e6)));
         add("planar, 1 to 10⁶ times as light outward", weigh(flat(), power(1e-6)));
     }
-    all.push(("20 pins, thin rods, 10⁻⁴".to_string(), rods(20, 20, 1e-4)));
-    all.push(("20 pins, tip 10³ times as heavy".to_string(), weigh(general(20, 20), |k| 1e3_f64.powf(k.floor()))));
+    all.push(("20 revolute joints, thin rods, 10⁻⁴".to_string(), rods(20, 20, 1e-4)));
+    all.push((
+        "20 revolute joints, tip 10³ times as heavy".to_string(),
+        weigh(general(20, 20), |k| 1e3_f64.powf(k.floor())),
+    ));
     all
 }
 

@@ -100,8 +100,10 @@ fn add(errors: &mut [[Errors; 2]; 3], k: usize, group: Output, nq: usize, result
 fn models() -> Vec<(String, Model)> {
     let mut all: Vec<(String, Model)> =
         MODELS.iter().map(|&(file, base)| (file.to_string(), model(file, base))).collect();
-    all.extend([3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 20].map(|n| (format!("{n} pins"), chains::general(n as u64, n))));
-    all.extend([5, 10, 20].map(|n| (format!("{n} pins, planar"), chains::planar(n as u64, n))));
+    all.extend(
+        [3, 4, 5, 6, 7, 8, 9, 10, 12, 15, 20].map(|n| (format!("{n} revolute joints"), chains::general(n as u64, n))),
+    );
+    all.extend([5, 10, 20].map(|n| (format!("{n} revolute joints, planar"), chains::planar(n as u64, n))));
     all.extend(chains::ill_conditioned());
     all.extend((0..TREES).map(|seed| (format!("tree {seed}, joints of all kinds"), tree(seed))));
     all
