@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::io::Write;
 
-use multibody::codegen::emit::quantity;
+use multibody::codegen::generate::quantity;
 use multibody::codegen::generate::trace;
 use multibody::codegen::model::{Gravity, Model, Value};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};

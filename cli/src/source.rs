@@ -3,12 +3,12 @@
 use std::io::Read;
 use std::path::Path;
 
-use multibody::codegen::import::words;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::read::{load, ImportOptions};
 use multibody::codegen::search::{self, Chosen};
+use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
 
 use super::args::ModelArgs;

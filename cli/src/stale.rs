@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{self, Arithmetic, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
 

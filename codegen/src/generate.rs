@@ -2,6 +2,8 @@
 
 use crate::code::{compile, Code};
 use crate::emit;
+#[doc(hidden)]
+pub use crate::emit::quantity;
 pub use crate::error::GenerateError;
 use crate::model::Model;
 pub use crate::options::{Arithmetic, Options, Precision, RolledCode};

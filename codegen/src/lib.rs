@@ -1,14 +1,14 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
-pub mod check;
+mod check;
 mod choice;
-pub mod code;
+mod code;
 pub mod diag;
-pub mod emit;
-pub mod error;
+mod emit;
+mod error;
 pub mod generate;
 pub mod identifiable;
-pub mod import;
+mod import;
 pub mod model;
 mod names;
 pub mod options;
@@ -19,6 +19,10 @@ pub mod rolled;
 mod sample;
 pub mod search;
 pub mod symbolic;
-pub mod trace;
+mod trace;
+
+/// Texts of messages, for the command and the macro.
+#[doc(hidden)]
+pub use import::words;
 
 pub use generate::{generate, Arithmetic, GenerateError, Generated, Options, Output, Precision, RolledCode};

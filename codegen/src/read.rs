@@ -1,4 +1,4 @@
-//! Reading a description: text to [`RawModel`](crate::import::raw::RawModel) by its format, then the checks. The one door to both.
+//! Reading a description: text to a raw model by its format, then the checks. The one door to both.
 
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Arguments of the macro: `key = value` pairs, each parsed separately, so that all errors are reported at once.
 
-use mbd_codegen::import::words::{did_you_mean, list, quote};
-use mbd_codegen::import::Base;
 use mbd_codegen::options::EliminationStrategy;
+use mbd_codegen::read::Base;
+use mbd_codegen::words::{did_you_mean, list, quote};
 use mbd_codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 

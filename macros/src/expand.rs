@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use mbd_codegen::diag::{Diagnostic, Severity};
-use mbd_codegen::import::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::model::Model;
 use mbd_codegen::read::{load, Base, ImportOptions};
+use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
 

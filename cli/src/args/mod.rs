@@ -5,9 +5,9 @@ mod values;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use multibody::codegen::import::{Base, ImportOptions};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::output;
+use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
 use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, snap, vector, HOLD};

@@ -1,7 +1,7 @@
 //! Parsers of argument values.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use multibody::codegen::import::words;
+use multibody::codegen::words;
 use multibody::codegen::Output;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::Stabilisation;

@@ -1,8 +1,8 @@
 //! Reads the states. All findings of a file are reported at once, each with the index of its state and its key.
 
-use multibody::codegen::import::words;
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::words;
 use multibody::runtime::Interpreter;
 use serde_json::{Map, Value};
 

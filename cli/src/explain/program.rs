@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use multibody::codegen::emit::quantity;
+use multibody::codegen::generate::quantity;
 use multibody::codegen::generate::{InputArray, OutputProgram};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::symbolic::{Op, Operand, Program, ProgramResult};

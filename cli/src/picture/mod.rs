@@ -5,8 +5,8 @@ mod view;
 
 use std::fmt::Write as _;
 
-use multibody::codegen::import::words;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::words;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::Interpreter;
 

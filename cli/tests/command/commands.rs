@@ -350,3 +350,22 @@ fn nobody_listens() {
         assert!(!read(&folder, "stderr").contains("panicked"), "{}", read(&folder, "stderr"));
     }
 }
+
+/// An arm with six revolute joints, the first along gravity, has one base inertial parameter of the first link and seven of each
+/// other one (M. Gautier, W. Khalil, 1990): 36. A damping and a dry friction of every joint come to them.
+#[test]
+fn base_parameters_are_named() {
+    let output = good(run(&["identifiable", "models/ur5.urdf"]));
+    let text = out(&output);
+    let head = "ur5: 72 dynamic parameters of 6 bodies and 6 velocities; 48 base parameters, 9 without effect\n";
+    assert!(text.starts_with(head), "{text}");
+    for line in [
+        "upper_arm_link.mz + 0.425 forearm_link.m + 0.425 wrist_1_link.m + 0.425 wrist_2_link.m + 0.425 wrist_3_link.m",
+        "wrist_3_link.ixx - wrist_3_link.izz",
+        "elbow_joint.friction",
+    ] {
+        assert!(text.lines().any(|l| l == line), "{line}:\n{text}");
+    }
+    let names = "shoulder_link.m, shoulder_link.mx, shoulder_link.my, shoulder_link.mz";
+    assert!(text.contains(&format!("\nwithout effect: {names}, ")), "{text}");
+}

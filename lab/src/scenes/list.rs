@@ -2,8 +2,8 @@
 
 use super::text::{chain, tapered, tree, FRICTION};
 use super::{Entry, Expect, Refused, Source};
-use multibody::codegen::import::Base;
 use multibody::codegen::model::Model;
+use multibody::codegen::read::Base;
 
 /// A file of `models/` and its text.
 macro_rules! file {

@@ -9,8 +9,8 @@
 
 use crate::wide::{inputs, model, Errors, Spread, Wide, MODELS};
 use mbd_codegen::generate::trace;
-use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::read::Base;
 use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output};
 use mbd_runtime::Scalar;

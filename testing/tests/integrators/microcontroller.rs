@@ -1,7 +1,7 @@
 //! A robot in single precision with one evaluation of the rates a step, as on a microcontroller.
 
-use mbd_codegen::import::Base;
 use mbd_codegen::model::Value;
+use mbd_codegen::read::Base;
 use mbd_codegen::search;
 use mbd_runtime::integrate::{Ab6, EnergyProjection, Stepper};
 use mbd_testing::state::random_state;

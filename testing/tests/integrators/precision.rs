@@ -1,7 +1,7 @@
 //! The sweeps and the explicit methods in double-double numbers: as good as those are, so that they can be references.
 
-use mbd_codegen::import::Base;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::read::Base;
 use mbd_codegen::search;
 use mbd_runtime::integrate::{Dop853, Point, Rk4, Stepper, Tsit5, Verner9};
 use mbd_runtime::wide::Wide;
