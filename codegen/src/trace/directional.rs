@@ -5,7 +5,7 @@ use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use super::{gravity_of, SymbolicInputs};
+use super::inputs::{gravity_of, SymbolicInputs};
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
 
