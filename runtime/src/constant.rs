@@ -1,7 +1,5 @@
 //! Real constants to about 100 bits, evaluated by the compiler.
 
-use crate::Scalar;
-
 /// A real constant as a sum of two doubles: the nearest double and the remainder, with a relative error of 2⁻¹⁰⁰.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Constant {
@@ -17,12 +15,6 @@ impl Constant {
 
     const fn pair(hi: f64, lo: f64) -> Constant {
         Constant { hi, lo, single: hi as f32 }
-    }
-
-    /// The constant in a number type, rounded once; for `f64` it is the nearest double.
-    #[inline]
-    pub fn get<S: Scalar>(self) -> S {
-        S::rounded(self)
     }
 
     /// Whether it is zero, so that a term with it need not be added.

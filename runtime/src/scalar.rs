@@ -117,6 +117,14 @@ impl Scalar for f32 {
     }
 }
 
+impl Constant {
+    /// The constant in a number type, rounded once; for `f64` it is the nearest double.
+    #[inline]
+    pub fn get<S: Scalar>(self) -> S {
+        S::rounded(self)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
