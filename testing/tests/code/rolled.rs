@@ -117,8 +117,8 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
 
 fn forced(seed: u64) -> Options {
     let mut rng = Rng::new(seed, 9);
-    // `Single` is twice in the list because blocks of joints that are eliminated together at the tips stay straight-line code
-    // and leave few nodes of short chains to rolled code.
+    // `Single` is twice in the list because blocks of joints that are eliminated together at the tips stay
+    // straight-line code and leave few nodes of short chains to rolled code.
     let elimination = rng.pick(&[
         EliminationStrategy::Single,
         EliminationStrategy::Single,

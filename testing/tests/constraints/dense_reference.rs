@@ -1,8 +1,9 @@
 //! Mechanisms with loops and couplings against dense matrices. The mechanisms are random trees with random constraints
 //! of every kind, redundant ones included, which hold in the state of the test.
 //!
-//! `Φ` of the reference comes from the definitions in ground axes, `M` and `h` from the open tree, multipliers from singular
-//! values (`dense/mod.rs`). The rows of interpreter and reference need not be the same, but must span the same space.
+//! `Φ` of the reference comes from the definitions in ground axes, `M` and `h` from the open tree, multipliers from
+//! singular values (`dense/mod.rs`). The rows of interpreter and reference need not be the same, but must span the same
+//! space.
 
 use std::collections::BTreeMap;
 

@@ -2,9 +2,8 @@
 //!
 //! Momenta are integrated in outer axes ([`mbd_runtime::integrate::chart`]), where they are constants, so that a step
 //! changes them by rounding only. The bounds follow from this: a step rounds each sum once, by half a unit in the last
-//! place, and adds
-//! `h` times the remainder of rates that cancel, some units in the last place of the largest term. The signs of such errors are
-//! random, so after `n` steps they amount to `√n` times that.
+//! place, and adds `h` times the remainder of rates that cancel, some units in the last place of the largest term. The
+//! signs of such errors are random, so after `n` steps they amount to `√n` times that.
 
 use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
 use mbd_codegen::read;

@@ -64,7 +64,8 @@ pub fn full(p: &Vector, n: usize, dependents: &[usize]) -> Vector {
     all
 }
 
-/// `d/dt (Bᵀ M v)` of the motion that starts with independent momenta `p` and zero dependent momenta. It needs no multipliers.
+/// `d/dt (Bᵀ M v)` of the motion that starts with independent momenta `p` and zero dependent momenta. It needs no
+/// multipliers.
 pub fn rates(system: &LoopSystem, truth: &Truth, dependents: &[usize]) -> Vector {
     let dense = &truth.dense;
     let b = tangents(&dense.phi, dependents);

@@ -28,7 +28,8 @@ pub struct Chain {
     x: Vec<Matrix>,
     e: Vec<Matrix>,
     mass: Vec<Matrix>,
-    /// `X` from the last body to the cut: to the axes of the loop's frame on the ground, at the origin of its frame on the body.
+    /// `X` from the last body to the cut: to the axes of the loop's frame on the ground, at the origin of its frame on
+    /// the body.
     cut: Matrix,
     /// `E_c`, constant in these axes.
     cut_rows: Matrix,
@@ -366,8 +367,8 @@ fn weight(system: &LoopSystem, chain: &Chain, k: usize) -> Vector {
     Vector::from_vec([f, n].concat())
 }
 
-/// `Ė` of a link's joint. It is zero except for a universal joint, whose first axis rotates in body axes against the second
-/// angle.
+/// `Ė` of a link's joint. It is zero except for a universal joint, whose first axis rotates in body axes against the
+/// second angle.
 fn joint_rate(system: &LoopSystem, chain: &Chain, k: usize, v: &Vector) -> Matrix {
     let e = &chain.e[k];
     let mut rate = Matrix::zeros(6, e.ncols());
