@@ -148,11 +148,11 @@ impl<Y: Closed> Study<Y> {
     pub fn minimal_end(&mut self, kind: Kind, h: f64) -> Ended {
         let (y, mut states) = (self.minimal_start(), Vec::new());
         Walk::new(&mut self.minimal(kind), &VERNER9, &y).all(h, END, &mut states);
-        // The run starts again from the start, so that the loop stays in its branch.
-        let mut form = self.minimal(kind);
-        let start = form.energy(&y);
-        let energy = states.iter().fold(0.0_f64, |m, y| m.max((form.energy(y) - start).abs()));
-        Ended { q: form.coordinates(states.last().unwrap_or(&y)), energy }
+        // The states are evaluated from the start on, so that the loop stays in its branch.
+        let mut equations = self.minimal(kind);
+        let start = equations.energy(&y);
+        let energy = states.iter().fold(0.0_f64, |m, y| m.max((equations.energy(y) - start).abs()));
+        Ended { q: equations.coordinates(states.last().unwrap_or(&y)), energy }
     }
 
     /// The motion with all coordinates, by the same steps.
@@ -198,7 +198,8 @@ impl<Y: Closed> Study<Y> {
         Some((distance(&y, reference), evaluations))
     }
 
-    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance for all components or for the coordinates alone.
+    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance for all components or for the coordinates
+    /// alone.
     pub fn adaptive(&mut self, kind: Kind, tolerance: f64, partial: bool, reference: &[f64]) -> Adaptive {
         let y = self.minimal_start();
         let mut form = self.minimal(kind);
@@ -257,7 +258,8 @@ impl<Y: Closed> Study<Y> {
         traces
     }
 
-    /// Figures 7.12 and 7.13 with steps of `h` s and all coordinates: errors of the loop along x and y and of the energy.
+    /// Figures 7.12 and 7.13 with steps of `h` s and all coordinates: errors of the loop along x and y and of the
+    /// energy.
     pub fn drift(&mut self, kind: Kind, h: f64, method: Method) -> [Traces; 2] {
         let y = self.whole_start();
         let mut states = vec![(0.0, y.clone())];
@@ -280,8 +282,8 @@ impl<Y: Closed> Study<Y> {
         traces
     }
 
-    /// `steps` classical steps of `h` s, with position correction after each: largest residual after and before it, and the
-    /// largest change of the energy, J.
+    /// `steps` classical steps of `h` s, with position correction after each: largest residual after and before it, and
+    /// the largest change of the energy, J.
     pub fn projected(&mut self, h: f64, steps: u64, mut tell: impl FnMut(u64)) -> [f64; 3] {
         let y = self.whole_start();
         let (n, start) = (self.start.len(), self.energy(Kind::Momenta, &y));
@@ -317,7 +319,7 @@ impl<Y: Closed> Study<Y> {
 }
 
 impl<const S: usize> Walk<'_, S> {
-    /// All steps to the end; every state on the way into `states`.
+    /// Makes all steps to the end and adds the state after every step to `states`.
     fn all(mut self, h: f64, end: f64, states: &mut Vec<Vec<f64>>) -> Vec<f64> {
         self.fixed(h, end, |_, walk| states.push(walk.y.clone()));
         self.y
