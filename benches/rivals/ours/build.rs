@@ -1,4 +1,4 @@
-//! Generates the code of the robots that are listed in the file `RIVALS_ROBOTS`.
+//! Generates the code of the robots in the list whose file the environment variable `RIVALS_ROBOTS` names.
 
 use mbd_codegen::search;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};

@@ -179,8 +179,8 @@ impl<Y: Closed> Study<Y> {
     /// Table 7.1.
     pub fn fixed(&mut self, kind: Kind, h: f64, reference: &[f64]) -> Fixed {
         let y = self.minimal_start();
-        let mut form = self.minimal(kind);
-        let mut walk = Walk::new(&mut form, &RKF45, &y);
+        let mut equations = self.minimal(kind);
+        let mut walk = Walk::new(&mut equations, &RKF45, &y);
         let (mut sums, mut steps) = ([0.0; 2], 0.0_f64);
         walk.fixed(h, END, |_, walk| {
             for (sum, half) in sums.iter_mut().zip(walk.error.chunks(INDEPENDENT.len())) {
@@ -202,8 +202,8 @@ impl<Y: Closed> Study<Y> {
     /// alone.
     pub fn adaptive(&mut self, kind: Kind, tolerance: f64, partial: bool, reference: &[f64]) -> Adaptive {
         let y = self.minimal_start();
-        let mut form = self.minimal(kind);
-        let mut walk = Walk::new(&mut form, &RKF45, &y);
+        let mut equations = self.minimal(kind);
+        let mut walk = Walk::new(&mut equations, &RKF45, &y);
         let watched = if partial { INDEPENDENT.len() } else { y.len() };
         let (mut tried, mut wins) = (Vec::new(), vec![0; y.len()]);
         let (mut sum, mut steps, mut step) = (0.0, 0.0_f64, INTERVAL);
@@ -241,7 +241,7 @@ impl<Y: Closed> Study<Y> {
         let y = self.minimal_start();
         let mut traces = [Traces::default(), Traces::default(), Traces::default()];
         for kind in KINDS {
-            let mut form = self.minimal(kind);
+            let mut equations = self.minimal(kind);
             let mut put = |t: f64, y: &[f64]| {
                 let (q, p) = y.split_at(INDEPENDENT.len());
                 match kind {
@@ -253,7 +253,7 @@ impl<Y: Closed> Study<Y> {
                 }
             };
             put(0.0, &y);
-            Walk::new(&mut form, &RKF45, &y).fixed(h, END, |t, walk| put(t, &walk.y));
+            Walk::new(&mut equations, &RKF45, &y).fixed(h, END, |t, walk| put(t, &walk.y));
         }
         traces
     }
@@ -263,12 +263,12 @@ impl<Y: Closed> Study<Y> {
     pub fn drift(&mut self, kind: Kind, h: f64, method: Method) -> [Traces; 2] {
         let y = self.whole_start();
         let mut states = vec![(0.0, y.clone())];
-        let mut form = Whole::new(&mut self.system, kind);
+        let mut equations = Whole::new(&mut self.system, kind);
         let mut keep = |t: f64, y: &[f64]| states.push((t, y.to_vec()));
         match method {
-            Method::Classical => Walk::new(&mut form, &RK4, &y).fixed(h, END, |t, w| keep(t, &w.y)),
+            Method::Classical => Walk::new(&mut equations, &RK4, &y).fixed(h, END, |t, w| keep(t, &w.y)),
             Method::Fehlberg { lower } => {
-                let mut walk = Walk::new(&mut form, &RKF45, &y);
+                let mut walk = Walk::new(&mut equations, &RKF45, &y);
                 walk.lower = lower;
                 walk.fixed(h, END, |t, w| keep(t, &w.y));
             }
@@ -289,8 +289,8 @@ impl<Y: Closed> Study<Y> {
         let (n, start) = (self.start.len(), self.energy(Kind::Momenta, &y));
         let (mut y, mut worst) = (y, [0.0_f64; 3]);
         for step in 1..=steps {
-            let mut form = Whole::new(&mut self.system, Kind::Momenta);
-            let mut walk = Walk::new(&mut form, &RK4, &y);
+            let mut equations = Whole::new(&mut self.system, Kind::Momenta);
+            let mut walk = Walk::new(&mut equations, &RK4, &y);
             walk.attempt(h);
             walk.accept();
             y = std::mem::take(&mut walk.y);

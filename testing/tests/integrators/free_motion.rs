@@ -162,13 +162,13 @@ impl Floating {
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
         i.momenta(&s.q, &s.v, &mut p);
-        let group = *i.lie_joints().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
+        let joint = *i.lie_joints().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
         let weights = model.joints.iter().map(|j| {
             let body = &model.bodies[j.child];
             (mbd_testing::value(body.mass, &[]), body.com.map(|x| mbd_testing::value(x, &[])))
         });
         let weights: Vec<_> = weights.collect();
-        Floating { mass: weights.iter().map(|w| w.0).sum(), weights, i, q: s.q, p, at: (group.q, group.v) }
+        Floating { mass: weights.iter().map(|w| w.0).sum(), weights, i, q: s.q, p, at: (joint.q, joint.v) }
     }
 
     /// Linear momentum, and angular momentum about the ground's origin, in ground axes.

@@ -1,5 +1,5 @@
-//! Generates code for the derivatives of the robots that are listed in the file `RIVALS_ROBOTS`. `RIVALS_ONLY` selects
-//! some of them.
+//! Generates code for the derivatives of the robots in the list whose file the environment variable `RIVALS_ROBOTS`
+//! names. `RIVALS_ONLY` selects some of them.
 
 use std::fmt::Write as _;
 

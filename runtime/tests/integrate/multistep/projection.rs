@@ -18,8 +18,8 @@ fn gradient<Y: Energetic<Scalar = f64> + Clone>((mut y, q, p): (Y, Y::Coordinate
     field.rates(&mut y, 0.0, &at, &mut rate);
     let chart: Chart<Y> = field.chart().clone();
     chart.gradient(&y, &at, &mut rate);
-    let group = |k: usize| y.lie_joints().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
-    let fixed: Vec<bool> = (0..2 * n).map(|k| k >= n && group(k - n)).collect();
+    let on_lie_group = |k: usize| y.lie_joints().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
+    let fixed: Vec<bool> = (0..2 * n).map(|k| k >= n && on_lie_group(k - n)).collect();
     let found: Vec<f64> = rate.parts().concat();
     let mut energy = |k: usize, e: f64| {
         let (mut moved, mut q, mut p) = (at.clone(), q.clone(), p.clone());

@@ -1,5 +1,5 @@
-//! Generates the code of every mechanism, and writes its description for Pinocchio to `NAME.loop` in the folder
-//! `RIVALS_MODELS`. `RIVALS_ONLY` selects some of the mechanisms.
+//! Generates the code of every mechanism, and writes its description for Pinocchio to `NAME.loop` in the folder that
+//! the environment variable `RIVALS_MODELS` names. `RIVALS_ONLY` selects some of the mechanisms.
 
 mod mechanisms;
 mod rods;
@@ -68,7 +68,7 @@ fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
     write(&format!("{name}.rs"), &generated.source);
     let plan = search::plan(model, PlanOptions::default());
     let (q, v, start) = order(model, &plan, theirs);
-    let count = |group: Output| generated.counts.iter().find(|c| c.0 == group).map_or(0, |c| c.1.total());
+    let count = |output: Output| generated.counts.iter().find(|c| c.0 == output).map_or(0, |c| c.1.total());
     let (rates, accelerations) = (count(Rates), count(Accelerations));
     let (nq, nv, rows) = (q.len(), v.len(), plan.dims.rows);
     let _ = write!(
