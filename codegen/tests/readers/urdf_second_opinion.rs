@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use urdf_rs::JointType;
 
 /// Folders with robots, relative to this crate. The environment variable `URDF_ROBOTS` can name further folders,
-/// separated as in
-/// `PATH`; they are searched with their subfolders.
+/// separated as in `PATH`; they are searched with their subfolders.
 const FOLDERS: [&str; 2] = ["../models", "../tests/reference/robots"];
 
 #[test]

@@ -138,8 +138,7 @@ fn reference(time: f64) -> [f64; 4] {
 }
 
 /// For separable Hamiltonians the semi-implicit Euler method is symplectic. For the oscillator `H = (p² + q²)/2` it
-/// conserves
-/// `p² + q² − h q p` to round-off, and the error of the energy stays within `h/2`.
+/// conserves `p² + q² − h q p` to round-off, and the error of the energy stays within `h/2`.
 #[test]
 fn semi_implicit_euler_is_symplectic_where_the_hamiltonian_is_separable() {
     struct Oscillator;

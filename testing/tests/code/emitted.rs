@@ -72,8 +72,7 @@ impl Emitted {
     }
 
     /// Runs a kernel. Inputs are flat arrays by the names of the arguments (`q`, `tau`); outputs are arrays by the
-    /// names of the
-    /// `&mut` arguments.
+    /// names of the `&mut` arguments.
     pub fn run(&self, name: &str, inputs: &HashMap<String, Vec<f64>>) -> HashMap<String, Vec<f64>> {
         let f = &self.functions[name];
         // Output arrays start empty and locals with NaN, so that a read before the write shows.

@@ -20,8 +20,7 @@ use crate::dense::minimal::{choices, full, least, others, pivot};
 use crate::dense::{minimal, thesis, Matrix, Truth, Vector};
 
 /// For any choice of independent velocities, `ṗ_ind` of the state with `p⁺_dep = 0` is `d/dt (Bᵀ M v)`. It is computed
-/// from
-/// `ṗ⁺` of the rates, and by [`CoordinatePartition`].
+/// from `ṗ⁺` of the rates, and by [`CoordinatePartition`].
 #[test]
 fn minimal_coordinates_are_a_gauge() {
     let mut velocity = Errors::new("qd", 1e-11);

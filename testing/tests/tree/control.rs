@@ -39,8 +39,8 @@ fn inverse_dynamics_is_mass_and_bias() {
     });
 }
 
-/// For any `v̇`, `τ = d/dt p(q, v) − ṗ(q, p, τ = 0)`. This side uses other sweeps and another principle than inverse
-/// dynamics.
+/// For any `v̇`, inverse dynamics gives `τ = d/dt p(q, v) − ṗ(q, p, τ = 0)`. The test computes the right-hand side by
+/// other sweeps, which use another principle.
 #[test]
 fn inverse_dynamics_is_the_change_of_momentum() {
     all("tau(a) = d/dt p - pd(0)", |c| {

@@ -1,8 +1,7 @@
 //! Derivatives of the rates against dual numbers, on random trees with all kinds of elements.
 //!
 //! The reference runs the sweeps for the rates, which use another factorisation and other formulas, on `q + ε N(q) e_k`
-//! and
-//! `p + ε e_k`.
+//! and `p + ε e_k`.
 
 use mbd_codegen::model::{Model, Value};
 use mbd_codegen::options::{PlanOptions, DEFAULT_SNAP};

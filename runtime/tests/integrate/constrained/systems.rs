@@ -380,8 +380,7 @@ impl Model for Polar {
 }
 
 /// A top of 1 kg: a free body with a spherical joint at the origin as constraint. Its three rows, in ground axes, add
-/// nothing to
-/// `ṗ⁺`.
+/// nothing to `ṗ⁺`.
 #[derive(Clone, Debug)]
 pub struct Top {
     groups: [LieJoint; 1],
