@@ -1,4 +1,4 @@
-//! Generates code for random trees, which `tests/code/compiled.rs` includes: the way a user's build script goes.
+//! Generates code for random trees as a user's build script would; `tests/code/compiled.rs` includes the code.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::search;
 
-// The generator of random trees belongs to the crate this script builds, so it is taken in as source.
+// The generator of random trees belongs to the crate that this script builds, so the script includes its source.
 #[path = "src/batch.rs"]
 mod batch;
 #[allow(dead_code, unused_imports)]
 #[path = "src/random/mod.rs"]
 mod random;
 
-/// The crate's own, which `random` uses.
+/// The included modules call `crate::value`. This is a copy of that function of the crate.
 fn value(v: Value, params: &[f64]) -> f64 {
     match v {
         Value::Const(x) => x,

@@ -1,4 +1,4 @@
-//! The methods of diffsol, feature `diffsol`, against a method of order 9 at tight tolerances.
+//! The methods of diffsol (feature `diffsol`) against a method of order 9 with tight tolerances.
 
 use multibody::codegen::read;
 use multibody::codegen::search;
@@ -44,7 +44,7 @@ impl Scene {
         Ok(([q, p].concat(), statistics))
     }
 
-    /// The error at the end is at most `factor` tolerances, for every method.
+    /// Checks for every method that the error at the end is at most `factor` times the tolerance.
     fn check(&self, name: &str, tolerances: &[(Stiff, &[f64])], factor: f64) {
         let exact = self.reference();
         for (method, tolerances) in tolerances {
@@ -64,7 +64,8 @@ impl Scene {
 const ALL: [(Stiff, &[f64]); 3] =
     [(Stiff::Bdf, &[1e-4, 1e-6, 1e-8]), (Stiff::TrBdf2, &[1e-3, 1e-5]), (Stiff::Esdirk34, &[1e-4, 1e-6])];
 
-/// Errors of steps add up, and the swing doubles them some ten times in two seconds.
+/// Limit of the error in multiples of the tolerance. Errors of steps add up, and the motion doubles them some ten times
+/// in two seconds.
 const FACTOR: f64 = 300.0;
 
 #[test]
@@ -73,7 +74,8 @@ fn double_pendulum() {
     Scene::new(text, &[1.0, -0.5], &[0.0, 0.0], 2.0).check("double pendulum", &ALL, FACTOR);
 }
 
-/// A pendulum on a slider that a spring of 1e8 N/m holds, damped near the limit of oscillating: rates of decay of 1e4 1/s.
+/// A pendulum on a prismatic joint with a spring of 1e8 N/m. The spring is damped almost critically, so that deviations
+/// decay with rates of 1e4 1/s.
 const STIFF: &str = r#"
 gravity = [0, 0, -9.81]
 [[body]]
@@ -103,13 +105,13 @@ axis = [0, 1, 0]
 fn stiff_spring() {
     let scene = Scene::new(STIFF, &[0.0, 1.0], &[0.0, 0.0], 1.0);
     scene.check("stiff spring", &ALL, FACTOR);
-    // Far fewer steps than what stability leaves to an explicit method.
+    // An explicit method would need far more steps for stability.
     let solver = Diffsol { absolute: 1e-6, relative: 1e-6, ..Diffsol::default() };
     let (_, statistics) = scene.run(solver).unwrap();
     assert!(statistics.steps < 1000, "{statistics:?}");
 }
 
-/// Quaternions go by their components.
+/// The solver integrates components of quaternions.
 #[test]
 fn tumbling_body() {
     let text = r#"

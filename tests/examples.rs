@@ -1,4 +1,4 @@
-//! The programs of `examples/` run; each of them asserts what it shows.
+//! Runs the programs of `examples/`. Each of them asserts what it shows.
 
 #[path = "../examples/arm_control.rs"]
 mod arm_control;

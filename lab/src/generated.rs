@@ -53,8 +53,8 @@ pub trait VisitRates {
     fn visit<Y: System<Scalar = f64> + 'static>(self, system: Y) -> Self::Out;
 }
 
-/// Runs an operation on the generated chain or tree of [`experiments`](crate::scenes::experiments) with friction of a given
-/// kind and number of links.
+/// Runs an operation on the generated chain or tree of [`experiments`](crate::scenes::experiments) with friction of a
+/// given kind and number of links.
 pub fn visit_chain<V: VisitRates>(family: &str, links: usize, visitor: V) -> Option<V::Out> {
     Some(match (family, links) {
         ("open", 10) => visitor.visit(chain10_friction::Scene::new()),

@@ -1,4 +1,4 @@
-//! The benches of the integrators, on a small choice of scenes.
+//! The benches of the integrators, on a few scenes.
 #![cfg(feature = "generated")]
 
 #[path = "../../cli/tests/command/run.rs"]
@@ -22,7 +22,7 @@ fn work_against_error() {
     let samples: Vec<serde_json::Value> =
         read(&folder, "a.jsonl").lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
     let verner: Vec<_> = samples.iter().filter(|s| s["method"] == "verner9" && s["variant"] == "generated").collect();
-    // A tighter tolerance costs more and errs less, within what a controller may scatter.
+    // A tighter tolerance needs more evaluations and gives a smaller error; a single error may be larger by chance.
     for pair in verner.windows(2) {
         assert!(pair[1]["evaluations"].as_u64() > pair[0]["evaluations"].as_u64());
     }
@@ -38,7 +38,7 @@ fn long_runs() {
         let line = out(&output).lines().find(|l| l.starts_with(&format!("| {name} "))).expect("a row");
         line.split('|').filter_map(|cell| cell.trim().parse().ok()).collect()
     };
-    // Setting, work, time, energy, trajectory, both projected.
+    // The columns are setting, work, time, energy, trajectory, and the last two with projection.
     let (rk4, verner9) = (row("rk4"), row("verner9"));
     assert!((0.8..1.1).contains(&verner9[1]), "work {}", verner9[1]);
     assert!(rk4[3] > 1e3 * verner9[3] && rk4[4] > 1e3 * verner9[4], "{rk4:?} {verner9:?}");

@@ -1,5 +1,5 @@
-//! The scenes of the benchmarks: models that pass the checks or are refused as they should be, starts that fit them, and
-//! (feature `generated`) generated code that agrees with the interpreter.
+//! The scenes of the benchmarks: models that pass the checks or are refused, starts that fit the models, and (feature
+//! `generated`) generated code that agrees with the interpreter.
 
 use mbd_lab::scenes::{self, Expect, Scene};
 use multibody::codegen::model::Value;
@@ -10,14 +10,15 @@ use multibody::runtime::{Energetic, Interpreter, System};
 fn names_are_unique_and_find_their_scenes() {
     let names: Vec<&str> = scenes::names().collect();
     for (k, name) in names.iter().enumerate() {
-        assert!(!names[..k].contains(name), "{name} stands twice");
+        assert!(!names[..k].contains(name), "{name} is in the list twice");
         assert_eq!(scenes::by_name(name).map(|s| s.name), Some(*name));
     }
     assert!(scenes::by_name("no such scene").is_none());
 }
 
-/// Sizes, quaternions, energies, friction only where energy is not kept; and what `expect` says, seen at the mass matrix and
-/// in the first steps: energy is kept to what RK4 keeps of it, or a step fails.
+/// Starts have the sizes of their models, unit quaternions and finite energies, and exactly the scenes that are not
+/// conservative have friction. Where `expect` is `Runs`, the mass matrix is regular and RK4 conserves the energy in the
+/// first steps; where it is `Stops`, a step fails.
 #[test]
 fn starts_fit_their_models_and_their_expectations() {
     for s in scenes::all() {
@@ -35,7 +36,7 @@ fn starts_fit_their_models_and_their_expectations() {
         match (s.expect, first_steps(&s, &mut system)) {
             (Expect::Runs, Ok(change)) => {
                 assert_eq!(rank, Ok(()), "{}", s.name);
-                // 4e-7 where it is largest, of steps chosen for errors that can be seen.
+                // The largest measured change is 4e-7; the steps of the scenes are chosen for visible errors.
                 assert!(!s.conservative || change < 1e-5, "{}: energy changes by {change:e}", s.name);
             }
             (Expect::Stops, Err(_)) => assert!(rank.is_err(), "{}", s.name),
@@ -71,7 +72,8 @@ fn models_without_inertia_are_refused() {
     }
 }
 
-/// As the thesis describes it: link 11 and link 21 fork at the tip of link 10, links 31 and 41 at that of link 20.
+/// The tree forks as the thesis describes: links 11 and 21 are on the tip of link 10, links 31 and 41 on that of link
+/// 20.
 #[test]
 fn the_tree_forks_where_the_thesis_says() {
     let s = scenes::by_name("tree150_friction").expect("the scene");
@@ -111,7 +113,7 @@ mod generated {
 
     use super::*;
 
-    /// Every number a function gave, function by function.
+    /// The results of every function, by its name.
     type Results = Vec<(&'static str, Vec<f64>)>;
 
     /// Coordinates, velocities, momenta.
@@ -152,7 +154,8 @@ mod generated {
         out.iter_mut().zip(from).for_each(|(out, x)| *out = S::constant(*x));
     }
 
-    /// The start, and a state near it in which nothing rests, of numbers that `round` leaves as they are.
+    /// The start, and a state near it in which all joints move. `round` has rounded all numbers to the precision of the
+    /// test.
     fn states(s: &Scene, round: fn(f64) -> f64) -> Vec<State> {
         let mut system = s.interpreter::<f64>();
         let quaternions: Vec<usize> = system.quaternions().collect();
@@ -235,9 +238,9 @@ mod generated {
         })
     }
 
-    /// Generated code is rewritten for speed, so it rounds otherwise than the interpreter; how much the mass matrix amplifies
-    /// that is seen at the interpreter's own error. Ten times that is allowed, since single results scatter, and ten
-    /// roundings of the largest.
+    /// Generated code is rewritten for speed, so its rounding differs from that of the interpreter. The error of the
+    /// interpreter shows how much the mass matrix amplifies rounding. Generated code may have ten times this error,
+    /// because single results scatter, plus ten roundings of the largest result.
     fn compare(what: &str, ours: Option<Results>, plain: Results, exact: &Results, epsilon: f64) -> usize {
         let Some(ours) = ours else { return 0 };
         assert_eq!((ours.len(), plain.len()), (exact.len(), exact.len()));
@@ -291,7 +294,8 @@ mod generated {
     }
 }
 
-/// Where the mass matrix is badly conditioned, rounding keeps iterations from going on to the last digits: no reason to fail.
+/// If the mass matrix is ill-conditioned, rounding ends the convergence of iterations before the last digits. Implicit
+/// methods must not fail because of that.
 #[test]
 fn implicit_steps_converge_on_chains() {
     use multibody::runtime::catalogue::{any, entries, Start};

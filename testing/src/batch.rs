@@ -1,4 +1,5 @@
-//! Trees for which the build script generates code. The build script and the test that runs the code both include this file.
+//! Trees for which the build script generates code. The build script and the test that runs the code both include this
+//! file.
 
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
@@ -7,7 +8,7 @@ use mbd_codegen::{Output, RolledCode};
 
 use crate::random::{random_model, Distribution, Rng};
 
-/// Number of trees, limited so that they compile in well under a minute.
+/// Number of trees, few enough to compile in well under a minute.
 pub const TREES: u64 = 44;
 
 /// From this index on, the trees are chains with rolled code wherever links repeat.

@@ -14,7 +14,7 @@ pub fn general(seed: u64, n: usize) -> Model {
 pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
     let distribution = Distribution { bodies: (n, n), taper, gravity: [0.0, 1.0, 0.0], ..Distribution::default() };
     let mut model = random_model(seed, &distribution);
-    // The generator makes an identity placement one time in six; a general chain must not have any.
+    // The generator makes one placement in six an identity; a general chain must not have any.
     for (k, joint) in model.joints.iter_mut().enumerate() {
         if joint.placement.rotation == Rotation::NONE {
             joint.placement.rotation = Rotation::Rpy([0.3, 0.7, 1.1 + k as f64].map(Value::Const));
@@ -23,7 +23,7 @@ pub fn general_tapered(seed: u64, n: usize, taper: f64) -> Model {
     model
 }
 
-/// The same chain in a plane: vertical axes, placements rotated about them.
+/// The same chain in a plane: all axes are vertical, and placements are rotations about them.
 pub fn planar(seed: u64, n: usize) -> Model {
     let mut model = general(seed, n);
     for joint in &mut model.joints {
@@ -46,8 +46,8 @@ pub fn weigh(mut model: Model, factor: impl Fn(f64) -> f64) -> Model {
     model
 }
 
-/// Thin rods of 1 m end to end. The moment of inertia about a rod is `thin` times that across it, and every second joint
-/// rotates about its rod.
+/// A chain of thin rods of 1 m, connected end to end. The moment of inertia about a rod is `thin` times that across it,
+/// and every second joint rotates about its rod.
 pub fn rods(seed: u64, n: usize, thin: f64) -> Model {
     let mut model = general(seed, n);
     for k in 0..n {
@@ -63,7 +63,7 @@ pub fn rods(seed: u64, n: usize, thin: f64) -> Model {
     model
 }
 
-/// Chains whose mass matrices are far from well-conditioned, each with its name.
+/// Chains with ill-conditioned mass matrices, each with its name.
 pub fn ill_conditioned() -> Vec<(String, Model)> {
     let mut all = Vec::new();
     for n in [6, 10] {
@@ -84,14 +84,12 @@ pub fn ill_conditioned() -> Vec<(String, Model)> {
         add("planar, 1 to 10⁶ times as light outward", weigh(flat(), power(1e-6)));
     }
     all.push(("20 revolute joints, thin rods, 10⁻⁴".to_string(), rods(20, 20, 1e-4)));
-    all.push((
-        "20 revolute joints, tip 10³ times as heavy".to_string(),
-        weigh(general(20, 20), |k| 1e3_f64.powf(k.floor())),
-    ));
+    let heavy_tip = weigh(general(20, 20), |k| 1e3_f64.powf(k.floor()));
+    all.push(("20 revolute joints, tip 10³ times as heavy".to_string(), heavy_tip));
     all
 }
 
-/// A chain whose axes are parallel except for angles of about `angle`, rad, with placements along and across them.
+/// A chain whose axes are parallel except for angles of about `angle`, rad. Links extend along and across the axes.
 pub fn nearly_parallel(seed: u64, n: usize, angle: f64) -> Model {
     let (mut model, mut rng) = (general(seed, n), Rng::new(seed, 7));
     for joint in &mut model.joints {

@@ -19,8 +19,8 @@ use crate::value;
 pub struct LoopKnobs {
     /// Distribution of the tree.
     pub tree: Distribution,
-    /// Whether all joints are revolute and prismatic joints of one plane; loops that are closed by joints then have redundant
-    /// rows.
+    /// Whether all joints are revolute and prismatic joints of one plane. A loop that is closed by a joint then has
+    /// redundant rows.
     pub planar: bool,
     /// Smallest and largest number of constraints.
     pub count: (usize, usize),
@@ -34,7 +34,7 @@ pub struct LoopKnobs {
     pub kinds: [f64; 16],
     /// Probability that a constraint has a `decay`.
     pub decay: f64,
-    /// Probability that a loop leaves its joints no motion.
+    /// Probability that a loop may leave its joints no motion.
     pub locked: f64,
 }
 
@@ -96,15 +96,15 @@ pub struct LoopSystem {
     pub state: State,
 }
 
-/// A random mechanism that can move: `Φ` has fewer independent rows than there are velocities. Where prescribed motions and
-/// loops contradict each other, the prescribed joints are at rest.
+/// A random mechanism that can move: `Φ` has fewer independent rows than there are velocities. Where prescribed motions
+/// and loops contradict each other, the prescribed joints are at rest.
 pub fn random_loops(seed: u64, distribution: &LoopKnobs) -> LoopSystem {
     for attempt in 0..1000 {
         if let Some(system) = attempted(seed, attempt, distribution) {
             return system;
         }
     }
-    panic!("seed {seed}: no mechanism with these distribution can move: {distribution:?}")
+    panic!("seed {seed}: no mechanism drawn from this distribution can move: {distribution:?}")
 }
 
 fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSystem> {
@@ -174,7 +174,7 @@ fn transposed(a: &Mat3<f64>) -> Mat3<f64> {
     std::array::from_fn(|i| std::array::from_fn(|k| a[k][i]))
 }
 
-/// A rotation matrix in a form of the model description, exact to rounding.
+/// A rotation matrix as roll, pitch and yaw of the model description, exact to rounding.
 fn described(r: &Mat3<f64>) -> Rotation {
     let pitch = (-r[2][0]).atan2((r[2][1] * r[2][1] + r[2][2] * r[2][2]).sqrt());
     let (roll, yaw) = if pitch.cos() > 1e-3 {

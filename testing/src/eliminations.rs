@@ -1,4 +1,5 @@
-//! Plans with eliminations drawn at random: what the search would find, layouts that no search picks, and none of its time.
+//! Plans with eliminations drawn at random. They cover what the search finds and layouts that it never picks, and take
+//! no time to find.
 
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions, RolledCode, DEFAULT_SNAP};
@@ -12,7 +13,7 @@ pub fn random_plan(model: &Model, seed: u64) -> Plan {
     random_plan_snapped(model, DEFAULT_SNAP, seed)
 }
 
-/// The same with [`PlanOptions::snap`] given, rad.
+/// A random plan with the given [`PlanOptions::snap`], rad.
 pub fn random_plan_snapped(model: &Model, snap: f64, seed: u64) -> Plan {
     let single = PlanOptions {
         snap,
@@ -30,7 +31,8 @@ pub fn random_plan_snapped(model: &Model, snap: f64, seed: u64) -> Plan {
     plan
 }
 
-/// The plan with an elimination drawn for each of its chains, frames, closed loops, and for the mass matrix.
+/// The plan with random eliminations of its chains and closed loops, random non-rotating frames, and a random number of
+/// nodes in the mass matrix.
 fn eliminated(single: &Plan, rng: &mut Rng) -> Plan {
     let mut plan = single.clone();
     plan.matrix_depth = rng.below(plan.nodes.len() + 1);

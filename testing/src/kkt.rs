@@ -1,5 +1,6 @@
-//! Constraints in ground axes from their definitions: residuals of the positions, and rates of every row as functions of the
-//! poses and velocities of both frames. Of the sweeps, only the motion of frames of the open tree is used.
+//! Constraints in ground axes, computed from their definitions: residuals of the positions, and rates of every row as
+//! functions of the poses and velocities of both frames. The only sweep in use is the one for the motion of frames of
+//! the open tree.
 
 use mbd_codegen::model::{ConstraintKind, LoopKind, Model, Mount};
 use mbd_codegen::plan::Plan;
@@ -36,7 +37,7 @@ pub fn unit(a: Vec3<f64>) -> Vec3<f64> {
     a.map(|x| x / n)
 }
 
-/// Two directions that make a right-handed triple with `a`, which has any length.
+/// Two directions that make a right-handed triple with `a`; the length of `a` does not matter.
 pub fn across(a: Vec3<f64>) -> [Vec3<f64>; 2] {
     let a = unit(a);
     let least = (0..3).min_by(|&i, &k| a[i].abs().total_cmp(&a[k].abs())).unwrap_or(0);
@@ -90,7 +91,8 @@ pub fn mounted<S: Scalar>(plan: &Plan, params: &[f64], frames: &[FrameState<S>],
     body.carried(&rotation, mount.placement.xyz.map(|x| value(x, params)))
 }
 
-/// What the positions must make zero; the same number of entries whatever the number of rows of rates.
+/// Residuals, which are zero at closed positions. Their number depends on the kind of loop only and may differ from the
+/// number of rows in [`rates`].
 pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let d = less(b.origin, a.origin);
     let num = |x: mbd_codegen::model::Value| S::constant(value(x, params));
@@ -103,7 +105,8 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
         LoopKind::Prismatic { axis } => [across_offset(axis), turned(a, b)].concat(),
         LoopKind::Cylindrical { axis } => [across_offset(axis), parallel(axis)].concat(),
         LoopKind::Helical { axis, pitch } => {
-            // The angle from two directions across the axis, and the sine of its difference from the angle of the displacement.
+            // The residual is the sine of the difference of two angles: the angle of rotation, from two directions
+            // across the axis, and the angle that belongs to the displacement.
             let (slide, pitch) = (along(unit(axis)), num(pitch));
             let [n, m] = across(axis);
             let (c, s) = (dot3(a.direction(n), b.direction(n)), dot3(a.direction(m), b.direction(n)));
@@ -139,8 +142,8 @@ fn turned<S: Scalar>(a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     (0..3).map(|k| dot3(a.direction(e((k + 1) % 3)), b.direction(e(k)))).collect()
 }
 
-/// Rates of all rows at closed positions: first those of [`residuals`], in their order, then those that constrain velocities
-/// only.
+/// Rates of all rows at closed positions: first the rates of [`residuals`], in their order, then the rows that
+/// constrain velocities only.
 pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let d = less(b.origin, a.origin);
     let num = |x: mbd_codegen::model::Value| S::constant(value(x, params));
@@ -149,7 +152,7 @@ pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S
     let w = less(b.ang, a.ang);
     let along = |n: Vec3<f64>| dot3(a.direction(n), v);
     let across_rate = |n: Vec3<f64>| across(n).map(along).to_vec();
-    // d/dt (m · c), where m is fixed to the first frame and c to the second.
+    // The rate d/dt (m · c), where m is fixed to the first frame and c to the second.
     let between = |m: Vec3<S>, c: Vec3<S>| dot3(w, cross(c, m));
     let parallel = |n: Vec3<f64>| across(n).map(|m| between(a.direction(m), b.direction(unit(n)))).to_vec();
     let e = |k: usize| std::array::from_fn::<f64, 3, _>(|i| f64::from(u8::from(i == k)));
@@ -249,7 +252,7 @@ impl Rows<'_> {
         self.model.constraints.iter().zip(poses).map(one).collect()
     }
 
-    /// Rates of all rows at given velocities of the state and at the drives' velocities, which `i` has.
+    /// Rates of all rows at the velocities `v` of the state and at the velocities of the drives, which `i` contains.
     pub fn rates<S: Scalar>(&self, i: &mut Interpreter<S>, q: &[S], v: &[S]) -> Vec<Vec<S>> {
         let poses = self.poses(i, q, v);
         let params = &self.state.params;
@@ -292,7 +295,7 @@ impl Rows<'_> {
         (rows, gamma)
     }
 
-    /// The open tree in motion, as dual numbers: inputs with their rates, coordinates with their rates.
+    /// The open tree moving with velocities `v`, as dual numbers: inputs and coordinates, each with its rate.
     pub fn moving(&self, v: &[f64]) -> (Interpreter<Dual<f64>>, Vec<Dual<f64>>) {
         let q = &self.state.q;
         let mut qd = vec![0.0; q.len()];
@@ -307,8 +310,8 @@ pub fn unit_of(n: usize, k: usize) -> Vec<f64> {
     (0..n).map(|j| f64::from(u8::from(j == k))).collect()
 }
 
-/// Rank of a matrix by elimination, with the largest remaining row as pivot. Rows are scaled to unit length first, so that a
-/// remainder of the size of round-off counts as zero.
+/// Rank of a matrix by elimination, with the largest remaining row as pivot. Rows are scaled to unit length first, so
+/// that a remainder of the size of round-off counts as zero.
 pub fn rank(rows: &[Vec<f64>], tolerance: f64) -> usize {
     let norm = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>().sqrt();
     let scaled = |r: &Vec<f64>| {

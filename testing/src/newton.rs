@@ -1,4 +1,5 @@
-//! Newton's and Euler's laws, body by body, from the motion of frames alone: a reference for the sweeps.
+//! Newton's and Euler's laws, body by body, computed from the motion of frames alone. They are a reference for the
+//! sweeps.
 
 use mbd_codegen::model::{JointKind, JointMotion, Model};
 use mbd_codegen::plan::{Plan, Rigid};
@@ -55,7 +56,7 @@ pub fn twice_kinetic(model: &Model, params: &[f64], body: usize, at: &FrameState
     let [p, l] = momentum(model, params, body, at);
     let w = apply(&other.rotation, other.velocity.ang);
     let origin = apply(&other.rotation, other.velocity.lin);
-    // Velocity of the body's point that coincides with the origin of the ground.
+    // The velocity of the point of the body that coincides with the origin of the ground.
     let v = add3(origin, cross(other.position, w));
     (0..3).map(|k| p[k] * v[k] + l[k] * w[k]).sum()
 }
@@ -108,8 +109,8 @@ pub fn joint_coordinates(plan: &Plan, params: &[f64], state: &[f64], drives: &[f
     (0..plan.model.joints.len()).map(coordinates).collect()
 }
 
-/// Motion `[linear; angular]` of the child frame for a unit velocity of each degree of freedom, in its own axes, at joint
-/// coordinates `q`.
+/// Motion `[linear; angular]` of the child frame for a unit velocity of each degree of freedom, in its own axes, at
+/// joint coordinates `q`.
 pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
     let unit = |a: Vec3<f64>| {
         let n = a.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -126,7 +127,7 @@ pub fn freedoms(kind: &JointKind, params: &[f64], q: &[f64]) -> Vec<[f64; 6]> {
         }
         JointKind::Universal { axes: [a, b] } => {
             let (a, b) = (unit(a), unit(b));
-            // The first axis in the axes after the second rotation (Rodrigues).
+            // The first axis, in the axes that result from the second rotation (Rodrigues' formula).
             let (s, c) = (-q[1]).sin_cos();
             let along = (1.0 - c) * (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
             let across = cross(b, a);

@@ -11,7 +11,7 @@ use crate::random::Rng;
 /// A state and all inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Coordinates, quaternions of unit length.
+    /// Coordinates; quaternions have unit length.
     pub q: Vec<f64>,
     /// Velocities.
     pub v: Vec<f64>,
@@ -82,8 +82,8 @@ impl State {
         self.interpreter_of(plan, |x, _| x)
     }
 
-    /// The same interpreter over any scalar. `lift` makes a scalar of a number and its rate of change; only prescribed positions
-    /// and rates have a rate that is not zero.
+    /// The same interpreter over any scalar. `lift` makes a scalar of a number and its rate of change; only prescribed
+    /// positions and rates have a rate that is not zero.
     pub fn interpreter_of<S: Scalar>(&self, plan: &Plan, lift: impl Fn(f64, f64) -> S) -> Interpreter<S> {
         let all = |list: &[f64]| list.iter().map(|x| lift(*x, 0.0)).collect::<Vec<S>>();
         let mut i = Interpreter::new(plan.tree(&all(&self.params)), self.gravity.map(|x| lift(x, 0.0)));
@@ -97,8 +97,8 @@ impl State {
     }
 }
 
-/// Derivatives of the rates with respect to parameter `k` by the sweeps, at the state for which `at` was computed, and the
-/// interpreter with the varied parameter.
+/// Derivatives of the rates with respect to parameter `k`, computed by the sweeps at the state to which `at` belongs;
+/// and the interpreter over dual numbers in which this parameter has the derivative one.
 pub fn parameter<S: Scalar>(
     plan: &Plan,
     s: &State,

@@ -1,4 +1,4 @@
-//! A writer of the TOML format: it shows failing cases and tests the reader.
+//! A writer of the TOML format. It prints failing cases and tests the reader.
 
 mod constraints;
 
@@ -11,7 +11,7 @@ use mbd_codegen::model::{
 /// Order in which joints are written; the reader sorts them depth first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// As in the model.
+    /// The order of the model.
     DepthFirst,
     /// Breadth first: all joints of one depth, then those of the next.
     BreadthFirst,
@@ -98,7 +98,7 @@ struct Writer<'m> {
 }
 
 impl Writer<'_> {
-    /// A number; an angle is written in degrees where that reads back to the same number.
+    /// A number. An angle is written in degrees where the reader converts that back to the same number.
     fn number(&self, v: Value, angle: bool) -> String {
         match v {
             Value::Param(k) => format!("{{ param = {} }}", quoted(&self.model.params[k].name)),
@@ -139,7 +139,7 @@ impl Writer<'_> {
         }
     }
 
-    /// One number where all are the same, a list otherwise.
+    /// Writes one number where all are the same, a list otherwise.
     fn freedoms(&self, out: &mut String, key: &str, values: &[Value], angle: bool) {
         let Some(first) = values.first() else { return };
         if values.iter().all(|v| v == first) {

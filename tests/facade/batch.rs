@@ -1,4 +1,4 @@
-//! Many states in one call: the numbers are those of single states, bit for bit, for any number of states.
+//! Many states in one call have the results of single states, bit for bit, for any number of states.
 
 use multibody::runtime::batch::{BatchError, RatesBatch};
 use multibody::runtime::kernel::{Kernel, Plain};
@@ -6,8 +6,8 @@ use multibody::runtime::kernel::{Kernel, Plain};
 multibody::mbd_model! { path = "models/ur5.urdf", name = Ur5, outputs = [rates, energy] }
 multibody::mbd_model! { path = "models/double_pendulum.toml", name = Single, outputs = [rates], scalar = f32 }
 
-/// One column for each coordinate, of `n` numbers that differ. The 5th and 12th state have angles far beyond the main
-/// path of sine and cosine.
+/// One column of `n` different numbers for each coordinate. The 5th and 12th state have angles so large that sine and
+/// cosine leave their main path.
 fn columns<const N: usize>(n: usize, shift: f64) -> [Vec<f64>; N] {
     std::array::from_fn(|k| {
         let number = |s: usize| (shift + 0.7 * k as f64 + 1.3 * s as f64).sin() * if s % 7 == 5 { 1e9 } else { 2.0 };
@@ -27,7 +27,7 @@ fn state<T: Copy, const N: usize>(columns: &[Vec<T>; N], s: usize) -> [T; N] {
     columns.each_ref().map(|c| c[s])
 }
 
-/// A batch of every length has the bits of single states.
+/// Batches of every length have the bits of single states.
 #[test]
 fn every_length() {
     let mut arm = Ur5::new();
@@ -55,7 +55,7 @@ fn every_length() {
     }
 }
 
-/// Lanes have the bits of single states, in any number.
+/// Any number of lanes has the bits of single states.
 #[test]
 fn any_lanes() {
     fn lanes<const L: usize>() {
@@ -79,7 +79,7 @@ fn any_lanes() {
     lanes::<16>();
 }
 
-/// Plain arithmetic and whatever the processor has differ by rounding only.
+/// Plain arithmetic and the fastest arithmetic of the processor differ by rounding only.
 #[test]
 fn levels_agree() {
     let arm = Ur5::new();
@@ -94,7 +94,7 @@ fn levels_agree() {
         for (best, plain) in best.iter().zip(&plain) {
             let size = plain.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             for (a, b) in best.iter().zip(plain) {
-                // Some hundred roundings, and the condition of the arm's inertia.
+                // The bound allows for some hundred roundings and for the condition of the arm's inertia.
                 assert!((a - b).abs() <= 1e-12 * size, "{a} and {b} in state {s}");
             }
         }
@@ -114,7 +114,7 @@ fn lengths_are_checked() {
     assert!(qd.iter().chain(&pd).flatten().all(|x| *x == 7.0), "nothing is written");
 }
 
-/// The threads of rayon give the numbers of one thread.
+/// Computation by the threads of rayon gives the numbers of one thread.
 #[cfg(feature = "rayon")]
 #[test]
 fn threads() {
@@ -131,7 +131,7 @@ fn threads() {
     }
 }
 
-/// Code over any system has batches too.
+/// Generic code can use batches through the trait.
 #[test]
 fn through_the_trait() {
     fn count<S: RatesBatch<f64, 6, 6, 6>>(system: &S, n: usize) -> usize {

@@ -1,7 +1,8 @@
-//! The committed code of `generated/` and of the tour against the interpreter: every function, bit for bit, on twenty random states.
+//! The committed code of `generated/` and of the tour against the interpreter: every function, bit for bit, in twenty
+//! random states.
 //!
-//! The generator rewrites exactly, so both compute the same operations in the same order; only the sign of zeros may
-//! differ, which `+ 0.0` levels.
+//! With exact arithmetic, generated code and interpreter compute the same operations in the same order. Only the sign
+//! of zeros may differ, which the comparison removes by adding `0.0`.
 
 #[path = "../../generated/mod.rs"]
 #[rustfmt::skip]
@@ -30,7 +31,7 @@ fn interpreter(file: &str, base: Base) -> (Plan, Interpreter<f64>) {
     (plan, interpreter)
 }
 
-/// Marsaglia's xorshift, the same numbers everywhere.
+/// Marsaglia's xorshift generator, which gives the same numbers on every machine.
 struct Random(u64);
 
 impl Random {
@@ -51,7 +52,7 @@ fn unit(quaternion: &mut [f64]) {
     quaternion.iter_mut().for_each(|x| *x /= norm);
 }
 
-/// Equal bits, zeros apart; infinities and NaN are equal to nothing.
+/// Asserts that numbers are finite and have equal bits; zeros may differ in sign.
 fn same(what: &str, state: u64, ours: &[f64], theirs: &[f64]) {
     assert_eq!(ours.len(), theirs.len(), "{what}");
     for (k, (a, b)) in ours.iter().zip(theirs).enumerate() {
@@ -90,7 +91,7 @@ macro_rules! check {
     };
 }
 
-/// What all outputs are called with.
+/// The arguments of all outputs.
 struct Given<const NQ: usize, const NV: usize> {
     q: [f64; NQ],
     v: [f64; NV],

@@ -1,9 +1,9 @@
-//! Operation counts are gates: additions, multiplications and divisions of the emitted rates. General chains of many
-//! lengths are counted among the random trees of `testing`.
+//! Limits of operation counts: additions, multiplications and divisions of the emitted rates. The tests of `testing`
+//! count general chains of more lengths.
 //!
-//! *Best known* is what a prototype reached before this generator: one operation each for additions, multiplications and
-//! divisions, sines and cosines given, no joint forces. Either arithmetic may meet it; the other limits keep what has been
-//! reached, some 1 % above it.
+//! *Best known* counts are those of a prototype before this generator. They count one operation each for additions,
+//! multiplications and divisions, with sines and cosines given and without joint forces. One of the two arithmetics
+//! must reach them. The other limits are about 1 % above what has been reached.
 
 use std::fmt::Write as _;
 
@@ -28,20 +28,20 @@ fn read(name: &str, text: &str, base: Base, gravity: Option<[f64; 3]>) -> Model 
     read::model(name, text, &ImportOptions { base, gravity }).unwrap_or_else(|findings| panic!("{findings}")).model
 }
 
-/// What is counted.
+/// The operations that are counted.
 #[derive(Clone, Copy, PartialEq)]
 enum Scope {
-    /// Everything but sines and cosines.
+    /// All operations but sines and cosines.
     All,
-    /// As the best known counts: they begin with sines (the offset of an angle is an addition before), for a floating base
-    /// with its rotation matrix, and end with velocities (quaternion rates come after).
+    /// The operations of the best known counts. They begin after sines and cosines, or after the rotation matrix of a
+    /// floating base; an addition for the offset of an angle is before that. They end with velocities, before
+    /// quaternion rates.
     Core,
 }
 
 /// Operations of the rates without joint forces, exact and fast.
-fn rates(model: &Model, forms: EliminationStrategy, scope: Scope) -> [usize; 2] {
-    let plan_options =
-        PlanOptions { elimination: forms, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
+fn rates(model: &Model, elimination: EliminationStrategy, scope: Scope) -> [usize; 2] {
+    let plan_options = PlanOptions { elimination, accelerations: false, mass_matrix: false, ..PlanOptions::default() };
     let plan = search::plan(model, plan_options);
     ARITHMETIC.map(|arithmetic| {
         let options = Options { plan: plan_options, efforts: false, arithmetic, ..Options::default() };
@@ -61,9 +61,9 @@ fn check(what: &str, best_known: Option<usize>, limits: [usize; 2], counts: [usi
     assert!(best_known.is_none_or(|k| best <= k), "{what}: {best} operations, best known {best_known:?}");
 }
 
-/// Pins in which nothing is aligned and nothing is zero; each body hangs on the one before it, or where `parent` says.
+/// A tree of `n` revolute joints without aligned axes and without zeros. `parent` gives the parent of each body.
 fn general(n: usize, parent: impl Fn(usize) -> String, first: &str, gravity: Option<[f64; 3]>) -> Model {
-    // Numbers without pattern.
+    // The numbers of the model have no pattern.
     let mut k = 0.0_f64;
     let mut next = |low: f64, high: f64| {
         k += 0.618_033_988_749_894_9;
@@ -95,7 +95,7 @@ fn general_chain(n: usize, gravity: Option<[f64; 3]>) -> Model {
     general(n, |i| if i == 1 { "ground".to_string() } else { format!("link{}", i - 1) }, "", gravity)
 }
 
-/// Four legs of three joints on a floating trunk.
+/// A floating trunk with four legs of three joints each.
 fn general_quadruped(gravity: Option<[f64; 3]>) -> Model {
     let trunk = "[[body]]\nname = \"trunk\"\nmass = 12.3\ncom = [0.02, -0.03, 0.05]\n\
         inertia = { xx = 0.4, yy = 0.5, zz = 0.6, xy = 0.021, xz = -0.013, yz = 0.017 }\n\
@@ -103,7 +103,8 @@ fn general_quadruped(gravity: Option<[f64; 3]>) -> Model {
     general(12, |i| if i % 3 == 1 { "trunk".to_string() } else { format!("link{}", i - 1) }, trunk, gravity)
 }
 
-/// Without gravity, with gravity. Nothing is zero, so these hold for every chain of pins; `testing` has more lengths.
+/// Counts of general chains without and with gravity. No number is zero, so these counts are bounds for every chain of
+/// revolute joints.
 #[test]
 fn general_chains_stay_below_the_best_known() {
     for (n, best_known) in [(2, [59, 83]), (3, [220, 261]), (6, [1037, 1126]), (7, [1380, 1485]), (10, [2327, 2564])] {
@@ -129,7 +130,7 @@ fn a_general_quadruped_stays_below_the_best_known() {
     }
 }
 
-/// The form with the fewest operations.
+/// Counts for the eliminations with the fewest operations.
 #[test]
 fn real_robots_stay_below_the_best_known() {
     type Row = (&'static str, Base, [Option<usize>; 2], [[usize; 2]; 2]);
@@ -137,7 +138,7 @@ fn real_robots_stay_below_the_best_known() {
         ("ur5.urdf", Base::Fixed, [Some(417), Some(438)], [[240, 237], [249, 245]]),
         ("panda_arm.urdf", Base::Fixed, [Some(823), Some(877)], [[819, 812], [869, 861]]),
         ("iiwa14.urdf", Base::Fixed, [None; 2], [[579, 567], [645, 634]]),
-        // Fast arithmetic computes shared products again where the longest path waits for them.
+        // Fast arithmetic repeats shared products where the longest path waits for them.
         ("chain10_planar.toml", Base::Fixed, [Some(498), Some(647)], [[466, 466], [496, 495]]),
         ("double_pendulum.toml", Base::Fixed, [None; 2], [[19, 18], [30, 29]]),
         ("spherical_pendulum.toml", Base::Fixed, [None; 2], [[98, 94], [129, 124]]),
@@ -153,7 +154,7 @@ fn real_robots_stay_below_the_best_known() {
     }
 }
 
-/// The form that is taken if nobody asks: the one with the shortest time.
+/// Counts for the default eliminations, which take the shortest time.
 #[test]
 fn what_is_generated_by_default_stays_below_its_limits() {
     for (name, base, limits) in [
@@ -183,13 +184,13 @@ fn joint_forces_cost_one_addition_each_at_most() {
             let options = Options { efforts, arithmetic: Arithmetic::Exact, ..Options::default() };
             trace(&plan, Output::Rates, &options).expect("rates").program.counts().total()
         });
-        // A first joint with a vertical axis has no momentum rate but its force: nothing to add it to.
+        // If the axis of the first joint is vertical, its momentum rate is the joint force alone, without an addition.
         assert!(with - without == nv || with - without == nv - 1, "{name}: {}", with - without);
     }
 }
 
-/// Rates and all four blocks of derivatives. In comments the operations of CasADi's code of Pinocchio's
-/// `computeABADerivatives` (`benches/rivals/derivatives`), where it has been made.
+/// Counts for rates and all four blocks of derivatives. The comments give the operations of CasADi's code for
+/// Pinocchio's `computeABADerivatives` (`benches/rivals/derivatives`), where it was generated.
 #[test]
 fn derivatives_stay_below_their_limits() {
     for (file, base, limit) in [

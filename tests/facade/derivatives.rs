@@ -1,4 +1,4 @@
-//! Derivatives in use: implicit midpoint steps by Newton's method, over generated code and the interpreter alike.
+//! Derivatives in use: implicit midpoint steps by Newton's method, with generated code and with the interpreter.
 
 use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
@@ -10,7 +10,8 @@ multibody::mbd_model! {
     outputs = [rates, momenta, energy, derivatives]
 }
 
-/// One step `z₁ = z₀ + h f((z₀ + z₁)/2)` of a system whose coordinates are angles; the largest residual of every iteration.
+/// Makes one step `z₁ = z₀ + h f((z₀ + z₁)/2)` of a system whose coordinates are angles. Returns the largest residual
+/// of every iteration.
 fn midpoint<M: Differentiable<Scalar = f64>>(
     m: &mut M,
     h: f64,
@@ -44,7 +45,7 @@ fn midpoint<M: Differentiable<Scalar = f64>>(
     residuals
 }
 
-/// Gaussian elimination; the matrix is near the unit matrix.
+/// Gaussian elimination without pivoting, for a matrix near the unit matrix.
 fn solve(mut a: Vec<Vec<f64>>, x: &mut [f64]) {
     let n = x.len();
     for k in 0..n {
@@ -58,7 +59,7 @@ fn solve(mut a: Vec<Vec<f64>>, x: &mut [f64]) {
     (0..n).for_each(|k| x[k] /= a[k][k]);
 }
 
-/// With exact derivatives the residual falls as its square, down to rounding.
+/// With exact derivatives, every iteration squares the residual, down to rounding.
 fn assert_newton(residuals: &[f64]) {
     println!("{residuals:?}");
     assert!(residuals[4] < 1e-14, "{residuals:?}");
@@ -78,7 +79,7 @@ fn newton_converges_quadratically_in_implicit_steps() {
         assert_newton(&midpoint(&mut model, 0.02, &mut q, &mut p));
     }
     let after: f64 = model.energy(&q, &p).iter().sum();
-    // The rule is symplectic and of second order: the energy swings within some h².
+    // The implicit midpoint rule is symplectic and of second order: the error of the energy stays of the order h².
     assert!((after - before).abs() < 1e-2 * before.abs().max(1.0), "{before} {after}");
 
     let text = std::fs::read_to_string("models/double_pendulum.toml").expect("the model");

@@ -1,4 +1,4 @@
-//! What `mbd_model!` says about wrong arguments and wrong models: each `tests/ui/*.rs` is compiled, must fail, and must print
+//! Messages of `mbd_model!` about wrong arguments and wrong models. Each `tests/ui/*.rs` must fail to compile and print
 //! its `.stderr`. `UPDATE=1 cargo test -p multibody --test facade macro_errors` rewrites the `.stderr` files.
 
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use std::time::SystemTime;
 /// The folder of the cases; paths in the macro are relative to it.
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/ui");
 
-/// The library `multibody` that was compiled last: the one of the sources as they are, because this test depends on it.
+/// The library `multibody` that was compiled last. It belongs to the present sources, because this test depends on it.
 fn library(dependencies: &Path) -> PathBuf {
     let files =
         std::fs::read_dir(dependencies).expect("the folder of the dependencies").map(|f| f.expect("a file").path());
@@ -20,7 +20,7 @@ fn library(dependencies: &Path) -> PathBuf {
     files.filter(is_library).max_by_key(age).expect("cargo has compiled the library")
 }
 
-/// What the compiler prints for a case, without the lines that count errors.
+/// Messages of the compiler for a case, without the lines that count errors.
 fn messages(case: &Path, dependencies: &Path, library: &Path) -> String {
     let name = case.file_name().and_then(|n| n.to_str()).expect("a name");
     let compiled = Command::new(std::env::var_os("RUSTC").unwrap_or("rustc".into()))

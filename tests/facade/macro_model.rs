@@ -1,4 +1,4 @@
-//! Types made by `mbd_model!`: they compile without a warning, and compute what the interpreter computes, bit for bit.
+//! Types made by `mbd_model!` compile without warnings and give the results of the interpreter, bit for bit.
 #![deny(warnings, missing_docs, unused, nonstandard_style, unreachable_pub)]
 
 use multibody::codegen::options::PlanOptions;
@@ -8,9 +8,9 @@ use multibody::runtime::integrate::{Rk4, Stepper};
 use multibody::runtime::system::Part;
 use multibody::runtime::{Interpreter, System};
 
-/// Types as a user's public module has them.
+/// Types in a public module, as users have them.
 pub mod made {
-    // Several in one module, and nothing imported.
+    // There are several types in one module, and the module imports nothing.
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = DoublePendulum, arithmetic = exact }
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = Again, outputs = [velocities], efforts = false }
     multibody::mbd_model! { path = "models/ur5.urdf", name = pub(crate) Ur5, arithmetic = exact }
@@ -62,10 +62,10 @@ pub mod made {
     named!("models/double_pendulum.toml", Wrapped, [energy], ::multibody::runtime);
 }
 
-/// Warnings about a model can be silenced.
+/// An attribute silences warnings about a model.
 #[allow(deprecated)]
 mod warned {
-    // An inertia that no body has.
+    // No body can have this inertia.
     multibody::mbd_model! {
         urdf = "<robot name='w'><link name='r'/><link name='a'><inertial><mass value='2'/><inertia ixx='1' ixy='0' ixz='0' \
                 iyy='1' iyz='0' izz='3'/></inertial></link><joint name='j' type='continuous'><parent link='r'/>\
@@ -82,7 +82,7 @@ fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
     plan.interpreter(&plan.default_params())
 }
 
-/// Numbers in (-1, 1) that no coincidence favours.
+/// Numbers in (-1, 1) without special values.
 fn numbers(seed: usize, out: &mut [f64]) {
     for (k, x) in out.iter_mut().enumerate() {
         *x = ((1 + seed * 31 + k) as f64 * 0.618_033_988_749_895).fract() * 2.0 - 1.0;
@@ -93,7 +93,7 @@ fn bits(x: &[f64]) -> Vec<u64> {
     x.iter().map(|x| x.to_bits()).collect()
 }
 
-/// One type against the interpreter: rates, momenta, energies at a few states, then a step of the integrator.
+/// Compares one type with the interpreter: rates, momenta and energies in a few states, then a step of the integrator.
 macro_rules! compare {
     ($name:ident, $made:ident, $file:literal, $base:expr) => {
         #[test]
@@ -149,7 +149,8 @@ compare!(solo12_floating, Solo12, "models/solo12.urdf", Base::Floating);
 
 #[test]
 fn arguments_take_effect() {
-    // All numbers of f32, moon gravity along -y, both frames asked for, in that order.
+    // All numbers are `f32`, the gravity of the moon acts along -y, and the requested frames come in the order of the
+    // request.
     let single = made::Single::new();
     let copy = single;
     assert_eq!((made::Single::FRAME_TIP, made::Single::FRAME_UPPER), (0, 1));
@@ -160,7 +161,7 @@ fn arguments_take_effect() {
     let [_, potential] = single.energy(&[0.5, 0.5], &[0.0, 0.0]);
     assert_eq!(potential, 0.0, "no work along y");
 
-    // `efforts = false` leaves no field, and the output list no other function.
+    // With `efforts = false` the type has no field, and it has only functions of the requested outputs.
     let again = made::Again {};
     let mut v = [0.0; 2];
     again.velocities(&[0.0, 0.0], &[1.0, 0.0], &mut v);
@@ -177,7 +178,7 @@ fn inline_descriptions() {
     bob.gravity = [0.0, 3.0, 0.0];
     bob.wrenches[made::Bob::WRENCH_BOB][3] = 0.5;
     assert_eq!(bob.neutral(), [0.0, 0.0, 0.0, 1.0]);
-    // At rest the moment about x is that of the weight, -m g y × (0, 0, -1), and the given one.
+    // At rest, the moment about x is the sum of that of the weight, -m g y × (0, 0, -1), and the given one.
     let (mut qd, mut pd) = ([1.0; 4], [1.0; 3]);
     bob.rates(&[0.0, 0.0, 0.0, 1.0], &[0.0; 3], &mut qd, &mut pd);
     assert_eq!(qd, [0.0; 4]);

@@ -1,4 +1,4 @@
-//! The library as its users see it: generated types, committed code, shipped models, reference data.
+//! Tests of the library as users see it: generated types, committed code, shipped models, reference data.
 
 mod batch;
 mod committed;

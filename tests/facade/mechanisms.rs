@@ -1,4 +1,5 @@
-//! The shipped mechanisms with loops: they close, move as mechanics says they can, and keep their loops and their energy.
+//! The shipped mechanisms with loops: their loops close and stay closed, their mobility is right, and their energy is
+//! conserved.
 
 use std::path::{Path, PathBuf};
 
@@ -12,30 +13,33 @@ use multibody::runtime::integrate::{Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
 
-/// Velocities of a mechanism at rest, but for one of them.
+/// A mechanism and its motion, which starts with one given velocity.
 struct Case {
     name: &'static str,
-    /// Rows as written, and the velocities that are left.
+    /// Number of rows, redundant ones included.
     rows: usize,
+    /// Number of independent velocities.
     mobility: usize,
     /// Length of the motion, s.
     time: f64,
-    /// Index and size of the velocity that the others follow.
+    /// Index and value of the given velocity, which the others follow.
     thrown: (usize, f64),
 }
 
-/// Mobility by Grübler, f − r: planar four-bars and the slider-crank 3 − 2; Strandbeest leg 7 − 3·2; Stewart platform 6 + 6·3 − 6·3;
-/// Delta robot 3 + 6 − 6; spring leg 9 − 2; disc 6 − 3; bicycle 9 − 2·3. A pin in space has 5 rows, all but 2 redundant in a plane.
+/// All shipped mechanisms. Their mobility is Grübler's `f − r`, with `f` freedoms of the tree and `r` independent rows:
+/// planar four-bars and the slider-crank 3 − 2; Strandbeest leg 7 − 3·2; Stewart platform 6 + 6·3 − 6·3; Delta robot 3
+/// + 6 − 6; spring leg 9 − 2; disc 6 − 3; bicycle 9 − 2·3. A revolute joint that closes a loop has 5 rows, of which 3
+/// are redundant if the mechanism is planar.
 const CASES: [Case; 10] = [
     Case { name: "fourbar", rows: 5, mobility: 1, time: 1.0, thrown: (0, 8.0) },
     Case { name: "fourbar_3d", rows: 5, mobility: 1, time: 1.0, thrown: (0, 8.0) },
-    // Through the change point.
+    // This motion passes a change point.
     Case { name: "fourbar_equal", rows: 5, mobility: 1, time: 0.9, thrown: (0, 6.0) },
     Case { name: "slider_crank", rows: 5, mobility: 1, time: 1.0, thrown: (0, 10.0) },
     Case { name: "strandbeest_leg", rows: 15, mobility: 1, time: 1.0, thrown: (0, 6.0) },
     Case { name: "stewart", rows: 18, mobility: 6, time: 0.2, thrown: (0, 0.1) },
     Case { name: "delta", rows: 6, mobility: 3, time: 1.0, thrown: (0, 0.1) },
-    // Stiff springs, short steps.
+    // The springs are stiff and need short steps, so the motion is short.
     Case { name: "spring_leg", rows: 2, mobility: 7, time: 0.1, thrown: (0, 0.1) },
     Case { name: "rolling_disc", rows: 3, mobility: 3, time: 1.0, thrown: (0, 1.0) },
     Case { name: "bicycle", rows: 6, mobility: 3, time: 1.0, thrown: (0, 5.0) },
@@ -82,7 +86,7 @@ fn closed(plan: &Plan) -> (Interpreter<f64>, Vec<f64>) {
     (interpreter, q)
 }
 
-/// Number of independent rows of `Φ`, by elimination with complete pivoting: nothing of the mechanism's own.
+/// Number of independent rows of `Φ`, by elimination with complete pivoting, independent of the sweeps.
 fn rank(interpreter: &mut Interpreter<f64>, q: &[f64]) -> usize {
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     interpreter.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
@@ -97,7 +101,8 @@ fn rank(interpreter: &mut Interpreter<f64>, q: &[f64]) -> usize {
     while rank < rows.len() {
         let all = (rank..rows.len()).flat_map(|i| (0..nv).map(move |j| (i, j)));
         let Some((i, j)) = all.max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs())) else { break };
-        // Rounding leaves 1e-16 of metres and radians of order one; what is independent here is above 1e-3.
+        // Entries are metres and radians of order one: rounding leaves 1e-16, and independent rows leave more than
+        // 1e-3.
         if rows[i][j].abs() < 1e-9 {
             break;
         }
@@ -141,7 +146,7 @@ fn they_close_and_have_the_mobility_that_mechanics_says() {
     }
 }
 
-/// Rates of the rows at velocities, largest.
+/// Largest rate of a row at given velocities.
 fn broken(interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> f64 {
     let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     interpreter.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
@@ -185,24 +190,25 @@ fn they_keep_their_loops_and_their_energy() {
             let size = v.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
             rate = rate.max(broken(&mut system, &q, &v) / size);
         }
-        // Closed to 1e-14 after every step, as far as the next digit of rows of some metres and radians allows.
+        // Projection closes positions to 1e-14, apart from rounding of rows of some metres and radians.
         assert!(open <= 4e-14, "{}: open by {open:e}", case.name);
-        // Round-off of sums of some ten terms; where rows become dependent (change point) a row may count down to 1e-10 of its
-        // square, that is 1e-5 of its size, and round-off grows by as much.
+        // Rates of rows are zero up to rounding of sums of some ten terms. Near a change point rows become dependent: a
+        // row counts as independent down to a pivot of 1e-10, that is 1e-5 of its size, and rounding grows by this
+        // factor.
         let round_off = if case.name == "fourbar_equal" { 1e-10 } else { 1e-12 };
         assert!(rate <= round_off, "{}: velocities break the rows by {rate:e}", case.name);
-        // Every step may err by the tolerance in momenta, and T goes with their square.
+        // The error of momenta in every step may be the tolerance, and T is quadratic in momenta.
         let steps = driver.statistics().steps as f64;
         assert!(
             worst <= 2.0 * tolerance * steps * scale,
             "{}: energy {worst:e} of {scale:e} in {steps} steps",
             case.name
         );
-        assert!(steps >= 5.0, "{}: it moves", case.name);
+        assert!(steps >= 5.0, "{}: {steps} steps", case.name);
     }
 }
 
-/// Steps that jump over the change point go on smoothly: the bars stay parallel, time after time.
+/// Fixed steps that jump over the change points stay on their branch of the motion: the bars stay parallel.
 #[test]
 fn a_parallelogram_passes_its_change_points() {
     let plan = plan("fourbar_equal");
@@ -226,13 +232,14 @@ fn a_parallelogram_passes_its_change_points() {
         above = q[0].sin() > 0.0;
     }
     assert!(passed >= 4, "{passed} change points");
-    // Positions are closed to 1e-14, across the way only to that over the distance from the fork, which counts from 1e-5 rad on.
+    // Positions are closed to 1e-14, but across the direction of motion only to 1e-14 divided by the distance from the
+    // change point, which is at least 1e-5 rad.
     assert!(apart < 1e-9, "bars at {apart:e} rad");
     assert!(lost < 1e-8 * 3.5, "{lost:e} J of 3.5 J");
 }
 
-/// Steps chosen by their error follow what rounding makes of the fork at the change point. That it is closed again after each of
-/// them takes no energy, whichever way it goes.
+/// With steps by error control, rounding decides on the branch behind the change point. Projection after every step
+/// does not change the energy on either branch.
 #[test]
 fn a_change_point_takes_no_energy() {
     let plan = plan("fourbar_equal");
@@ -259,13 +266,13 @@ fn a_change_point_takes_no_energy() {
         apart = apart.max((q[0] - q[2]).abs());
         lost = lost.max((sum(system.energy(&q, &p)) - before).abs());
     }
-    assert!(apart > 0.1, "it never crossed: {apart:e} rad");
-    // 1e-8 of some joules.
+    assert!(apart > 0.1, "the bars never left the parallel branch: {apart:e} rad");
+    // The bound is 1e-8 of some joules.
     assert!(lost < 3e-8, "{lost:e} J");
 }
 
-/// Small motions of the bicycle at 5 m/s have the four published eigenvalues (Meijaard et al. 2007, table 2): the lean, sampled
-/// at equal times, meets the recursion whose roots are `e^{λh}`.
+/// Small motions of the bicycle at 5 m/s have the four published eigenvalues `λ` (Meijaard et al. 2007, table 2): the
+/// lean, sampled at equal times, satisfies the recursion whose roots are `e^{λh}`.
 #[test]
 fn the_bicycle_rides_as_published() {
     const WEAVE: (f64, f64) = (-0.775_341_882_195_85, 4.464_867_713_788_23);
@@ -312,10 +319,10 @@ fn the_bicycle_rides_as_published() {
         driver.state(&system, &mut q, &mut p);
         leans.push(lean(&q));
     }
-    // Leans of 1e-3 rad: what is not linear is of the third order, the bicycle being the same to both sides: 1e-6 of them.
+    // Leans are 1e-3 rad. As the bicycle is symmetric, nonlinear terms are of third order, 1e-6 of the leans.
     let found = misfit(&leans, h, WEAVE);
     assert!(found < 1e-5, "misfit {found:e}");
-    // The test would see a thousandth.
+    // The test must detect an error of a thousandth of a frequency.
     let other = misfit(&leans, h, (WEAVE.0, 1.001 * WEAVE.1));
     assert!(other > 1e-5, "misfit {other:e} of another frequency");
 }

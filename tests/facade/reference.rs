@@ -1,5 +1,5 @@
-//! Against Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames, reactions and centroidal quantities of nineteen mechanisms
-//! (`tests/reference/README.md`).
+//! Comparison with Pinocchio: p, q̇, ṗ, q̈, τ(q̈), energies, M, frames, reactions and centroidal quantities of
+//! nineteen mechanisms (`tests/reference/README.md`).
 
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::state_layout;
@@ -59,7 +59,7 @@ impl Case {
                 model.wrenches.push(multibody::codegen::model::Wrench { name: link, body, axes });
             }
         }
-        // Every number as it stands: Pinocchio knows nothing of snapped angles.
+        // Pinocchio does not snap angles, so the plan must not either.
         let plan = search::plan(&model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
         let mut params = plan.default_params();
         for (value, param) in params.iter_mut().zip(plan.params()) {
@@ -69,14 +69,14 @@ impl Case {
         let interpreter = Interpreter::new(plan.tree(&params), [gravity[0], gravity[1], gravity[2]]);
         let mut layout = state_layout::pinocchio(&plan);
         if file.ends_with(".toml") {
-            // The data's own order is the file's; only the form of the coordinates is Pinocchio's.
+            // The order of joints is that of the data; only the coordinates of each joint follow Pinocchio's layout.
             layout = by_name(&plan, &data, layout);
         }
         Case { name: name.to_string(), data, plan, layout, interpreter }
     }
 }
 
-/// The layout's parts with the places the data states.
+/// The layout with the indices that the data gives for each joint.
 fn by_name(plan: &Plan, data: &Value, mut layout: Layout) -> Layout {
     for joint in data["joints"].as_array().expect("joints") {
         let name = joint["name"].as_str().expect("a name");
@@ -130,7 +130,7 @@ fn check(name: &str) {
         let mut p = vec![0.0; nv];
         interpreter.momenta(&q, &v, &mut p);
         worst.compare("p", &ours(&p), &numbers(&state["p"]));
-        // The reference's own momenta in, so that errors do not add up.
+        // The inputs are the momenta of the reference, so that errors do not add up.
         layout.v_from(&q, &numbers(&state["p"]), &mut p);
         let (mut v2, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
         interpreter.rates(&q, &p, &mut v2, &mut qd, &mut pd);
@@ -142,7 +142,7 @@ fn check(name: &str) {
         let mut a = vec![0.0; nv];
         interpreter.accelerations(&q, &v, &mut a);
         worst.compare("qdd", &ours(&a), &numbers(&state["qdd"]));
-        // Its accelerations in, its joint forces out.
+        // From the accelerations of the reference, inverse dynamics must give its joint forces.
         layout.v_from(&q, &numbers(&state["qdd"]), &mut a);
         let mut inverse = vec![0.0; nv];
         interpreter.inverse_dynamics(&q, &v, &a, &mut inverse);

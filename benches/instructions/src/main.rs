@@ -1,5 +1,5 @@
-//! `instructions MODEL FUNCTION CALLS`: calls a generated function so many times. `.ci/instructions.sh` lets valgrind count
-//! what two runs with different numbers of calls differ by.
+//! `instructions MODEL FUNCTION CALLS` calls a generated function as many times as it is told. `.ci/instructions.sh`
+//! counts the instructions of one call by valgrind, from two runs with different numbers of calls.
 
 use std::hint::black_box;
 
@@ -58,7 +58,8 @@ models! {
     g1, Robot;
 }
 
-/// Some state. Which one does not matter: the code has no branches but those for angles beyond 1e5 rad.
+/// An arbitrary state. The number of instructions does not depend on it: the only branches are for angles beyond 1e5
+/// rad.
 fn state<const N: usize>() -> [f64; N] {
     std::array::from_fn(|k| 0.1 + 0.05 * k as f64)
 }
@@ -68,7 +69,7 @@ fn main() -> Result<(), String> {
     let [model, function, calls] = &arguments[..] else { return Err("usage: instructions MODEL FUNCTION CALLS".into()) };
     let calls = calls.parse().map_err(|_| format!("`{calls}` is no number of calls"))?;
     let result = run(model, function, calls)?;
-    // Read, so that nothing is left out.
+    // The result is used, so that the compiler cannot remove the calls.
     if result.is_nan() {
         return Err(format!("{model} {function}: not a number"));
     }

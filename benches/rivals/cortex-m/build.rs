@@ -1,4 +1,5 @@
-//! Links the rival's object files, which `run.sh` names in `RIVALS_OBJECTS`, and the example's memory map.
+//! Links the object files of CasADi's code, which `run.sh` names in `RIVALS_OBJECTS`, with the memory map of the
+//! firmware example.
 
 fn main() {
     let here = std::env::var("CARGO_MANIFEST_DIR").expect("cargo sets it");

@@ -1,4 +1,4 @@
-//! Generates the code of the robots listed in the file that `RIVALS_ROBOTS` names.
+//! Generates the code of the robots in the list whose file the environment variable `RIVALS_ROBOTS` names.
 
 use mbd_codegen::search;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
@@ -29,7 +29,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     let text = std::fs::read_to_string(path).expect("the model");
     let base = if base == "floating" { Base::Floating } else { Base::Fixed };
     let mut model = read::model(path, &text, &ImportOptions { base, gravity: None }).unwrap_or_else(|findings| panic!("{findings}")).model;
-    // Pinocchio's forward dynamics knows no dampers.
+    // Pinocchio's forward dynamics has no dampers.
     for joint in &mut model.joints {
         joint.damping.fill(mbd_codegen::model::Value::Const(0.0));
     }
@@ -41,16 +41,16 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     };
     let generated = generate(&model, &options).expect("code");
     write(&format!("{name}.rs"), &generated.source);
-    // For the order of coordinates, which no form changes.
+    // This plan is for the order of coordinates only, which is the same for every elimination.
     let plan = search::plan(&model, PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() });
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();
-        assert_eq!(here, there, "{name}: coordinates of one form");
+        assert_eq!(here, there, "{name}: both programs have the same coordinates");
         (0..here).for_each(|k| q[part.q.0 + k] = part.q.1 + k);
         (0..n).for_each(|k| v[part.v.0 + k] = part.v.1 + k);
     }
-    let ops = |g: Output| generated.counts.iter().find(|c| c.0 == g).expect("generated").1.total();
+    let ops = |output: Output| generated.counts.iter().find(|c| c.0 == output).expect("generated").1.total();
     let (rates, accelerations) = (ops(Output::Rates), ops(Output::Accelerations));
     let (nq, nv) = (q.len(), v.len());
     let _ = write!(

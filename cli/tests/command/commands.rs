@@ -1,4 +1,4 @@
-//! The command `mbd`, run as a program.
+//! The subcommands of `mbd`, except those of loops and `mbd eval`.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -47,7 +47,7 @@ fn check_tells_all_findings() {
     let found = err(&output).lines().filter(|l| l.starts_with(&format!("{file}:")) && l.contains(": error: ")).count();
     assert!(findings > 1 && found == findings, "{findings} expected, {found} found");
     bad(output, &[]);
-    // A sound model beside it is still told.
+    // A sound model in the same call is still reported.
     let both = run(&["check", file, "models/ur5.urdf"]);
     assert_eq!(both.status.code(), Some(1));
     assert!(out(&both).contains("models/ur5.urdf: sound"), "{}", out(&both));
@@ -80,12 +80,12 @@ fn counts() {
     assert!(total < 363 * 6 - 475, "{total} operations");
     let table = good(run(&["count", "models/chain6.toml"]));
     assert!(out(&table).contains("363n - 475") && out(&table).contains(&total.to_string()), "{}", out(&table));
-    // The formulas hold for serial chains of pins on the ground alone.
+    // The formulas are for serial chains of revolute joints on the ground only.
     for other in [&["count", "models/panda.urdf"][..], &["count", "models/ur5.urdf", "--base", "floating"]] {
         let output = good(run(other));
         assert!(!out(&output).contains("363n"), "{}", out(&output));
     }
-    // What is not there costs nothing.
+    // Gravity and joint forces that do not exist cost nothing.
     let rates = |more: &[&str]| {
         let arguments = [&["count", "models/ur5.urdf", "--outputs", "rates", "--json"], more].concat();
         json_of(&good(run(&arguments)))["outputs"][0]["total"].as_u64().expect("a number")
@@ -107,7 +107,7 @@ fn generates_the_same_bytes() {
     };
     let (a, b) = (written("a.rs"), written("b.rs"));
     assert_eq!(a, b);
-    // An absolute path shows as the name of the file.
+    // Of an absolute path, the code contains the name of the file only.
     assert!(!a.contains(ROOT));
     assert_eq!(a.replace("from ur5.urdf.", "from models/ur5.urdf."), out(&printed));
     assert_eq!(files(&folder), ["a.rs", "b.rs"]);
@@ -131,7 +131,7 @@ fn failures_leave_files_alone() {
     assert_eq!(read(&folder, "old.rs"), "as it was");
 }
 
-/// Columns of a table: names, then rows of numbers.
+/// Names of the columns of a table, and its rows of numbers.
 fn columns(table: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut lines = table.lines();
     let names: Vec<String> = lines.next().expect("names").split(',').map(String::from).collect();
@@ -152,7 +152,7 @@ fn simulates() {
     for (k, row) in rows.iter().enumerate() {
         assert!((row[0] - 0.1 * k as f64).abs() < 1e-12, "{}", row[0]);
         let (energy, start) = (row[row.len() - 1], rows[0][row.len() - 1]);
-        // The tolerance is 1e-9, the energy a few J.
+        // The tolerance is 1e-9 and the energy a few J.
         assert!((energy - start).abs() < 1e-7, "{energy} {start}");
     }
     let picture = read(&folder, "double_pendulum.svg");
@@ -165,7 +165,7 @@ fn simulates() {
         ["simulate", &model, "--q", "0.1,-0.2", "--v", "-1,0", "--time", "0.01", "--csv", "a.csv", "--svg", "a.svg"];
     good(run_in(&folder, &start));
     assert!(read(&folder, "a.csv").lines().nth(1).expect("a row").starts_with("0,0.1,-0.2,-1,"));
-    // Ten seconds, a thousand rows and that of the start.
+    // The default is ten seconds with a thousand rows and that of the start.
     good(run_in(&folder, &["simulate", &model]));
     let (_, rows) = columns(&read(&folder, "double_pendulum.csv"));
     assert_eq!((rows.len(), rows[1000][0]), (1001, 10.0));
@@ -183,7 +183,7 @@ fn simulates_on_the_energy_of_the_start() {
     };
     let drift = |energies: &[f64]| energies.iter().map(|e| (e - energies[0]).abs()).fold(0.0, f64::max);
     let (free, kept) = (drift(&energies(&[])), drift(&energies(&["--project"])));
-    // Rows stand where steps end. Energies are some tens of joules: their rounding.
+    // Steps end at the rows of the table. The bound is rounding of energies of some tens of joules.
     assert!(kept < 1e-13 && free > 1e3 * kept, "{kept:e} {free:e}");
     let damped = format!("{ROOT}/models/chain100.toml");
     bad(run_in(&folder, &["simulate", &damped, "--project"]), &["dampers", "--no-damping"]);
@@ -209,7 +209,7 @@ fn simulates_by_any_method() {
         let low = method.title.contains("order 2") || method.title.contains("Euler");
         let (rows, text) = run(&["--method", method.name, "--step", "0.002"]);
         println!("{}: {:.1e}", method.name, apart(&rows));
-        // Of order one and two: a step of 2 ms, rates of some tens.
+        // The first bound is for methods of order one and two, with steps of 2 ms and rates of some tens.
         assert!(apart(&rows) < if low { 1.0 } else { 1e-5 }, "{}: {:e}", method.name, apart(&rows));
         assert!(text.contains(&format!("by {} ({}), steps of 0.002 s", method.name, method.title)), "{text}");
         assert!(text.contains("work: 500 steps, 0 more rejected"), "{text}");
@@ -224,7 +224,7 @@ fn simulates_by_any_method() {
     }
     let (rows, text) = run(&["--partial"]);
     assert!(apart(&rows) < 1e-6 && text.contains("tolerance of coordinates 1e-9"), "{text}");
-    // With a step and nothing else, as it has always been.
+    // With a step and no method, the method is RK4.
     assert!(run(&["--step", "0.01"]).1.contains("by rk4"));
 }
 
@@ -245,7 +245,7 @@ fn failed_simulations_write_nothing() {
     bad(simulate(&["--csv", "a", "--svg", "a"]), &["both to be written to `a`"]);
     bad(simulate(&["--step", "1e-12"]), &["steps are too many"]);
     bad(simulate(&["--every", "1e-12"]), &["rows are too many"]);
-    // Known before the work begins, and neither of the two is written.
+    // The error is found before the simulation, and neither of the two files is written.
     bad(simulate(&["--time", "1e9", "--svg", "none/a.svg"]), &["cannot write `none/a.svg`"]);
     bad(simulate(&["--time", "1e9", "--csv", "."]), &["cannot write `.`"]);
     for wrong in [
@@ -331,7 +331,7 @@ fn the_tour() {
 }
 
 #[test]
-fn nobody_listens() {
+fn closed_standard_output_is_no_failure() {
     let folder = folder("pipe");
     for arguments in
         [&["explain", "models/panda.urdf", "--after", "simplify"][..], &["--help"], &["check", "models/ur5.urdf"]]

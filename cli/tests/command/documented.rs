@@ -1,32 +1,32 @@
-//! The commands that README and docs show. Those in code blocks run if their files are there, and print what is shown; all others
-//! are at least understood.
+//! The commands that README and docs show. Those in code blocks are run if their files exist, and must print what is
+//! shown. The arguments of all others must be valid.
 //!
-//! A comment `<!-- prints: mbd check models/ur5.urdf -->` before a code block says that the block is the output of that command.
-//! A line `[...]` in it stands for lines that are left out; times and rates of work differ from run to run.
+//! A comment `<!-- prints: mbd check models/ur5.urdf -->` before a code block says that the block is the output of that
+//! command. A line `[...]` in it stands for lines that are left out. Times and rates of work are not compared.
 
 use std::path::Path;
 
 use crate::run::{err, folder, out, run_in, HAS_SCENES, IS_LAB, ROOT};
 
-/// Commands that take longer than a test may, by a part of them.
+/// Arguments of commands that take too long for a test.
 const LONG: [&str; 1] = ["models/chain100.toml"];
 
-/// Where the commands of a page draw its pictures.
+/// The folder into which the commands of a page write its pictures.
 const PICTURES: &str = "docs/pictures";
 
-/// A command as a page shows it.
+/// A command that a page shows.
 struct Shown {
-    /// File and line, or file alone for a command within a sentence.
+    /// File and line, or only the file for a command within a sentence.
     place: String,
     text: String,
-    /// Whether it stands in a code block, complete.
+    /// Whether the command is in a code block, and so complete.
     in_block: bool,
-    /// What it prints, where that is shown.
+    /// The output of the command, if the page shows it.
     prints: Option<String>,
 }
 
 impl Shown {
-    /// Arguments of the program that is tested; `None` for another one.
+    /// Arguments of the command, or `None` if it is not the program under test.
     fn arguments(&self) -> Option<Vec<&str>> {
         let mut words: Vec<&str> = self.text.trim().trim_start_matches("$ ").split_whitespace().collect();
         words.truncate(words.iter().position(|w| ["#", ">", "|"].contains(w)).unwrap_or(words.len()));
@@ -45,7 +45,8 @@ impl Shown {
         (is_lab == IS_LAB && !other_package && built).then(|| arguments.to_vec())
     }
 
-    /// Whether its files are in the repository and it takes about a second. Experiments take minutes.
+    /// Whether the test can run the command: its files are in the repository, and it takes about a second (experiments
+    /// take minutes).
     fn can_run(&self, arguments: &[&str]) -> bool {
         let is_file = |a: &&&str| [".toml", ".urdf", ".json"].iter().any(|end| a.ends_with(end));
         let there = arguments.iter().filter(is_file).all(|a| Path::new(ROOT).join(a).exists());
@@ -95,7 +96,7 @@ fn of_page(name: &str, text: &str, all: &mut Vec<Shown>) {
     all.retain(|shown| shown.arguments().is_some());
 }
 
-/// Numbers replaced in lines that tell times or rates of work.
+/// The line with numbers replaced if it contains times or rates of work.
 fn without_times(line: &str) -> String {
     if ![" ms", " million"].iter().any(|unit| line.contains(unit)) {
         return line.trim_end().to_string();
@@ -125,7 +126,7 @@ fn agree(printed: &str, shown: &str, place: &str) {
     assert!(skipping || printed_lines.all(|l| l.trim().is_empty()), "{place}: the command prints more:\n{printed}");
 }
 
-/// Compares the output of a command with every page that shows it, and says on how many it is.
+/// Compares the output of a command with every page that shows it. Returns the number of these pages.
 #[track_caller]
 pub fn agrees_with_pages(command: &[&str], printed: &str) -> usize {
     let all = shown();
@@ -162,7 +163,8 @@ fn commands_in_code_blocks_run_and_print_what_is_shown() {
     }
 }
 
-/// In an empty folder commands end early, because their files are missing, unless an argument is not understood.
+/// Commands run in an empty folder: they end early because their files are missing. An invalid argument would be
+/// another error.
 #[test]
 fn other_commands_are_understood() {
     let folder = folder("understood");
@@ -172,7 +174,7 @@ fn other_commands_are_understood() {
         met += 1;
         let asked: Vec<&str> = if IS_LAB { [&arguments[..], &["--help"]].concat() } else { arguments.clone() };
         let output = run_in(&folder, &asked);
-        // A sentence may name a command without all that it needs.
+        // A sentence may name a command without all its arguments.
         let missing = ["required arguments were not provided", "a value is required"];
         let incomplete = !shown.in_block && missing.iter().any(|text| err(&output).contains(text));
         let understood = output.status.code() != Some(2) || incomplete;

@@ -1,4 +1,4 @@
-//! `mbd eval`, run as a program.
+//! The subcommand `mbd eval`.
 
 use crate::run::*;
 use serde_json::{json, Value};
@@ -38,7 +38,7 @@ fn compare_with_reference(name: &str) {
         for (ours, theirs) in results.iter().zip(states) {
             let (ours, theirs) = (numbers(&ours[key]), numbers(&theirs[key]));
             assert_eq!(ours.len(), theirs.len(), "{key}");
-            // As in tests/facade/reference.rs.
+            // The tolerance is that of `tests/facade/reference.rs`.
             let size = theirs.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
             for (a, b) in ours.iter().zip(&theirs) {
                 assert!((a - b).abs() <= 1e-11 * size, "{name}: {key}: {a} and {b}");
@@ -85,7 +85,7 @@ fn eval_says_what_is_wrong() {
         run(&["eval", pendulum, "--input", "no.json", "--wrench", "uper"]),
         &["--wrench: no body is named `uper`", "did you mean `upper`?"],
     );
-    // A mass without size on a pin through it.
+    // The parameter removes the mass of the second body, so that its revolute joint has no inertia.
     let point = "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\n\
                  [[body]]\nname = 'b'\nmass = { param = 'm' }\ncom = [1, 0, 0]\n[[joint]]\nname = 'k'\ntype = 'pin'\n\
                  parent = 'a'\nchild = 'b'\nxyz = [1, 0, 0]\n[params]\nm = 1\n";
@@ -107,7 +107,8 @@ fn rotate(q: &[f64], x: &[f64]) -> Vec<f64> {
 #[test]
 fn eval_in_the_layout_of_mujoco() {
     let folder = folder("mujoco");
-    // A free body with its mass at the origin: in outer axes it falls with g, whatever it does. Motions must not be zero.
+    // The centre of mass of a free body is at its origin. In outer axes, the origin falls with g for any motion, so the
+    // velocities of the test are not zero.
     let body = "[[body]]\nname = 'a'\nmass = 2\ninertia = [1, 2, 2.5]\n[[joint]]\nname = 'j'\ntype = 'floating'\nchild = 'a'\n";
     let body = write(&folder, "body.toml", body);
     let q = [0.3, -1.0, 2.0, 0.5, -0.1, 0.7, 0.5];
@@ -124,7 +125,7 @@ fn eval_in_the_layout_of_mujoco() {
     near(&Value::from(numbers(&state["p"])[..3].to_vec()), &[2.0, 4.0, 6.0]);
     near(&Value::from(numbers(&state["pd"])[..3].to_vec()), &[0.0, 0.0, -19.62]);
     near(&Value::from(numbers(&state["qd"])[..3].to_vec()), &[1.0, 2.0, 3.0]);
-    // A robot: the force on all of it is its weight; momenta and mass matrix turn with the base.
+    // A floating robot: the total force is its weight, and momenta and mass matrix are in the axes of the layout.
     let q: Vec<f64> = q.iter().copied().chain((0..12).map(|k| 0.1 * f64::from(k) - 0.5)).collect();
     let v: Vec<f64> = (0..18).map(|k| 0.3 * f64::from(k) - 2.0).collect();
     let input = write(&folder, "solo.json", &json!({ "states": [{ "q": q, "v": v }] }).to_string());
@@ -137,7 +138,7 @@ fn eval_in_the_layout_of_mujoco() {
     near(&state["p"], &product);
     let twice: f64 = p.iter().zip(&v).map(|(p, v)| p * v).sum();
     near(&state["kinetic"], &[twice / 2.0]);
-    // The same state in body axes.
+    // The default layout gives the same state in body axes.
     let back = [q[3], -q[4], -q[5], -q[6]];
     let own_q: Vec<f64> = [&q[..3], &q[4..7], &q[3..4], &q[7..]].concat();
     let own_v: Vec<f64> = [&rotate(&back, &v[..3])[..], &v[3..]].concat();

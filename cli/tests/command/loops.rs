@@ -1,4 +1,4 @@
-//! The command on models with loops: closing, what is said where they do not close, simulation, pictures, evaluation.
+//! The command on models with loops: closing, messages about loops that do not close, simulation, pictures, evaluation.
 
 use crate::run::{bad, err, files, folder, good, out, run, run_in, ROOT};
 use serde_json::Value;
@@ -32,20 +32,20 @@ fn loops_that_do_not_close() {
     let folder = folder("loops_open");
     let line = 1 + FOURBAR.lines().position(|l| l == "name = \"closing_pin\"").expect("it");
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file");
-    // From the end of the crank, held at 60 degrees, to the other pivot it is further than the other two bars reach:
-    // hypot(0.9 - 0.15 cos 60°, 0.15 sin 60°) - 0.65 = 0.1852.
+    // The crank is held at 60°. The distance from its end to the other pivot exceeds the length of the other two bars
+    // by hypot(0.9 - 0.15 cos 60°, 0.15 sin 60°) - 0.65 = 0.1852.
     write("far.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.9, 0, 0]"));
     let place =
         format!("far.toml:{line}:8: error: loop `closing_pin` does not close: what is left is 1.852e-1 m after ");
     bad(run_in(&folder, &["check", "far.toml"]), &[&place, "rank ", "help: look at lengths"]);
     bad(run_in(&folder, &["simulate", "far.toml"]), &[&place]);
     assert_eq!(files(&folder), ["far.toml"]);
-    // It closes, but not with the crank where it is held.
+    // This loop can close, but not with the held angle of the crank.
     write("held.toml", &FOURBAR.replace("xyz = [0.4, 0, 0]", "xyz = [0.75, 0, 0]"));
     bad(run_in(&folder, &["check", "held.toml"]), &["does not close", "help: with no joint `held` all is met"]);
 }
 
-/// Two wheels and couplings of them.
+/// A model of two wheels with couplings between them.
 fn gears(couplings: &[(&str, [f64; 2], f64)]) -> String {
     let mut text = String::new();
     for name in ["a", "b"] {
@@ -65,7 +65,7 @@ fn couplings_that_contradict_or_repeat_or_lock() {
     let folder = folder("loops_gears");
     let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file");
     write("contradict.toml", &gears(&[("gear", [1.0, 2.0], 0.0), ("belt", [2.0, 4.0], 0.1)]));
-    // Least squares of φ₁ = x, φ₂ = 2x − 0.1: x = 0.04, 0.04 and −0.02 are left.
+    // The least squares of φ₁ = x and φ₂ = 2x − 0.1 are at x = 0.04, with residuals 0.04 and −0.02.
     let texts = [
         "coupling `gear` cannot be met: what is left is 4.000e-2 rad",
         "coupling `belt` cannot be met: what is left is 2.000e-2 rad",
@@ -96,12 +96,12 @@ fn simulates_and_draws() {
     let picture = std::fs::read_to_string(folder.join("a.svg")).expect("the picture");
     assert!(picture.starts_with("<svg ") && picture.ends_with("</svg>\n") && !picture.contains("NaN"));
     assert_eq!(picture.matches("<g opacity").count(), 9);
-    // What is held keeps its velocity, the others follow.
+    // The held joint keeps its velocity, and the others follow.
     let table = std::fs::read_to_string(folder.join("fourbar.csv")).expect("the table");
     let first: Vec<&str> = table.lines().nth(1).expect("a row").split(',').collect();
     let number = |k: usize| first[k].parse::<f64>().expect("a number");
     assert!((number(4) - 8.0).abs() < 1e-12 && number(5).abs() > 0.1, "{first:?}");
-    // Drift that nobody removes is told as such.
+    // The output mentions `--hold` when drift is not removed.
     let output = good(run_in(&folder, &["simulate", &model, "--time", "0.2", "--step", "0.005", "--hold", "none"]));
     assert!(out(&output).contains("--hold says how they are kept closed"), "{}", out(&output));
     bad(run_in(&folder, &["simulate", &model, "--project"]), &["--project does not keep loops closed"]);
@@ -125,9 +125,9 @@ fn evaluates() {
     };
     let (phi, lambda) = (list("phi"), list("lambda"));
     assert!(phi.len() == 5 && phi.iter().all(|x| x.abs() < 1e-12), "{phi:?}");
-    // Two forces in the plane of the bars; the three rows that follow from the rest carry nothing.
+    // Two multipliers are forces in the plane of the bars; those of the three redundant rows are zero.
     assert_eq!(lambda.iter().filter(|x| x.abs() > 1e-9).count(), 2, "{lambda:?}");
-    // The power of loops is none: v · (M v̇ + h) = −(Φv) · λ = 0, against terms of some watts.
+    // The constraint forces have no power: v · (M v̇ + h) = −(Φv) · λ = 0. Single terms are some watts.
     let (v, a, h) = (&row[4..7], list("qdd"), list("h"));
     let m: Vec<Vec<f64>> = serde_json::from_value(results["states"][0]["M"].clone()).expect("a matrix");
     let power: f64 = (0..3).map(|i| v[i] * (h[i] + (0..3).map(|k| m[i][k] * a[k]).sum::<f64>())).sum();

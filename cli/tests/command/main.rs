@@ -1,4 +1,4 @@
-//! The command `mbd`, run as a program.
+//! Tests of the command `mbd`, run as a program.
 
 mod commands;
 mod documented;

@@ -1,5 +1,5 @@
-//! What the tests of the command share.
-#![allow(dead_code)] // each of them uses a part
+//! Functions that the tests of the commands share.
+#![allow(dead_code)] // Each test uses a part.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -9,17 +9,17 @@ use serde_json::Value;
 /// Root of the repository.
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// The executable of the crate that is tested.
+/// The executable under test: that of the crate to which the test belongs.
 const PROGRAM: &str = match (option_env!("CARGO_BIN_EXE_mbd"), option_env!("CARGO_BIN_EXE_mbd-lab")) {
     (Some(program), _) | (None, Some(program)) => program,
-    (None, None) => panic!("the tests of a command stand in its crate"),
+    (None, None) => panic!("the tests of a command must be in its crate"),
 };
 
 /// Whether the program has the generated scenes; only that of the experiments can.
 #[allow(unexpected_cfgs)]
 pub const HAS_SCENES: bool = cfg!(feature = "generated");
 
-/// Whether the program is that of the experiments.
+/// Whether the executable is that of the experiments, `mbd-lab`.
 pub const IS_LAB: bool = option_env!("CARGO_BIN_EXE_mbd-lab").is_some();
 
 /// An empty directory for one test.
@@ -30,12 +30,12 @@ pub fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// Runs in a folder.
+/// Runs the executable in a folder.
 pub fn run_in(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(PROGRAM).current_dir(folder).args(arguments).output().expect("the program runs")
 }
 
-/// Runs in the root of the repository.
+/// Runs the executable in the root of the repository.
 pub fn run(arguments: &[&str]) -> Output {
     run_in(Path::new(ROOT), arguments)
 }
@@ -50,14 +50,14 @@ pub fn err(output: &Output) -> &str {
     std::str::from_utf8(&output.stderr).expect("UTF-8")
 }
 
-/// Exit status 0.
+/// Asserts exit status 0.
 #[track_caller]
 pub fn good(output: Output) -> Output {
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     output
 }
 
-/// Exit status 1, nothing on standard output, a help line, and all of the texts in the messages.
+/// Asserts exit status 1, an empty standard output, and messages that contain a help line and all of the texts.
 #[track_caller]
 pub fn bad(output: Output, texts: &[&str]) {
     let messages = err(&output);
@@ -79,7 +79,7 @@ pub fn files(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Writes a file; its path.
+/// Writes a file and returns its path.
 pub fn write(folder: &Path, name: &str, text: &str) -> String {
     let path = folder.join(name);
     std::fs::write(&path, text).expect("a file");

@@ -1,5 +1,6 @@
-//! Broken models and the exact findings about them. `UPDATE=1 cargo test -p mbd-codegen --test readers broken` rewrites the `.txt` files beside them;
-//! review every change as prose: what, where, what to do.
+//! Broken models and the exact findings about them. `UPDATE=1 cargo test -p mbd-codegen --test readers broken` rewrites
+//! the `.txt` files beside the models. Review every change of them as prose: a finding says what is wrong, where, and
+//! what to do.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::diag::Severity;
 use mbd_codegen::read::{self, ImportOptions};
 
-/// Runs every file in `folder` with this extension against the `.txt` beside it.
+/// Reads every file in `folder` with this extension and compares the findings with the `.txt` beside it.
 fn run(folder: &str, extension: &str, at_least: usize) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/broken").join(folder);
     let entries = fs::read_dir(&folder).expect("the folder of broken models").map(|e| e.expect("an entry").path());
@@ -21,7 +22,11 @@ fn run(folder: &str, extension: &str, at_least: usize) {
         let text = fs::read_to_string(path).expect("UTF-8");
         let (model, findings) = read::load(&name, &text, &ImportOptions::default());
         assert!(!findings.0.is_empty(), "{name}: nothing was found");
-        assert_eq!(model.is_none(), findings.has_errors(), "{name}: a model exactly where there is no error");
+        assert_eq!(
+            model.is_none(),
+            findings.has_errors(),
+            "{name}: there must be a model exactly if there is no error"
+        );
         for d in &findings.0 {
             assert!(
                 !d.help.is_empty() || d.severity == Severity::Notice,

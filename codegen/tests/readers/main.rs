@@ -1,4 +1,4 @@
-//! The readers of TOML and URDF: what valid files mean, and what is said about others.
+//! The readers of TOML and URDF: the models of valid files, and the findings about others.
 
 mod broken;
 mod mutate;

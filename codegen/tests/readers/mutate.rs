@@ -1,11 +1,12 @@
-//! A small deterministic mutator of text files, byte- and token-wise, shared by the tests and the fuzzer in `examples/fuzz.rs`.
+//! A small deterministic mutator of text files. It changes bytes, tokens and lines. The tests and the fuzzer in
+//! `examples/fuzz.rs` share it.
 
 use std::path::Path;
 
 /// Pseudo-random changes; the same seed gives the same changes.
 pub struct Mutator(u64);
 
-/// Bits of both formats that are worth inserting anywhere.
+/// Pieces of both formats that are inserted anywhere.
 const TOKENS: &[&str] = &[
     "[[body]]",
     "[[joint]]",
@@ -67,7 +68,7 @@ const TOKENS: &[&str] = &[
 ];
 
 impl Mutator {
-    /// From a seed.
+    /// A mutator with the given seed.
     pub fn new(seed: u64) -> Self {
         Mutator(seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15))
     }
@@ -82,7 +83,7 @@ impl Mutator {
         ((z ^ (z >> 31)) % n.max(1) as u64) as usize
     }
 
-    /// One of the seeds with one to eight changes.
+    /// One of the texts in `seeds` with one to eight changes.
     pub fn mutate(&mut self, seeds: &[String]) -> String {
         let mut text = seeds[self.below(seeds.len())].clone();
         for _ in 0..=self.below(3) + self.below(6) / 5 * 5 {
@@ -120,7 +121,7 @@ impl Mutator {
         String::from_utf8_lossy(&bytes).into_owned()
     }
 
-    /// Puts one token in the place of another: names meet other names, types other types.
+    /// Replaces one token by another of any text, such as a name by another name or a type by another type.
     fn swap_tokens(&mut self, text: &str, seeds: &[String]) -> String {
         let source = if self.below(4) == 0 { &seeds[self.below(seeds.len())] } else { text };
         let (from, to) = (tokens(source), tokens(text));
@@ -143,7 +144,7 @@ impl Mutator {
         format!("{}{}{}", &text[..at.start], NUMBERS[self.below(NUMBERS.len())], &text[at.end..])
     }
 
-    /// Removes, repeats, moves or imports a line or a few.
+    /// Removes, repeats or moves one or a few lines, or inserts lines of another text.
     fn change_lines(&mut self, text: &str, seeds: &[String]) -> String {
         let mut lines: Vec<&str> = text.split('\n').collect();
         let (at, count) = (self.below(lines.len()), 1 + self.below(8));
@@ -198,7 +199,7 @@ fn tokens(text: &str) -> Vec<std::ops::Range<usize>> {
     out
 }
 
-/// The texts of all files with this extension in the folders and below, in a fixed order.
+/// The texts of all files with this extension in the folders and their subfolders, in a fixed order.
 pub fn corpus(folders: &[&str], extension: &str) -> Vec<String> {
     let mut files = Vec::new();
     let mut open: Vec<_> = folders.iter().map(|f| Path::new(f).to_path_buf()).collect();
@@ -216,7 +217,8 @@ pub fn corpus(folders: &[&str], extension: &str) -> Vec<String> {
     files.iter().filter_map(|f| std::fs::read_to_string(f).ok()).collect()
 }
 
-/// The seeds, and the ones among them that are models once more and again until they make up half: what is right reaches deepest when damaged.
+/// The seeds, with those that are models repeated until they make up half. Damaged models get furthest through the
+/// reader.
 pub fn balanced(mut seeds: Vec<String>, is_model: impl Fn(&str) -> bool) -> Vec<String> {
     let good: Vec<String> = seeds.iter().filter(|s| is_model(s)).cloned().collect();
     let missing = seeds.len().saturating_sub(2 * good.len());

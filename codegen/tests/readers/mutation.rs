@@ -1,4 +1,4 @@
-//! Damaged files must give findings, never a panic, and a model exactly where no finding is an error.
+//! Damaged files must give findings and never a panic. They give a model exactly if no finding is an error.
 
 use mbd_codegen::read::{self, ImportOptions};
 
@@ -17,16 +17,16 @@ fn survive(file: &str, seeds: &[String], rounds: u64) {
         }
         with_model += u64::from(model.is_some());
     }
-    // The mutations have to be small enough for the checks behind the parser to be reached.
+    // Mutations must be small enough that some files get past the parser to the checks.
     assert!(with_model > rounds / 50, "only {with_model} of {rounds} mutated files were models");
 }
 
-/// From the broken models and the good ones of one format.
+/// The broken models and the valid ones of one format.
 fn seeds(extension: &str) -> Vec<String> {
     let file = format!("m.{extension}");
     let folders = [concat!(env!("CARGO_MANIFEST_DIR"), "/tests"), concat!(env!("CARGO_MANIFEST_DIR"), "/../models")];
     let mut seeds = mutate::corpus(&folders, extension);
-    // Large files take long and say little more.
+    // Large files take long and find little more.
     seeds.retain(|s| s.len() < 20_000);
     mutate::balanced(seeds, |text| read::load(&file, text, &ImportOptions::default()).0.is_some())
 }

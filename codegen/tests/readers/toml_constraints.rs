@@ -58,7 +58,7 @@ fn every_type_is_read() {
     }
 }
 
-/// The model knows where its constraints and joints are described, which has no say in comparisons.
+/// The model knows the lines of its constraints and joints. Comparisons of models ignore them.
 #[test]
 fn origins_are_kept() {
     let m = clean(ALL);
@@ -128,7 +128,7 @@ fn starts_come_in_the_order_of_joints() {
             start(1, &[degrees(30.0)], true),
             start(2, &[degrees(-90.0)], false),
             start(3, &[1.0, 2.0, 0.3, 0.0, 0.0, 0.6, 0.8], false),
-            // Held where it is without a start.
+            // A joint that is held without a start is held at its neutral position.
             start(4, &[0.0, 0.0, 0.0, 1.0], true),
             start(5, &[0.1, 0.2, degrees(45.0)], false),
             start(7, &[degrees(10.0), degrees(20.0)], false),
@@ -143,11 +143,11 @@ fn quaternions_are_scaled() {
     let q = with("0.5001, 0.5, 0.5, 0.5");
     let n = q[3..].iter().map(|x| x * x).sum::<f64>();
     assert!((n - 1.0).abs() < 4.0 * f64::EPSILON, "{n}");
-    // What has unit length already keeps its digits.
+    // A quaternion that already has unit length keeps its digits.
     assert_eq!(with("0.6, 0, -0.8, 0")[3..], [0.6, 0.0, -0.8, 0.0]);
 }
 
-/// Without constraints a start is the state to begin with.
+/// Without constraints, starts are the coordinates of the state at the beginning.
 #[test]
 fn starts_need_no_loops() {
     let text =
@@ -157,7 +157,7 @@ fn starts_need_no_loops() {
     assert_eq!(clean(text).constraints, []);
 }
 
-/// Axes of a cross written with seven digits are square.
+/// Two axes that are written with seven digits count as perpendicular.
 #[test]
 fn rounded_axes_are_square() {
     let with = |axis2: &str| {
@@ -167,7 +167,7 @@ fn rounded_axes_are_square() {
     assert!(with("[0.7071, 0.7071, 1e-5]").0[0].message.contains("not at right angles"));
 }
 
-/// A loop binds bodies across a joint that follows another, and a frame on the ground may be any place.
+/// A loop may connect two bodies between which there is only a mimic joint.
 #[test]
 fn followers_move() {
     let text = "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\n\

@@ -1,4 +1,4 @@
-//! Valid TOML models: every entry of the format, defaults, order, and what must not be reported.
+//! Valid TOML models: every entry of the format, defaults, order, and models that must not cause findings.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, FRAC_PI_6, PI};
 
@@ -15,7 +15,7 @@ fn clean(text: &str) -> Model {
     model.expect("a model where nothing was found")
 }
 
-/// Messages of a text, without file and help.
+/// Messages of the findings about a text, without file and help.
 fn messages(text: &str) -> Vec<String> {
     read::load("m.toml", text, &Default::default()).1 .0.into_iter().map(|d| d.message).collect()
 }
@@ -73,7 +73,7 @@ fn joints_are_read() {
     assert_eq!(joint("root").placement, Placement::IDENTITY);
     assert_eq!(joint("slide").motion, JointMotion::Prescribed);
     assert_eq!(joint("hip").placement.rotation, Rotation::Rpy([C(0.0), C(PI), Value::Param(1)]));
-    // The leader is an index into the final order.
+    // The leader is an index in the final order of joints.
     assert_eq!(joint("axle").motion, JointMotion::Mimic { leader: 6, ratio: C(-2.0), offset: C(30f64.to_radians()) });
     assert_eq!(joint("cardan").kind, JointKind::Universal { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]] });
     assert_eq!(joint("cardan").rest, [10f64.to_radians(), 20f64.to_radians()].map(C));
@@ -110,7 +110,7 @@ fn columns_count_characters() {
     assert_eq!((findings.0[0].line, findings.0[0].column), (1, 24), "{findings}");
 }
 
-/// Inertias that exist, at the edge of the triangle inequality or behind a parameter.
+/// Inertias of real bodies at the edge of the triangle inequality cause no findings.
 #[test]
 fn fair_inertias_pass() {
     for inertia in [
@@ -141,7 +141,8 @@ fn triangle_slack_is_relative() {
     }
 }
 
-/// What resists a freedom, and what does not.
+/// A body at the end of the tree must have inertia about every freedom of its joint, unless the freedom has an armature
+/// or a given motion. Missing inertia is reported with the axis.
 #[test]
 fn massless_leaves() {
     let two = |body: &str, joint: &str| {
@@ -187,7 +188,8 @@ fn massless_leaves() {
     }
 }
 
-/// A body welded on gives a massless one its inertia, wherever it sits and however it is turned.
+/// A body that a fixed joint connects to a massless body gives it inertia, with any placement except a point mass on
+/// the axis.
 #[test]
 fn welded_bodies_count_together() {
     let welded = |placement: &str| {
@@ -198,7 +200,7 @@ fn welded_bodies_count_together() {
     };
     assert_eq!(welded("xyz = [1, 0, 0]"), [""; 0]);
     assert_eq!(welded("rpy = [1, 0, 0]"), [""; 0]);
-    // On the axis, or back on it.
+    // With these placements the mass is on the axis.
     assert_eq!(welded("xyz = [0, 0, 2]").len(), 1);
     assert_eq!(welded("rpy = { deg = [90, 0, 0] }\nxyz = [0, 1, 0]").len(), 1);
 }
@@ -207,7 +209,7 @@ fn welded_bodies_count_together() {
 fn long_chains_are_no_trouble() {
     let n = 20_000;
     let mut text = String::new();
-    // Listed from the tip to the root.
+    // The joints are listed from the tip to the root.
     for k in (0..n).rev() {
         let parent = if k == 0 { "ground".into() } else { format!("b{}", k - 1) };
         text += &format!("[[body]]\nname = 'b{k}'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j{k}'\ntype = 'pin'\nparent = '{parent}'\nchild = 'b{k}'\n");
@@ -215,12 +217,12 @@ fn long_chains_are_no_trouble() {
     let m = clean(&text);
     assert_eq!(m.joints.len(), n);
     assert_eq!(m.joints[n - 1].name, format!("j{}", n - 1));
-    // The same as a ring: one finding.
+    // The same bodies in a ring cause one finding.
     let ring = text.replace("parent = 'ground'", &format!("parent = 'b{}'", n - 1));
     assert_eq!(messages(&ring).len(), 1);
 }
 
-/// The models this project ships are clean, all of them.
+/// All models of this project are without findings.
 #[test]
 fn shipped_models_are_clean() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../models");

@@ -1,4 +1,4 @@
-//! Real robots, read by this crate and by `urdf-rs`: both have to say the same, number by number. Both turn the same decimal text into the
+//! Real robots, read by this crate and by `urdf-rs`, must have the same numbers. Both convert decimal text to the
 //! nearest `f64`, so the comparison is exact.
 
 use mbd_codegen::model::{Body, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value};
@@ -6,8 +6,8 @@ use mbd_codegen::read::{self, Base, ImportOptions};
 use std::path::{Path, PathBuf};
 use urdf_rs::JointType;
 
-/// Folders with robots, relative to this crate. A list of others can be given in `URDF_ROBOTS`, separated like those in `PATH`; they are
-/// looked through with their subfolders.
+/// Folders with robots, relative to this crate. The environment variable `URDF_ROBOTS` can name further folders,
+/// separated as in `PATH`; they are searched with their subfolders.
 const FOLDERS: [&str; 2] = ["../models", "../tests/reference/robots"];
 
 #[test]
@@ -32,10 +32,9 @@ fn real_robots_are_read_as_urdf_rs_reads_them() {
         }
     }
     println!("{compared} of {} robots compared", files.len());
-    // Robots from elsewhere may be broken; those of this project are not.
+    // Robots of other folders may be broken, but not those of this project.
     refused.iter().for_each(|r| println!("{r}"));
     assert!(refused.is_empty() || !more.is_empty(), "robots of this project are refused");
-    // Five of `models`, seven of the reference robots, and one of the corpus.
     assert!(compared >= 13, "only {compared} robots found");
 }
 
@@ -52,7 +51,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
 
 fn compare(file: &str, model: &Model, robot: &urdf_rs::Robot) {
     assert_eq!(model.bodies.len(), robot.links.len(), "{file}");
-    assert_eq!(model.joints.len(), robot.joints.len() + 1, "{file}: the base joint comes in addition");
+    assert_eq!(model.joints.len(), robot.joints.len() + 1, "{file}: the base joint is an additional joint");
     for (body, link) in model.bodies.iter().zip(&robot.links) {
         compare_body(&format!("{file}: link {}", link.name), body, link);
     }
@@ -70,7 +69,7 @@ fn compare_body(what: &str, body: &Body, link: &urdf_rs::Link) {
     compare_pose(what, &Placement { xyz: body.com, rotation: body.inertia_axes }, &link.inertial.origin);
 }
 
-/// The name `ground` means the fixed world in a model.
+/// The name that the reader gives a link: `ground` is reserved for the fixed world of a model.
 fn renamed(link: &str) -> &str {
     if link == "ground" {
         "ground_link"
@@ -99,7 +98,7 @@ fn compare_joint(what: &str, ours: &Joint, joint: &urdf_rs::Joint, model: &Model
     let parent = ours.parent.map(|b| model.bodies[b].name.as_str());
     assert_eq!(parent, Some(renamed(&joint.parent.link)), "{what}");
     assert_eq!(model.bodies[ours.child].name, renamed(&joint.child.link), "{what}");
-    // More than one freedom: URDF does not say what one damping means there, and this reader warns.
+    // For joints with more than one freedom URDF does not define damping, and this reader warns.
     let damping = joint.dynamics.as_ref().map_or(0.0, |d| d.damping);
     if kind.nv() == 1 {
         assert_eq!(ours.damping, [Value::Const(damping)], "{what}");

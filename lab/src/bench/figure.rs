@@ -1,4 +1,4 @@
-//! Log–log figures.
+//! Figures with logarithmic axes.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -11,7 +11,7 @@ pub struct Line {
     pub name: String,
     /// Points, in order.
     pub points: Vec<(f64, f64)>,
-    /// Whether the line is dashed and without marks, as lines that others are compared with are.
+    /// Whether the line is dashed and without marks, as lines for comparison are.
     pub thin: bool,
 }
 

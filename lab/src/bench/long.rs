@@ -1,4 +1,5 @@
-//! Long runs: energy and trajectory, each method with as many evaluations as the classical one.
+//! Long runs, in which each method has as many evaluations as the classical method RK4: errors of energy and
+//! trajectory.
 
 use std::time::Instant;
 
@@ -47,8 +48,8 @@ pub fn methods(asked: &[String]) -> Vec<String> {
     std::iter::once("rk4".to_string()).chain(rest.cloned()).collect()
 }
 
-/// Energy at the start above the nearest minimum of the potential energy. The minimum is found by a motion whose momenta are
-/// reduced at every step, so that it comes to rest there.
+/// Energy at the start above the nearest minimum of the potential energy. The minimum is found by a motion whose
+/// momenta are reduced at every step, so that it comes to rest there.
 pub fn height(scene: &Scene, system: &mut Erased<f64>) -> f64 {
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let (mut q, mut p) = scene.start(system);
@@ -78,8 +79,8 @@ struct Long {
     failure: Option<String>,
 }
 
-/// Number of steps between two evaluations of the energy. Evaluated at every step, it would cost as much as the steps of cheap
-/// methods.
+/// Number of steps between two evaluations of the energy. Evaluated at every step, it would cost as much as the steps
+/// of cheap methods.
 const LOOK: u64 = 16;
 
 fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, project: bool, t_end: f64) -> Option<Long> {
@@ -116,8 +117,8 @@ fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, proje
     Some(Long { evaluations: driver.statistics().evaluations, seconds, energy, q, failure })
 }
 
-/// The setting at which a method needs as many evaluations as RK4 at its step. It is found by bisection on a short run and
-/// corrected on longer ones.
+/// The setting at which a method needs as many evaluations as RK4 at its step. It is found by bisection on a short run
+/// and corrected on longer ones.
 fn setting(scene: &Scene, system: &mut Erased<f64>, method: &str, t_end: f64) -> Option<f64> {
     let rk4 = 4.0 / scene.rk4_step;
     let adaptive = catalogue::entry(method)?.adaptive;

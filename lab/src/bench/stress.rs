@@ -1,4 +1,4 @@
-//! Stress: every method on every scene.
+//! Stress runs: every method on every scene.
 
 use crate::scenes::{self, Scene};
 use multibody::runtime::catalogue::{self, Start};

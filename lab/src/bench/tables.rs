@@ -24,7 +24,7 @@ pub struct Series<'a> {
     pub samples: Vec<&'a Sample>,
 }
 
-/// Groups samples by program, variant and method, in the order of their first sample.
+/// Series of samples with the same program, variant and method, in the order of their first sample.
 pub fn series(samples: &[Sample]) -> Vec<Series<'_>> {
     let mut all: Vec<Series> = Vec::new();
     for sample in samples {
@@ -45,8 +45,8 @@ pub fn series(samples: &[Sample]) -> Vec<Series<'_>> {
 }
 
 impl Series<'_> {
-    /// Time (s) and evaluations for an error at the end, by linear interpolation of logarithms between two runs; the smallest
-    /// where several pairs of runs give one.
+    /// Time (s) and evaluations for an error at the end, by linear interpolation of logarithms between two runs; the
+    /// smallest where several pairs of runs give one.
     pub fn cost(&self, error: f64) -> Option<(f64, f64)> {
         let point = |s: &Sample| (s.end_error.unwrap_or(f64::INFINITY).max(1e-17), s.cpu_s, s.evaluations as f64);
         let mut best: Option<(f64, f64)> = None;
@@ -230,8 +230,8 @@ pub fn long(scene: &Scene, rows: &[LongRow]) -> String {
     text
 }
 
-/// Table of the stress runs: one line for each scene and number type, with the largest error and the messages of the methods
-/// that stopped.
+/// Table of the stress runs: one line for each scene and number type, with the largest error and the messages of the
+/// methods that stopped.
 pub fn stress(rows: &[StressRow]) -> String {
     let mut text = String::from("| scene | method | setting | error at the end, or why not |\n|---|---|---|---|\n");
     for row in rows {

@@ -1,4 +1,4 @@
-//! Work against error.
+//! Work for a given error.
 
 use crate::generated::{visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable};
 use crate::scenes::{Dynamics, Expect, Scene};
@@ -37,8 +37,8 @@ impl Variant {
         }
     }
 
-    /// Whether a method is run in this variant. All methods are run with generated code, or with the interpreter where there is
-    /// no code; the other variants run a selection of the explicit methods.
+    /// Whether a method is run in this variant. All methods are run with generated code, or with the interpreter where
+    /// there is no code; the other variants run a selection of the explicit methods.
     fn runs(self, method: &Entry, code: bool) -> bool {
         let few = ["rk4", "dop853", "verner9"];
         match self {
@@ -98,9 +98,10 @@ pub fn single(scene: &Scene) -> Erased<f32> {
 /// Largest number of degrees of freedom for which the reference is computed in double-double numbers.
 const WIDE: usize = 14;
 
-/// A state at the end with far more correct digits than the runs that are compared with it, where this takes seconds only.
+/// A state at the end with far more correct digits than the runs that are compared with it, where this takes seconds
+/// only.
 pub fn reference(scene: &Scene) -> Option<Reference> {
-    // For the largest scenes it would take minutes, for digits that are not needed.
+    // For the largest scenes a tighter tolerance would take minutes and give digits that are not needed.
     let (tight, other) = if scene.v.len() > HUGE { (1e-8, "adams") } else { (1e-14, "dop853") };
     let solve = |system: &mut Erased<f64>, method: &str| -> Option<Vec<f64>> {
         let (q, p) = scene.start(system);
@@ -131,10 +132,10 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
 
 /// Time, s, after which a series of finer and finer runs ends.
 const LONGEST: f64 = 0.15;
-/// With more degrees of freedom than this, only some methods are run: implicit methods factor dense matrices, and others take
-/// minutes.
+/// With more degrees of freedom than this, only some methods are run: implicit methods factor dense matrices, and
+/// others take minutes.
 const LARGE: usize = 20;
-/// These methods.
+/// The methods that are run on such mechanisms.
 const CHOICE: [&str; 6] = ["rk4", "tsit5", "dop853", "verner9", "ab6", "adams"];
 /// With more degrees of freedom than this, a run takes seconds, and only two methods are run.
 const HUGE: usize = 200;

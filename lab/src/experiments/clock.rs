@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-/// Shortest time of a call of each function, s, over interleaved rounds, so that a disturbance affects all functions alike.
+/// Shortest time of a call of each function, s, over interleaved rounds, so that a disturbance affects all functions
+/// alike.
 pub fn least(calls: &mut [&mut dyn FnMut()], rounds: u32, round: f64) -> Vec<f64> {
     let counts: Vec<u32> = calls.iter_mut().map(|call| count(call, round)).collect();
     let mut best = vec![f64::INFINITY; calls.len()];

@@ -1,4 +1,4 @@
-//! The equations of a mechanism with loops in the four forms that are compared, on plain numbers.
+//! The equations of a mechanism with loops in the four formulations that the experiments compare, on plain numbers.
 //!
 //! Every joint has one degree of freedom, so that there are as many coordinates as velocities.
 
@@ -6,7 +6,7 @@ use multibody::runtime::{Accelerated, Conjugate, Constrained, Energetic, System}
 
 use super::plain::Equation;
 
-/// A mechanism with loops, interpreted.
+/// The interpreter of a mechanism with loops, or another system with the same functions.
 pub trait Closed:
     System<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>>
     + Constrained<Rows = Vec<f64>, Entries = Vec<f64>>
@@ -59,8 +59,8 @@ impl Halves {
     }
 }
 
-/// All coordinates, with augmented momenta (`σ` starts every step at zero) or with velocities (the accelerations satisfy the
-/// constraints, positions and velocities drift).
+/// All coordinates, with augmented momenta (`σ` starts every step at zero) or with velocities (the accelerations
+/// satisfy the constraints, positions and velocities drift).
 pub struct Whole<'a, Y> {
     system: &'a mut Y,
     kind: Kind,
@@ -117,7 +117,8 @@ pub struct Minimal<'a, Y> {
 }
 
 impl<'a, Y: Closed> Minimal<'a, Y> {
-    /// The equations of a mechanism near coordinates `q`. The chosen rows do not change; the other rows must depend on them.
+    /// The equations of a mechanism near coordinates `q`. The chosen rows do not change; the other rows must depend on
+    /// them.
     pub fn new(system: &'a mut Y, kind: Kind, independent: &[usize], q: &[f64]) -> Self {
         let mut room = Halves::new(system);
         room.q.copy_from_slice(q);
@@ -255,8 +256,8 @@ fn leading(mut a: Vec<Vec<f64>>, count: usize) -> Vec<usize> {
     chosen
 }
 
-/// Solves `A x = b` by elimination with pivots; a singular matrix gives numbers that are not finite, which the caller's steps
-/// stop at.
+/// Solves `A x = b` by elimination with pivots. A singular matrix gives numbers that are not finite, at which the steps
+/// of the caller stop.
 fn solve(mut a: Vec<Vec<f64>>, mut b: Vec<f64>) -> Vec<f64> {
     let n = b.len();
     for k in 0..n {

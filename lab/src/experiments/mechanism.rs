@@ -11,7 +11,7 @@ use mbd_cli::{Failure, Outcome};
 
 /// A mechanism whose joints have one degree of freedom each.
 pub struct Mechanism {
-    /// Its equations.
+    /// Equations of motion.
     pub system: Interpreter<f64>,
     /// Coordinates at the start; loops are closed to the digits of the file.
     pub q: Vec<f64>,
@@ -30,7 +30,7 @@ pub fn read(text: &str) -> Outcome<Mechanism> {
     Ok(Mechanism { system, q })
 }
 
-/// The starts of the file; at the forks of trees, the branches start at ±0.3 rad.
+/// The initial coordinates of the file, except that the branches at the forks of trees start at ±0.3 rad.
 fn start(model: &Model, plan: &Plan) -> Vec<f64> {
     let mut q = plan.start();
     for (q, joint) in q.iter_mut().zip(&model.joints) {

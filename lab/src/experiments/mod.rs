@@ -1,5 +1,5 @@
-//! `mbd-lab experiments`: repeats chapter 7 of the thesis and prints its numbers too. `docs/experiments.md` states how points
-//! are settled that the thesis leaves open.
+//! `mbd-lab experiments`: repeats chapter 7 of the thesis and prints its numbers for comparison. `docs/experiments.md`
+//! states the decisions on points that the thesis leaves open.
 
 mod biped;
 mod clock;

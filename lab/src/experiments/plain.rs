@@ -1,16 +1,17 @@
 //! Equations on plain numbers, and explicit steps whose errors can be examined component by component.
 //!
-//! The library's solvers combine all errors in one norm. The thesis's tables separate them, and count evaluations as MATLAB's
-//! `ode45` does.
+//! The library's solvers combine all errors in one norm. The thesis's tables separate them, and count evaluations as
+//! MATLAB's `ode45` does.
 
 use multibody::runtime::integrate::tableau::Tableau;
 use multibody::runtime::integrate::Constant;
 
-/// `ẏ = f(y)`.
+/// The differential equation `ẏ = f(y)`.
 pub trait Equation {
     /// Rates of a state.
     fn rates(&mut self, y: &[f64], rates: &mut [f64]);
-    /// Modifies a state between two steps, so that the multipliers start at zero again. Returns whether it changed the state.
+    /// Modifies a state between two steps, so that the multipliers start at zero again. Returns whether it changed the
+    /// state.
     fn between(&mut self, _y: &mut [f64]) -> bool {
         false
     }
@@ -142,8 +143,9 @@ pub struct Controlled {
     pub evaluations: u64,
 }
 
-/// A run from time 0 with the step-size control of MATLAB's `ode45`, with equal absolute and relative tolerances: L. F. Shampine, M. W. Reichelt,
-/// The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the step becomes too small.
+/// A run from time 0 with the step-size control of MATLAB's `ode45`, with equal absolute and relative tolerances: L. F.
+/// Shampine, M. W. Reichelt, The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997). `None` where the
+/// step becomes too small.
 ///
 /// `ode45` itself has the tableau of Dormand and Prince.
 pub fn controlled<const S: usize>(

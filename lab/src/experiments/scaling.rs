@@ -18,8 +18,8 @@ use mbd_cli::note;
 use mbd_cli::plot::Panel;
 use mbd_cli::Outcome;
 
-/// Loops of planar mechanisms are closed by a revolute joint; three of its five rows are redundant in a plane.
-const PIN: &str = "pin";
+/// Kind of the loops: a revolute joint. In planar mechanisms three of its five rows are redundant.
+const REVOLUTE: &str = "pin";
 
 /// Kinds of systems, as the legends name them.
 const FAMILIES: [&str; 3] = ["open", "tree", "closed"];
@@ -38,7 +38,7 @@ fn text(family: &str, n: usize) -> String {
     match family {
         "open" => texts::open(n),
         "tree" => texts::tree(n),
-        _ => texts::closed(n, PIN, false),
+        _ => texts::closed(n, REVOLUTE, false),
     }
 }
 
@@ -66,7 +66,7 @@ impl Effort {
         }
     }
 
-    /// Time of an evaluation of each.
+    /// Time of an evaluation of each mechanism.
     fn times(&self, mechanisms: &mut [Mechanism]) -> Vec<f64> {
         let mut calls: Vec<Box<dyn FnMut() + '_>> = mechanisms.iter_mut().map(call).collect();
         let mut calls: Vec<&mut dyn FnMut()> = calls.iter_mut().map(|c| &mut **c as &mut dyn FnMut()).collect();
@@ -74,7 +74,7 @@ impl Effort {
     }
 }
 
-/// One evaluation at the start, with velocities.
+/// A function that makes one evaluation at the start with small velocities.
 fn call(mechanism: &mut Mechanism) -> Box<dyn FnMut() + '_> {
     let Mechanism { system, q, .. } = mechanism;
     let (mut p, mut qd, mut pd) = (system.zero_momenta(), system.neutral(), system.zero_momenta());
@@ -82,13 +82,13 @@ fn call(mechanism: &mut Mechanism) -> Box<dyn FnMut() + '_> {
     Box::new(move || system.rates_at(0.0, std::hint::black_box(q), &p, &mut qd, &mut pd))
 }
 
-/// Momenta of a motion: those of small velocities.
+/// Momenta of small velocities, so that the evaluation is not one at rest.
 fn moving(system: &mut Interpreter<f64>, q: &[f64], p: &mut [f64]) {
     let v: Vec<f64> = (0..p.len()).map(|k| 0.1 - 0.02 * (k % 11) as f64).collect();
     system.momenta(q, &v, p);
 }
 
-/// Measures and writes.
+/// Measures all systems and writes tables and figures.
 pub fn run(args: &ScalingArgs, out: &mut dyn Write) -> Outcome {
     directory(args.out.as_deref())?;
     let effort = Effort::new(args.quick);
@@ -290,7 +290,7 @@ fn space(effort: &Effort) -> Outcome<String> {
     };
     line("open", [texts::open(20), texts::crosswise(20)])?;
     line("closed by a ball joint", [texts::closed(20, "spherical", false), texts::closed(20, "spherical", true)])?;
-    line("closed by a pin", [texts::closed(20, PIN, false), texts::closed(20, PIN, true)])?;
+    line("closed by a pin", [texts::closed(20, REVOLUTE, false), texts::closed(20, REVOLUTE, true)])?;
     let [crosswise, planar] = thesis::CHAIN20.map(|t| 1e6 * t);
     let cells =
         ["open, thesis".into(), format!("{planar}"), format!("{crosswise}"), format!("{:.2}", crosswise / planar)];
@@ -306,7 +306,7 @@ fn many_loops(args: &ScalingArgs, effort: &Effort, out: &mut dyn Write) -> Outco
     for &count in counts {
         let mut both = Vec::new();
         for series in [false, true] {
-            both.push(mechanism::read(&texts::four_bars(count, PIN, series))?);
+            both.push(mechanism::read(&texts::four_bars(count, REVOLUTE, series))?);
         }
         rows.push((count, effort.times(&mut both)));
     }

@@ -148,11 +148,11 @@ impl<Y: Closed> Study<Y> {
     pub fn minimal_end(&mut self, kind: Kind, h: f64) -> Ended {
         let (y, mut states) = (self.minimal_start(), Vec::new());
         Walk::new(&mut self.minimal(kind), &VERNER9, &y).all(h, END, &mut states);
-        // The run starts again from the start, so that the loop stays in its branch.
-        let mut form = self.minimal(kind);
-        let start = form.energy(&y);
-        let energy = states.iter().fold(0.0_f64, |m, y| m.max((form.energy(y) - start).abs()));
-        Ended { q: form.coordinates(states.last().unwrap_or(&y)), energy }
+        // The states are evaluated from the start on, so that the loop stays in its branch.
+        let mut equations = self.minimal(kind);
+        let start = equations.energy(&y);
+        let energy = states.iter().fold(0.0_f64, |m, y| m.max((equations.energy(y) - start).abs()));
+        Ended { q: equations.coordinates(states.last().unwrap_or(&y)), energy }
     }
 
     /// The motion with all coordinates, by the same steps.
@@ -179,8 +179,8 @@ impl<Y: Closed> Study<Y> {
     /// Table 7.1.
     pub fn fixed(&mut self, kind: Kind, h: f64, reference: &[f64]) -> Fixed {
         let y = self.minimal_start();
-        let mut form = self.minimal(kind);
-        let mut walk = Walk::new(&mut form, &RKF45, &y);
+        let mut equations = self.minimal(kind);
+        let mut walk = Walk::new(&mut equations, &RKF45, &y);
         let (mut sums, mut steps) = ([0.0; 2], 0.0_f64);
         walk.fixed(h, END, |_, walk| {
             for (sum, half) in sums.iter_mut().zip(walk.error.chunks(INDEPENDENT.len())) {
@@ -198,11 +198,12 @@ impl<Y: Closed> Study<Y> {
         Some((distance(&y, reference), evaluations))
     }
 
-    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance for all components or for the coordinates alone.
+    /// Tables 7.3 and 7.4, figures 7.14 and 7.15: an absolute tolerance for all components or for the coordinates
+    /// alone.
     pub fn adaptive(&mut self, kind: Kind, tolerance: f64, partial: bool, reference: &[f64]) -> Adaptive {
         let y = self.minimal_start();
-        let mut form = self.minimal(kind);
-        let mut walk = Walk::new(&mut form, &RKF45, &y);
+        let mut equations = self.minimal(kind);
+        let mut walk = Walk::new(&mut equations, &RKF45, &y);
         let watched = if partial { INDEPENDENT.len() } else { y.len() };
         let (mut tried, mut wins) = (Vec::new(), vec![0; y.len()]);
         let (mut sum, mut steps, mut step) = (0.0, 0.0_f64, INTERVAL);
@@ -240,7 +241,7 @@ impl<Y: Closed> Study<Y> {
         let y = self.minimal_start();
         let mut traces = [Traces::default(), Traces::default(), Traces::default()];
         for kind in KINDS {
-            let mut form = self.minimal(kind);
+            let mut equations = self.minimal(kind);
             let mut put = |t: f64, y: &[f64]| {
                 let (q, p) = y.split_at(INDEPENDENT.len());
                 match kind {
@@ -252,21 +253,22 @@ impl<Y: Closed> Study<Y> {
                 }
             };
             put(0.0, &y);
-            Walk::new(&mut form, &RKF45, &y).fixed(h, END, |t, walk| put(t, &walk.y));
+            Walk::new(&mut equations, &RKF45, &y).fixed(h, END, |t, walk| put(t, &walk.y));
         }
         traces
     }
 
-    /// Figures 7.12 and 7.13 with steps of `h` s and all coordinates: errors of the loop along x and y and of the energy.
+    /// Figures 7.12 and 7.13 with steps of `h` s and all coordinates: errors of the loop along x and y and of the
+    /// energy.
     pub fn drift(&mut self, kind: Kind, h: f64, method: Method) -> [Traces; 2] {
         let y = self.whole_start();
         let mut states = vec![(0.0, y.clone())];
-        let mut form = Whole::new(&mut self.system, kind);
+        let mut equations = Whole::new(&mut self.system, kind);
         let mut keep = |t: f64, y: &[f64]| states.push((t, y.to_vec()));
         match method {
-            Method::Classical => Walk::new(&mut form, &RK4, &y).fixed(h, END, |t, w| keep(t, &w.y)),
+            Method::Classical => Walk::new(&mut equations, &RK4, &y).fixed(h, END, |t, w| keep(t, &w.y)),
             Method::Fehlberg { lower } => {
-                let mut walk = Walk::new(&mut form, &RKF45, &y);
+                let mut walk = Walk::new(&mut equations, &RKF45, &y);
                 walk.lower = lower;
                 walk.fixed(h, END, |t, w| keep(t, &w.y));
             }
@@ -280,15 +282,15 @@ impl<Y: Closed> Study<Y> {
         traces
     }
 
-    /// `steps` classical steps of `h` s, with position correction after each: largest residual after and before it, and the
-    /// largest change of the energy, J.
+    /// `steps` classical steps of `h` s, with position correction after each: largest residual after and before it, and
+    /// the largest change of the energy, J.
     pub fn projected(&mut self, h: f64, steps: u64, mut tell: impl FnMut(u64)) -> [f64; 3] {
         let y = self.whole_start();
         let (n, start) = (self.start.len(), self.energy(Kind::Momenta, &y));
         let (mut y, mut worst) = (y, [0.0_f64; 3]);
         for step in 1..=steps {
-            let mut form = Whole::new(&mut self.system, Kind::Momenta);
-            let mut walk = Walk::new(&mut form, &RK4, &y);
+            let mut equations = Whole::new(&mut self.system, Kind::Momenta);
+            let mut walk = Walk::new(&mut equations, &RK4, &y);
             walk.attempt(h);
             walk.accept();
             y = std::mem::take(&mut walk.y);
@@ -317,7 +319,7 @@ impl<Y: Closed> Study<Y> {
 }
 
 impl<const S: usize> Walk<'_, S> {
-    /// All steps to the end; every state on the way into `states`.
+    /// Makes all steps to the end and adds the state after every step to `states`.
     fn all(mut self, h: f64, end: f64, states: &mut Vec<Vec<f64>>) -> Vec<f64> {
         self.fixed(h, end, |_, walk| states.push(walk.y.clone()));
         self.y

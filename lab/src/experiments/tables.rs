@@ -67,7 +67,8 @@ pub fn fixed(rows: &[(f64, [Fixed; 2])]) -> String {
     text + "\n"
 }
 
-/// Runs of `ode45`: mean end error and evaluations of accelerations and of Hamilton's equations, none where it gave up.
+/// Runs of `ode45` with accelerations and with Hamilton's equations: mean end error and evaluations. `None` if the
+/// steps became too small.
 pub type Runs = [Option<(f64, u64)>; 2];
 
 /// Table 7.2.
@@ -108,7 +109,8 @@ pub fn ode45(rows: &[(f64, Runs)]) -> String {
     text
 }
 
-/// Table 7.3: full control, control of the coordinates; accelerations, Hamilton.
+/// Table 7.3: first with control of all errors, then with control of the coordinates' errors; accelerations, then
+/// Hamilton.
 pub fn control(rows: &[[Adaptive; 2]; 2]) -> String {
     let mut text = head(
         "Table 7.3: Runge-Kutta-Fehlberg with error control, tolerance 1e-6",
@@ -132,7 +134,7 @@ pub fn control(rows: &[[Adaptive; 2]; 2]) -> String {
     text + "\n"
 }
 
-/// Table 7.4, of full control.
+/// Table 7.4, with control of all errors.
 pub fn wins(runs: &[Adaptive; 2]) -> String {
     let mut text =
         String::from("### Table 7.4: intervals of 0.01 s in which a number of the state had the largest error\n\n");

@@ -1,6 +1,7 @@
 //! Numbers printed in the thesis, for comparison with our own.
 
-/// Table 7.1: step (s), end error in acceleration and in Hamiltonian form, mean truncation error of the coordinates in both.
+/// Table 7.1: step (s), end error in acceleration and in Hamiltonian form, mean truncation error of the coordinates in
+/// both.
 pub const FIXED: [(f64, [f64; 2], [f64; 2]); 5] = [
     (1e-2, [2.8e-3, 1.2e-3], [1.6e-6, 9.7e-7]),
     (5e-3, [1.9e-4, 5.4e-5], [4.3e-8, 3.9e-8]),
@@ -26,7 +27,8 @@ pub const ODE45: [(f64, f64, [u64; 2]); 6] = [
 pub const ODE15S: [(f64, [u64; 2]); 4] =
     [(1e-3, [336, 235]), (1e-6, [682, 460]), (1e-9, [1542, 998]), (1e-12, [7916, 4815])];
 
-/// Table 7.3: control of all errors, then of the coordinates' alone; mean truncation error, mean end error, evaluations.
+/// Table 7.3: control of all errors, then of the coordinates' alone; mean truncation error, mean end error,
+/// evaluations.
 pub const CONTROL: [([f64; 2], [f64; 2], [u64; 2]); 2] =
     [([4.2e-9, 4.4e-8], [1.4e-5, 2.0e-5], [1578, 1177]), ([4.7e-8, 4.7e-8], [4.8e-5, 2.1e-5], [1164, 1159])];
 

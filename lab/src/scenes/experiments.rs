@@ -24,8 +24,8 @@ fn arc(i: usize, n: usize) -> f64 {
     1.2 - 2.0 * (i as f64 - 0.5) / n as f64
 }
 
-/// Chain of `n` links on an arc. A loop of the given type fixes its tip where it starts. With `crosswise`, every second joint
-/// rotates about y, at a small angle.
+/// Chain of `n` links on an arc. A loop of the given type fixes its tip where it starts. With `crosswise`, every second
+/// joint rotates about y, at a small angle.
 pub fn closed(n: usize, kind: &str, crosswise: bool) -> String {
     let comment = format!("Closed chain of {n} equal links (thesis 7.2) in an arc; the last tip is held by a loop.");
     let axis = |i: usize| if !crosswise || i % 2 == 1 { Z } else { Y };
@@ -75,16 +75,17 @@ fn turn(axes: &mut [[f64; 3]; 3], about_z: bool, angle: f64) {
     }
 }
 
-/// Lengths of a four-bar, m: crank, coupler, rocker, and the distance of its two joints on the ground or on the bar that carries it.
+/// Lengths of a four-bar, m: crank, coupler, rocker, and the distance of its two joints on the ground or on the bar
+/// that carries it.
 const FOUR_BAR: [f64; 4] = [0.1, 0.2, 0.2, 0.2];
-/// Angles of the three bars from the line of the joints on the ground at the start; solved for the crank's, rad.
+/// Angle of the crank at the start, from the line through the two joints of the base, rad.
 const CRANK: f64 = 1.0;
 
-/// Angles of coupler and rocker at the start.
+/// Angles of coupler and rocker at the start, which follow from that of the crank.
 fn four_bar_start() -> [f64; 2] {
     let [crank, coupler, rocker, base] = FOUR_BAR;
     let (x, y) = (base - crank * CRANK.cos(), -crank * CRANK.sin());
-    // Triangle of coupler, rocker and the line from the crank's tip to the rocker's joint.
+    // The angle follows from the triangle of coupler, rocker and the line from the crank's tip to the rocker's joint.
     let (across, along) = (x.hypot(y), y.atan2(x));
     let angle = ((coupler.powi(2) + across.powi(2) - rocker.powi(2)) / (2.0 * coupler * across)).acos();
     let coupler_angle = along + angle;
@@ -92,7 +93,8 @@ fn four_bar_start() -> [f64; 2] {
     [coupler_angle, tip[1].atan2(tip[0])]
 }
 
-/// `count` four-bars closed by loops of the given type: side by side on the ground, or each on the coupler of the one before.
+/// `count` four-bars closed by loops of the given type: side by side on the ground, or each on the coupler of the one
+/// before.
 pub fn four_bars(count: usize, kind: &str, series: bool) -> String {
     let way = if series { "each on the coupler of the one before" } else { "side by side on the ground" };
     let mut text = Text::new(&format!("four_bars{count}"), &format!("{count} four-bars, {way}."), GRAVITY);

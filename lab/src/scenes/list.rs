@@ -243,7 +243,7 @@ pub(super) static SCENES: [Entry; 22] = [
     },
 ];
 
-/// `1e-6^(1/5)`: a millionth in five steps.
+/// The number `1e-6^(1/5)`, whose fifth power is a millionth.
 const FIFTH_ROOT: f64 = 0.063_095_734_448_019_33;
 
 pub(super) static REFUSED: [Refused; 2] = [

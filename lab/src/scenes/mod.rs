@@ -1,4 +1,5 @@
-//! Scenes of the benchmarks and of the integrators' tests: a model, a start, the length of the run, and the required result.
+//! Scenes of the benchmarks and of the integrators' tests: a model, a start, the length of the run, and the required
+//! result.
 //!
 //! `list.rs` is the list of scenes; a new scene is a new entry there.
 
@@ -20,7 +21,8 @@ use multibody::codegen::read::{self, Base, ImportOptions};
 pub enum Expect {
     /// The run reaches the end, with at most the error stated for the method and its step or tolerances.
     Runs,
-    /// The mass matrix is singular at the start, which the checks of the file cannot find: a typed error and no numbers.
+    /// The mass matrix is singular at the start, which the checks of the file cannot find: a typed error and no
+    /// numbers.
     Stops,
 }
 
@@ -60,7 +62,7 @@ pub struct Refused {
     pub title: &'static str,
     /// Name of the model file in `models/`.
     pub file: &'static str,
-    /// Its text.
+    /// Text of the model file.
     pub text: &'static str,
     /// Part of the error message.
     pub finding: &'static str,

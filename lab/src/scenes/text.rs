@@ -64,7 +64,7 @@ impl Text {
         );
     }
 
-    /// The file.
+    /// The text of the file.
     pub fn finish(self) -> String {
         self.0
     }
@@ -110,8 +110,8 @@ pub(super) fn chain(name: &str, n: usize, damping: f64) -> String {
     text.finish()
 }
 
-/// Tree of thesis 7.2: branches of ten links that fork in two, `levels` times ten links deep; links are numbered level by
-/// level, and in a level branch by branch. Straight along x at zero angles.
+/// Tree of thesis 7.2: branches of ten links that fork in two, `levels` times ten links deep; links are numbered level
+/// by level, and in a level branch by branch. Straight along x at zero angles.
 pub(super) fn tree(name: &str, levels: u32, damping: f64) -> String {
     let comment = format!("Planar tree (thesis 7.2): branches of ten links that fork in two, {levels} levels.");
     forking(name, &comment, levels, damping, |_| 10)
@@ -146,8 +146,8 @@ pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, link
     text.finish()
 }
 
-/// Six slender links of 0.3 m in space, hanging at zero angles, with joints about y and x in turn; the first weighs `mass` kg, each
-/// further one `ratio` times the one before.
+/// Six slender links of 0.3 m in space, hanging at zero angles, with joints about y and x in turn; the first weighs
+/// `mass` kg, each further one `ratio` times the one before.
 pub(super) fn tapered(name: &str, mass: f64, ratio: f64) -> String {
     let comment = format!("Six links in space, each of {ratio:?} times the mass of the one before, no friction.");
     let mut text = Text::new(name, &comment, [0.0, 0.0, -9.81]);
@@ -160,7 +160,7 @@ pub(super) fn tapered(name: &str, mass: f64, ratio: f64) -> String {
             parent: parent.as_deref(),
             mass,
             com: [0.0, 0.0, -0.15],
-            // A radius of 1 cm: m r²/2.
+            // The inertia about the link is m r²/2 with a radius of 1 cm.
             inertia: [across, across, mass * 5e-5],
             place: [0.0, 0.0, if k == 0 { 0.0 } else { -0.3 }],
             axis: if k % 2 == 0 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] },

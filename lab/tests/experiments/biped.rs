@@ -1,17 +1,18 @@
-//! The biped of thesis 7.3 by hand: Lagrange's equations in absolute angles, dense, with nothing of the library in them but
-//! what an integrator needs.
+//! The biped of thesis 7.3, written by hand: Lagrange's equations in absolute angles with dense matrices. They are
+//! independent of the library except for the trait that integrators need.
 //!
-//! Link `i` points along `(cos θ_i, sin θ_i)`. A place is a sum of links, so kinetic energy is `½ Σ c_ij cos(θ_i − θ_j) ω_i ω_j`
-//! and potential energy `g Σ w_i sin θ_i` with numbers `c`, `w` of the chain alone.
+//! Link `i` points along `(cos θ_i, sin θ_i)`. The position of a point is a sum of links, so the kinetic energy is
+//! `½ Σ c_ij cos(θ_i − θ_j) ω_i ω_j` and the potential energy `g Σ w_i sin θ_i`, where `c` and `w` are constants of the
+//! chain.
 
 use multibody::runtime::system::LieJoint;
 use multibody::runtime::System;
 
-/// Links.
+/// Number of links.
 pub const N: usize = 5;
-/// Rows of the loop.
+/// Number of rows of the loop.
 pub const M: usize = 2;
-/// Length (m), gravity (m/s²), place of the second foot on x (m); mass 1 kg.
+/// Length of the links (m), gravity (m/s²), position of the second foot on x (m). Each link has a mass of 1 kg.
 const LENGTH: f64 = 0.25;
 const GRAVITY: f64 = 9.81;
 const FOOT: f64 = 0.25;
@@ -47,7 +48,7 @@ pub fn solve<const K: usize>(mut a: [[f64; K]; K], mut b: [f64; K]) -> [f64; K] 
     b
 }
 
-/// How often link `j` counts in the place of the centre of mass of link `i`: 1 below it, ½ for itself.
+/// Factor of link `j` in the position of the centre of mass of link `i`: 1 for links below it, ½ for the link itself.
 fn share(i: usize, j: usize) -> f64 {
     let mut at = PARENT[i];
     while let Some(k) = at {
@@ -67,7 +68,7 @@ fn share(i: usize, j: usize) -> f64 {
 pub struct Biped {
     c: Matrix,
     w: Vector,
-    /// Angles the loop is closed from.
+    /// Angles from which Newton's method closes the loop.
     pub theta: Vector,
 }
 
@@ -96,7 +97,7 @@ impl Biped {
         [std::array::from_fn(|i| -on(i) * theta[i].sin()), std::array::from_fn(|i| on(i) * theta[i].cos())]
     }
 
-    /// Newton's method on the last two angles.
+    /// Closes the loop by Newton's method on the last two angles.
     pub fn close(&mut self) {
         for _ in 0..20 {
             let (r, j) = (Self::residual(&self.theta), Self::jacobian(&self.theta));
@@ -163,7 +164,7 @@ impl Biped {
     }
 }
 
-/// Joint angles from absolute ones, and the other way.
+/// Joint angles from absolute angles. [`absolute`] is the inverse.
 pub fn relative(theta: &Vector) -> Vector {
     std::array::from_fn(|i| theta[i] - PARENT[i].map_or(0.0, |p| theta[p]))
 }
@@ -176,7 +177,7 @@ pub fn absolute(q: &Vector) -> Vector {
     theta
 }
 
-/// The first three angles and their rates as the state.
+/// The state consists of the first three angles and their rates.
 impl System for Biped {
     type Scalar = f64;
     type Coordinates = Vec<f64>;

@@ -1,4 +1,4 @@
-//! The thesis's biped by every way of computing it, and the command that repeats its experiments.
+//! The biped of the thesis in every formulation, and the command that repeats the experiments of the thesis.
 
 mod biped;
 #[allow(dead_code)]
@@ -20,7 +20,7 @@ use run::{files, folder, good, out, read, run_in};
 
 const END: f64 = 0.85;
 
-/// The model as it is shipped, closed.
+/// The shipped model with its loop closed.
 fn shipped() -> (Interpreter<f64>, Vec<f64>) {
     let text = read(Path::new(run::ROOT), "models/biped.toml");
     let (model, findings) = read::load("biped.toml", &text, &ImportOptions::default());
@@ -32,7 +32,7 @@ fn shipped() -> (Interpreter<f64>, Vec<f64>) {
     let mut q = system.neutral();
     model.starts.iter().for_each(|s| q[s.joint] = s.q[0]);
     assert_eq!(q[..3], [1.7, -0.7, 0.3]);
-    // The dependent angles of the file have three digits.
+    // In the file, the dependent angles have three digits.
     let closed = relative(&Biped::new().theta);
     for k in 3..5 {
         assert!((q[k] - closed[k]).abs() < 1e-3, "{q:?} {closed:?}");
@@ -46,7 +46,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m, (a, b)| (a - b).abs().max(m))
 }
 
-/// Angles of the joints at the end by the equations that are written down by hand.
+/// Angles of the joints at the end by the equations that are written by hand.
 fn by_hand() -> Vector {
     let mut biped = Biped::new();
     let (mut q, mut v) = (biped.neutral(), biped.zero_momenta());
@@ -79,7 +79,7 @@ fn every_way_leads_to_the_same_end() {
     let steps = 1700;
     let h = END / f64::from(steps);
 
-    // Method 1: augmented momenta, multipliers begun anew at every step.
+    // Method 1 has augmented momenta, with momentum projection after every step.
     let (mut q, mut p, mut v, mut sigma) =
         (start.clone(), system.zero_momenta(), system.zero_momenta(), system.zero_rows());
     let mut method = Verner9::new(&system);
@@ -91,7 +91,8 @@ fn every_way_leads_to_the_same_end() {
     }
     assert!(apart(&q, &reference) < 1e-9, "method 1: {q:?} {reference:?}");
 
-    // Method 2: minimal coordinates, dependents chosen and changed by the library; then those of the thesis throughout.
+    // Method 2 has minimal coordinates. First the library chooses and switches the dependent ones, then they are those
+    // of the thesis for the whole motion.
     for thesis in [false, true] {
         let (mut q, mut p) = (start.clone(), system.zero_momenta());
         let minimal = CoordinatePartition::new(system.clone(), &mut q, &mut p).expect("closed");
@@ -111,18 +112,18 @@ fn every_way_leads_to_the_same_end() {
         assert!(thesis == (minimal.switches().0 == 0), "{:?}", minimal.switches());
     }
 
-    // The acceleration form, its index reduced.
-    let mut form = AccelerationForm::new(system);
-    let (mut q, mut v) = (start, form.zero_momenta());
-    let mut method = Verner9::new(&form);
+    // The last formulation has accelerations, with the index of the constraints reduced.
+    let mut accelerated = AccelerationForm::new(system);
+    let (mut q, mut v) = (start, accelerated.zero_momenta());
+    let mut method = Verner9::new(&accelerated);
     for k in 0..steps {
-        method.step(&mut form, f64::from(k) * h, h, &mut q, &mut v).expect("a step");
+        method.step(&mut accelerated, f64::from(k) * h, h, &mut q, &mut v).expect("a step");
     }
     assert!(apart(&q, &reference) < 1e-9, "accelerations: {q:?} {reference:?}");
-    assert!((energy(&mut form, &q, &v) - before).abs() < 1e-10);
+    assert!((energy(&mut accelerated, &q, &v) - before).abs() < 1e-10);
 }
 
-/// Largest opening of the loop over the motion with classical steps of 1 ms.
+/// Largest residual of the loop over the motion with RK4 steps of 1 ms.
 fn drift<Y>(
     system: &mut Y,
     q: &[f64],
@@ -150,21 +151,21 @@ fn momenta_drift_less_than_accelerations_and_projection_stops_it() {
     };
     let (mut system, q) = shipped();
     let (mut v, mut sigma, mut pivots) = (system.zero_momenta(), system.zero_rows(), system.zero_rows());
-    let settled = drift(&mut system, &q, gap, |system, q, p| system.project_momenta(0.0, q, p, &mut v, &mut sigma));
+    let momenta = drift(&mut system, &q, gap, |system, q, p| system.project_momenta(0.0, q, p, &mut v, &mut sigma));
     let projected = drift(&mut system, &q, gap, |system, q, p| {
         system.project_momenta(0.0, q, p, &mut v, &mut sigma);
-        // Two steps of Newton's method: the first one leaves the square of 1e-8.
+        // Two iterations of Newton's method are needed: the first one leaves an error of the order of 1e-8 squared.
         for _ in 0..2 {
             system.position_correction(q, &mut sigma, &mut v, &mut pivots);
             q.iter_mut().zip(&v).for_each(|(q, dq)| *q += dq);
         }
     });
     let accelerated = drift(&mut AccelerationForm::new(system), &q, gap, |_, _, _| ());
-    assert!(accelerated > 30.0 * settled, "{accelerated:e} {settled:e}");
+    assert!(accelerated > 30.0 * momenta, "{accelerated:e} {momenta:e}");
     assert!(projected <= 1e-13, "{projected:e}");
 }
 
-/// The momenta of the method's start are those of its velocities.
+/// The momenta of zero velocities are zero.
 #[test]
 fn the_start_is_at_rest() {
     let (mut system, q) = shipped();
@@ -174,7 +175,7 @@ fn the_start_is_at_rest() {
     assert!(p.iter().all(|p| *p == 0.0));
 }
 
-/// Cells of the rows of a table under a title that begin with a name.
+/// Cells of the row that begins with `first`, in the table whose title begins with `title`.
 fn cells(text: &str, title: &str, first: &str) -> Vec<String> {
     let table = text.split("### ").find(|t| t.starts_with(title)).unwrap_or_else(|| panic!("no `{title}` in\n{text}"));
     let row = table.lines().find(|l| l.starts_with(&format!("| {first}")));
@@ -196,8 +197,8 @@ fn the_command_repeats_the_biped() {
         let row = cells(text, "Coordinates", way);
         assert!(number(&row[7]) < 1e-9 && number(&row[8]) < 1e-10, "{row:?}");
     }
-    // The thesis's truncation errors, which nothing but the equations and the method decide, within what it rounds them to and
-    // the 10 % that experiments differ by.
+    // Truncation errors depend only on the equations and the method. They agree with those of the thesis within its
+    // rounding and 10 %.
     for (step, errors) in [("0.005", [4.3e-8, 3.9e-8]), ("0.001", [1.4e-11, 1.3e-11])] {
         let row = cells(text, "Table 7.1", step);
         for (cell, theirs) in row[4..6].iter().zip(errors) {

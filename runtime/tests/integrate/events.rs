@@ -1,4 +1,4 @@
-//! Events: times, order, directions, ends of runs.
+//! Events: times, order, directions, runs that end at events.
 
 use super::systems::*;
 use mbd_runtime::integrate::{
@@ -6,7 +6,7 @@ use mbd_runtime::integrate::{
 };
 use mbd_runtime::{Interpreter, Real, System};
 
-/// Functions of the state as closures, and a record of what happened.
+/// Event functions given by a closure, and a record of the events.
 struct Watched<F, const N: usize> {
     watches: [Watch; N],
     values: F,
@@ -41,7 +41,7 @@ use Direction::{Both, Falling, Rising};
 
 const HALF_PI: f64 = std::f64::consts::FRAC_PI_2;
 
-/// Swings through the lowest point at odd multiples of the quarter period, and stands at even ones.
+/// A pendulum passes its lowest point at odd multiples of the quarter period, and is at rest at even ones.
 #[test]
 fn a_pendulum_by_its_quarter_periods() {
     let quarter = quarter(HALF_PI, 2.0);
@@ -59,12 +59,12 @@ fn a_pendulum_by_its_quarter_periods() {
         assert_eq!(solver.time(), end);
         events.happened
     }
-    // At the start p = 0: no event. Of one instant the first function comes first.
+    // The zero p = 0 at the start is no event. Events at the same time come in the order of their functions.
     let expected: Vec<(usize, f64)> = (0..3)
         .flat_map(|k| [(0, 1), (2, 1), (3, 2), (1, 3), (2, 3)].map(|(e, n)| (e, f64::from(n + 4 * k) * quarter)))
         .collect();
     for (name, times, tolerance) in [
-        // Errors of the motion are about ten tolerances here, those of dense output of low order a little more.
+        // Errors of the motion are about ten tolerances here, and a little more with dense output of low order.
         ("tsit5", times(pendulum(), Tsit5::new, 1e-8, 12.0 * quarter), 3e-7),
         ("rkf45, cubic", times(pendulum(), Rkf45::new, 1e-8, 12.0 * quarter), 1e-5),
         ("dop853", times(pendulum(), Dop853::new, 1e-12, 12.0 * quarter), 1e-10),
@@ -82,11 +82,11 @@ fn a_pendulum_by_its_quarter_periods() {
     }
 }
 
-/// The run stands at the zero, goes on without meeting it again, and misses none.
+/// A run ends at a terminal event. The next run does not find the same event again, and misses none.
 #[test]
 fn terminal_events_end_runs() {
     ends_at_events(pendulum::<f64>(), Dop853::new);
-    // One that begins anew after each.
+    // This method restarts after each event.
     ends_at_events(pendulum::<f64>(), VariableAdams::new);
 }
 
@@ -103,27 +103,28 @@ where
         let outcome = solver.run_events(&mut y, 1e3, &mut events).expect("a run");
         let Outcome::Event { index: 0, time } = outcome else { panic!("{outcome:?}") };
         let expected = f64::from(2 * k + 1) * quarter;
-        // Some hundred tolerances after so many swings.
+        // The error of the motion grows to some hundred tolerances in these periods.
         assert!((time - expected).abs() < 5e-9, "{k}: {time} {expected}");
         assert_eq!(solver.time(), time);
-        // Four units in the last place of the time, at a speed below two; rounding of the dense output, whose weights are
-        // some hundreds.
+        // The bound is four units in the last place of the time, at a speed below two, and rounding of the dense
+        // output, whose weights are some hundreds.
         let q = state(&mut solver, &y)[0];
         assert!(q.abs() <= 8.0 * f64::EPSILON * time + 1e-13, "{k}: {q:e}");
     }
-    // Every other event is a turn: none at the start.
+    // Every other event is a turning point; that at the start is not an event.
     assert_eq!(events.happened.iter().map(|e| e.0).collect::<Vec<_>>(), [&[0][..], &[1, 0].repeat(19)].concat());
     let statistics = solver.statistics();
     assert!(statistics.steps > 100 && statistics.evaluations > 2 * statistics.steps, "{statistics:?}");
 }
 
-/// Falls from 1 m at 2 m/s², keeps half its speed at each bounce: 1 s, then 1, 1/2, 1/4 s more.
+/// A ball falls from 1 m at 2 m/s² and keeps half its speed at each bounce. It hits the ground after 1 s, then after 1,
+/// 1/2 and 1/4 s more.
 #[test]
 fn a_ball_that_bounces() {
     let mut y = Plain::new(|_, _: &[f64; 1], p: &[f64; 1]| ([p[0]], [-2.0]));
     let method = Tsit5::new(&y);
     let mut solver = adaptive(&mut y, method, 1e-9, (&[1.0], &[0.0]));
-    // Both ways: the way up after a bounce is not an event.
+    // The event has both directions, but the start upwards after a bounce is not an event.
     let mut events = Watched::new([(Both, true)], |_, q: &[f64], _: &[f64]| [q[0]]);
     let mut expected = 1.0;
     for k in 0..12 {
@@ -138,7 +139,8 @@ fn a_ball_that_bounces() {
     assert_eq!(events.happened.len(), 12);
 }
 
-/// A parabola is solved in one step. It tops a line for a third of that: found; for a hundredth: not promised, not found.
+/// The motion along a parabola is one step. If the parabola is above a line for a third of the step, both zeros are
+/// found; for a hundredth of the step they are missed, as the documentation allows.
 #[test]
 fn two_zeros_in_one_step() {
     for (share, found) in [(0.3, 2), (0.01, 0)] {
@@ -146,7 +148,7 @@ fn two_zeros_in_one_step() {
         let method = Rk4::new(&y);
         let (q, p) = ([0.0], [1.0]);
         let mut solver = Solver::new(&mut y, method, Step::Fixed(1.0), 0.0, &q, &p).expect("a start");
-        // t (1 − t) is the same at 0.43 ∓ share / 2 of a parabola moved there.
+        // The line meets the parabola t (1 − t) at the times a and b.
         let (a, b) = (0.43 - 0.5 * share, 0.43 + 0.5 * share);
         let line = move |t: f64| a * b + (1.0 - a - b) * t;
         let mut events =
@@ -162,7 +164,8 @@ fn two_zeros_in_one_step() {
     }
 }
 
-/// Zeros that differ by rounding: none is lost behind the end of a run, none is met twice.
+/// Functions whose zeros differ by rounding: a run that ends at one of them does not lose the others, and none is found
+/// twice.
 #[test]
 fn events_at_one_instant() {
     let mut y = oscillator();
@@ -178,7 +181,8 @@ fn events_at_one_instant() {
         ends += 1;
         assert!(ends < 20);
     }
-    // Five zeros (at 1, 3, 5, 7, 9 quarters); the flat cube may come a run of its own.
+    // There are five zeros, at 1, 3, 5, 7 and 9 quarter periods. The cube is flat at its zero, so its time is less
+    // exact.
     for k in 0..4 {
         let times: Vec<f64> = events.happened.iter().filter(|e| e.0 == k).map(|e| e.1 / HALF_PI).collect();
         assert_eq!(times.len(), 5, "{k}: {times:?}");
@@ -189,7 +193,8 @@ fn events_at_one_instant() {
     assert!(events.happened.windows(2).all(|w| w[0].1 <= w[1].1));
 }
 
-/// On zero at the start, on zero for good, not a number: no event. Reached at the very end: one.
+/// A function that is zero at the start, that is always zero, or that becomes NaN has no event. A zero at the very end
+/// of a run is an event.
 #[test]
 fn zeros_that_are_no_events() {
     let mut y = oscillator();
@@ -203,7 +208,7 @@ fn zeros_that_are_no_events() {
     assert_eq!(events.happened, [(3, 2.0)]);
 }
 
-/// A quaternion changes its sign with every turn, and in no other way: it does not jump from step to step.
+/// The components of a quaternion change sign continuously, once in every turn; they do not jump from step to step.
 #[test]
 fn components_of_quaternions() {
     let mut y: Interpreter<f64> = rotor();
@@ -214,7 +219,7 @@ fn components_of_quaternions() {
     solver.limits.max_step = 1.1;
     let mut events = Watched::new([(Falling, false), (Rising, false)], |_, q: &[f64], _: &[f64]| [q[3], q[3]]);
     assert_eq!(solver.run_events(&mut y, 50.0, &mut events), Ok(Outcome::End));
-    // cos(spin t / 2) = 0.
+    // The expected times are the zeros of cos(spin t / 2).
     let expected = (0..).map(|n| f64::from(2 * n + 1) * HALF_PI * 2.0 / spin).take_while(|t| *t < 50.0);
     let expected: Vec<f64> = expected.collect();
     assert_eq!(events.happened.len(), expected.len());

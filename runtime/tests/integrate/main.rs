@@ -1,4 +1,4 @@
-//! Methods of integration on small systems that are written down by hand.
+//! Methods of integration on small systems that are written by hand.
 
 mod constrained;
 mod events;

@@ -1,4 +1,4 @@
-//! Displacements one after the other, step doubling, the semi-implicit Euler method.
+//! Composition of displacements, step doubling, the semi-implicit Euler method.
 
 use mbd_runtime::integrate::{
     Chart, Euler, Midpoint, Point, Rk4, SemiImplicitEuler, Solver, Step, StepDoubling, Stepper, Tolerances, Verner9,
@@ -6,14 +6,14 @@ use mbd_runtime::integrate::{
 use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::System;
 
-/// An ordinary coordinate, a rotation, a pose, a planar joint: for charts alone.
+/// An ordinary coordinate, a rotation, a pose and a planar joint, without equations of motion, for tests of charts.
 #[derive(Clone, Debug)]
 struct Kinds([LieJoint; 3]);
 
 impl Kinds {
     fn new(momenta: bool) -> Self {
-        let group = |kind, q, v| LieJoint { momenta, ..LieJoint::new(kind, q, v) };
-        Kinds([group(LieGroup::SO3, 1, 1), group(LieGroup::SE3, 5, 4), group(LieGroup::SE2, 12, 10)])
+        let joint = |kind, q, v| LieJoint { momenta, ..LieJoint::new(kind, q, v) };
+        Kinds([joint(LieGroup::SO3, 1, 1), joint(LieGroup::SE3, 5, 4), joint(LieGroup::SE2, 12, 10)])
     }
 }
 
@@ -70,7 +70,7 @@ fn displacements_one_after_the_other() {
         let mut both = first.clone();
         Chart::compose(&system, &second, &mut both);
 
-        // In one, and one after the other.
+        // The composed displacement is compared with both displacements, one after the other.
         let (mut q1, mut p1) = (q, p);
         chart.state(&system, &both, &mut q1, &mut p1);
         chart.advance(&system, 0.0, &first).unwrap();
@@ -86,8 +86,8 @@ fn displacements_one_after_the_other() {
     }
 }
 
-/// A pendulum of length and mass 1 with a slider on it that stiffens with its length: not separable. `H = p₀²/2(1 + q₁²) +
-/// p₁²/2 + cos q₀ (1 − q₁) + 4 q₁²`.
+/// A system like a pendulum with a mass that moves along it against a spring. The Hamiltonian is not separable:
+/// `H = p₀²/2(1 + q₁²) + p₁²/2 + cos q₀ (1 − q₁) + 4 q₁²`.
 #[derive(Clone, Copy)]
 struct Swing;
 
@@ -96,7 +96,7 @@ impl Swing {
         p[0] * p[0] / (2.0 * (1.0 + q[1] * q[1])) + p[1] * p[1] / 2.0 + q[0].cos() * (q[1] - 1.0) + 4.0 * q[1] * q[1]
     }
 
-    /// Away from rest.
+    /// A state in motion.
     const START: ([f64; 2], [f64; 2]) = ([1.2, 0.3], [0.4, -0.2]);
 }
 
@@ -137,8 +137,8 @@ fn reference(time: f64) -> [f64; 4] {
     state(&mut Verner9::new(&Swing), time, 400 * time as u32)
 }
 
-/// Where the Hamiltonian is separable this is the symplectic method: for the oscillator `H = (p² + q²)/2` it keeps
-/// `p² + q² − h q p` to round-off; the energy stays within `h/2`.
+/// For separable Hamiltonians the semi-implicit Euler method is symplectic. For the oscillator `H = (p² + q²)/2` it
+/// conserves `p² + q² − h q p` to round-off, and the error of the energy stays within `h/2`.
 #[test]
 fn semi_implicit_euler_is_symplectic_where_the_hamiltonian_is_separable() {
     struct Oscillator;
@@ -169,13 +169,14 @@ fn semi_implicit_euler_is_symplectic_where_the_hamiltonian_is_separable() {
     for k in 0..steps {
         method.step(&mut Oscillator, f64::from(k) * h, h, &mut q, &mut p).unwrap();
     }
-    // A random walk of roundings of a few last places.
+    // Roundings of a few units in the last place add up as a random walk.
     let walk = f64::from(steps).sqrt() * 4.0 * f64::EPSILON;
     assert!((kept(&q, &p) - 1.0).abs() < walk, "{:e}", kept(&q, &p) - 1.0);
     assert_eq!(method.statistics().evaluations, 200_000);
 }
 
-/// The documentation says that it drifts where the Hamiltonian is not separable.
+/// For Hamiltonians that are not separable, the energy of the semi-implicit Euler method drifts, as its documentation
+/// says.
 #[test]
 fn semi_implicit_euler_drifts_where_it_is_not() {
     let drift = |steps: u32| {
@@ -184,7 +185,7 @@ fn semi_implicit_euler_drifts_where_it_is_not() {
     };
     let [coarse, fine] = [20_000, 40_000].map(drift);
     println!("{coarse:.2e}, with half the step {fine:.2e}");
-    // Some per cent of the energy in seventy periods, less with smaller steps.
+    // The energy drifts by some per cent in seventy periods, and by less with smaller steps.
     assert!(coarse.abs() > 1e-3 && coarse.abs() < 2e-2 && fine.abs() < coarse.abs());
 }
 
@@ -208,9 +209,9 @@ fn step_doubling_meets_tolerances() {
         let (other, more) = run(StepDoubling::over(&Swing, Midpoint::new(&Swing)), tolerance, time);
         let [a, b, c] = [&state, &better, &other].map(|s| largest(s, &exact) / tolerance);
         println!("{tolerance:e}: {a:.1} {counts:?}, extrapolated {b:.1} {same:?}, midpoint {c:.1} {more:?}");
-        // Every step adds at most one tolerance; what the motion makes of them is of the size of one in two periods.
+        // Every step adds an error of at most one tolerance, which the motion does not magnify much in two periods.
         assert!(a < counts[0] as f64 && b < same[0] as f64 && c < more[0] as f64);
-        // Eleven a step and a rejection; two more for the choice of the first step; the last start.
+        // Each step and each rejected step takes eleven evaluations. The choice of the first step takes two more.
         let tries = counts[0] + counts[1];
         assert!(counts[2] >= 11 * tries && counts[2] <= 12 * tries + 3, "{counts:?}");
         assert!(more[0] > counts[0]);

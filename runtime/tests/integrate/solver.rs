@@ -1,4 +1,4 @@
-//! The solver: tolerances met, ends hit, limits kept, failures typed, dense output of its order.
+//! The solver: tolerances, exact ends of runs, limits, kinds of failures, order of dense output.
 
 use super::systems::*;
 use mbd_runtime::integrate::tableau;
@@ -26,8 +26,9 @@ macro_rules! for_each {
     }};
 }
 
-/// How many tolerances the error at the end may be: of a motion over a few periods, at all tolerances from 1e-4 to 1e-12.
-/// That of Cash and Karp's pair estimates least of what it does; a planet that passes its sun magnifies what it meets there.
+/// The largest error at the end in multiples of the tolerance, for motions over a few periods and all tolerances from
+/// 1e-4 to 1e-12. The pair of Cash and Karp underestimates its errors most, and a planet that passes its sun magnifies
+/// errors.
 fn factor(name: &str) -> f64 {
     match name {
         "verner9" => 2.0,
@@ -69,7 +70,8 @@ fn tolerances_are_met() {
     });
 }
 
-/// A body that tumbles on a ball joint, through the interpreter: the chart's coordinates and momenta are what is controlled.
+/// A body that tumbles on a spherical joint, computed by the interpreter. Error control acts on coordinates and momenta
+/// of the chart.
 #[test]
 fn a_rotor_meets_its_tolerance() {
     let (q, p) = (rotor().neutral(), vec![0.5, 2.0, 3.0]);
@@ -86,7 +88,7 @@ fn a_rotor_meets_its_tolerance() {
             let end = run(&mut solver, &mut y, 20.0).expect("a run");
             let off = apart(&end, &reference) / tolerance;
             let norm: f64 = end[..4].iter().map(|x| x * x).sum::<f64>().sqrt();
-            // Angular momentum in outer axes is a constant of the method, whatever its error.
+            // Every method conserves angular momentum in outer axes, whatever its error.
             let (v, w, l) = ([end[0], end[1], end[2]], end[3], [end[4], end[5], end[6]]);
             let cross = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]] };
             let turn = cross(v, l);
@@ -94,17 +96,18 @@ fn a_rotor_meets_its_tolerance() {
             let outer: Vec<f64> = (0..3).map(|k| l[k] + 2.0 * (w * turn[k] + twice[k])).collect();
             println!("{name} {tolerance:e}: {off:.2}, angular momentum {:.1e}", apart(&outer, &p));
             assert!((norm - 1.0).abs() < 1e-15 * 4.0, "{name}: {norm}");
-            // Rounding of as many steps as there are, of numbers near 3.
+            // The bound is rounding of numbers near 3 in all steps.
             assert!(apart(&outer, &p) < 1e-13, "{name}: {outer:?}");
-            // Six turns, and errors of the spin are angles later.
+            // The body makes six turns, over which errors of the angular velocity grow into errors of the angle.
             assert!(off < 10.0 * factor(name), "{name} {tolerance:e}: {off}");
         }
     });
 }
 
-/// One scene, every number: what changes here changes the cost of every simulation.
+/// Numbers of steps and evaluations for one motion. A change of them means that the cost of every simulation has
+/// changed.
 #[test]
-fn statistics_are_pinned() {
+fn statistics_do_not_change() {
     let mut found = Vec::new();
     for_each!(name, make => {
         let mut y = pendulum::<f64>();
@@ -115,15 +118,15 @@ fn statistics_are_pinned() {
         assert_eq!([jacobians, factorisations, iterations], [0; 3]);
         found.push((name, steps, rejections, evaluations));
     });
-    let pinned = [
+    let expected = [
         ("rkf45", 90, 0, 541),
         ("cash-karp", 70, 0, 421),
         ("tsit5", 81, 0, 488),
         ("dop853", 25, 1, 312),
         ("verner9", 22, 0, 353),
     ];
-    assert_eq!(found, pinned);
-    // A start, and what each step costs; the rate at the end is not asked for.
+    assert_eq!(found, expected);
+    // RK4 takes four evaluations a step and none for the rate at the end.
     for (method, steps, evaluations) in [(4, 10, 40), (4, 13, 52)] {
         let mut y = pendulum::<f64>();
         let rk4 = Rk4::new(&y);
@@ -148,7 +151,7 @@ fn runs_land_on_their_ends() {
             run(&mut solver, &mut y, t).unwrap_or_else(|e| panic!("{step:?} {t}: {e}"));
             assert_eq!(solver.time(), t, "{step:?}");
         }
-        // Not backwards.
+        // A run never goes backwards.
         run(&mut solver, &mut y, 1.0).expect("a run");
         solver.advance(&mut y, 1.0).expect("no step");
         let end = state(&mut solver, &y);
@@ -163,7 +166,8 @@ fn runs_land_on_their_ends() {
     }
 }
 
-/// A multiple of the step takes that many steps: rounding makes no last one of next to nothing, in either precision.
+/// A run over a multiple of the step takes exactly that many steps. Rounding does not cause a tiny last step, in either
+/// precision.
 #[test]
 fn fixed_steps_are_counted() {
     let mut y = pendulum::<f64>();
@@ -197,7 +201,7 @@ fn limits_are_kept() {
     }
     assert!(solver.statistics().steps >= 60);
 
-    // Steps, rejected ones included, are limited a call; what was reached is kept.
+    // The number of steps of one call is limited, rejected steps included. The state that was reached is kept.
     let mut y = pendulum::<f64>();
     let method = Tsit5::new(&y);
     let mut solver = adaptive(&mut y, method, 1e-10, (&[2.0], &[0.0]));
@@ -207,11 +211,11 @@ fn limits_are_kept() {
     assert!(time > 0.0 && time == solver.time());
     let statistics = solver.statistics();
     assert_eq!(statistics.steps + statistics.rejections, 10);
-    // The next call goes on.
+    // The next call continues from there.
     solver.limits.steps = u64::MAX;
     run(&mut solver, &mut y, 50.0).expect("a run");
 
-    // A smallest step that is too large for the tolerance.
+    // The smallest allowed step is too large for the tolerance.
     let mut y = pendulum::<f64>();
     let method = Tsit5::new(&y);
     let mut solver = adaptive(&mut y, method, 1e-12, (&[2.0], &[0.0]));
@@ -220,7 +224,7 @@ fn limits_are_kept() {
     let StepError::StepTooSmall { time: 0.0, step, error } = error else { panic!("{error:?}") };
     assert!(step < 0.1 && error > 1.0, "{step} {error}");
 
-    // Steps of no length end no run.
+    // Steps that are not positive could never end a run, so they are refused.
     for h in [0.0, -1.0, f64::NAN] {
         let mut y = pendulum::<f64>();
         let method = Tsit5::new(&y);
@@ -238,7 +242,7 @@ fn limits_are_kept() {
 #[test]
 fn failures_have_their_type_and_time() {
     for_each!(name, make => {
-        // q = 1 / (1 − t), and the same with an essential singularity's steepness: q̇ = 1 / (t − 1)².
+        // Both equations have the solution q = 1 / (1 − t): the first is q̇ = q², the second q̇ = 1 / (t − 1)².
         for pole in [true, false] {
             let mut y = Plain::new(move |t: f64, q: &[f64; 1], _: &[f64; 1]| {
                 ([if pole { q[0] * q[0] } else { 1.0 / ((t - 1.0) * (t - 1.0)) }], [0.0])
@@ -252,17 +256,16 @@ fn failures_have_their_type_and_time() {
             let StepError::StepTooSmall { time, step, .. } = error else { panic!("{name}: {error:?}") };
             assert!((time - 1.0).abs() < 1e-6 && step < 1e-14, "{name}: {time} {step:e}");
             assert_eq!(time, solver.time());
-            // The state of the last accepted step is there, and says how far it went: what it misses is as much as the
-            // time to the pole is uncertain.
+            // The state is that of the last accepted step, close to the pole.
             let q = state(&mut solver, &y)[0];
             assert!(q.is_finite() && q > 1e6, "{name}: {q:e}");
         }
-        // Singular from the start.
+        // The rate is singular at the start.
         let mut y = Plain::new(|_, q: &[f64; 1], p: &[f64; 1]| ([p[0] / q[0]], [0.0]));
         let method = make!(&y);
         let mut solver = adaptive(&mut y, method, 1e-8, (&[0.0], &[0.0]));
         assert_eq!(run(&mut solver, &mut y, 1.0), Err(StepError::NotFinite { time: 0.0, index: 0 }), "{name}");
-        // With fixed steps beyond all numbers.
+        // Fixed steps past the pole overflow.
         let mut y = Plain::new(|_, q: &[f64; 1], _: &[f64; 1]| ([q[0] * q[0]], [0.0]));
         let method = make!(&y);
         let (q, p) = ([1.0], [0.0]);
@@ -271,7 +274,7 @@ fn failures_have_their_type_and_time() {
         let StepError::NotFinite { time, index: 0 } = error else { panic!("{name}: {error:?}") };
         assert!((1.0..2.0).contains(&time) && time == solver.time(), "{name}: {time}");
         assert!(state(&mut solver, &y)[0].is_finite(), "{name}");
-        // No unit quaternion.
+        // The quaternion does not have unit length.
         let mut y = rotor();
         let method = make!(&y);
         let (q, p) = (vec![0.0, 0.0, 0.0, 1.01], vec![0.0; 3]);
@@ -279,15 +282,15 @@ fn failures_have_their_type_and_time() {
         let StepError::Quaternion { time: 3.0, index: 0, norm } = error else { panic!("{name}: {error:?}") };
         assert!((norm - 1.01).abs() < 1e-15, "{name}: {norm}");
     });
-    // No estimate to choose steps by.
+    // A method without error estimate cannot choose steps.
     let mut y = pendulum::<f64>();
     let method = Rk4::new(&y);
     let made = Solver::new(&mut y, method, Step::Adaptive(Tolerances::new(1e-6)), 2.0, &[1.0], &[0.0]);
     assert_eq!(made.err(), Some(StepError::NoEstimate { time: 2.0 }));
 }
 
-/// Momenta that need smaller steps than the coordinates: a fast small force. Without their control steps are saved and the
-/// coordinates are as good as was asked for.
+/// A small force that oscillates fast makes momenta need smaller steps than coordinates. Without error control of
+/// momenta there are fewer steps, and coordinates still meet the tolerance.
 #[test]
 fn control_by_coordinates_alone() {
     let runs = [false, true].map(|partial| {
@@ -298,7 +301,7 @@ fn control_by_coordinates_alone() {
         let step = Step::Adaptive(tolerances);
         let mut solver = Solver::new(&mut y, method, step, 0.0, &[1.0], &[0.0]).expect("a start");
         let end = run(&mut solver, &mut y, 10.0).expect("a run");
-        // q̈ + q = cos ωt.
+        // The equation is q̈ + q = cos ωt.
         let a = 1.0 / (1.0 - 1e4);
         let exact = (1.0 - a) * 10_f64.cos() + a * 1e3_f64.cos();
         ((end[0] - exact).abs(), solver.statistics().evaluations)
@@ -333,20 +336,20 @@ where
     worst
 }
 
-/// Within a step the error falls as `h` to one more than the order.
+/// The error of dense output of order `k` within a step falls as `h^(k + 1)`.
 #[test]
 fn dense_output_has_its_order() {
     fn order(name: &str, expected: u32, h: f64, error: impl Fn(f64) -> f64) {
         let (coarse, fine) = (error(h), error(0.5 * h));
         let found = (coarse / fine).log2();
         println!("{name}: {found:.2} ({coarse:.1e}, {fine:.1e})");
-        // Of steps that are not yet small the last bit is uncertain; and where the weights leave little of the leading term,
-        // the next one shows.
+        // Steps that are not very small show the order only approximately. Where the leading term of the error is
+        // small, the next one shows.
         let least = f64::from(expected) - 0.5;
         assert!((least..least + 1.5).contains(&found), "{name}: {found}, expected {expected}");
         assert!(fine > 1e-13, "{name}: round-off");
     }
-    // A cubic where there is nothing better.
+    // Methods without dense output of their own use a cubic.
     order("euler", 2, 0.01, |h| dense_error(planet(), Euler::new, h));
     order("midpoint", 3, 0.01, |h| dense_error(planet(), Midpoint::new, h));
     order("rk4", 4, 0.02, |h| dense_error(planet(), Rk4::new, h));
@@ -359,7 +362,7 @@ fn dense_output_has_its_order() {
     order("verner9", 9, 0.12, |h| dense_error(planet(), Verner9::new, h));
 }
 
-/// From one step to the next it neither jumps nor bends, rotations included.
+/// From one step to the next, dense output and its rate are continuous, also for rotations.
 #[test]
 fn dense_output_is_smooth() {
     for_each!(name, make => {
@@ -376,7 +379,8 @@ fn dense_output_is_smooth() {
         for _ in 0..20 {
             solver.advance(&mut y, 1e3).expect("a step");
             let h = solver.last_step().1;
-            // A millisecond's thousandth: what bends within it is 1e-6 of the curvature, below ten; rounding 1e-16 / 1e-6.
+            // Rates are differences over 1 µs. Their error is 1e-6 times a curvature below ten, and rounding is 1e-16 /
+            // 1e-6.
             let d = 1e-6;
             let (start, end) = (at(&mut solver, 0.0, &mut y), at(&mut solver, 1.0, &mut y));
             let rate = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| (b - a) / d).collect() };
@@ -387,7 +391,7 @@ fn dense_output_is_smooth() {
                 assert!(apart(rate, &in_rate) < 1e-4, "{name}: {rate:?} {in_rate:?}");
             }
             let near = at(&mut solver, 1.0 - f64::EPSILON, &mut y);
-            // Rounding, times weights of up to some hundreds.
+            // The bound is rounding times weights of up to some hundreds.
             assert!(apart(&near, &end) < 2e-12, "{name}: {near:?} {end:?}");
             assert_eq!(end, state(&mut solver, &y), "{name}");
             last = Some((end, out_rate));
@@ -395,7 +399,7 @@ fn dense_output_is_smooth() {
     });
 }
 
-/// Steps follow the motion, smoothly: few are rejected, and none grows just after that.
+/// Steps change smoothly with the motion. Few are rejected, and no step grows directly after a rejected one.
 #[test]
 fn the_controller_is_calm() {
     for_each!(name, make => {
@@ -414,17 +418,17 @@ fn the_controller_is_calm() {
         for pair in steps[..steps.len() - 2].windows(2) {
             let ratio = pair[1].1 / pair[0].1;
             assert!((0.2 * 0.2..=6.0).contains(&ratio), "{name}: {ratio}");
-            // Of the step after a rejected one; not tried larger than that.
+            // A step after a rejected one is not larger than it.
             assert!(!pair[0].2 || ratio <= 1.0 + 1e-12, "{name}: {ratio}");
         }
-        // Where an estimate passes through zero a step or two are longer.
+        // The extreme 5 % are left out: where an error estimate passes through zero, a step or two are longer.
         let mut sizes: Vec<f64> = steps.iter().map(|s| s.1).collect();
         sizes.sort_by(f64::total_cmp);
         let (least, most) = (sizes[sizes.len() / 20], sizes[sizes.len() - 1 - sizes.len() / 20]);
         println!("{name}: {} steps of {least:.3} to {most:.3} s, {rejections} rejections", steps.len());
-        // Time runs as r^(3/2), r from 1/2 to 3/2.
+        // Steps go as r^(3/2), with distances r from 1/2 to 3/2.
         assert!((3.0..12.0).contains(&(most / least)), "{name}: {most} {least}");
-        // Some at each of ten passages of the sun, whatever the number of steps.
+        // There are a few rejected steps at each of ten passages of the sun, whatever the number of steps.
         assert!(rejections <= 60, "{name}: {rejections} of {}", steps.len());
     });
 }
@@ -439,9 +443,10 @@ fn single_precision() {
         let end = run(&mut solver, &mut y, (4.0 * quarter) as f32).expect("a run");
         let off = apart(&end, &[2.0, 0.0]);
         println!("{name}: {off:.1e} in {} steps", solver.statistics().steps);
-        // Ten tolerances (see above, a little more for Cash and Karp), and rounding of some tens of steps.
+        // The bound is ten tolerances (see `factor`; a little more for Cash and Karp), and rounding of some tens of
+        // steps.
         assert!(off < 3e-4, "{name}: {off}");
-        // Below rounding the estimate is too: no tolerance makes it fail, and none of them endless.
+        // A tolerance below rounding must neither give a wrong result nor an endless run.
         let method = make!(&y);
         let mut solver = adaptive(&mut y, method, 1e-9, (&[2.0], &[0.0]));
         solver.limits.steps = 20_000;
@@ -453,7 +458,7 @@ fn single_precision() {
     });
 }
 
-/// Thirty-two digits: one period of the pendulum, landing on a time that is no double.
+/// One period of the pendulum in numbers of 32 digits. The run ends at a time that is no double.
 #[cfg(feature = "wide")]
 #[test]
 fn double_double() {

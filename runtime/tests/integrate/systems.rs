@@ -1,5 +1,5 @@
-//! Systems whose motion is known, and what tests do with them.
-#![allow(dead_code)] // each test uses a part
+//! Systems whose motion is known, and functions of the tests.
+#![allow(dead_code)] // Each test uses a part.
 
 use mbd_runtime::integrate::{Solver, Step, StepError, Stepper, Tolerances};
 use mbd_runtime::spatial::RigidInertia;
@@ -7,7 +7,7 @@ use mbd_runtime::system::LieJoint;
 use mbd_runtime::tree::{Dims, Elimination, Kind, Node, Passive, Source, Tree};
 use mbd_runtime::{Interpreter, Real, Scalar, System};
 
-/// Equations with `N` coordinates and no groups, by their rates `(t, q, p) → (q̇, ṗ)`.
+/// Equations with `N` coordinates and no Lie groups, given by their rates `(t, q, p) → (q̇, ṗ)`.
 #[derive(Clone, Debug)]
 pub struct Plain<S, F, const N: usize>(pub F, core::marker::PhantomData<S>);
 
@@ -46,17 +46,17 @@ where
     }
 }
 
-/// `q = cos t`, `p = −sin t` from (1, 0).
+/// The oscillator with `q = cos t`, `p = −sin t` if it starts from (1, 0).
 pub fn oscillator() -> impl System<Scalar = f64, Coordinates = [f64; 1], Momenta = [f64; 1]> {
     Plain::new(|_, q: &[f64; 1], p: &[f64; 1]| ([p[0]], [-q[0]]))
 }
 
-/// `q̈ = −sin q`.
+/// The pendulum `q̈ = −sin q`.
 pub fn pendulum<S: Real>() -> impl System<Scalar = S, Coordinates = [S; 1], Momenta = [S; 1]> {
     Plain::new(|_, q: &[S; 1], p: &[S; 1]| ([p[0]], [-q[0].sin_cos().0]))
 }
 
-/// Quarter period of the pendulum let go at an angle, by the arithmetic-geometric mean.
+/// Quarter period of the pendulum released at rest at an angle, by the arithmetic-geometric mean.
 pub fn quarter<S: Real>(half_pi: S, angle: S) -> S {
     let (mut a, mut b) = (S::one(), (S::constant(0.5) * angle).sin_cos().1);
     for _ in 0..9 {
@@ -68,7 +68,7 @@ pub fn quarter<S: Real>(half_pi: S, angle: S) -> S {
 /// Eccentricity of the orbit.
 pub const ECCENTRICITY: f64 = 0.5;
 
-/// A planet with period 2π; at time zero nearest to the sun, at (1 − e, 0).
+/// A planet with period 2π. At time zero it is nearest to the sun, at (1 − e, 0).
 pub fn planet() -> impl System<Scalar = f64, Coordinates = [f64; 2], Momenta = [f64; 2]> {
     Plain::new(|_, q: &[f64; 2], p: &[f64; 2]| {
         let r2 = q[0] * q[0] + q[1] * q[1];
@@ -77,7 +77,7 @@ pub fn planet() -> impl System<Scalar = f64, Coordinates = [f64; 2], Momenta = [
     })
 }
 
-/// Where it is, by Kepler's equation.
+/// State of the planet by Kepler's equation.
 pub fn orbit(t: f64) -> ([f64; 2], [f64; 2]) {
     let (e, mut u) = (ECCENTRICITY, t);
     for _ in 0..50 {
@@ -87,7 +87,7 @@ pub fn orbit(t: f64) -> ([f64; 2], [f64; 2]) {
     ([u.cos() - e, b * u.sin()], [-u.sin() * rate, b * u.cos() * rate])
 }
 
-/// A rigid body on a ball joint at its centre of mass, principal moments of inertia 1, 2, 3 kg m².
+/// A rigid body on a spherical joint at its centre of mass, with principal moments of inertia 1, 2, 3 kg m².
 pub fn rotor() -> Interpreter<f64> {
     let (o, one) = (0.0, 1.0);
     let passive = Passive { damping: o, stiffness: o, rest: o, armature: o };
@@ -122,12 +122,12 @@ pub fn rotor() -> Interpreter<f64> {
     Interpreter::new(tree, [0.0; 3])
 }
 
-/// Root mean square over all components.
+/// Root mean square of the differences of all components.
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
 
-/// A solver by tolerance.
+/// A solver that chooses steps by a tolerance.
 pub fn adaptive<Y: System, M: Stepper<Y>>(
     system: &mut Y,
     method: M,
@@ -141,7 +141,7 @@ where
     Solver::new(system, method, step, Y::Scalar::zero(), q, p).expect("a start")
 }
 
-/// Its state, coordinates before momenta.
+/// State of a solver, coordinates before momenta.
 pub fn state<Y: System, M: Stepper<Y>>(solver: &mut Solver<Y, M>, system: &Y) -> Vec<f64>
 where
     Y::Scalar: Real,
@@ -151,7 +151,7 @@ where
     q.as_ref().iter().chain(p.as_ref()).map(|x| x.to_f64()).collect()
 }
 
-/// Runs, and gives the state at the end.
+/// Runs a solver and returns the state at the end.
 pub fn run<Y: System, M: Stepper<Y>>(
     solver: &mut Solver<Y, M>,
     system: &mut Y,

@@ -6,7 +6,7 @@ use mbd_runtime::spatial::Mat3;
 use super::builder::{Builder, Skeleton};
 use super::joints::sine;
 
-/// How much inertia a body has.
+/// The inertia of a body: complete, without moments of inertia, or none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weight {
     /// Mass and a positive definite inertia.
@@ -19,10 +19,10 @@ pub enum Weight {
 
 /// Weights that keep the mass matrix regular, and the joints that need a rotor for it.
 ///
-/// The mass matrix is regular if the kinetic energy is zero only at rest. It is zero only if every body of full weight is at
-/// rest. A body of less weight has a parent of full weight (or the ground); if the parent is at rest, the body moves by its
-/// own joint only. This joint cannot move either if it has a rotor on every degree of freedom, or if a child of full weight is
-/// connected by a joint whose motion can never cancel its own.
+/// The mass matrix is regular if the kinetic energy is zero only at rest. It is zero only if every body of full weight
+/// is at rest. A body of less weight has a parent of full weight (or the ground); if the parent is at rest, the body
+/// moves by its own joint only. This joint cannot move either if it has a rotor on every degree of freedom, or if a
+/// child of full weight is connected by a joint whose motion can never cancel its own.
 pub fn weights(b: &mut Builder, s: &Skeleton, joints: &[Joint], params: &[f64]) -> (Vec<Weight>, Vec<bool>) {
     let n = joints.len();
     let mut weight = vec![Weight::Full; n];
@@ -57,7 +57,7 @@ fn independent(kind: &JointKind, child: &Joint, params: &[f64]) -> bool {
         return true;
     }
     let (Some((turns, a)), Some((child_turns, b))) = (single(kind), single(&child.kind)) else { return false };
-    // The comparison is in the axes of the body between them, where both axes are constant.
+    // The comparison is made in the axes of the body between both joints, where both joint axes are constant.
     let r = matrix(&child.placement.rotation, params);
     let b: [f64; 3] = std::array::from_fn(|i| r[i][0] * b[0] + r[i][1] * b[1] + r[i][2] * b[2]);
     turns != child_turns || sine(a, b) > 0.5
@@ -88,7 +88,7 @@ pub fn matrix(rotation: &Rotation, params: &[f64]) -> Mat3<f64> {
 }
 
 impl Builder<'_> {
-    /// A body of about the given size.
+    /// A body of about the given mass and length.
     pub fn body(&mut self, name: String, weight: Weight, mass: f64, length: f64) -> Body {
         let (zero, none) = ([Value::ZERO; 3], Rotation::NONE);
         if weight == Weight::None {
@@ -99,7 +99,8 @@ impl Builder<'_> {
         if weight == Weight::Point {
             return Body { name, mass: self.value(mass), com, inertia: [Value::ZERO; 6], inertia_axes: none };
         }
-        // A box whose edges differ by less than a factor of two: its inertia stays valid when parameters vary.
+        // The edges of this box differ by less than a factor of two, so that its inertia stays valid when parameters
+        // vary.
         let mut edges: [f64; 3] = std::array::from_fn(|_| length * self.rng.range(0.6, 1.0));
         if self.rng.chance(0.3) {
             edges[1] = edges[0]; // symmetric about z

@@ -1,4 +1,4 @@
-//! State of the construction of a random model; the methods of [`Builder`] stand beside what they make.
+//! State of the construction of a random model. The methods of [`Builder`] are in the modules whose parts they make.
 
 use mbd_codegen::model::{Param, Value};
 
@@ -19,7 +19,7 @@ pub struct Builder<'k> {
 pub struct Skeleton {
     /// Parent of each body.
     pub parent: Vec<Option<usize>>,
-    /// Number of bodies between it and the ground.
+    /// Number of bodies between each body and the ground.
     pub depth: Vec<i32>,
 }
 
@@ -34,7 +34,7 @@ impl Builder<'_> {
         Value::Param(k)
     }
 
-    /// The same, except that zero is always a constant.
+    /// As [`Builder::value`], except that zero is always a constant.
     pub fn value_or_zero(&mut self, x: f64) -> Value {
         if x == 0.0 {
             Value::ZERO

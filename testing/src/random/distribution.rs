@@ -9,7 +9,7 @@ pub struct Distribution {
     pub bodies: (usize, usize),
     /// Probability that a body's parent is any earlier body instead of the latest.
     pub branching: f64,
-    /// Probability of another body that is connected to the ground.
+    /// Probability that a body after the first one is connected to the ground.
     pub roots: f64,
     /// Probability that a placement or axis is general rather than along the axes.
     pub skew: f64,

@@ -55,7 +55,7 @@ impl Builder<'_> {
         }
     }
 
-    /// A random orientation in one of the forms of the description.
+    /// A random orientation, written in one of the ways that the model description has.
     pub fn rotation(&mut self) -> Rotation {
         let general = self.rng.chance(self.distribution.skew);
         if self.rng.chance(0.25) {
@@ -85,7 +85,7 @@ impl Builder<'_> {
         (spec.make)(axes, if spec.pitch { self.value(pitch) } else { Value::ZERO })
     }
 
-    /// One number for each degree of freedom: all the same, or different, some of them zero.
+    /// One number for each degree of freedom. Either all are the same, or they differ and some are zero.
     pub fn per_freedom(&mut self, n: usize, chance: f64, low: f64, high: f64) -> Vec<Value> {
         if !self.rng.chance(chance) {
             return vec![Value::ZERO; n];

@@ -7,7 +7,7 @@ use super::builder::{Builder, Skeleton};
 use super::distribution::Distribution;
 use super::rng::Rng;
 
-/// Names that could collide with words of generated code; some bodies and joints get them.
+/// Names that could collide with names in generated code. Some bodies and joints get them.
 const ODD_NAMES: [&str; 12] =
     ["type", "self", "q", "kept", "tau", "Upper arm", "link-7", "Größe 2", "new", "rates", "kinetic", "7th"];
 
@@ -68,7 +68,7 @@ impl Builder<'_> {
         let can: Vec<usize> = (0..joints.len()).filter(|&j| joints[j].kind.nv() == 1).collect();
         let rank: Vec<u64> = joints.iter().map(|_| self.rng.bits()).collect();
         for &j in &can {
-            // The leader has a lower rank, so that there are chains of mimic joints but no cycles.
+            // Leaders have a lower rank, so that there are chains of mimic joints but no cycles.
             let leaders: Vec<usize> = can.iter().copied().filter(|&l| rank[l] < rank[j]).collect();
             if leaders.is_empty() || joints[j].motion != JointMotion::Free || !self.rng.chance(self.distribution.mimic)
             {
@@ -128,8 +128,8 @@ fn depth_first(parent: &[Option<usize>]) -> Vec<usize> {
     order
 }
 
-/// A random mechanism: checked, regular (`M` is positive definite in every configuration and near the defaults of the
-/// parameters), the same for the same seed and distribution.
+/// A random mechanism that passes the checks of the generator. Its mass matrix is positive definite in every
+/// configuration and near the defaults of the parameters. The same seed and distribution give the same mechanism.
 pub fn random_model(seed: u64, distribution: &Distribution) -> Model {
     let mut b = Builder { rng: Rng::new(seed, 2), distribution, params: Vec::new() };
     let s = b.skeleton();
@@ -152,7 +152,7 @@ pub fn random_model(seed: u64, distribution: &Distribution) -> Model {
     let mut bodies: Vec<_> = (0..n).map(body).collect();
     let mut joints: Vec<Joint> = depth_first(&s.parent).into_iter().map(|j| joints[j].clone()).collect();
     b.mimics(&mut joints);
-    // The bodies are shuffled, because nothing may depend on their order.
+    // Nothing may depend on the order of bodies, so the order is random.
     let mut place: Vec<usize> = (0..n).collect();
     for i in (1..n).rev() {
         place.swap(i, b.rng.below(i + 1));

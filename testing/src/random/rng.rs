@@ -1,4 +1,4 @@
-//! A small deterministic random number generator: the same numbers on every machine and in every version.
+//! A small deterministic random number generator. It gives the same numbers on every machine and in every version.
 
 /// The generator SplitMix64, whose state is one word.
 #[derive(Clone, Debug)]

@@ -1,11 +1,12 @@
-//! Loops, couplings and starts in the TOML format.
+//! Writes loops, couplings and starts in the TOML format.
 
 use mbd_codegen::model::{Constraint, ConstraintKind, Joint, LoopKind, Mount, Placement, Start, Value};
 
 use super::{line, quoted, turns, Writer};
 
 impl Writer<'_> {
-    /// Writes every constraint, preceded by frames for those ends of loops that are neither bodies nor frames of the model.
+    /// Writes every constraint, preceded by frames for those ends of loops that are neither bodies nor frames of the
+    /// model.
     pub(super) fn constraints(&self, out: &mut String) {
         for constraint in &self.model.constraints {
             if let ConstraintKind::Loop { first, second, .. } = &constraint.kind {

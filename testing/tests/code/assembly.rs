@@ -1,4 +1,5 @@
-//! Lanes are vector instructions: emitted code is compiled, and its assembly looked at.
+//! Code for lanes compiles to vector instructions. The test compiles emitted code and counts instructions of its
+//! assembly.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -6,7 +7,7 @@ use std::process::Command;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{generate, Options, Output, Precision};
 
-/// Runs the compiler that built this test, or the first on the path.
+/// Runs the compiler that built this test, or the first one on the path.
 fn rustc(arguments: &[&str], source: &Path, folder: &Path) {
     let compiler = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut command = Command::new(compiler);
@@ -51,7 +52,7 @@ fn source(model: &str, name: &str, precision: Precision) -> String {
     )
 }
 
-/// Bodies of the functions whose symbol contains all of some words.
+/// Bodies of the functions whose symbols contain all of the given words.
 fn functions<'a>(assembly: &'a str, words: &[&str]) -> Vec<Vec<&'a str>> {
     let mut found = Vec::new();
     let mut body: Option<Vec<&str>> = None;
@@ -68,7 +69,7 @@ fn functions<'a>(assembly: &'a str, words: &[&str]) -> Vec<Vec<&'a str>> {
     found
 }
 
-/// Instructions of arithmetic: (of whole vectors of 32 bytes, of single numbers).
+/// Numbers of arithmetic instructions: on whole vectors of 32 bytes, and on single numbers.
 fn arithmetic(body: &[&str], packed: &str, single: &str) -> (usize, usize) {
     let is = |word: &str, suffix: &str| {
         let name = word.strip_suffix(suffix).and_then(|n| n.strip_prefix('v')).unwrap_or("");
@@ -86,20 +87,21 @@ fn arithmetic(body: &[&str], packed: &str, single: &str) -> (usize, usize) {
 #[test]
 fn lanes_are_vectors() {
     if !cfg!(target_arch = "x86_64") {
-        eprintln!("not looked at: the assembly of {}", std::env::consts::ARCH);
+        eprintln!("this test does not check the assembly of {}", std::env::consts::ARCH);
         return;
     }
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("assembly");
     std::fs::create_dir_all(&folder).expect("room for the assembly");
     let runtime = Path::new(env!("CARGO_MANIFEST_DIR")).join("../runtime/src/lib.rs");
-    // The runtime's only dependency, which integrators use between steps: here the standard library's functions.
+    // A stand-in for libm, the only dependency of the runtime. Only integrators use its functions, between steps.
     let one = ["sqrt", "exp", "exp2", "log", "log2", "cbrt", "ceil"];
     let one = one.map(|f| format!("pub fn {f}(x: f64) -> f64 {{ x.{}() }}\n", if f == "log" { "ln" } else { f }));
     let stand_in = folder.join("libm.rs");
     std::fs::write(&stand_in, one.concat() + "pub fn pow(x: f64, y: f64) -> f64 { x.powf(y) }\n").expect("the source");
     rustc(&["--crate-name", "libm"], &stand_in, &folder);
     let math = format!("libm={}", folder.join("liblibm.rlib").display());
-    // Without the switch for AVX-512: every compiler has AVX2. Without the interpreter: nothing else to link.
+    // The code is compiled for AVX2, which every compiler knows, not for AVX-512. The runtime is compiled without the
+    // interpreter, so that there is nothing else to link.
     let features = ["--cfg", "feature=\"std\"", "--crate-name", "mbd_runtime", "--extern", &math];
     rustc(&features, &runtime, &folder);
     let text = source("ur5.urdf", "double", Precision::F64) + &source("ur5.urdf", "single", Precision::F32);
@@ -118,7 +120,7 @@ fn lanes_are_vectors() {
         eprintln!(
             "{word}: {vectors} instructions on whole vectors, {fused} of them fused; {numbers} on single numbers"
         );
-        // The arm has some three hundred operations, sines and cosines a hundred more.
+        // The rates of the arm take about three hundred operations, its sines and cosines another hundred.
         assert!(vectors > 250 && fused > 80, "{word}: {vectors} on vectors, {fused} fused");
         assert_eq!(numbers, 0, "{word}: on single numbers");
     }

@@ -1,7 +1,8 @@
 //! Generated code equals the interpreter bit for bit on a thousand random trees.
 //!
-//! What is compared is the emitted source text itself, run by a small evaluator (`emitted.rs`); `compiled.rs` holds compiled
-//! code against the interpreter on fewer trees. Zeros may differ in sign, nothing else may differ, NaN is never right.
+//! The test runs the emitted source text by a small evaluator (`emitted.rs`); `compiled.rs` compares compiled code with
+//! the interpreter on fewer trees. Zeros may differ in sign. No other difference is allowed, and results must be
+//! finite.
 
 use std::collections::HashMap;
 
@@ -30,7 +31,7 @@ impl Case {
         let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
         let model = random_model(seed, &Distribution::everything(seed, size));
         let mut rng = Rng::new(seed, 4);
-        // Derivatives are long: of the larger trees every fourth has them.
+        // Code of derivatives is long, so only every fourth of the larger trees has it.
         let derivatives = size <= 4 || seed.is_multiple_of(4);
         let options = Options {
             arithmetic: Arithmetic::Exact,
@@ -38,7 +39,7 @@ impl Case {
             efforts: rng.chance(0.8),
             ..Options::default()
         };
-        // Every tenth is laid out by the search.
+        // The search lays out every tenth tree.
         let plan = match seed % 10 {
             0 => search::plan(&model, options.searches()),
             _ => random_plan(&model, seed),
@@ -73,7 +74,7 @@ impl Case {
         }
     }
 
-    /// Derivatives; the parameter blocks column by column.
+    /// Compares derivatives; the blocks of parameters column by column.
     fn compare_derivatives(&self, s: &State, p: &[f64], i: &mut Interpreter<f64>, inputs: &HashMap<String, Vec<f64>>) {
         let mut d = Derivatives::new(i.tree());
         i.derivatives(&s.q, p, &mut d);
@@ -113,7 +114,7 @@ impl Case {
         let mut p = vec![0.0; nv];
         i.momenta(&s.q, &s.v, &mut p);
         let inputs = self.inputs(&s, &p);
-        let run = |group: Output| self.emitted.run(group.name(), &inputs);
+        let run = |output: Output| self.emitted.run(output.name(), &inputs);
         self.compare("momenta", &run(Output::Momenta)["p"], &p);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
         i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
@@ -148,11 +149,11 @@ impl Case {
         self.compare("regressor", &self.emitted.run(Output::Regressor.name(), &given)["y"], &y);
         i.bias(&s.q, &s.v, &mut h);
         self.compare("bias", &run(Output::Bias)["h"], &h);
-        let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
+        let (mut jacobians, mut biases) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
         i.jacobians(&s.q, &mut jacobians);
         self.compare("jacobians", &run(Output::Jacobians)["jacobian"], &jacobians);
-        i.bias_accelerations(&s.q, &s.v, &mut drifts);
-        self.compare("bias_accelerations", &run(Output::BiasAccelerations)["bias"], &drifts.concat());
+        i.bias_accelerations(&s.q, &s.v, &mut biases);
+        self.compare("bias_accelerations", &run(Output::BiasAccelerations)["bias"], &biases.concat());
         let (mut center, mut matrix, mut bias) = ([0.0; 3], vec![0.0; 6 * nv], [0.0; 6]);
         i.centroidal(&s.q, &s.v, &mut center, &mut matrix, &mut bias);
         let emitted = run(Output::Centroidal);
@@ -173,7 +174,7 @@ impl Case {
     }
 }
 
-/// Every tree is checked in two states; there is no way past `check`.
+/// Checks every tree in two states.
 fn batch(seeds: std::ops::Range<u64>) {
     for seed in seeds {
         let case = Case::new(seed);
@@ -182,7 +183,7 @@ fn batch(seeds: std::ops::Range<u64>) {
     }
 }
 
-// Four tests, so that all cores have something to do.
+// There are four tests so that they run on several cores.
 
 #[test]
 fn trees_0_to_249() {

@@ -1,4 +1,4 @@
-//! Compiled code against the interpreter: bit for bit in double precision, within rounding in single.
+//! Compiled code against the interpreter: bit for bit in double precision, within rounding errors in single precision.
 
 #[allow(dead_code)]
 mod batch {
@@ -34,7 +34,7 @@ mod batch {
         x.iter().map(|x| (*x).into()).collect()
     }
 
-    /// A batch of whatever lengths the tree has, with joint forces where it takes them.
+    /// A batch for a tree with any numbers of coordinates, velocities and joint forces.
     trait Batch<T, const NQ: usize, const NV: usize, const NT: usize>: RatesBatch<T, NQ, NV, NT> {
         fn batch<const S: usize>(
             &self,
@@ -106,12 +106,13 @@ mod batch {
                 results.push(("tau", numbers(&out)));
                 tree.bias(&q, &v, &mut out);
                 results.push(("h", numbers(&out)));
-                let (mut jacobian, mut drift) = ([[[0.0; NV]; 6]; $frames], [[0.0; 6]; $frames]);
+                let (mut jacobian, mut bias) = ([[[0.0; NV]; 6]; $frames], [[0.0; 6]; $frames]);
                 tree.jacobians(&q, &mut jacobian);
                 results.push(("jacobians", numbers(&jacobian.concat().concat())));
-                tree.bias_accelerations(&q, &v, &mut drift);
-                results.push(("bias_accelerations", numbers(&drift.concat())));
-                // Lanes and batches have the bits of single states. Neighbouring states differ.
+                tree.bias_accelerations(&q, &v, &mut bias);
+                results.push(("bias_accelerations", numbers(&bias.concat())));
+                // Lanes and batches must give the bits of single states. Neighbouring states differ, so that mixed-up
+                // lanes show.
                 const STATES: usize = 21;
                 let state = |s: usize| {
                     let shift = <$t>::of(0.01 * s as f64);
@@ -170,7 +171,7 @@ use mbd_testing::batch::{is_single, tree};
 use mbd_testing::state::{parameter, random_state, State};
 use mbd_testing::toml::to_toml;
 
-/// What the interpreter says, with the momenta it is given.
+/// Results of the interpreter for the given momenta.
 fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Results {
     let of = |x: &[f64]| x.iter().map(|x| S::constant(*x)).collect::<Vec<S>>();
     let back = |x: &[S]| x.iter().map(|x| (*x).into()).collect::<Vec<f64>>();
@@ -228,11 +229,11 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     i.bias(&q, &v, &mut out);
     results.push(("h", back(&out)));
     let n = plan.frames.len();
-    let (mut jacobians, mut drifts) = (of(&vec![0.0; 6 * n * v.len()]), vec![[S::zero(); 6]; n]);
+    let (mut jacobians, mut biases) = (of(&vec![0.0; 6 * n * v.len()]), vec![[S::zero(); 6]; n]);
     i.jacobians(&q, &mut jacobians);
     results.push(("jacobians", back(&jacobians)));
-    i.bias_accelerations(&q, &v, &mut drifts);
-    results.push(("bias_accelerations", back(&drifts.concat())));
+    i.bias_accelerations(&q, &v, &mut biases);
+    results.push(("bias_accelerations", back(&biases.concat())));
     results
 }
 
@@ -276,11 +277,11 @@ fn double_precision_is_the_same_bit_for_bit() {
     println!("{numbers} numbers compared");
 }
 
-/// Generated code folds constants in double precision and rounds them once, the interpreter rounds every step: both stray
-/// from the exact result by rounding errors of the same size. So a difference is judged by the error of the interpreter in
-/// single precision against that in double precision (the largest of a result), not by a bound
-/// from condition numbers, which would be far too wide: no more than eight times as large, and at least what a hundred
-/// roundings give.
+/// Generated code folds constants in double precision and rounds them once; the interpreter rounds every step. Both
+/// differ from the exact result by rounding errors of the same size. The error of the compiled code may therefore be at
+/// most eight times that of the interpreter in single precision (the largest of a result, against the interpreter in
+/// double precision); an error of a hundred roundings is always allowed. A bound from condition numbers would be far
+/// too wide.
 #[test]
 fn single_precision_is_as_good_as_the_interpreters() {
     let mut worst = (0.0_f64, String::new());

@@ -1,7 +1,7 @@
 //! Generated code of mechanisms with loops and couplings equals the interpreter bit for bit.
 //!
-//! As in `bitwise.rs` what is compared is the emitted text. Derivatives are compared with the interpreter run on numbers with
-//! derivatives.
+//! As in `bitwise.rs`, an evaluator runs the emitted source text. Derivatives are compared with those of the
+//! interpreter on dual numbers.
 
 use std::collections::HashMap;
 
@@ -48,7 +48,7 @@ impl Case {
         let mut options =
             Options { arithmetic: Arithmetic::Exact, outputs, efforts: rng.chance(0.7), ..Options::default() };
         options.plan.rolled = RolledCode::Never;
-        // Every fifth is laid out by the search.
+        // The search lays out every fifth mechanism.
         let plan = match seed % 5 {
             0 => search::plan(&system.model, options.searches()),
             _ => random_plan(&system.model, seed),
@@ -91,7 +91,7 @@ impl Case {
 
     fn check(&self) {
         let (s, inputs) = (&self.state, self.inputs());
-        let run = |group: Output| self.emitted.run(group.name(), &inputs);
+        let run = |output: Output| self.emitted.run(output.name(), &inputs);
         let mut i = s.interpreter(&self.plan);
         let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
@@ -116,10 +116,10 @@ impl Case {
         self.compare("jacobian", &closure["jacobian"], &entries);
         let mut freed = self.p.clone();
         i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
-        let settle = run(Output::ProjectMomenta);
-        self.compare("settled v", &settle["v"], &v);
-        self.compare("freed", &settle["freed"], &freed);
-        self.compare("sigma", &settle["sigma"], &rows);
+        let projected = run(Output::ProjectMomenta);
+        self.compare("projected v", &projected["v"], &v);
+        self.compare("freed", &projected["freed"], &freed);
+        self.compare("sigma", &projected["sigma"], &rows);
         let mut pivots = i.zero_rows();
         i.position_correction(&s.q, &mut rows, &mut v, &mut pivots);
         let correction = run(Output::PositionCorrection);
@@ -133,7 +133,7 @@ impl Case {
         }
     }
 
-    /// Rates on numbers with derivatives: velocities and momentum rates.
+    /// Velocities and momentum rates on dual numbers.
     fn along(&self, q: &[Dual<f64>], p: &[Dual<f64>], params: &[Dual<f64>]) -> [Vec<Dual<f64>>; 2] {
         let s = &self.state;
         let gravity = match self.plan.model.gravity {
@@ -188,7 +188,8 @@ impl Case {
     }
 }
 
-/// Mechanisms whose flattened trees have a freedom without inertia are left out: no code can be made for them.
+/// Checks mechanisms. No code can be generated for a mechanism that has a freedom without inertia after its tree was
+/// made planar; such mechanisms are left out.
 fn batch(seeds: std::ops::Range<u64>) {
     let mut left_out = 0;
     for seed in seeds.clone() {
@@ -200,7 +201,7 @@ fn batch(seeds: std::ops::Range<u64>) {
     assert!(left_out <= seeds.count() / 10, "{left_out} left out");
 }
 
-// Two tests, so that cores have something to do.
+// There are two tests so that they run on two cores.
 
 #[test]
 fn mechanisms_0_to_24() {
@@ -212,7 +213,8 @@ fn mechanisms_25_to_49() {
     batch(25..50);
 }
 
-/// Constraints by default and with everything, and not for trees.
+/// Code of a mechanism with constraints has the outputs for constraints, by default and with all outputs; code of a
+/// tree has none of them.
 #[test]
 fn outputs_follow_the_model() {
     let closed = random_loops(1, &LoopKnobs::plain()).model;

@@ -1,4 +1,4 @@
-//! Operation counts of random mechanisms: limits, and that what a scene does not have costs nothing.
+//! Operation counts of random mechanisms: limits, and elements that a mechanism does not have, which must cost nothing.
 
 use mbd_codegen::generate::{generate, trace};
 use mbd_codegen::model::{Gravity, JointKind, Model, Rotation, Value, Wrench, WrenchAxes};
@@ -12,18 +12,19 @@ use mbd_testing::random::{random_model, Distribution};
 
 const NONE: Gravity = Gravity::Constant([Value::ZERO; 3]);
 
-/// Joints one by one: what is said of loads and outputs does not depend on the form.
-fn program(model: &Model, group: Output, efforts: bool) -> mbd_codegen::symbolic::Program {
+/// The program with joints eliminated one by one. What these tests state of loads and outputs holds for every
+/// elimination.
+fn program(model: &Model, output: Output, efforts: bool) -> mbd_codegen::symbolic::Program {
     let plan = PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() };
     let options = Options { efforts, arithmetic: Arithmetic::Exact, plan, ..Options::default() };
-    trace(&search::plan(model, plan), group, &options).expect("no frames are named").program
+    trace(&search::plan(model, plan), output, &options).expect("no frames are named").program
 }
 
-fn counts(model: &Model, group: Output) -> Counts {
-    program(model, group, false).counts()
+fn counts(model: &Model, output: Output) -> Counts {
+    program(model, output, false).counts()
 }
 
-/// Operations of the rates in the form that has the fewest.
+/// Operations of the rates with the elimination that has the fewest.
 fn fewest(model: &Model) -> usize {
     let plan = PlanOptions {
         elimination: EliminationStrategy::Fewest,
@@ -35,11 +36,11 @@ fn fewest(model: &Model) -> usize {
     trace(&search::plan(model, plan), Output::Rates, &options).expect("no frames are named").program.counts().total()
 }
 
-/// A chain of `n` pins, general in every number.
+/// A chain of `n` revolute joints, general in every number.
 fn general_chain(seed: u64, n: usize) -> Model {
     let distribution = Distribution { bodies: (n, n), gravity: [0.0, 1.0, 0.0], ..Distribution::default() };
     let mut model = random_model(seed, &distribution);
-    // Identity placements happen one time in six; here nothing may be aligned.
+    // The generator makes one placement in six an identity; in a general chain nothing may be aligned.
     for (k, joint) in model.joints.iter_mut().enumerate() {
         if joint.placement.rotation == Rotation::NONE {
             joint.placement.rotation = Rotation::Rpy([0.3, 0.7, 1.1 + k as f64].map(Value::Const));
@@ -48,7 +49,7 @@ fn general_chain(seed: u64, n: usize) -> Model {
     model
 }
 
-/// The same in a plane: vertical axes, placements turned about them.
+/// The same chain in a plane: all axes are vertical, and placements are rotations about them.
 fn planar_chain(seed: u64, n: usize) -> Model {
     let mut model = general_chain(seed, n);
     for joint in &mut model.joints {
@@ -59,17 +60,17 @@ fn planar_chain(seed: u64, n: usize) -> Model {
     model
 }
 
-/// Planar chains: the cost of one more body is always the same, and a fraction of that in space.
+/// One more body of a planar chain always costs the same, and only a fraction of its cost in space.
 #[test]
 fn planar_chains_are_cheap() {
     let count = |n: usize| fewest(&planar_chain(0, n));
     let (ten, twelve) = (count(10), count(12));
-    // What it was when this was written: gates, not theorems.
+    // These are the counts when the test was written. The limits keep the counts from growing.
     assert!(ten <= 561 && twelve - ten <= 2 * 66, "{ten} operations for 10 bodies, {twelve} for 12");
     assert_eq!(count(14) - twelve, twelve - ten);
 }
 
-/// Inertial forces only: no operation of the rates belongs to gravity or wrenches.
+/// Without gravity and wrenches, no operation of the rates belongs to loads.
 #[test]
 fn absent_loads_cost_nothing() {
     for seed in 0..100 {
@@ -84,12 +85,13 @@ fn absent_loads_cost_nothing() {
     }
 }
 
-/// Wrenches and gravity are no part of velocities, momenta and the mass matrix; wrenches none of the energy.
+/// Velocities, momenta and the mass matrix do not depend on wrenches and gravity; the energy does not depend on
+/// wrenches.
 #[test]
 fn loads_stay_out_of_what_does_not_depend_on_them() {
     for seed in 0..100 {
         let mut model = random_model(seed, &Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6) });
-        let all = |model: &Model, groups: &[Output]| groups.iter().map(|g| counts(model, *g)).collect::<Vec<_>>();
+        let all = |model: &Model, outputs: &[Output]| outputs.iter().map(|o| counts(model, *o)).collect::<Vec<_>>();
         let kinematic = [
             Output::Velocities,
             Output::Momenta,
@@ -106,7 +108,7 @@ fn loads_stay_out_of_what_does_not_depend_on_them() {
     }
 }
 
-/// Joint forces cost at most one addition each, and nothing where there are none.
+/// Each joint force costs at most one addition.
 #[test]
 fn efforts_cost_one_addition_each() {
     for seed in 0..100 {
@@ -118,7 +120,7 @@ fn efforts_cost_one_addition_each() {
     }
 }
 
-/// Outputs cost nothing unless they are asked for, and do not change each other.
+/// An output that is not requested costs nothing, and outputs do not change each other.
 #[test]
 fn outputs_are_independent() {
     for seed in 0..30 {
@@ -128,20 +130,20 @@ fn outputs_are_independent() {
                 .unwrap_or_else(|e| panic!("seed {seed}: {e}"))
         };
         let all = generated(Output::available(false).collect());
-        for (k, group) in Output::available(false).enumerate() {
-            let one = generated(vec![group]);
-            assert_eq!(one.counts, [all.counts[k]], "seed {seed}: {group:?}");
-            for other in Output::available(false).filter(|g| *g != group) {
+        for (k, output) in Output::available(false).enumerate() {
+            let one = generated(vec![output]);
+            assert_eq!(one.counts, [all.counts[k]], "seed {seed}: {output:?}");
+            for other in Output::available(false).filter(|o| *o != output) {
                 assert!(
                     !one.source.contains(&format!("pub fn {}(", other.name())),
-                    "seed {seed}: {group:?}, {other:?}"
+                    "seed {seed}: {output:?}, {other:?}"
                 );
             }
         }
     }
 }
 
-/// A frame that is not asked for is not computed.
+/// A frame that is not requested is not computed.
 #[test]
 fn frames_are_chosen_one_by_one() {
     let model = random_model(3, &Distribution { bodies: (6, 6), ..Distribution::default() });
@@ -152,11 +154,12 @@ fn frames_are_chosen_one_by_one() {
     };
     let names: Vec<String> = model.joints.iter().map(|j| model.bodies[j.child].name.clone()).collect();
     let each: Vec<usize> = names.iter().map(|n| count(vec![n.clone()])).collect();
-    assert!(each.windows(2).all(|w| w[0] < w[1]), "{each:?}: farther out costs more");
+    assert!(each.windows(2).all(|w| w[0] < w[1]), "{each:?}: a frame farther from the ground must cost more");
     assert!(count(names) > each[5]);
 }
 
-/// The more of a mechanism is aligned, the less it costs; the same chain with symmetric links costs less still.
+/// A chain with aligned axes costs less than a general one, with symmetric links less still, and a planar chain the
+/// least.
 #[test]
 fn structure_pays() {
     for seed in 0..20 {

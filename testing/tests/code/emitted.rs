@@ -1,20 +1,20 @@
 //! Runs emitted Rust without compiling it: the source text is parsed with `syn`, lowered, and run.
 //!
-//! What is run are the kernels, for one lane; `compiled.rs` has what stands around them, and lanes. The emitted language is
-//! tiny, and everything outside it is refused with a panic: `let` of a number or a pair, sums, products, quotients, signs,
-//! sine-cosine pairs one by one or all at once, roots, guarded reciprocals, reads and writes of arrays at constant places, loops over lanes. A
-//! name that is defined twice in a block is refused too, although Rust would allow it.
+//! Only the kernels run here, for one lane; `compiled.rs` tests the functions around them, and lanes. The emitted
+//! language is small: `let` of a number or a pair, sums, products, quotients, signs, sine-cosine pairs one by one or
+//! all at once, roots, guarded reciprocals, reads and writes of arrays at constant places, `for` over lanes. Anything
+//! else panics. A name that is defined twice in a block panics too, although Rust would allow it.
 
 use std::collections::HashMap;
 
 use mbd_runtime::trig::sincos_f64;
 use syn::{Expr, FnArg, ImplItem, Item, Lit, Pat, Stmt, Type, UnOp};
 
-/// A number: locals and arrays by their indices in the function.
+/// An expression for a number. Locals and arrays are given by their indices in the function.
 enum Number {
     Literal(f64),
     Local(usize),
-    /// Number of an array.
+    /// An item of an array: indices of the array and of the item.
     Item(usize, usize),
     Negative(Box<Number>),
     Sum(Box<[Number; 2]>),
@@ -22,7 +22,7 @@ enum Number {
     Product(Box<[Number; 2]>),
     Quotient(Box<[Number; 2]>),
     Root(Box<Number>),
-    /// `1 / a` where `a` is above `b`.
+    /// The reciprocal `1 / a` if `a` is above `b`, else zero.
     ReciprocalAbove(Box<[Number; 2]>),
 }
 
@@ -39,7 +39,7 @@ enum Step {
 struct Function {
     /// Name and mutability of every argument.
     arguments: Vec<(String, bool)>,
-    /// Arguments first, then own arrays.
+    /// Names of the arguments, then of the function's own arrays.
     arrays: Vec<String>,
     locals: Vec<HashMap<String, usize>>,
     count: usize,
@@ -71,11 +71,11 @@ impl Emitted {
         Emitted { functions }
     }
 
-    /// Runs a kernel: arrays in by the names of arguments (`q`, `tau`), flat; arrays out by the names of the `&mut`
-    /// arguments; a returned array has the name of the result.
+    /// Runs a kernel. Inputs are flat arrays by the names of the arguments (`q`, `tau`); outputs are arrays by the
+    /// names of the `&mut` arguments.
     pub fn run(&self, name: &str, inputs: &HashMap<String, Vec<f64>>) -> HashMap<String, Vec<f64>> {
         let f = &self.functions[name];
-        // Not zero: what is read before it is written must show.
+        // Output arrays start empty and locals with NaN, so that a read before the write shows.
         let mut arrays: Vec<Vec<f64>> = vec![Vec::new(); f.arrays.len()];
         for (array, (arg, mutable)) in arrays.iter_mut().zip(&f.arguments) {
             if !mutable {
@@ -96,7 +96,7 @@ impl Emitted {
                 Step::Set(to, k, x) => {
                     let x = x.value(&locals, &arrays);
                     let array = &mut arrays[*to];
-                    // Results are written in order; the lengths of their arrays are not in the text.
+                    // Results are written in order. Arrays grow here because the text does not contain their lengths.
                     if *k == array.len() {
                         array.push(x);
                     } else {

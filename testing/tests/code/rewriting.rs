@@ -1,11 +1,12 @@
-//! Rewriting for speed does not cost accuracy: exact and fast programs against the same formulas in double-double.
+//! Rewriting for speed does not cost accuracy: exact and fast programs are compared with the same formulas in
+//! double-double.
 //!
-//! The reference is the exact program run on numbers of 106 bits; see `wide` for how errors are measured. Fast programs are
-//! run with fused multiply-adds and without.
+//! The reference is the exact program run on numbers of 106 bits; see `wide` for how errors are measured. Fast programs
+//! are run with fused multiply-adds and without.
 //!
-//! Limits, for every model: the median error at most 2 times, what 99 states in 100 stay below at most 3 times that of the
-//! exact program. Errors below two roundings of the largest result are not compared: there the exact program may be exact
-//! by chance.
+//! Limits, for every model: the median error is at most 2 times that of the exact program, and the error that 99 of 100
+//! states stay below at most 3 times. Errors below two roundings of the largest result are not compared: there the
+//! exact program may be exact by chance.
 
 use crate::wide::{inputs, model, Errors, Spread, Wide, MODELS};
 use mbd_codegen::generate::trace;
@@ -18,17 +19,17 @@ use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::random_state;
 
 /// Compares one output of a plan on many states; gives the ratios of the medians and of the worst errors.
-fn compare(name: &str, plan: &Plan, group: Output, states: u64) -> Spread {
+fn compare(name: &str, plan: &Plan, output: Output, states: u64) -> Spread {
     let program = |arithmetic| {
         let options = Options { arithmetic, ..Options::default() };
-        trace(plan, group, &options).unwrap_or_else(|e| panic!("{name}: {e}"))
+        trace(plan, output, &options).unwrap_or_else(|e| panic!("{name}: {e}"))
     };
     let (exact, fast) = (program(Arithmetic::Exact), program(Arithmetic::Fast));
-    let parts = match group {
+    let parts = match output {
         Output::Rates => vec![0..plan.dims.nq, plan.dims.nq..exact.program.outputs.len()],
         _ => vec![0..exact.program.outputs.len(); 1],
     };
-    // Errors of the exact program, of the fast one with fused operations, and without; part by part.
+    // For each part: errors of the exact program, of the fast one with fused operations, and of the fast one without.
     let mut errors = vec![[(); 3].map(|()| Errors::default()); parts.len()];
     for seed in 0..states {
         let s = random_state(plan, seed);
@@ -55,7 +56,7 @@ fn compare(name: &str, plan: &Plan, group: Output, states: u64) -> Spread {
         let [fused, plain] = [fused, plain].map(|s| s.times(exact));
         println!(
             "{name} {}: size {:.1e}, exact {:.1e} (worst {:.1e}); fused times {:.2} ({:.2}), plain times {:.2} ({:.2})",
-            group.name(),
+            output.name(),
             errors[0].typical(),
             exact.median,
             exact.worst,
@@ -69,9 +70,9 @@ fn compare(name: &str, plan: &Plan, group: Output, states: u64) -> Spread {
     worst
 }
 
-fn check(name: &str, plan: &Plan, group: Output, states: u64) {
-    let times = compare(name, plan, group, states);
-    assert!(times.within_limits(), "{name}, {}: errors are {times:.2?} times as large", group.name());
+fn check(name: &str, plan: &Plan, output: Output, states: u64) {
+    let times = compare(name, plan, output, states);
+    assert!(times.within_limits(), "{name}, {}: errors are {times:.2?} times as large", output.name());
 }
 
 #[test]
@@ -87,8 +88,8 @@ fn every_output_of_random_trees() {
     for seed in 0..20 {
         let model = random_model(seed, &Distribution::everything(seed, 6));
         let plan = search::plan(&model, Options::default().plan);
-        for group in Output::available(false) {
-            check(&format!("tree {seed}"), &plan, group, 1000);
+        for output in Output::available(false) {
+            check(&format!("tree {seed}"), &plan, output, 1000);
         }
     }
 }

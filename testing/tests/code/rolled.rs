@@ -1,6 +1,7 @@
-//! The loop form of long chains against the interpreter.
+//! Rolled code of long chains against the interpreter.
 //!
-//! In exact arithmetic the operations are those of the sweeps, so results are the same bit for bit, whatever the tree.
+//! In exact arithmetic, rolled code has the operations of the sweeps, so results are the same bit for bit on every
+//! tree.
 
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
@@ -38,7 +39,8 @@ fn inputs(program: &OutputProgram<RolledProgram>, s: &State, p: &[f64], a: &[f64
     all
 }
 
-/// Compares every group that has loops; gives the number of nodes in loops.
+/// Compares every output that has rolled code with the interpreter. Returns the largest number of rolled nodes of an
+/// output.
 fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     let plan = search::plan(model, options.plan);
     let mut s = random_state(&plan, seed);
@@ -53,11 +55,11 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     i.accelerations(&s.q, &s.v, &mut a);
     let mut nodes = 0;
     let (mut rows, mut pivots) = (i.zero_rows(), i.zero_rows());
-    for &group in Output::ALL {
-        let Some(program) = rolled(&plan, group, options) else { continue };
+    for &output in Output::ALL {
+        let Some(program) = rolled(&plan, output, options) else { continue };
         nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
         let results = program.program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
-        let expected = match group {
+        let expected = match output {
             Output::Rates => {
                 i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
                 [qd.as_slice(), &pd].concat()
@@ -92,22 +94,22 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
         };
         assert_eq!(results.len(), expected.len());
         if options.arithmetic == Arithmetic::Fast {
-            // Some hundred roundings and their growth through an inertia whose condition is below 1e3 in chains this
-            // short, against the largest of the results.
+            // The tolerance, relative to the largest of the results, allows for a few hundred roundings and for their
+            // growth by the condition of the inertia, which is below 1e3 in chains this short.
             let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
             let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            assert!(off <= 1e-11 * size, "seed {seed}: {group:?} is {off:e} off, size {size:e}\n{}", to_toml(model));
+            assert!(off <= 1e-11 * size, "seed {seed}: {output:?} is {off:e} off, size {size:e}\n{}", to_toml(model));
             continue;
         }
         for (k, (a, b)) in results.iter().zip(&expected).enumerate() {
             let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
-            assert!(same && a.is_finite(), "seed {seed}: {group:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
+            assert!(same && a.is_finite(), "seed {seed}: {output:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
         }
-        let straight = trace(&plan, group, options).map(|g| g.program.counts().total()).unwrap_or_default();
+        let straight = trace(&plan, output, options).map(|g| g.program.counts().total()).unwrap_or_default();
         let more = program.program.counts().total();
         assert!(
             more >= straight,
-            "seed {seed}: {group:?}: loops have {more} operations, straight-line code {straight}"
+            "seed {seed}: {output:?}: rolled code has {more} operations, straight-line code {straight}"
         );
     }
     nodes
@@ -115,8 +117,9 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
 
 fn forced(seed: u64) -> Options {
     let mut rng = Rng::new(seed, 9);
-    // Blocks at the tips stay straight-line and leave little for loops in short chains.
-    let forms = rng.pick(&[
+    // `Single` is twice in the list because blocks of joints that are eliminated together at the tips stay
+    // straight-line code and leave few nodes of short chains to rolled code.
+    let elimination = rng.pick(&[
         EliminationStrategy::Single,
         EliminationStrategy::Single,
         EliminationStrategy::Fewest,
@@ -125,23 +128,23 @@ fn forced(seed: u64) -> Options {
     Options {
         arithmetic: Arithmetic::Exact,
         efforts: rng.chance(0.7),
-        plan: PlanOptions { elimination: forms, rolled: RolledCode::Always, ..PlanOptions::default() },
+        plan: PlanOptions { elimination, rolled: RolledCode::Always, ..PlanOptions::default() },
         ..Options::default()
     }
 }
 
 #[test]
-fn chains_of_pins() {
+fn chains_of_revolute_joints() {
     for seed in 0..30 {
         let n = 5 + seed as usize % 25;
         let distribution = Distribution { bodies: (n, n), taper: 1.0, ..Distribution::default() };
         let nodes = compare(&random_model(seed, &distribution), seed, &forced(seed));
-        assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+        assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are rolled");
     }
 }
 
-/// Chains whose tips are held by the ground, in space and in a plane, equal links among them: columns of the rows are carried
-/// through the turns.
+/// Chains in space and in a plane whose tips are connected to the ground. Rolled code then carries the columns of the
+/// constraint's rows from link to link.
 #[test]
 fn closed_chains() {
     let kinds = [
@@ -164,21 +167,22 @@ fn closed_chains() {
         let decay = if seed % 4 == 0 { Value::Const(5.0) } else { Value::ZERO };
         model.constraints.push(Constraint::new("loop", kind, decay));
         let mut options = forced(seed);
-        // Frames that do not turn keep their nodes out of loops.
+        // Nodes with non-rotating frames stay straight-line code.
         if options.plan.elimination == EliminationStrategy::Fewest {
             options.plan.elimination = EliminationStrategy::Single;
         }
         let nodes = compare(&model, seed, &options);
         if seed % 4 == 0 {
-            // With a decay the rows ask for the pose of the tip, and pull at the joints: straight-line code.
+            // With a decay, the rows need the pose of the tip and exert forces on the joints; this stays straight-line
+            // code.
             continue;
         }
         let plan = search::plan(&model, options.plan);
-        for group in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
-            let is_rolled = rolled(&plan, group, &options).is_some();
-            assert!(is_rolled, "seed {seed}: {group:?} is not in loops, {:?}", options.plan);
+        for output in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
+            let is_rolled = rolled(&plan, output, &options).is_some();
+            assert!(is_rolled, "seed {seed}: {output:?} has no rolled code, {:?}", options.plan);
         }
-        assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are in loops");
+        assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are rolled");
         options.arithmetic = Arithmetic::Fast;
         compare(&model, seed, &options);
     }
@@ -204,12 +208,12 @@ fn trees_of_everything() {
     let mut nodes = 0;
     for seed in 0..300 {
         let all = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6 + seed as usize % 20) };
-        // Parameters, followers and drives keep their nodes out of loops.
+        // Nodes with parameters, mimic joints or drives stay straight-line code.
         let plain = Distribution { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
         let distribution = if seed % 3 == 0 { all } else { plain };
         nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
-    assert!(nodes > 150, "only {nodes} nodes were in loops");
+    assert!(nodes > 150, "only {nodes} nodes were rolled");
 }
 
 #[test]
@@ -230,5 +234,5 @@ fn chains_of_one_kind() {
         };
         nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
-    assert!(nodes > 200, "only {nodes} nodes were in loops");
+    assert!(nodes > 200, "only {nodes} nodes were rolled");
 }

@@ -1,7 +1,7 @@
-//! What rounding errors are measured with: double-double numbers as a scalar, and errors of many states.
+//! Measurement of rounding errors: double-double numbers as a scalar, and errors of many states.
 //!
-//! Sines and cosines are rounded to 53 bits: those that programs on doubles compute. They are inputs of the algebra, the
-//! same in every form, and their own errors are held to an ulp elsewhere; what is compared here are the roundings after them.
+//! Sines and cosines are those that programs on doubles compute, rounded to 53 bits. They are the same for every
+//! elimination, and another test keeps their own errors within an ulp; the roundings after them are measured here.
 
 use mbd_codegen::generate::OutputProgram;
 use mbd_codegen::model::Model;
@@ -12,7 +12,7 @@ use mbd_runtime::Scalar;
 use mbd_testing::state::State;
 
 /// Inputs of a program in their order.
-pub fn inputs(group: &OutputProgram<Program>, s: &State, p: &[f64]) -> Vec<f64> {
+pub fn inputs(output: &OutputProgram<Program>, s: &State, p: &[f64]) -> Vec<f64> {
     let array = |name: &str| -> Vec<f64> {
         match name {
             "q" => s.q.clone(),
@@ -28,10 +28,10 @@ pub fn inputs(group: &OutputProgram<Program>, s: &State, p: &[f64]) -> Vec<f64> 
             other => panic!("unknown input {other}"),
         }
     };
-    group.inputs.iter().flat_map(|a| array(a.name)).collect()
+    output.inputs.iter().flat_map(|a| array(a.name)).collect()
 }
 
-/// The models of the project and how they hang on the ground.
+/// Models of the project, each with the connection of its base to the ground.
 pub const MODELS: [(&str, Base); 11] = [
     ("double_pendulum.toml", Base::Fixed),
     ("spherical_pendulum.toml", Base::Fixed),
@@ -46,7 +46,7 @@ pub const MODELS: [(&str, Base); 11] = [
     ("g1.urdf", Base::Floating),
 ];
 
-/// One of them.
+/// One of [`MODELS`].
 pub fn model(file: &str, base: Base) -> Model {
     let path = format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("the model");
@@ -57,9 +57,10 @@ pub fn model(file: &str, base: Base) -> Model {
 
 /// Errors of one array of results in many states.
 ///
-/// The error of a state is the largest in the array, relative to the largest entry: the array is used as a whole. An array
-/// that happens to pass zero in a state has no relative error; it is measured by a tenth of the median of largest entries.
-/// Otherwise the worst of all states would be the one nearest to zero, and its error that of a single rounding.
+/// The error of a state is the largest error in the array, relative to the largest entry of the array. If this entry is
+/// smaller than a tenth of its median over all states, the error is relative to that tenth instead. Otherwise the worst
+/// of all states would be the one in which the array is nearest to zero, and its error would be that of a single
+/// rounding.
 #[derive(Clone, Default)]
 pub struct Errors {
     off: Vec<f64>,
@@ -93,18 +94,19 @@ impl Errors {
     }
 }
 
-/// States among which the worst is more than chance.
+/// Number of states from which on their worst error is not a matter of chance.
 pub const MANY: u64 = 10_000;
 
-/// Errors of many states in two numbers; not below two roundings.
+/// Errors of many states in two numbers, each at least two roundings.
 ///
-/// Of fewer than [`MANY`] states, `worst` is what 99 in 100 stay below: the very worst of few is the error of one state,
-/// which another order of the same operations makes three times as large or as small by chance.
+/// For fewer than [`MANY`] states, `worst` is the error that 99 of 100 states stay below. The largest error of few
+/// states is that of one state, which another order of the same operations makes three times as large or as small by
+/// chance.
 #[derive(Clone, Copy, Debug)]
 pub struct Spread {
     /// The median.
     pub median: f64,
-    /// The worst, or what 99 in 100 stay below.
+    /// The worst error, or the error that 99 of 100 states stay below.
     pub worst: f64,
 }
 
@@ -117,12 +119,12 @@ impl Spread {
         Spread { median: above(e.len() / 2), worst: above(last) }
     }
 
-    /// The larger numbers of two.
+    /// The larger median and the larger worst error of two spreads.
     pub fn larger(self, other: Spread) -> Spread {
         Spread { median: self.median.max(other.median), worst: self.worst.max(other.worst) }
     }
 
-    /// In multiples of another.
+    /// This spread in multiples of another.
     pub fn times(self, other: Spread) -> Spread {
         Spread { median: self.median / other.median, worst: self.worst / other.worst }
     }

@@ -1,5 +1,5 @@
-//! Mechanisms with loops in minimal coordinates, and described in several ways: every choice of independents, the thesis's own
-//! recursion, parameters, forms of elimination, single precision.
+//! Mechanisms with loops in minimal coordinates and in several descriptions: every choice of independent velocities,
+//! the recursion of the thesis, parameters in place of constants, eliminations, single precision.
 
 use std::collections::BTreeMap;
 
@@ -19,8 +19,8 @@ use crate::dense::case::{system, Case, Errors, SYSTEMS};
 use crate::dense::minimal::{choices, full, least, others, pivot};
 use crate::dense::{minimal, thesis, Matrix, Truth, Vector};
 
-/// Any choice of independent velocities: `ṗ_ind` out of `ṗ⁺` at `p⁺_dep = 0` is `d/dt (Bᵀ M v)`, by the rates themselves
-/// and by [`CoordinatePartition`].
+/// For any choice of independent velocities, `ṗ_ind` of the state with `p⁺_dep = 0` is `d/dt (Bᵀ M v)`. It is computed
+/// from `ṗ⁺` of the rates, and by [`CoordinatePartition`].
 #[test]
 fn minimal_coordinates_are_a_gauge() {
     let mut velocity = Errors::new("qd", 1e-11);
@@ -70,7 +70,8 @@ fn minimal_coordinates_are_a_gauge() {
     adapted.done();
 }
 
-/// The recursion of section 5.3.3 and the gauge, on the chains that it is for.
+/// Section 5.3.3 of the thesis has a recursion for minimal coordinates of serial chains. It gives the same motion as
+/// the rates with `p⁺_dep = 0`.
 #[test]
 fn the_gauge_agrees_with_the_thesis_s_recursion() {
     let mut velocity = Errors::new("v", 1e-11);
@@ -107,14 +108,15 @@ fn the_gauge_agrees_with_the_thesis_s_recursion() {
     rate.done();
 }
 
-/// Velocities, settled momenta, rates, accelerations, `Φᵀλ` of a plan in a state; no order of rows enters.
+/// Velocities, projected momenta, rates, accelerations and `Φᵀλ` of a plan in a state. None of them depends on the
+/// order of rows.
 fn results(plan: &Plan, s: &State, p: &[f64]) -> [Vec<f64>; 5] {
     let mut i = s.interpreter(plan);
     let q = s.q.clone();
-    let (mut settled, mut v, mut sigma) = (p.to_vec(), i.zero_momenta(), i.zero_rows());
-    i.project_momenta(0.0, &q, &mut settled, &mut v, &mut sigma);
+    let (mut projected, mut v, mut sigma) = (p.to_vec(), i.zero_momenta(), i.zero_rows());
+    i.project_momenta(0.0, &q, &mut projected, &mut v, &mut sigma);
     let (mut qd, mut pd, mut a) = (i.neutral(), i.zero_momenta(), i.zero_momenta());
-    i.rates_at(0.0, &q, &settled, &mut qd, &mut pd);
+    i.rates_at(0.0, &q, &projected, &mut qd, &mut pd);
     i.generalized_accelerations(&q, &v, &mut a);
     let (mut lambda, mut residual, mut entries) = (i.zero_rows(), i.zero_rows(), i.zero_entries());
     i.multipliers(0.0, &q, &v, &mut lambda);
@@ -125,7 +127,7 @@ fn results(plan: &Plan, s: &State, p: &[f64]) -> [Vec<f64>; 5] {
             force[i.entry_columns()[at]] += lambda[k] * entries[at];
         }
     }
-    [v, settled, pd, a, force]
+    [v, projected, pd, a, force]
 }
 
 /// Largest difference relative to the largest entry of both (at least 1).
@@ -137,7 +139,7 @@ fn difference(a: &[Vec<f64>; 5], b: &[Vec<f64>; 5]) -> f64 {
     a.iter().zip(b).map(one).fold(0.0, f64::max)
 }
 
-/// Systems whose rows are well apart: 1e-11 then leaves three digits for the inertias.
+/// Systems whose rows are far from dependent. Their results then differ by less than 1e-10.
 fn apart(seed: u64, system: LoopSystem) -> Option<Case> {
     Case::of(seed, system).filter(|c| c.pivot > 1e-2)
 }
@@ -163,13 +165,13 @@ fn parameters_of_constraints_are_as_good_as_constants() {
 }
 
 #[test]
-fn forms_of_elimination_do_not_matter() {
+fn eliminations_do_not_matter() {
     let (mut worst, mut met) = (0.0_f64, 0);
     for seed in 0..80 {
         let Some(c) = apart(seed, system(seed)) else { continue };
         met += 1;
-        let of = |forms| {
-            let plan = search::plan(&c.system.model, PlanOptions { elimination: forms, ..PlanOptions::default() });
+        let of = |elimination| {
+            let plan = search::plan(&c.system.model, PlanOptions { elimination, ..PlanOptions::default() });
             results(&plan, &c.system.state, c.p.as_slice())
         };
         let [first, others @ ..] = EliminationStrategy::ALL.map(of);
@@ -183,13 +185,13 @@ fn forms_of_elimination_do_not_matter() {
     assert!(met > 30);
 }
 
-/// What six digits give: velocities and held rows of systems that do not lose them.
+/// Velocities of well-conditioned systems in single precision.
 #[test]
 fn single_precision_holds_constraints() {
     let (mut worst, mut met) = (0.0_f64, 0);
     for seed in 0..SYSTEMS {
         let Some(c) = apart(seed, system(seed)) else { continue };
-        // The unbound motion is that of the inertias alone: it tells how many digits they cost.
+        // Without constraints, velocities depend on the inertias only. Large ones mean that the inertias lose digits.
         if c.truth.unbound.amax() > 20.0 || c.truth.dense.condition() > 5.0 {
             continue;
         }
@@ -208,7 +210,7 @@ fn single_precision_holds_constraints() {
     assert!(met > 100);
 }
 
-/// Joints between a body and the ground.
+/// Joints on the path from a body to the ground.
 fn way(model: &Model, body: Option<usize>) -> Vec<usize> {
     let joint = |body| model.joints.iter().position(|j| Some(j.child) == body);
     std::iter::successors(joint(body), |&j| joint(model.joints[j].parent)).collect()
@@ -226,7 +228,7 @@ fn cycle(model: &Model, kind: &ConstraintKind) -> Vec<usize> {
     }
 }
 
-/// Loops of all sorts are met.
+/// Loops of every sort occur among the systems.
 #[test]
 fn the_systems_have_everything() {
     let mut met: BTreeMap<&str, u64> = BTreeMap::new();

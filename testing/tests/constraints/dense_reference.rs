@@ -1,8 +1,9 @@
-//! Mechanisms with loops and couplings against dense matrices: random trees with random constraints of every kind, closed in
-//! the state that is looked at, redundant ones included.
+//! Mechanisms with loops and couplings against dense matrices. The mechanisms are random trees with random constraints
+//! of every kind, redundant ones included, which hold in the state of the test.
 //!
-//! `Φ` of the reference comes from the definitions in ground axes, `M` and `h` from the open tree, multipliers from singular
-//! values (`dense/mod.rs`). Rows of the two sides need not be the same, only what they span.
+//! `Φ` of the reference comes from the definitions in ground axes, `M` and `h` from the open tree, multipliers from
+//! singular values (`dense/mod.rs`). The rows of interpreter and reference need not be the same, but must span the same
+//! space.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +28,7 @@ fn rates_are_those_of_dense_matrices() {
         let (qd, pd) = c.rates(&c.p.clone());
         let exact = c.coordinate_rates(&c.truth.v);
         velocity.add(&c, &qd, &exact, c.truth.unbound.amax().max(exact.amax()));
-        // But for what multipliers may add.
+        // Rates are compared only along directions that the constraints allow: multipliers may differ in the others.
         let free = c.truth.dense.allowed();
         let (ours, exact) = (free.transpose() * pd, free.transpose() * c.truth.momentum_rates());
         let turning = c.truth.phi_rate.transpose() * &c.truth.sigma;
@@ -51,12 +52,12 @@ fn rows_are_those_of_the_definitions() {
         let (residual, phi) = c.phi(&q);
         let n = residual.len();
         residuals.add(&c, &residual.into(), &Vector::zeros(n), 1.0);
-        // Everything that one side allows the other allows.
+        // The rows of interpreter and reference must allow the same motions.
         let own = Dense::of(c.truth.dense.m.clone(), phi.clone(), Vector::zeros(n), Vector::zeros(c.p.len()));
         assert_eq!(own.rank, c.truth.dense.rank, "seed {seed}");
         let through = &phi * c.truth.dense.allowed();
         entries.add(&c, &Vector::from_element(1, through.amax()), &Vector::zeros(1), phi.amax());
-        // Residuals change as the rows say: near by, where they are not zero.
+        // The rows are the derivatives of the residuals, compared by central differences.
         let mut rng = Rng::new(seed, 10);
         let v = Vector::from_fn(c.p.len(), |_, _| rng.around(1.0));
         let h = 1e-4;
@@ -100,7 +101,7 @@ fn accelerations_and_multipliers_are_those_of_dense_matrices() {
 }
 
 #[test]
-fn settled_states_are_those_of_dense_matrices() {
+fn projected_momenta_are_those_of_dense_matrices() {
     let mut velocity = Errors::new("v", 1e-11);
     let mut held = Errors::new("rows held", 1e-12);
     let mut momentum = Errors::new("p", 1e-11);
@@ -114,7 +115,7 @@ fn settled_states_are_those_of_dense_matrices() {
         let phi = c.phi(&c.q()).1;
         let (v, scale) = (Vector::from(v), c.truth.unbound.amax().max(c.truth.v.amax()));
         velocity.add(&c, &v, &c.truth.v, scale);
-        // Prescribed motions of the constraints are what the exact velocities give.
+        // `Φ v` of the exact velocities is the prescribed motion of the constraints.
         held.add(&c, &(&phi * &v), &(&phi * &c.truth.v), phi.amax() * scale);
         let carried = &c.truth.dense.m * &c.truth.v + &c.truth.dense.driven;
         let scale = c.p.amax().max(c.truth.pull.amax()).max(c.truth.dense.m.amax() * scale);
@@ -134,7 +135,7 @@ fn settled_states_are_those_of_dense_matrices() {
     kinetic.done();
 }
 
-/// Near closed positions: `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁺φ` with residuals and rows as the interpreter has them there.
+/// Near closed positions, the correction is `δq = −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁺φ` with the residuals and rows of the interpreter.
 #[test]
 fn corrections_are_those_of_dense_matrices() {
     let mut corrections = Errors::new("dq", 1e-10);
@@ -142,7 +143,7 @@ fn corrections_are_those_of_dense_matrices() {
     for seed in 0..SYSTEMS {
         let Some(mut c) = Case::new(seed) else { continue };
         let n = c.truth.dense.phi.nrows();
-        // Redundant rows are so on closed positions only; elsewhere nothing tells the two sides which to leave out.
+        // Rows are redundant at closed positions only; elsewhere interpreter and reference may omit different rows.
         if c.truth.dense.rank < n || c.truth.dense.condition() > 100.0 {
             continue;
         }
@@ -172,7 +173,7 @@ fn corrections_are_those_of_dense_matrices() {
     left.done();
 }
 
-/// Off closed positions the rates of those that decay do: `Φ v = b − decay · φ`.
+/// Away from closed positions, residuals of constraints with a decay change by `Φ v = b − decay · φ`.
 #[test]
 fn errors_of_positions_decay() {
     let mut rates = Errors::new("decay", 1e-11);

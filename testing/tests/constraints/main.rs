@@ -1,4 +1,4 @@
-//! Closed loops and couplings against dense matrices, definitions and each other.
+//! Closed loops and couplings: comparisons with dense matrices, with definitions, and of different descriptions.
 
 #[allow(dead_code)]
 #[path = "../tree/cases.rs"]

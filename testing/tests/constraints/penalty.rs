@@ -1,4 +1,4 @@
-//! Penalties in place of multipliers: rows give way by `σ/α`, and less the larger the weight.
+//! Penalties in place of multipliers: a row is violated by `σ/α`, which is less the larger the weight `α`.
 
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
@@ -28,7 +28,7 @@ fn rows_give_way_as_their_weight_says() {
             let mut soft = Interpreter::new(tree.penalised(weight, 0.0), gravity);
             let (mut v, mut sigma, mut freed) = (soft.zero_momenta(), soft.zero_rows(), p.clone());
             soft.project_momenta(0.0, &q, &mut freed, &mut v, &mut sigma);
-            // σ = α Φ v, row by row.
+            // The definition σ = α Φ v, row by row.
             let (mut gap, mut phi) = (soft.zero_rows(), soft.zero_entries());
             soft.constraint_residuals(&q, &mut gap, &mut phi);
             let scale =
@@ -38,7 +38,7 @@ fn rows_give_way_as_their_weight_says() {
                 let rate: f64 = at.map(|k| phi[k] * v[soft.entry_columns()[k]]).sum();
                 assert!((rate - sigma / weight).abs() < 1e-9 * scale, "seed {seed}: {rate} {sigma}");
             }
-            // Freed momenta are those of the velocities, and the energy is theirs.
+            // Projected momenta and the kinetic energy are those of the velocities.
             let mut again = soft.zero_momenta();
             soft.conjugate_momenta(&q, &v, &mut again);
             let size = p.iter().fold(1.0_f64, |m, x| m.max(x.abs()));

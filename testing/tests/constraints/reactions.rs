@@ -1,5 +1,5 @@
-//! Wrenches in the joints of mechanisms with loops: what Newton and Euler ask for, body by body, less what the constraints
-//! themselves put on the bodies, by the definitions of their rows.
+//! Wrenches in the joints of mechanisms with loops. The reference takes, body by body, the wrenches that Newton's and
+//! Euler's laws require and subtracts those of the constraints, which follow from the definitions of their rows.
 
 use mbd_codegen::model::{ConstraintKind, LoopKind};
 use mbd_runtime::spatial::{add3, cross};
@@ -12,8 +12,8 @@ use mbd_testing::newton;
 use crate::dense::case::{plan_of, Case, Errors, SYSTEMS};
 use crate::dense::Vector;
 
-/// Force and moment about its origin, in ground axes, that a frame gets for each unit of the rows' multipliers: a row's rate
-/// is their power. `first`: on the first frame, else on the second.
+/// For each row of a loop, the force and the moment about the frame's origin, in ground axes, that a unit multiplier
+/// exerts on the first frame, or on the second if `first` is false. Their power is the rate of the row.
 fn directions(kind: &LoopKind, params: &[f64], at: &[Pose<f64>; 2], first: bool) -> Vec<[f64; 6]> {
     let still = at.map(|pose| Pose { lin: [0.0; 3], ang: [0.0; 3], ..pose });
     let mut rows: Vec<[f64; 6]> = Vec::new();
@@ -29,7 +29,7 @@ fn directions(kind: &LoopKind, params: &[f64], at: &[Pose<f64>; 2], first: bool)
     rows
 }
 
-/// Force, and moment about the origin of the ground, on every body by the multipliers `λ` of the reference.
+/// Force on every body, and moment about the origin of the ground, that the multipliers `λ` of the reference exert.
 fn on_bodies(s: &LoopSystem, lambda: &Vector) -> Vec<[[f64; 3]; 2]> {
     let mut frames = vec![FrameState::ground(); s.open.frames.len()];
     s.state.interpreter(&s.open).frames(&s.state.q, &s.state.v, &mut frames);
@@ -64,7 +64,8 @@ fn reactions_are_what_is_left_for_the_joints() {
     for seed in 0..SYSTEMS {
         let Some(mut c) = Case::new(seed) else { continue };
         let coupled = c.system.model.constraints.iter().any(|c| matches!(c.kind, ConstraintKind::Coupling { .. }));
-        // Redundant rows share their loads in many ways; a coupling's force stands in the joints.
+        // Redundant rows can share their loads in many ways, and the forces of a coupling are part of the joints'
+        // wrenches.
         if c.truth.dense.rank < c.truth.dense.phi.nrows() || coupled {
             continue;
         }

@@ -1,5 +1,5 @@
-//! The reference for constraints held against itself: definitions of positions against those of velocities, momenta against
-//! accelerations. What it says about the sweeps is in `constraints.rs`.
+//! Consistency of the reference for constraints: definitions of positions against those of velocities, and momenta
+//! against accelerations. `dense_reference.rs` compares the sweeps with the reference.
 
 use mbd_runtime::System;
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
@@ -17,7 +17,7 @@ fn system(seed: u64) -> LoopSystem {
     }
 }
 
-/// Positions are closed, and their rates are the rows.
+/// Residuals are zero in the state, and the rows are their rates.
 #[test]
 fn residuals_and_rates_agree() {
     let (mut gap, mut worst, mut kinds) = (0.0_f64, 0.0_f64, std::collections::BTreeMap::new());
@@ -48,7 +48,8 @@ fn residuals_and_rates_agree() {
     assert!(kinds.len() == 17 && kinds.values().all(|n| *n > 10), "{kinds:?}");
 }
 
-/// The velocities that follow from `(q, p⁺)` change as the accelerations say, along `q̇` and `ṗ⁺`; by central differences.
+/// Along `q̇` and `ṗ⁺`, the velocities that follow from `(q, p⁺)` change by the accelerations. The test uses central
+/// differences.
 #[test]
 fn velocities_along_the_motion_have_the_accelerations() {
     let (mut worst, mut met, mut redundant) = (0.0_f64, 0, 0);
@@ -60,7 +61,7 @@ fn velocities_along_the_motion_have_the_accelerations() {
         let mut rng = Rng::new(seed, 7);
         let p = Vector::from_fn(s.open.dims.nv, |_, _| rng.around(1.0));
         let truth = Truth::new(&s, &p);
-        // Differences of sixth digits: ill-conditioned systems say nothing here.
+        // The differences have about six digits, which ill-conditioned systems would lose.
         if !truth.regular() || truth.dense.condition() > 20.0 || truth.unbound.norm() > 100.0 {
             continue;
         }
@@ -85,7 +86,7 @@ fn velocities_along_the_motion_have_the_accelerations() {
     assert!(met > 30 && redundant > 5);
 }
 
-/// The thesis's recursion for minimal coordinates gives what `d/dt (Bᵀ M v)` is, for every choice of dependent joints.
+/// The recursion of the thesis for minimal coordinates gives `d/dt (Bᵀ M v)` for every choice of dependent joints.
 #[test]
 fn the_thesis_s_recursion_is_right() {
     let (mut worst, mut worst_v, mut met) = (0.0_f64, 0.0_f64, 0);
@@ -105,7 +106,7 @@ fn the_thesis_s_recursion_is_right() {
                 let independents = others(nv, &dependents);
                 let p = full(&momenta.select_rows(&independents), nv, &dependents);
                 let truth = Truth::new(&s, &p);
-                // What a bad choice costs is not the subject.
+                // A badly conditioned choice loses digits, so it is left out.
                 if pivot(&truth.dense, &dependents) < 0.1 || !truth.regular() || truth.v.amax() > 100.0 {
                     continue;
                 }

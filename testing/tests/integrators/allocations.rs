@@ -1,4 +1,4 @@
-//! The interpreter and the integrators allocate when they are made, never afterwards.
+//! The interpreter and the integrators allocate during construction, never afterwards.
 
 use allocation_counter::measure;
 use mbd_runtime::integrate::{
@@ -58,7 +58,8 @@ fn nothing_is_allocated_after_construction() {
     }
 }
 
-/// The first velocity's momentum back where it was, and a time.
+/// Two events: the first momentum returns to its value at the start, and a given time is reached. The second field
+/// counts events.
 struct Back(f64, u32);
 
 impl Events<Interpreter<f64>, 2> for Back {
@@ -74,7 +75,7 @@ impl Events<Interpreter<f64>, 2> for Back {
 }
 
 #[test]
-fn nor_do_runs_with_events_allocate() {
+fn runs_with_events_allocate_nothing() {
     fn run<M: Stepper<Interpreter<f64>>>(seed: u64, method: impl Fn(&Interpreter<f64>) -> M) {
         let distribution = Distribution { bodies: (3, 4), armature: 0.5, ..Distribution::default() };
         let plan = random_plan(&random_model(seed, &distribution), seed);
@@ -105,7 +106,8 @@ fn nor_do_runs_with_events_allocate() {
     }
 }
 
-/// Two steps; how much is allocated in the second. In the first the interpreter makes room for derivatives.
+/// Makes two steps and counts the allocations of the second. In the first, the interpreter allocates room for
+/// derivatives.
 fn second_step<M: Stepper<Interpreter<f64>>>(i: &mut Interpreter<f64>, mut method: M, q: &[f64], p: &[f64]) -> u64 {
     let (mut q, mut p) = (q.to_vec(), p.to_vec());
     let mut step = |result: &mut Result<(), StepError>| *result = method.step(i, 0.0, 1e-4, &mut q, &mut p);
@@ -134,7 +136,7 @@ fn implicit_steps_allocate_nothing() {
     }
 }
 
-/// A start, steps with a history, changes of the order.
+/// The start, steps with a history, and changes of the order do not allocate.
 #[test]
 fn multistep_methods_allocate_nothing() {
     for seed in 0..20 {

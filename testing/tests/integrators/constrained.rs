@@ -1,5 +1,5 @@
-//! Integration of interpreted mechanisms with constraints: every stabilisation, minimal coordinates and methods with multipliers
-//! find the same motion.
+//! Integration of interpreted mechanisms with constraints. Every stabilisation, minimal coordinates and the methods
+//! with multipliers give the same motion.
 
 use mbd_codegen::model::Model;
 use mbd_codegen::read;
@@ -15,13 +15,13 @@ use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 type Mechanism = Interpreter<f64>;
 type State = (Vec<f64>, Vec<f64>);
 
-/// Crank, coupler and rocker, pinned together at the coupler's end; bars with mass in their middle.
-fn four_bar(pin: &str) -> String {
-    four_bar_of([1.0, 2.0, 2.0, 2.5], pin)
+/// A four-bar linkage of crank, coupler and rocker. `closing` is the kind of the loop that connects coupler and rocker.
+fn four_bar(closing: &str) -> String {
+    four_bar_of([1.0, 2.0, 2.0, 2.5], closing)
 }
 
-/// The same of other lengths, that of the ground the last.
-fn four_bar_of([crank, coupler, rocker, ground]: [f64; 4], pin: &str) -> String {
+/// A four-bar linkage with the given lengths of crank, coupler, rocker and ground, m.
+fn four_bar_of([crank, coupler, rocker, ground]: [f64; 4], closing: &str) -> String {
     let bar = |name: &str, parent: &str, at: f64, length: f64, joint: &str| {
         format!(
             r#"
@@ -57,13 +57,13 @@ body = "rocker"
 xyz = [{rocker}, 0, 0]
 [[loop]]
 name = "c"
-{pin}
+{closing}
 between = ["coupler_end", "rocker_end"]
 "#
     )
 }
 
-/// A plate that floats on three rods.
+/// A floating plate on three rods.
 const PLATE: &str = r#"name = "plate"
 gravity = [0, 0, -9.81]
 [[body]]
@@ -152,7 +152,7 @@ fn split(text: &str) -> OpenAndClosed<Mechanism, Mechanism> {
     OpenAndClosed { open: interpreter(&open), closed: interpreter(&closed) }
 }
 
-/// A closed state: coordinates near a guess, velocities near others.
+/// A state that satisfies the constraints, with coordinates and velocities near the given ones.
 fn state(y: &mut OpenAndClosed<Mechanism, Mechanism>, q: &[f64], v: &[f64], held: &[bool]) -> State {
     let (mut q, mut v, mut p) = (q.to_vec(), v.to_vec(), vec![0.0; v.len()]);
     let closed = close(y, &mut q, &Closing::holding(held)).unwrap();
@@ -162,9 +162,9 @@ fn state(y: &mut OpenAndClosed<Mechanism, Mechanism>, q: &[f64], v: &[f64], held
     (q, p)
 }
 
-fn crank(pin: &str) -> (OpenAndClosed<Mechanism, Mechanism>, State) {
-    let mut y = split(&four_bar(pin));
-    // The rocker is the last joint of the file, and of the state.
+fn crank(closing: &str) -> (OpenAndClosed<Mechanism, Mechanism>, State) {
+    let mut y = split(&four_bar(closing));
+    // The rocker is the last joint of the file and of the state.
     let start = state(&mut y, &[-1.5, 1.0, -2.0], &[5.0, 0.0, 0.0], &[true]);
     (y, start)
 }
@@ -210,12 +210,13 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 
-/// All ways lead to the same end, each with its order: planar, redundant in space, and with a quaternion.
+/// All ways to integrate with constraints converge to the same state with their orders. The mechanisms are a planar
+/// one, one with redundant rows in space, and one with a quaternion.
 #[test]
 fn all_ways_lead_to_the_same_end() {
     let planar = "type = \"point_on_line\"\naxis = [0, 1, 0]";
-    let pin = "type = \"revolute\"\naxis = [0, 1, 0]";
-    for (name, (mut y, start)) in [("planar", crank(planar)), ("redundant", crank(pin)), ("plate", plate())] {
+    let revolute = "type = \"revolute\"\naxis = [0, 1, 0]";
+    for (name, (mut y, start)) in [("planar", crank(planar)), ("redundant", crank(revolute)), ("plate", plate())] {
         let end = 1.0;
         let before = energy(&mut y, &start.0, &start.1);
         let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
@@ -239,14 +240,13 @@ fn all_ways_lead_to_the_same_end() {
             println!("{name} {policy:?}: {errors:?}");
             assert!((errors[0] / errors[1]).log2() > 3.5, "{name} {policy:?}: {errors:?}");
         }
-        // Work that is always the same, with four evaluations a step.
+        // Projection with a fixed number of iterations costs four evaluations a step.
         let two = Effort { iterations: 2, tolerance: 0.0 };
         let mut fixed = WithPostStep::new(&y, Rk4::new(&y), Projection::new(&y, Stabilisation::Mass, two));
         let mut steady = WithPostStep::new(&y, Rk4::new(&y), Projection::fixed_work::<2>(&y));
         let ends = (march(&mut y, &mut fixed, 200, end, &start), march(&mut y, &mut steady, 200, end, &start));
         assert_eq!(ends.0, ends.1, "{name}");
         assert_eq!(steady.statistics().evaluations, 800, "{name}");
-        // Minimal coordinates.
         let errors = [200, 400].map(|steps| {
             let (mut q, mut p) = start.clone();
             let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
@@ -258,7 +258,7 @@ fn all_ways_lead_to_the_same_end() {
         });
         println!("{name} minimal: {errors:?}");
         assert!((errors[0] / errors[1]).log2() > 3.5, "{name}: {errors:?}");
-        // Multipliers of the methods' own.
+        // Methods that compute multipliers themselves.
         let errors = [400, 800].map(|steps| {
             let mut method = Rattle::new(&y);
             let state = march(&mut y, &mut method, steps, end, &start);
@@ -278,7 +278,7 @@ fn all_ways_lead_to_the_same_end() {
     }
 }
 
-/// Every method of the catalogue runs with the projection around it, to the accuracy of its order.
+/// Every method of the catalogue runs with projection after its steps, with the accuracy of its order.
 #[test]
 fn every_method_by_its_name() {
     let (y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
@@ -301,7 +301,7 @@ fn every_method_by_its_name() {
         solver.state(&y, &mut q, &mut p);
         let (error, drift) = (apart(&q, &reference.0), off(&mut y, &q));
         println!("{}: {error:.1e}, drift {drift:.1e}", entry.name);
-        // First order with rates that change by some 30/s² in each of the 200 steps; second order; all others.
+        // The bounds are for first order (rates change by some 30/s², over 200 steps), second order, and higher orders.
         let bound = match entry.name {
             "euler" | "semi-implicit-euler" | "backward-euler" => 2e-2,
             "midpoint" | "implicit-midpoint" => 1e-4,
@@ -311,7 +311,7 @@ fn every_method_by_its_name() {
     }
 }
 
-/// Implicit methods use the derivatives of the constrained rates, settled in between.
+/// An implicit method uses the derivatives of the constrained rates, with projection after its steps.
 #[test]
 fn implicit_methods() {
     let (y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
@@ -326,12 +326,12 @@ fn implicit_methods() {
     println!("{:?}", solver.statistics());
     assert!(off(&mut y, &q) < 1e-13);
     let lost = (energy(&mut y, &q, &p) - before).abs();
-    // Some hundred steps, each within 1e-8 of a state of size 10.
+    // The run has a few hundred steps, each within 1e-8 of a state of size 10.
     assert!(lost < 1e-5, "{lost:e}");
 }
 
-/// A rolling disc: two of three rows bind velocities only. They hold to round-off at the end, the height too, energy as the
-/// tolerance asks.
+/// A rolling disc: two of its three rows constrain velocities only. At the end the height holds to round-off, and the
+/// energy to the tolerance.
 #[test]
 fn rolling() {
     let mut y = split(DISC);
@@ -362,8 +362,8 @@ fn rolling() {
     assert!(off(&mut y, &q) < 1e-13 && lost < 1e-8, "{lost:e}");
 }
 
-/// A hundred thousand steps of a disc that rolls and falls over to and fro: velocities do not leave their rows, the height not
-/// the ground, the energy not its value.
+/// A disc rolls and tilts to and fro for a hundred thousand steps. Its velocities satisfy the rows, and its height and
+/// energy keep their values.
 #[test]
 fn rolling_for_long() {
     let mut y = split(DISC).closed;
@@ -394,20 +394,21 @@ fn rolling_for_long() {
         }
     }
     println!("{lost:e} of {before} J, rows {off:e}, at {:?}", &q[..3]);
-    // Round-off of positions of some metres, and of rates of some metres a second.
+    // The bound is round-off of positions of some metres, and of velocities of some metres a second.
     assert!(off < 1e-13 && lost < 1e-9 * before.abs(), "{off:e} {lost:e}");
 }
 
-/// Sides alike in pairs: all bars come to lie in one line, where the loop loses rank and can go on in two ways. Both methods go
-/// past it seven times in steps of 1 ms on the way they are on. The energy stays; with minimal coordinates as far as their
-/// multipliers let it, which grow with one over the distance from the singular position unless they are settled.
+/// In a parallelogram linkage all bars come to lie in one line, where the loop loses rank and can continue in two ways.
+/// The motion passes this change point seven times in steps of 1 ms and stays on its branch. The energy is conserved;
+/// with minimal coordinates less accurately without momentum projection, because their multipliers grow with one over
+/// the distance from the singular position.
 #[test]
 fn past_the_change_point() {
-    for (name, pin) in [
+    for (name, closing) in [
         ("planar", "type = \"point_on_line\"\naxis = [0, 1, 0]"),
         ("redundant", "type = \"revolute\"\naxis = [0, 1, 0]"),
     ] {
-        let mut y = split(&four_bar_of([1.0, 2.0, 1.0, 2.0], pin));
+        let mut y = split(&four_bar_of([1.0, 2.0, 1.0, 2.0], closing));
         let start = state(&mut y, &[-1.5, 1.5, -1.5], &[6.0, -6.0, 6.0], &[true]);
         let before = energy(&mut y, &start.0, &start.1);
         let method = held(&y, Dop853::new(&y), Stabilisation::Mass);
@@ -423,10 +424,10 @@ fn past_the_change_point() {
         }
         println!("{name}: energy {worst:e}, drift {drift:e}, at {q:?}");
         assert!(worst < 5e-9 && drift < 1e-13, "{name}: {worst:e} {drift:e}");
-        for settle in [false, true] {
+        for project_momenta in [false, true] {
             let (mut q, mut p) = start.clone();
             let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = WithPostStep::new(&m, Dop853::new(&m), Repartition { project_momenta: settle });
+            let method = WithPostStep::new(&m, Dop853::new(&m), Repartition { project_momenta });
             let mut solver = Solver::new(&mut m, method, step, 0.0, &q, &p).unwrap();
             let mut worst = 0.0_f64;
             while solver.time() < 3.0 {
@@ -434,14 +435,14 @@ fn past_the_change_point() {
                 solver.state(&m, &mut q, &mut p);
                 worst = worst.max((energy(&mut m, &q, &p) - before).abs());
             }
-            println!("{name} minimal, {settle}: energy {worst:e}, at {q:?}");
-            // Measured: 3.5e-5 and 1.6e-4; 1.6e-7 and 1.3e-7 if settled.
-            assert!(worst < if settle { 2e-6 } else { 2e-3 }, "{name}, {settle}: {worst:e}");
+            println!("{name} minimal, {project_momenta}: energy {worst:e}, at {q:?}");
+            // The measured values are 3.5e-5 and 1.6e-4 without momentum projection, 1.6e-7 and 1.3e-7 with it.
+            assert!(worst < if project_momenta { 2e-6 } else { 2e-3 }, "{name}, {project_momenta}: {worst:e}");
         }
     }
 }
 
-/// In single precision, with one correction a step always: for small processors.
+/// Single precision with exactly one correction a step, as small processors would use it.
 #[test]
 fn single_precision() {
     let (y, (q, p)) = crank("type = \"point_on_line\"\naxis = [0, 1, 0]");
@@ -462,18 +463,18 @@ fn single_precision() {
     }
     let (kinetic, potential) = y.energies(&q, &p);
     println!("drift {worst:e}, energy {:e} of {before}", kinetic + potential - before);
-    // Angles of up to 60 rad: an epsilon of theirs is 4e-6.
+    // Angles reach 60 rad, so that their rounding is about 4e-6.
     assert!(worst < 2e-5, "{worst:e}");
     assert!((kinetic + potential - before).abs() < 2e-2, "{}", kinetic + potential - before);
 }
 
-/// Steps of 1 ms for 50 s (`STEPS` says otherwise): positions stay closed to round-off, and so do velocities.
+/// Steps of 1 ms for 50 s, or as many as the environment variable `STEPS` says: positions stay closed to round-off.
 #[test]
 fn long_run() {
     let n = std::env::var("STEPS").ok().and_then(|n| n.parse().ok()).unwrap_or(50_000_u32);
-    for pin in ["type = \"point_on_line\"\naxis = [0, 1, 0]", "type = \"revolute\"\naxis = [0, 1, 0]"] {
-        // At rest it swings: angles that grow without bound would grow coarse with it.
-        let mut y = split(&four_bar(pin));
+    for closing in ["type = \"point_on_line\"\naxis = [0, 1, 0]", "type = \"revolute\"\naxis = [0, 1, 0]"] {
+        // The linkage starts from rest and swings: angles that grow without bound would lose digits.
+        let mut y = split(&four_bar(closing));
         let (mut q, mut p) = state(&mut y, &[1.0, 0.5, 1.5], &[0.0; 3], &[true]);
         let mut y = y.closed;
         let before = energy(&mut y, &q, &p);
@@ -493,7 +494,7 @@ fn long_run() {
     }
 }
 
-/// No step allocates, whatever is done at its end.
+/// No step allocates, with any stabilisation.
 #[test]
 fn nothing_is_allocated() {
     let (mut y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
@@ -518,16 +519,17 @@ fn nothing_is_allocated() {
     check("rattle", &mut y, method, &start);
     let method = RadauIndex2::new(&y);
     check("radau", &mut y, method, &start);
-    for settle in [false, true] {
+    for project_momenta in [false, true] {
         let (mut q, mut p) = start.clone();
         let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap().with_ratio(1.1);
-        let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta: settle });
+        let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta });
         check("minimal", &mut m, method, &(q, p));
         assert!(m.switches().0 > 0);
     }
 }
 
-/// Time a step, drift and energy of all ways on the redundant four-bar, 1 ms, 2 s; prints, and holds nothing:
+/// Prints the time a step, the drift and the error of the energy of all ways to integrate with constraints, on the
+/// four-bar linkage with redundant rows, 2 s in steps of 1 ms. It tests nothing:
 /// `cargo test -p mbd-testing --test integrators comparison -- --ignored --nocapture`.
 #[test]
 #[ignore = "prints a comparison"]
@@ -535,7 +537,7 @@ fn comparison() {
     let (mut y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
     let before = energy(&mut y, &start.0, &start.1);
     let mut best = [(f64::INFINITY, 0.0, 0.0); 11];
-    // A tenth of the steps' rate; a weight of a thousand of the masses.
+    // The decay is a tenth of the rate of the steps. The weight of the penalties is 10⁴ kg, against bars of 1 and 2 kg.
     let text = four_bar("type = \"revolute\"\naxis = [0, 1, 0]\ndecay = 100.0");
     let mut braked = interpreter(&model(&text));
     let mut soft = Interpreter::new(y.closed.tree().penalised(1e4, 100.0), braked.gravity);
@@ -565,10 +567,10 @@ fn comparison() {
             let end = timed(&mut y.closed, method, &start);
             note(k, end, &mut y);
         }
-        for (k, settle) in [false, true].into_iter().enumerate() {
+        for (k, project_momenta) in [false, true].into_iter().enumerate() {
             let (mut q, mut p) = start.clone();
             let mut m = CoordinatePartition::new(y.closed.clone(), &mut q, &mut p).unwrap();
-            let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta: settle });
+            let method = WithPostStep::new(&m, Rk4::new(&m), Repartition { project_momenta });
             let end = timed(&mut m, method, &(q, p));
             note(5 + k, end, &mut y);
         }
@@ -591,7 +593,7 @@ fn comparison() {
         "gradient",
         "partition",
         "minimal",
-        "minimal settled",
+        "minimal, momenta",
         "rattle",
         "index two",
         "decay",

@@ -1,8 +1,9 @@
-//! Motion that nothing acts on from outside keeps its momentum to round-off, whatever the method.
+//! Without forces from outside, every method conserves the momentum to round-off.
 //!
-//! Momenta are integrated in outer axes ([`mbd_runtime::integrate::chart`]), where they are constants: what is added in a step
-//! is rounding alone. A bound: a step rounds each sum once, by half a last place, and adds `h` times what is left of rates that
-//! cancel, some last places of the largest term. Such errors have no sign, so after `n` steps they amount to `√n` times that.
+//! Momenta are integrated in outer axes ([`mbd_runtime::integrate::chart`]), where they are constants, so that a step
+//! changes them by rounding only. The bounds follow from this: a step rounds each sum once, by half a unit in the last
+//! place, and adds `h` times the remainder of rates that cancel, some units in the last place of the largest term. The
+//! signs of such errors are random, so after `n` steps they amount to `√n` times that.
 
 use mbd_codegen::model::{Gravity, JointKind, Placement, Value};
 use mbd_codegen::read;
@@ -46,8 +47,8 @@ fn off(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
     norm([0, 1, 2].map(|k| a[k] - b[k]))
 }
 
-/// A rotor with three different moments of inertia, held at its centre of mass, about to flip over: it turns about the middle
-/// axis (Dzhanibekov).
+/// A rotor with three different moments of inertia, supported at its centre of mass. It rotates about the axis of the
+/// middle moment of inertia, so that it flips over again and again (Dzhanibekov effect).
 fn rotor() -> (Interpreter<f64>, Vec<f64>, Vec<f64>) {
     let text = r#"
         gravity = [0, 0, 0]
@@ -71,7 +72,8 @@ fn rotor() -> (Interpreter<f64>, Vec<f64>, Vec<f64>) {
     (i, q, p)
 }
 
-/// Largest change of the angular momentum over `steps` steps of `h` s, relative to its size; and how often the rotor flips.
+/// Largest relative change of the angular momentum over `steps` steps of `h` s, and the number of times that the rotor
+/// flips.
 fn spin(method: &mut dyn Stepper<Interpreter<f64>>, steps: u64, h: f64) -> (f64, u64) {
     let (mut i, mut q, mut p) = rotor();
     let outer = |q: &[f64], p: &[f64]| turn(q, [p[0], p[1], p[2]]);
@@ -87,8 +89,9 @@ fn spin(method: &mut dyn Stepper<Interpreter<f64>>, steps: u64, h: f64) -> (f64,
     (change / norm(start), flips)
 }
 
-/// Half a last place for the sum, and `h ω` times a dozen for the rate: at `h ω = 0.01` the sum is what counts. Two last places
-/// more for the turn to body axes and back of what is shown. Four times the square root of the sum of squares.
+/// Bound of the change: per step half a unit in the last place for the sum, and a dozen times `h ω` units for the rate.
+/// These random errors grow with the square root of the steps; the factor four makes excesses unlikely. Eight units
+/// more are for the conversion of the result to body axes and back.
 fn spin_bound(steps: u64, h: f64) -> f64 {
     let turn = h * 10.0;
     f64::EPSILON * (4.0 * (steps as f64).sqrt() * (0.5 + 12.0 * turn) + 8.0)
@@ -104,12 +107,12 @@ fn angular_momentum_of_a_free_rotor() {
         let bound = spin_bound(steps, h);
         println!("{name}: {change:.1e} of {bound:.1e}, {flips} flips");
         assert!(change < bound, "{name}: {change:e} {bound:e}");
-        // It does flip over, so the momentum in body axes is not just left alone.
+        // The rotor must flip over: otherwise a method that does not change momenta in body axes would pass.
         assert!(flips >= steps / 5000, "{name}: {flips}");
     }
 }
 
-/// `cargo test --release -p mbd-testing --test integrators free_motion -- --ignored --nocapture`
+/// Run it by `cargo test --release -p mbd-testing --test integrators free_motion -- --ignored --nocapture`.
 #[test]
 #[ignore = "ten million steps each take a minute and more"]
 fn angular_momentum_over_ten_million_steps() {
@@ -128,7 +131,7 @@ fn angular_momentum_over_ten_million_steps() {
     }
 }
 
-/// A random tree that floats freely, and its bodies' masses and centres of mass.
+/// A random tree with a floating base, and the masses and centres of mass of its bodies.
 struct Floating {
     i: Interpreter<f64>,
     q: Vec<f64>,
@@ -159,13 +162,13 @@ impl Floating {
         let mut i = s.interpreter(&plan);
         let mut p = vec![0.0; s.v.len()];
         i.momenta(&s.q, &s.v, &mut p);
-        let group = *i.lie_joints().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
+        let joint = *i.lie_joints().iter().find(|g| g.kind == LieGroup::SE3).expect("the base floats");
         let weights = model.joints.iter().map(|j| {
             let body = &model.bodies[j.child];
             (mbd_testing::value(body.mass, &[]), body.com.map(|x| mbd_testing::value(x, &[])))
         });
         let weights: Vec<_> = weights.collect();
-        Floating { mass: weights.iter().map(|w| w.0).sum(), weights, i, q: s.q, p, at: (group.q, group.v) }
+        Floating { mass: weights.iter().map(|w| w.0).sum(), weights, i, q: s.q, p, at: (joint.q, joint.v) }
     }
 
     /// Linear momentum, and angular momentum about the ground's origin, in ground axes.
@@ -176,7 +179,7 @@ impl Floating {
         [linear, add3(angular, cross([q[0], q[1], q[2]], linear))]
     }
 
-    /// Linear momentum by the definition: masses and velocities of their centres.
+    /// Linear momentum by its definition: the sum of masses times velocities of the centres of mass.
     fn by_definition(&self, q: &[f64], p: &[f64]) -> Vec3<f64> {
         let mut i = self.i.clone();
         let mut v = vec![0.0; p.len()];
@@ -191,10 +194,10 @@ impl Floating {
     }
 }
 
-/// Steps of the multibody tests, and the length of one, s.
+/// Number of steps for the floating trees, and the length of a step, s.
 const STEPS: (u32, f64) = (500, 1e-3);
 
-/// Both momenta as long as nothing acts; with gravity `g` the linear one is `P + m g t`.
+/// Without gravity, linear and angular momentum are constant; with gravity `g` the linear momentum is `P + m g t`.
 fn fly(seed: u64, gravity: f64) {
     let scene = Floating::new(seed, gravity);
     let start = scene.momentum(&scene.q, &scene.p);
@@ -212,11 +215,12 @@ fn fly(seed: u64, gravity: f64) {
             change[1] = change[1].max(off(angular, start[1]));
             reach = reach.max(norm(linear)).max(norm(angular));
         }
-        // Terms of the rates that cancel are products of velocities (of a few 1/s) and momenta: `h` times them is small
-        // against the momenta themselves, of which a step rounds half a last place.
+        // Terms of the rates that cancel are products of velocities (of a few 1/s) and momenta. `h` times these terms
+        // is small compared with the momenta, which a step rounds by half a unit in the last place.
         let steps = f64::from(steps);
         let bound = 4.0 * f64::EPSILON * reach * steps.sqrt();
-        // The same force is added in every step, and rounded the same way in many: there these errors have a sign.
+        // Gravity adds the same momentum in every step, which many steps round in the same direction: these errors add
+        // up.
         let bound = if gravity == 0.0 { bound } else { bound + 0.5 * f64::EPSILON * reach * steps };
         println!("{seed}, {name}: linear {:.1e}, angular {:.1e}, bound {bound:.1e}", change[0], change[1]);
         assert!(change[0] < bound, "{seed}, {name}: linear {:e} {bound:e}", change[0]);

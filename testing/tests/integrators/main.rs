@@ -1,4 +1,4 @@
-//! Methods of integration on interpreted mechanisms: orders, what they keep, constraints, allocations.
+//! Methods of integration on interpreted mechanisms: orders, conserved quantities, constraints, allocations.
 
 mod allocations;
 mod constrained;

@@ -1,6 +1,7 @@
-//! Every method on the same random mechanisms: its order by halving the step, and the drift of what should not change.
+//! Every method on the same random mechanisms: its order, found by halving the step, and the drift of conserved
+//! quantities.
 //!
-//! A new method is a row of [`methods`].
+//! A new method gets a row in [`methods`].
 
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::search;
@@ -16,12 +17,12 @@ use mbd_testing::state::random_state;
 
 type Any<Y> = Box<dyn Stepper<Y>>;
 
-/// A method, and where its order shows.
+/// A method, and the step with which its order shows.
 struct Row<Y> {
     name: &'static str,
     order: f64,
     make: fn(&Y) -> Any<Y>,
-    /// The scene's steps times this: methods of high order are at round-off with those of RK4.
+    /// Factor on the scene's step. With the step of RK4, errors of methods of high order would be round-off.
     coarse: f64,
 }
 
@@ -29,8 +30,8 @@ const fn row<Y>(name: &'static str, order: u32, coarse: f64, make: fn(&Y) -> Any
     Row { name, order: order as f64, make, coarse }
 }
 
-/// Name, order, factor on the step, how it is made. From order 5 on in double-double numbers: there the order shows before
-/// round-off does.
+/// Methods with name, order, factor on the step, and constructor. Orders from 5 on are tested in double-double numbers,
+/// where errors are above round-off.
 fn methods<S: Real + 'static>() -> Vec<Row<Interpreter<S>>> {
     vec![
         row("Euler", 1, 0.125, |i| Box::new(Euler::new(i))),
@@ -48,7 +49,8 @@ fn methods<S: Real + 'static>() -> Vec<Row<Interpreter<S>>> {
         row("Gauss 6", 6, 2.0, |i| Box::new(Gauss6::new(i))),
         row("Gauss 12", 12, 16.0, |i| Box::new(Gauss12FixedPoint::new(i))),
         row("Radau 5", 5, 1.0, |i| Box::new(Radau5::new(i))),
-        // Its coefficients are doubles: smaller errors than this are theirs.
+        // The coefficients of Rodas5P are doubles, so that smaller errors than with this step would be those of
+        // coefficients.
         row("Rodas5P", 5, 4.0, |i| Box::new(Rodas5P::new(i))),
         row("Adams-Bashforth 4", 4, 0.25, |i| Box::new(Ab4::new(i))),
         row("Adams-Bashforth 6", 6, 0.25, |i| Box::new(Ab6::new(i))),
@@ -61,7 +63,7 @@ fn methods<S: Real + 'static>() -> Vec<Row<Interpreter<S>>> {
     ]
 }
 
-/// The same in acceleration form.
+/// Methods for the acceleration form of the equations.
 fn methods_of_velocities() -> Vec<Row<AccelerationForm<Interpreter<f64>>>> {
     vec![
         row("semi-implicit Euler, one evaluation", 1, 0.125, |i| Box::new(SemiImplicitEuler::of_velocities(i))),
@@ -78,12 +80,13 @@ struct Scene {
     q: Vec<f64>,
     p: Vec<f64>,
     v: Vec<f64>,
-    /// Step that resolves the motion, s: small against its periods, yet with errors of RK4 well above round-off.
+    /// Step that resolves the motion, s. It is small compared with the periods, but errors of RK4 are well above
+    /// round-off.
     h: f64,
 }
 
 impl Scene {
-    /// Three or four bodies, springs and gravity, nothing that takes energy out or puts it in.
+    /// A mechanism of three or four bodies with springs and gravity, whose energy is conserved.
     fn new(name: &'static str, seed: u64, steps: u16, kinds: [f64; 9]) -> Scene {
         let distribution =
             Distribution { bodies: (3, 4), kinds, springs: 1.0, armature: 0.5, ..Distribution::default() };
@@ -99,13 +102,14 @@ impl Scene {
         Scene { name, i, wide, q: s.q, p, v: s.v, h: 1.0 / f64::from(steps) }
     }
 
-    /// State after `time` s in steps of `h` s, and the largest drift of the energy relative to the largest kinetic energy.
+    /// State after `time` s in steps of `h` s, and the largest drift of the energy relative to the largest kinetic
+    /// energy.
     fn run(&self, row: &Row<Interpreter<f64>>, time: f64, h: f64) -> (Vec<f64>, f64) {
         let start = (self.q.clone(), self.p.clone());
         run(&self.i, row, start, time, h).unwrap_or_else(|e| panic!("{}, {}: {e}", self.name, row.name))
     }
 
-    /// The same in double-double numbers.
+    /// State after `time` s in steps of `h` s, in double-double numbers.
     fn run_wide(&self, row: &Row<Interpreter<Wide>>, time: f64, h: f64) -> Vec<Wide> {
         let start = (lifted(&self.q), lifted(&self.p));
         run(&self.wide, row, start, time, h).unwrap_or_else(|e| panic!("{}, {}: {e}", self.name, row.name)).0
@@ -149,20 +153,21 @@ where
 
 fn scenes() -> [Scene; 3] {
     [
-        Scene::new("pins and sliders", 21, 256, [3.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        Scene::new("revolute and prismatic joints", 21, 256, [3.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         Scene::new("planar, helical, universal", 22, 2048, [0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]),
         Scene::new("spherical and floating", 23, 512, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 1.0, 0.0]),
     ]
 }
 
-/// Order by three runs, each of half the step of the one before; tells what is not as the row says.
+/// Measures the order by three runs, each with half the step of the one before. Adds a line to `wrong` if it is not
+/// `expected`.
 fn check<S: Real>(scene: &str, name: &str, expected: f64, runs: [Vec<S>; 3], wrong: &mut Vec<String>) {
     let off = |a: &[S], b: &[S]| a.iter().zip(b).map(|(a, b)| (*a - *b).to_f64().powi(2)).sum::<f64>().sqrt();
     let [a, b, c] = runs;
     let (order, error) = ((off(&a, &b) / off(&b, &c)).log2(), off(&b, &c));
     println!("{scene}: {name}: order {order:.3}, error {error:.1e}");
-    // Errors of the next order are still there, the more the higher the order; where the leading ones happen to be small, they
-    // are all there is.
+    // Errors of the next order contribute, more so for high orders; they dominate where the leading error happens to be
+    // small.
     let margin = 0.06 * (expected + 1.0);
     let near = order > expected - margin && order < expected + 1.0 + margin;
     if !near {
@@ -219,12 +224,12 @@ fn rk4() -> Row<Interpreter<f64>> {
 }
 
 #[test]
-fn both_forms_are_one_motion() {
-    let form = row("RK4", 4, 1.0, |i| Box::new(Rk4::new(i)) as Any<AccelerationForm<Interpreter<f64>>>);
+fn both_forms_of_the_equations_give_one_motion() {
+    let accelerations = row("RK4", 4, 1.0, |i| Box::new(Rk4::new(i)) as Any<AccelerationForm<Interpreter<f64>>>);
     for scene in scenes() {
         let h = scene.h / 4.0;
         let (state, _) = scene.run(&rk4(), 0.25, h);
-        let (other, _) = scene.run_velocities(&form, 0.25, h);
+        let (other, _) = scene.run_velocities(&accelerations, 0.25, h);
         let (q, p) = state.split_at(scene.q.len());
         let mut v = vec![0.0; p.len()];
         scene.i.clone().velocities(q, p, &mut v);
@@ -240,7 +245,7 @@ fn energy_drifts_with_the_fourth_power_of_the_step() {
         let [coarse, fine] = [2.0, 1.0].map(|k| scene.run(&rk4(), 1.0, k * scene.h).1);
         println!("{}: drift {coarse:.1e}, with half the step {fine:.1e}", scene.name);
         assert!(fine < 1e-6, "{}: {fine:e}", scene.name);
-        // A factor of sixteen or more, where the step is short enough; the energy often does better.
+        // Fourth order means a factor of sixteen for short steps; the energy often converges faster.
         assert!(coarse / fine > 11.0, "{}: {coarse:e} {fine:e}", scene.name);
     }
 }

@@ -1,4 +1,5 @@
-//! The sweeps and the explicit methods in double-double numbers: as good as those are, so that they can be references.
+//! The sweeps and the explicit methods in double-double numbers have the accuracy of these numbers, so they can be
+//! references.
 
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
@@ -27,7 +28,7 @@ fn dot(a: &[Number], b: &[Number]) -> Number {
     a.iter().zip(b).fold(Number::zero(), |sum, (a, b)| sum + *a * *b)
 }
 
-/// A tree, a state of it, and momenta in both kinds of numbers.
+/// A tree with a state in both kinds of numbers.
 struct Scene {
     plan: Plan,
     state: State,
@@ -47,8 +48,9 @@ impl Scene {
         Scene { plan, state, i, q, v, p }
     }
 
-    /// Six pins, or a tree of pins and sliders, with inertias of every kind. Axes are along those of frames: cosine and sine
-    /// of a constant turn between them are doubles, whose squares make one to 53 bits only.
+    /// A UR5, and trees of revolute and prismatic joints with inertias of every kind. Joint axes are axes of frames:
+    /// for other directions, cosine and sine of constant rotations would be doubles, whose squares add up to one to 53
+    /// bits only.
     fn all() -> Vec<Scene> {
         let ur5 = search::plan(&crate::wide::model("ur5.urdf", Base::Fixed), Default::default());
         let random = |seed| {
@@ -62,7 +64,7 @@ impl Scene {
         std::iter::once(Scene::new(ur5, 0)).chain((1..16).map(random)).collect()
     }
 
-    /// Without anything that takes energy out or puts it in.
+    /// The scene without joint forces, so that the energy is conserved.
     fn conservative(mut self) -> Scene {
         self.state.tau.fill(0.0);
         self.i.tau.fill(Number::zero());
@@ -98,7 +100,8 @@ fn doubles_agree() {
     }
 }
 
-/// Momenta give back the velocities they are of; twice the kinetic energy is `p·v`, by another sweep.
+/// Momenta give back the velocities from which they were computed. Twice the kinetic energy, from another sweep, is
+/// `p·v`.
 #[test]
 fn the_algebra_is_good_to_its_last_bits() {
     for (k, mut scene) in Scene::all().into_iter().enumerate() {
@@ -111,12 +114,12 @@ fn the_algebra_is_good_to_its_last_bits() {
     }
 }
 
-/// Along the rates the energy grows by the power of the joint forces: differences of eighth order over steps of
-/// 1e-5 of the time in which the state changes by itself. What they leave out is below round-off, 1e-31 over the step. Sines
-/// of 53 bits would leave 1e-12.
+/// Along the rates, the energy changes by the power of the joint forces. Its derivative is taken by differences of
+/// eighth order with steps of 1e-5 of the time in which the state changes by itself. Their truncation error is below
+/// round-off, which is 1e-31 divided by the step. Sines of 53 bits would cause an error of 1e-12.
 #[test]
 fn power_is_the_rate_of_energy() {
-    // Of f(h) - f(-h), f(2h) - f(-2h), …, times h.
+    // The weights of f(h) - f(-h), f(2h) - f(-2h), … in h times the derivative.
     const DIFFERENCES: [(i64, i64); 4] = [(4, 5), (-1, 5), (4, 105), (-1, 280)];
     for (k, mut scene) in Scene::all().into_iter().enumerate() {
         let [v, qd, pd] = scene.rates();
@@ -143,7 +146,7 @@ fn power_is_the_rate_of_energy() {
     }
 }
 
-/// Halving the step divides the error by two to the order, down to where doubles see nothing any more.
+/// Halving the step divides the error by two to the order, also for errors far below the precision of doubles.
 #[test]
 fn methods_converge_far_below_doubles() {
     let scene = Scene::all().swap_remove(0).conservative();
@@ -171,7 +174,8 @@ fn methods_converge_far_below_doubles() {
     assert!(nine.1 < 1e-24 && eight.1 < 1e-21, "{nine:?} {eight:?}");
 }
 
-/// Points within a step against a step that ends there: the difference falls with the order of the interpolant and one.
+/// A point within a step, from dense output, is compared with a step that ends there. The difference falls with the
+/// order of the interpolant plus one.
 #[test]
 fn points_within_a_step_have_their_order() {
     fn order(scene: &Scene, mut method: impl Stepper<Interpreter<Number>>) -> f64 {

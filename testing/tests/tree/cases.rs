@@ -13,8 +13,8 @@ pub type D = Dual<f64>;
 
 pub const TREES: u64 = 1000;
 
-/// Relative to the largest entry involved. Rounding of one sweep is about 1e-15; the factor is the condition of the mass
-/// matrices of such trees (light tips on heavy bases, rotors of 0.01 beside bodies of 2 kg).
+/// Tolerance relative to the largest entry involved. Rounding of one sweep is about 1e-15; the remaining factor is the
+/// condition of the mass matrices of these trees (light tips on heavy bases, rotors of 0.01 beside bodies of 2 kg).
 pub const TOLERANCE: f64 = 3e-11;
 
 pub struct Case {
@@ -60,7 +60,7 @@ impl Case {
         self.p.iter().zip(&self.pd).map(|(x, dx)| Dual::new(*x, *dx)).collect()
     }
 
-    /// Frames of the bodies, moving.
+    /// Frames of the bodies, with their derivatives along the motion.
     pub fn bodies(&self) -> Vec<FrameState<D>> {
         let (mut i, q) = self.dual();
         let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
@@ -68,7 +68,7 @@ impl Case {
         newton::body_frames(&self.plan).into_iter().map(|k| frames[k]).collect()
     }
 
-    /// The same for given velocities of state and drives, without derivatives.
+    /// Frames of the bodies for given velocities of state and drives, without derivatives.
     pub fn bodies_at(&mut self, v: &[f64], drive: &[f64]) -> Vec<FrameState<f64>> {
         self.i.drive_v.copy_from_slice(drive);
         let mut frames = vec![FrameState::ground(); self.plan.frames.len()];
@@ -122,7 +122,8 @@ pub fn turn_back(at: &FrameState<D>, x: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| (0..3).map(|i| at.rotation[i][k].re * x[i]).sum())
 }
 
-/// What every body needs from its joints in a motion: force, and moment about the origin of the ground, in ground axes.
+/// Force on every body that its joints must supply for the motion, and moment about the origin of the ground, in ground
+/// axes.
 pub fn needed(c: &Case, bodies: &[FrameState<D>]) -> Vec<[[f64; 3]; 2]> {
     let (model, params) = (&c.plan.model, &c.s.params);
     let mut needed = Vec::new();

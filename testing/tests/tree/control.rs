@@ -1,4 +1,5 @@
-//! What controllers ask for, on random trees of everything: inverse dynamics, bias forces, Jacobians and drifts of frames.
+//! Quantities for controllers, on random trees with all kinds of elements: inverse dynamics, bias forces, Jacobians and
+//! bias accelerations of frames.
 
 use mbd_codegen::identifiable::identifiable;
 use mbd_codegen::model::JointKind;
@@ -11,7 +12,7 @@ use mbd_testing::{newton, value};
 
 use crate::cases::*;
 
-/// Random accelerations, which no joint forces of the case belong to.
+/// Random accelerations, unrelated to the joint forces of the case.
 fn any_accelerations(c: &Case) -> Vec<f64> {
     let mut rng = Rng::new(c.seed, 9);
     c.a.iter().map(|_| rng.around(4.0)).collect()
@@ -27,7 +28,7 @@ fn inverse_dynamics_undoes_accelerations() {
     });
 }
 
-/// No solution of equations on either side: the tolerance is that of a few sweeps.
+/// Neither side solves equations, so the tolerance is the rounding of a few sweeps.
 #[test]
 fn inverse_dynamics_is_mass_and_bias() {
     all("M a + h = tau(a)", |c| {
@@ -42,7 +43,8 @@ fn inverse_dynamics_is_mass_and_bias() {
     });
 }
 
-/// `τ = d/dt p(q, v) − ṗ(q, p, τ = 0)` for any `v̇`: other sweeps, another principle.
+/// For any `v̇`, inverse dynamics gives `τ = d/dt p(q, v) − ṗ(q, p, τ = 0)`. The test computes the right-hand side by
+/// other sweeps, which use another principle.
 #[test]
 fn inverse_dynamics_is_the_change_of_momentum() {
     all("tau(a) = d/dt p - pd(0)", |c| {
@@ -61,7 +63,8 @@ fn inverse_dynamics_is_the_change_of_momentum() {
     });
 }
 
-/// Virtual power of what the bodies need, rotors, dampers and springs, body by body from the motion of frames.
+/// Inverse dynamics is the virtual power of the forces that the bodies need, and of rotors, dampers and springs,
+/// computed body by body from the motion of frames.
 #[test]
 fn inverse_dynamics_is_what_newton_and_euler_ask_for() {
     all("tau(a) against virtual power of the bodies", |c| {
@@ -92,7 +95,7 @@ fn inverse_dynamics_is_what_newton_and_euler_ask_for() {
     });
 }
 
-/// Power of rotors, dampers and springs at the rates `unit` of the state alone.
+/// Power of rotors, dampers and springs at the velocities `unit` of the state, with the drives at rest.
 fn joints(c: &Case, unit: &[f64]) -> f64 {
     let (model, params, s) = (&c.plan.model, &c.s.params, &c.s);
     let none = vec![0.0; c.plan.dims.drive_v];
@@ -141,22 +144,22 @@ fn jacobians_take_velocities_to_those_of_frames() {
     });
 }
 
-/// `R (J v̇ + drift)` is the derivative of the frame's velocity in ground axes, prescribed motions included.
+/// `R (J v̇ + bias)` is the derivative of the frame's velocity in ground axes, prescribed motions included.
 #[test]
-fn drifts_complete_the_accelerations_of_frames() {
-    all("R (J a + drift) = d/dt (R velocity)", |c| {
+fn bias_accelerations_complete_the_accelerations_of_frames() {
+    all("R (J a + bias) = d/dt (R velocity)", |c| {
         c.a = any_accelerations(c);
         let (nv, n) = (c.plan.dims.nv, c.plan.frames.len());
-        let (mut jacobians, mut drifts) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
+        let (mut jacobians, mut biases) = (vec![0.0; 6 * nv * n], vec![[0.0; 6]; n]);
         c.i.jacobians(&c.s.q, &mut jacobians);
-        c.i.bias_accelerations(&c.s.q, &c.s.v, &mut drifts);
+        c.i.bias_accelerations(&c.s.q, &c.s.v, &mut biases);
         let (mut i, q) = c.dual();
         let mut frames = vec![FrameState::ground(); n];
         i.frames(&q, &c.dual_v(), &mut frames);
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         for (k, frame) in frames.iter().enumerate() {
             let row = |r: usize| &jacobians[(6 * k + r) * nv..(6 * k + r + 1) * nv];
-            let along = |r: usize| row(r).iter().zip(&c.a).map(|(j, a)| j * a).sum::<f64>() + drifts[k][r];
+            let along = |r: usize| row(r).iter().zip(&c.a).map(|(j, a)| j * a).sum::<f64>() + biases[k][r];
             ours.extend(turn(frame, std::array::from_fn(along)));
             ours.extend(turn(frame, std::array::from_fn(|r| along(r + 3))));
             for part in [frame.velocity.lin, frame.velocity.ang] {

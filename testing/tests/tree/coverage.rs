@@ -1,17 +1,17 @@
-//! The random trees of the other tests hold what they are said to hold.
+//! Every feature occurs often among the random trees of the other tests.
 
 use std::collections::BTreeMap;
 
 use mbd_codegen::model::{Gravity, Joint, JointKind, JointMotion, Model, Rotation, Value, WrenchAxes};
 use mbd_testing::random::{random_model, Distribution};
 
-/// Joints from one to the ground, itself first.
+/// The joints on the path from a joint to the ground; the joint itself comes first.
 fn path<'m>(model: &'m Model, joint: &'m Joint) -> Vec<&'m Joint> {
     let above = |j: &&'m Joint| j.parent.and_then(|p| model.joints.iter().find(|j| j.child == p));
     std::iter::successors(Some(joint), above).collect()
 }
 
-/// Where a mimic and its leader are to each other.
+/// The places of a mimic joint and its leader in the tree, relative to each other.
 fn position(model: &Model, a: &Joint, b: &Joint) -> &'static str {
     let (a_path, b_path) = (path(model, a), path(model, b));
     if a_path.contains(&b) || b_path.contains(&a) {
@@ -82,7 +82,7 @@ fn features(model: &Model) -> Vec<&'static str> {
 fn every_feature_is_among_the_trees() {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for seed in 0..1000 {
-        // As in `bitwise.rs`.
+        // The sizes of `bitwise.rs`.
         let size = [2, 3, 4, 5, 6, 8, 12][(seed % 7) as usize];
         let model = random_model(seed, &Distribution::everything(seed, size));
         for feature in features(&model) {

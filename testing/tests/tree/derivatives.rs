@@ -1,6 +1,7 @@
-//! Derivatives of the rates against dual numbers, on random trees of everything.
+//! Derivatives of the rates against dual numbers, on random trees with all kinds of elements.
 //!
-//! The reference runs the sweep for the rates (another factorisation, other formulas) on `q + ε N(q) e_k` and `p + ε e_k`.
+//! The reference runs the sweeps for the rates, which use another factorisation and other formulas, on `q + ε N(q) e_k`
+//! and `p + ε e_k`.
 
 use mbd_codegen::model::{Model, Value};
 use mbd_codegen::options::{PlanOptions, DEFAULT_SNAP};
@@ -20,10 +21,10 @@ type D = Dual<f64>;
 
 const TREES: u64 = 300;
 
-/// Relative to the largest entry of the block. The mass matrices of these trees lose five digits at worst (light tips on
-/// heavy bases), and a derivative of `ṗ` multiplies by the inverse twice.
+/// Tolerance relative to the largest entry of the block. The mass matrices of these trees lose five digits at worst
+/// (light tips on heavy bases), and a derivative of `ṗ` multiplies by the inverse twice.
 const TOLERANCE: f64 = 1e-9;
-/// What most trees keep to.
+/// Tolerance that 99 % of the trees keep.
 const USUAL: f64 = 1e-11;
 
 struct Case {
@@ -36,7 +37,7 @@ struct Case {
 }
 
 impl Case {
-    /// A tree whose freedoms are eliminated in one of the ways there are.
+    /// A tree with random eliminations.
     fn new(seed: u64) -> Case {
         let model = Case::model(seed);
         Case::of(random_plan(&model, seed), seed)
@@ -139,7 +140,7 @@ fn derivatives_at_given_velocities_are_those_of_dual_numbers() {
         let mut room = Derivatives::new(c.i.tree());
         let mut ours = MomentumDerivatives::new(c.i.tree());
         c.i.momentum_derivatives(&c.s.q, &c.s.v, &mut room, &mut ours);
-        // Body by body, and with no composite inertia.
+        // The reference goes body by body and uses no composite inertia.
         let i: Interpreter<D> = c.s.interpreter_of(&c.plan, |x, _| Dual::new(x, 0.0));
         let sweeps = Sweeps { tree: i.tree(), trace: &() };
         let mut w = Workspace::new(i.tree());
@@ -173,7 +174,7 @@ fn derivatives_at_given_velocities_are_those_of_dual_numbers() {
         }
     }
     println!("worst {worst:.1e}");
-    // Nothing is divided: no condition enters.
+    // These derivatives divide by nothing, so the condition of the mass matrix does not matter.
     assert!(worst < 1e-12, "{worst:e}");
 }
 
@@ -225,10 +226,10 @@ fn parameters_are_those_of_dual_numbers() {
     assert!(compared > 100);
 }
 
-/// How freedoms are eliminated is nobody's business but the rates': derivatives stay what they are. They only meet
-/// frames that do not turn; the rest of a form must not leak into them.
+/// The elimination of freedoms affects only the computation of the rates, not the values of the derivatives. The sweeps
+/// for derivatives depend on non-rotating frames and on nothing else of an elimination.
 #[test]
-fn forms_do_not_matter() {
+fn eliminations_do_not_matter() {
     let mut met = [0; 6];
     let mut worst = 0.0_f64;
     for seed in 0..TREES / 2 {
@@ -240,11 +241,11 @@ fn forms_do_not_matter() {
             let ours = [&c.d.v, &c.d.pd, &c.d.dv_dq, &c.d.dv_dp, &c.d.dpd_dq, &c.d.dpd_dp];
             let theirs = [&other.d.v, &other.d.pd, &other.d.dv_dq, &other.d.dv_dp, &other.d.dpd_dq, &other.d.dpd_dp];
             for (a, b) in ours.into_iter().zip(theirs) {
-                worst = worst.max(c.worst("another form", a, b));
+                worst = worst.max(c.worst("another elimination", a, b));
             }
         }
         for node in [&c].into_iter().chain(&others).flat_map(|c| &c.i.tree().nodes) {
-            let forms = [
+            let features = [
                 node.elimination.deferred,
                 node.elimination.before_joint,
                 node.elimination.non_rotating,
@@ -252,10 +253,10 @@ fn forms_do_not_matter() {
                 !node.elimination.ends.is_empty(),
                 !node.elimination.screws.is_empty(),
             ];
-            met.iter_mut().zip(forms).for_each(|(met, here)| *met += usize::from(here));
+            met.iter_mut().zip(features).for_each(|(met, here)| *met += usize::from(here));
         }
     }
-    // Robots with parallel joints: their forms have frames that do not turn.
+    // The eliminations of robots with parallel joints have non-rotating frames.
     for file in ["ur5.urdf", "chain10_planar.toml"] {
         let text =
             std::fs::read_to_string(format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
@@ -277,7 +278,7 @@ fn forms_do_not_matter() {
     assert!(met.iter().all(|n| *n > 20), "{met:?}");
 }
 
-/// Every kind of joint, wrench, drive and mimic is met.
+/// Every kind of joint, wrench, drive and mimic occurs among the trees.
 #[test]
 fn the_trees_have_everything() {
     let mut met = [0; 10];

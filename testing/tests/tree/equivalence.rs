@@ -1,4 +1,4 @@
-//! The same mechanism described in two ways moves in one way.
+//! Two descriptions of the same mechanism give the same motion.
 
 use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
 use mbd_codegen::plan::Plan;
@@ -16,7 +16,7 @@ use mbd_testing::{substituted, value};
 
 const TREES: u64 = 300;
 
-/// Everything the interpreter gives, by name.
+/// All outputs of the interpreter, by name.
 type Results = Vec<(&'static str, Vec<f64>)>;
 
 fn results(plan: &Plan, s: &State) -> Results {
@@ -73,7 +73,8 @@ fn compare(seed: u64, model: &Model, a: &Results, b: &Results, tolerance: f64) -
     worst
 }
 
-/// Parameters at some values, or the values themselves: the frames are chosen differently, the motion is the same.
+/// Parameters with values, or constants with the same values: the plans choose different frames, but the motion is the
+/// same.
 #[test]
 fn parameters_are_as_good_as_constants() {
     let mut worst = 0.0_f64;
@@ -89,7 +90,7 @@ fn parameters_are_as_good_as_constants() {
     println!("parameters against constants: {worst:.1e}");
 }
 
-/// Parts of base parameters moved to the parent: nothing that moves may notice.
+/// Moving parts of the base parameters from a body to its parent does not change the motion.
 #[test]
 fn regrouped_trees_move_as_described_ones() {
     let mut worst = 0.0_f64;
@@ -133,8 +134,8 @@ fn regrouped_trees_move_as_described_ones() {
     println!("regrouped against described: {worst:.1e}");
 }
 
-/// With `x_free = G x + offset`: `M = Gᵀ M_free G`, `p = Gᵀ p_free`, `ṗ = Gᵀ ṗ_free`, and what keeps the followers in step
-/// does no work: `Gᵀ M_free (a − a_free) = 0`.
+/// With `x_free = G x + offset`: `M = Gᵀ M_free G`, `p = Gᵀ p_free`, `ṗ = Gᵀ ṗ_free`. The forces that keep the mimic
+/// joints in step with their leaders do no work: `Gᵀ M_free (a − a_free) = 0`.
 #[test]
 fn mimics_are_projections_of_free_joints() {
     let (mut worst, mut seen) = (0.0_f64, 0);
@@ -155,7 +156,7 @@ fn mimics_are_projections_of_free_joints() {
         let mut s_free = s.clone();
         s_free.v = at(&s.v, &s.drive[1]);
         s_free.q = coordinates_on_free(&plan, &free, &s);
-        // The force goes to the leader; the drives are what they were.
+        // Joint forces act on leaders only. The drives are unchanged.
         s_free.tau = leaders_only(&plan, &free, &s.tau);
         let (ours, theirs) = (results(&plan, &s), results(&free, &s_free));
         let of = |r: &Results, name: &str| r.iter().find(|(n, _)| *n == name).expect("it is there").1.clone();
@@ -169,7 +170,7 @@ fn mimics_are_projections_of_free_joints() {
             g.iter().map(|g| (0..n).map(|r| dot(&m_free[r * n..(r + 1) * n], g)).collect()).collect();
         let m: Vec<f64> = g.iter().flat_map(|a| mg.iter().map(|b| dot(a, b)).collect::<Vec<_>>()).collect();
         let project = |x: &[f64]| g.iter().map(|g| dot(g, x)).collect::<Vec<f64>>();
-        // Accelerations: both sides as forces.
+        // Accelerations are compared as forces.
         let a = at(&of(&ours, "a"), &s.drive[2]);
         let left: Vec<f64> = mg.iter().map(|mg| dot(mg, &a)).collect();
         let right: Vec<f64> = mg.iter().map(|mg| dot(mg, &of(&theirs, "a"))).collect();
@@ -186,7 +187,7 @@ fn mimics_are_projections_of_free_joints() {
             worst = worst.max(d);
         }
     }
-    println!("mimics against projections: {worst:.1e} on {seen} trees with shared coordinates");
+    println!("mimic joints against projections: {worst:.1e} on {seen} trees with shared coordinates");
     assert!(seen > 100, "only {seen} trees have a mimic to test");
 }
 
@@ -224,7 +225,7 @@ fn leaders_only(plan: &Plan, free: &Plan, tau: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Angles a little off right angles, taken as exact: the motion changes by no more than that.
+/// Angles close to right angles are snapped to right angles. The motion changes by the order of these differences.
 #[test]
 fn snapping_changes_no_more_than_the_angles() {
     const OFF: f64 = 1e-8;
@@ -247,16 +248,16 @@ fn snapping_changes_no_more_than_the_angles() {
         noticed += usize::from(!snapped.notices.is_empty());
         assert!(exact.notices.is_empty(), "seed {seed}: {:?}", exact.notices);
         let s = random_state(&exact, seed);
-        // 1.5707963 is 2.7e-8 off by itself. Three angles in each of six joints, and the condition of M behind velocities and
-        // accelerations: a few thousand times the angle.
+        // The tolerance is a few thousand times the difference of one angle: each of six joints has three angles, and
+        // velocities and accelerations depend on the condition of M. The number 1.5707963 itself is 2.7e-8 off.
         worst = worst.max(compare(seed, &model, &results(&exact, &s), &results(&snapped, &s), 5e3 * OFF));
     }
     println!("snapped against exact: {worst:.1e} for angles {OFF:.0e} off, {noticed} models with a notice");
     assert!(noticed > 200);
 }
 
-/// Two equal pendulums on the ground that move together swing as each of them would alone (a coordinate that is solved at
-/// the ground must feel that the ground accelerates against gravity).
+/// Two equal pendulums on the ground that move together swing as each of them would alone. The sweeps represent gravity
+/// by an acceleration of the ground, which must also reach a coordinate that is solved at the ground.
 #[test]
 fn coupled_pendulums_on_the_ground_feel_gravity() {
     let body =

@@ -1,7 +1,7 @@
-//! Identities of mechanics on random trees of everything: exact relations, no finite differences.
+//! Identities of mechanics on random trees with all kinds of elements: exact relations, no finite differences.
 //!
-//! Time derivatives are taken by dual numbers: the sweep for momenta, run with `q + ε q̇` and `v + ε v̇`, gives `p + ε ṗ`,
-//! which owes nothing to the sweep for `ṗ`.
+//! Time derivatives are taken by dual numbers: the sweep for momenta, run with `q + ε q̇` and `v + ε v̇`, gives
+//! `p + ε ṗ` independently of the sweep for `ṗ`.
 
 use mbd_codegen::model::JointKind;
 use mbd_runtime::spatial::cross;
@@ -98,7 +98,7 @@ fn energies_are_those_of_the_bodies() {
         for (k, at) in bodies.iter().enumerate() {
             twice += newton::twice_kinetic(model, params, k, at, at);
             let (m, centre) = newton::mass_centre(model, params, k, at);
-            // What is welded to the ground adds a constant, which is left out.
+            // Bodies that are fixed to the ground add only a constant, which the sweep omits.
             if c.plan.frames[newton::body_frames(&c.plan)[k]].node.is_none() {
                 continue;
             }
@@ -146,7 +146,8 @@ fn energy_changes_by_the_power_put_in() {
                 terms.extend(damping.map(|(d, v)| -(value(*d, params) * v * v)));
                 continue;
             }
-            // What the drive puts in beside spring and damper of its own joint; the energy of the spring is part of H.
+            // Power of the drive in addition to that of the spring and damper of its joint; the spring's energy is part
+            // of H.
             let position = &positions[slot.joint];
             for (k, e) in newton::freedoms(&joint.kind, params, position).iter().enumerate() {
                 let along: f64 = e.iter().zip(wrench).map(|(e, f)| e * f).sum();
@@ -267,7 +268,7 @@ fn reduced_inertia_has_nothing_along_its_freedoms() {
                 for j in 0..6 {
                     assert!(along.get(j).abs() <= 1e-12 * size, "seed {seed}, node {i}, {:?}: {along:?}", node.kind);
                 }
-                // The rows of single freedoms are zero by construction, not by luck.
+                // For joints with one freedom the sweep sets these rows to exact zeros.
                 if let Kind::Revolute | Kind::Prismatic = node.kind {
                     assert_eq!(along.dot(&node.kind.axis(0).motion(1.0)), 0.0, "seed {seed}, node {i}");
                 }

@@ -1,5 +1,5 @@
-//! Trees without constraints: identities of mechanics, controllers' quantities, derivatives, descriptions that mean the same,
-//! reference data.
+//! Trees without constraints: identities of mechanics, quantities for controllers, derivatives, equivalent
+//! descriptions.
 
 mod cases;
 mod control;

@@ -22,13 +22,14 @@ fn reader_gives_the_model_that_was_written() {
     }
 }
 
-/// A constraint of any kind between what the model has; whether it can be met is of no concern here.
+/// A random constraint between joints or bodies of the model. Only its text matters: the mechanism need not be able to
+/// move.
 fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
     let single = |j: &usize| model.joints[*j].kind.nv() == 1 && model.joints[*j].motion == JointMotion::Free;
     let singles: Vec<usize> = (0..model.joints.len()).filter(single).collect();
     let decay = Value::Const(rng.pick(&[0.0, 20.0]));
     if singles.len() >= 2 && rng.chance(0.3) {
-        // Every joint once, beginning anywhere.
+        // Each joint occurs at most once; the first one is random.
         let first = rng.below(singles.len());
         let terms = (0..2 + rng.below(singles.len() - 1))
             .map(|t| (singles[(first + t) % singles.len()], value(model, rng, 0.5, 2.0)))
@@ -40,7 +41,8 @@ fn constraint(model: &Model, k: usize, rng: &mut Rng) -> Option<Constraint> {
     let bodies = std::iter::once(None).chain((0..model.bodies.len()).map(Some));
     ends.extend(bodies.map(|body| Mount { body, placement: Placement::IDENTITY }));
     let [first, second] = [0; 2].map(|_| ends[rng.below(ends.len())].clone());
-    // The body that a body follows without freedom; what a mimic follows does not matter.
+    // For each body, the body that it follows through fixed and prescribed joints. A loop between bodies that follow
+    // the same body has no freedom to bind.
     let mut root = vec![None; model.bodies.len()];
     for j in &model.joints {
         let rigid = j.kind.nv() == 0 || j.motion == JointMotion::Prescribed;

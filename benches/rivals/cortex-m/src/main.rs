@@ -1,4 +1,5 @@
-//! Counts instructions of one evaluation, ours and CasADi's, over the same states, and compares the accelerations.
+//! Counts the instructions of one evaluation of our code and of CasADi's, in the same states, and compares the
+//! accelerations.
 #![no_std]
 #![no_main]
 
@@ -14,7 +15,7 @@ mbd_macros::mbd_model! {
 }
 
 const STATES: usize = 64;
-/// Times that all states are gone through; the counter holds 24 bits of 40 instructions each.
+/// Number of passes through all states. It is limited because the counter has 24 bits, each tick being 40 instructions.
 const ROUNDS: u32 = 16;
 
 type Kernel = unsafe extern "C" fn(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64);
@@ -22,17 +23,17 @@ type Kernel = unsafe extern "C" fn(q: *const f64, v: *const f64, tau: *const f64
 extern "C" {
     /// CasADi's code with the sine and cosine of the C library.
     fn ur5_casadi(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64);
-    /// The same code with ours.
+    /// The same code with our sine and cosine.
     fn ur5_casadi_own(q: *const f64, v: *const f64, tau: *const f64, out: *mut f64);
 }
 
-/// Ours, for CasADi's code.
+/// Our sine, for CasADi's code.
 #[no_mangle]
 extern "C" fn own_sin(x: f64) -> f64 {
     mbd_runtime::trig::sincos_f64(x).0
 }
 
-/// Ours, for CasADi's code.
+/// Our cosine, for CasADi's code.
 #[no_mangle]
 extern "C" fn own_cos(x: f64) -> f64 {
     mbd_runtime::trig::sincos_f64(x).1
@@ -46,7 +47,7 @@ struct State {
     tau: [f64; 6],
 }
 
-/// Angles up to 3, velocities up to 1, forces up to 5.
+/// Random states with angles up to 3 rad, velocities up to 1 rad/s and joint forces up to 5 N m.
 fn states(system: &mut Ur5) -> [State; STATES] {
     let mut seed = 1_u32;
     let mut random = |size: f64| {
@@ -63,7 +64,7 @@ fn states(system: &mut Ur5) -> [State; STATES] {
     states
 }
 
-/// Instructions of one call, loop included.
+/// Instructions of one call, with its share of the loop over states. `None` if the counter overflowed.
 fn count(states: &[State; STATES], mut call: impl FnMut(&State, &mut [f64; 12])) -> Option<u64> {
     let mut out = [0.0; 12];
     start_counter();
@@ -74,16 +75,16 @@ fn count(states: &[State; STATES], mut call: impl FnMut(&State, &mut [f64; 12]))
         }
     }
     let (ticks, wrapped) = read_counter();
-    // One instruction a nanosecond, one tick each 40 of them.
+    // The simulated processor makes one instruction a nanosecond, and the counter one tick in 40 instructions.
     (!wrapped).then_some(u64::from(ticks) * 40 / (u64::from(ROUNDS) * STATES as u64))
 }
 
 fn theirs(kernel: Kernel, s: &State, out: &mut [f64; 12]) {
-    // SAFETY: arrays of 6, 6 and 6 numbers to read; 6 of 12 to write.
+    // SAFETY: the kernel reads arrays of 6, 6 and 6 numbers, and writes 6 of the 12 numbers of `out`.
     unsafe { kernel(s.q.as_ptr(), s.v.as_ptr(), s.tau.as_ptr(), out.as_mut_ptr()) }
 }
 
-/// Largest difference of accelerations, relative to the largest of each state; in units of 1e-18.
+/// Largest difference of accelerations, relative to the largest acceleration of each state, in units of 1e-18.
 fn difference(states: &[State; STATES], system: &mut Ur5, kernel: Kernel) -> u64 {
     let mut worst = 0.0_f64;
     for s in states {

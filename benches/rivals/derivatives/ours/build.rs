@@ -1,4 +1,5 @@
-//! Generates the derivatives of the robots listed in the file that `RIVALS_ROBOTS` names; `RIVALS_ONLY` chooses some.
+//! Generates code for the derivatives of the robots in the list whose file the environment variable `RIVALS_ROBOTS`
+//! names. `RIVALS_ONLY` selects some of them.
 
 use std::fmt::Write as _;
 
@@ -35,7 +36,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     let text = std::fs::read_to_string(path).expect("the model");
     let base = if base == "floating" { Base::Floating } else { Base::Fixed };
     let mut model = read::model(path, &text, &ImportOptions { base, gravity: None }).unwrap_or_else(|findings| panic!("{findings}")).model;
-    // Pinocchio's forward dynamics knows no dampers.
+    // Pinocchio's forward dynamics has no dampers.
     for joint in &mut model.joints {
         joint.damping.fill(mbd_codegen::model::Value::Const(0.0));
     }
@@ -52,7 +53,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     for part in pinocchio(&plan).parts {
         let (here, there, n) = part.form.sizes();
-        assert_eq!(here, there, "{name}: coordinates of one form");
+        assert_eq!(here, there, "{name}: both programs have the same coordinates");
         (0..here).for_each(|k| q[part.q.0 + k] = part.q.1 + k);
         (0..n).for_each(|k| v[part.v.0 + k] = part.v.1 + k);
     }

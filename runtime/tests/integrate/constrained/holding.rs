@@ -1,4 +1,4 @@
-//! Stabilisation around every kind of method.
+//! Stabilisation after the steps of every kind of method.
 
 use super::systems::*;
 use mbd_runtime::constrained::{ConstraintError, Effort, Projection, Stabilisation, WithPostStep};
@@ -46,8 +46,8 @@ fn double() -> (Closed<Sticks>, State) {
     (Closed::new(Sticks::double()), (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]))
 }
 
-/// Positions drift by the method's error, and stay where they belong with any of the three projections; momenta carry no `σ`
-/// where they are settled.
+/// Without position projection, positions drift by the method's error. With any of the three position projections they
+/// stay closed. With momentum projection, momenta have no part `Φᵀσ`.
 #[test]
 fn drift() {
     for policy in ALL {
@@ -70,7 +70,7 @@ fn drift() {
     }
 }
 
-/// Each method keeps its order: the error falls by `2^order` or nearly when steps are halved.
+/// Each method keeps its order: halving the step divides the error by about `2^order`.
 #[test]
 fn orders() {
     fn check<M: Stepper<Closed<Sticks>>>(name: &str, order: i32, steps: u32, make: impl Fn(&Closed<Sticks>) -> M) {
@@ -96,11 +96,12 @@ fn orders() {
     check("tsit5", 5, 20, Tsit5::new);
     check("dop853", 8, 5, Dop853::new);
     check("abm4", 4, 100, Abm4::new);
-    // Its order, 12, shows only where the error is round-off.
+    // Order 12 shows only where the error is round-off, so the test requires less.
     check("gauss12", 8, 2, Gauss12FixedPoint::new);
 }
 
-/// Steps by error control, with stages used again, dense output on the way, events' states.
+/// Steps by error control, also for methods that reuse a stage of the last step; states are closed in dense output and
+/// at the end.
 #[test]
 fn adaptive_steps() {
     fn check<M: Stepper<Closed<Sticks>>>(name: &str, factor: f64, make: impl Fn(&Closed<Sticks>) -> M) {
@@ -131,7 +132,7 @@ fn adaptive_steps() {
     check("adams", 200.0, VariableAdams::new);
 }
 
-/// A redundant row changes nothing.
+/// A redundant row does not change the motion.
 #[test]
 fn redundant_rows() {
     let end = [1, 2].map(|n| {
@@ -143,13 +144,14 @@ fn redundant_rows() {
     assert!(apart(&end[0].0, &end[1].0) < 1e-13 && apart(&end[0].1, &end[1].1) < 1e-13, "{end:?}");
 }
 
-/// A top as a free body with a pin: the quaternion's chart, positions and momenta are moved together.
+/// A top, described as a free body with a spherical joint as constraint. Projection changes positions and momenta in
+/// the chart of the quaternion.
 #[test]
-fn a_body_on_its_group() {
+fn a_body_on_its_lie_group() {
     for policy in ALL {
         let mut y = Closed::new(Top::new());
         let q = y.model.leaning(0.3);
-        // About its axis, 100 rad/s, and a little about x.
+        // The top rotates with 100 rad/s about its axis, and slowly about x.
         let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 100.0];
         let (mut v, mut sigma) = (vec![0.0; 6], vec![0.0; 3]);
         y.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
@@ -175,7 +177,7 @@ fn a_body_on_its_group() {
     }
 }
 
-/// Ten thousand steps of 1 ms: the drift is that of round-off, with two iterations always.
+/// In ten thousand steps of 1 ms with two iterations each, the drift is round-off.
 #[test]
 fn long_drift() {
     let (mut y, start) = double();
@@ -191,9 +193,10 @@ fn long_drift() {
     assert_eq!(method.post_step.rank(), (Some(2), 0));
 }
 
-/// A step far beyond what three iterations bring back is refused with its numbers, and the state is as it was.
+/// A step whose positions three iterations cannot close is refused with residual and rank, and the state does not
+/// change.
 #[test]
-fn what_cannot_be_brought_back_is_refused() {
+fn positions_that_cannot_be_closed_are_refused() {
     let mut y = Closed::new(Sticks::pendulum(1));
     let method = Euler::new(&y);
     let mut method = held(&y, method, Stabilisation::Mass);
@@ -202,7 +205,7 @@ fn what_cannot_be_brought_back_is_refused() {
     let StepError::Constraint { time: 0.0, error: ConstraintError::NotClosed { residual, rank, .. } } = error else {
         panic!("{error:?}")
     };
-    // 300 m from the pivot; each iteration halves that.
+    // The step ends 300 m from the pivot, and each iteration halves the distance.
     assert!(residual > 100.0 && rank == 1, "{error}");
     let (mut q, mut p) = start.clone();
     assert!(method.step(&mut y, 0.0, 10.0, &mut q, &mut p).is_err());

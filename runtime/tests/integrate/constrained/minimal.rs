@@ -1,4 +1,4 @@
-//! Minimal coordinates.
+//! Motion in minimal coordinates.
 
 use super::holding::{apart, held, march};
 use super::systems::*;
@@ -14,7 +14,7 @@ fn minimal<T: Model + Clone>(y: &Closed<T>, (q, p): &State) -> (CoordinatePartit
     (y, (q, p))
 }
 
-/// A crank that turns all round: crank and rocker, let go with 5 rad/s.
+/// A crank-rocker linkage whose crank rotates all the way round, starting with 5 rad/s.
 fn crank() -> (Closed<Sticks>, State) {
     let mut y = Closed::new(Sticks::four_bar([1.0, 2.0, 2.0, 2.5]));
     let q = y.closed(&[0.0, 1.0, 1.5, 2.5], &[true, true]).unwrap();
@@ -24,7 +24,7 @@ fn crank() -> (Closed<Sticks>, State) {
     (y, (q, p))
 }
 
-/// `p⁺ + Φᵀ δ` moves as `p⁺` does, whatever `δ`: velocities to round-off.
+/// The momenta `p⁺ + Φᵀ δ` have the same velocities as `p⁺` for any `δ`, to round-off.
 #[test]
 fn multipliers_are_a_gauge() {
     let (mut y, (q, p)) = crank();
@@ -34,16 +34,17 @@ fn multipliers_are_a_gauge() {
     let (w, tau, _) = y.velocities(&q, &moved);
     assert!(apart(&v, &w) < 1e-14);
     assert!((0..3).all(|i| (tau[i] - sigma[i] - delta[i]).abs() < 1e-13));
-    // So are minimal coordinates.
+    // The momenta of minimal coordinates are one choice of `δ`: the one with zero dependent momenta.
     let (y_min, (q_min, p_min)) = minimal(&y, &(q, p.clone()));
     assert_eq!(y_min.dependents().count(), 3);
     assert!(y_min.dependents().all(|d| p_min[d] == 0.0));
     assert!(apart(&v, &y.velocities(&q_min, &p_min).0) < 1e-14);
 }
 
-/// The same motion as method 1 with projection, with every method, to the tolerance; energy, closed at every step.
+/// With every method, the motion is that of redundant coordinates with projection, to the tolerance. The energy is
+/// conserved, and every step ends closed.
 #[test]
-fn the_same_motion_as_method_one() {
+fn the_same_motion_as_with_projection() {
     fn check<M: Stepper<CoordinatePartition<Closed<Sticks>>>>(
         name: &str,
         make: impl Fn(&CoordinatePartition<Closed<Sticks>>) -> M,
@@ -72,7 +73,7 @@ fn the_same_motion_as_method_one() {
             solver.statistics()
         );
         println!("{:.2} closures an evaluation", m.closures() as f64 / solver.statistics().evaluations as f64);
-        // Four turns; what the tolerance allows grows with them.
+        // The crank makes four turns, over which the errors of steps add up.
         assert!(error < 1e-7 && drift < 5e-7, "{name}");
         assert!(switches > 5 && record.iter().all(|s| s.pivot > 2.0), "{name}: {switches}");
     }
@@ -80,7 +81,8 @@ fn the_same_motion_as_method_one() {
     check("verner9", Verner9::new);
 }
 
-/// Order 4 with steps of one size, in a method with a history as well, which starts anew after a switch.
+/// With fixed steps, RK4 has order 4, and so has a multistep method, which must restart after a switch of the
+/// partition.
 #[test]
 fn orders() {
     let (mut y, start) = crank();
@@ -106,15 +108,15 @@ fn orders() {
     assert!((errors[0] / errors[1]).log2() > 3.4, "{errors:?}");
 }
 
-/// Through the dead point: crank and coupler in one line, where the rocker's point does not determine the crank. With
-/// switching nothing of the energy is lost beyond 1e-9; without it the same partition comes to an end there.
+/// At the dead point crank and coupler are in one line, and the position of the rocker does not determine that of the
+/// crank. With switching of the partition the energy is conserved to 1e-9. Without switching the run fails there.
 #[test]
 fn through_the_dead_point() {
     let (y, start) = crank();
     let run = |ratio: f64| {
         let (m, (mut q, mut p)) = minimal(&y, &start);
         let mut m = m.with_ratio(ratio);
-        // The rocker's x is the independent coordinate.
+        // The x coordinate of the rocker's tip is the independent one.
         m.choose_among(&[0, 1, 3], &mut q, &mut p).unwrap();
         let method = WithPostStep::new(&m, Dop853::new(&m), Repartition::default());
         let mut solver = Solver::new(&mut m, method, Step::Adaptive(Tolerances::new(1e-12)), 0.0, &q, &p).unwrap();
@@ -131,7 +133,7 @@ fn through_the_dead_point() {
     assert!(result.is_err() && switches == 0, "{result:?}");
 }
 
-/// A stick twice: the redundant row is left out, the partition has one dependent.
+/// The same stick is present twice: one row is redundant, so the partition has one dependent coordinate.
 #[test]
 fn redundant_rows() {
     let mut y = Closed::new(Sticks::pendulum(2));
@@ -141,12 +143,13 @@ fn redundant_rows() {
     let mut method = WithPostStep::new(&m, Rk4::new(&m), Repartition::default());
     let end = march(&mut m, &mut method, 2000, 2.0, &from).unwrap();
     let energy = y.energy(&end.0, &end.1) - y.energy(&start.0, &start.1);
-    // Measured: 1.5e-8 at 1 ms, 2.4e-7 at 2 ms; the place along x is a more crooked coordinate than the angle.
+    // The measured errors are 1.5e-8 with steps of 1 ms and 2.4e-7 with 2 ms. The motion in x is less smooth than in
+    // the angle.
     assert!(m.switches().0 >= 2 && energy.abs() < 5e-8, "{energy:e}, {:?}", m.switches());
     assert!(y.off(&end.0, &end.1).0 < 1e-15);
 }
 
-/// Loops that share nothing are groups of their own: a pair of dependents each.
+/// Loops without common coordinates choose and switch their dependent coordinates independently of each other.
 #[test]
 fn many_loops() {
     let n = 12;
@@ -175,9 +178,9 @@ fn many_loops() {
     assert_eq!(m.switches().0, n as u64 * m1.switches().0);
 }
 
-/// Parts of a free body's pose depend on its other freedoms: the top again.
+/// A top as a free body: some freedoms of its pose depend on the others.
 #[test]
-fn a_body_on_its_group() {
+fn a_body_on_its_lie_group() {
     let mut y = Closed::new(Top::new());
     let q = y.model.leaning(0.3);
     let mut p = vec![0.0, 0.0, 0.0, 0.02 * 2.0, 0.0, 0.01 * 30.0];
@@ -202,18 +205,18 @@ fn a_body_on_its_group() {
     }
 }
 
-/// Dependents that do not follow from the rest are refused, with the rank.
+/// A choice of dependent coordinates that do not follow from the others is refused with the rank.
 #[test]
 fn impossible_partitions_are_refused() {
     let (y, start) = crank();
     let (mut m, (mut q, mut p)) = minimal(&y, &start);
-    // The crank stands upright: its tip cannot move in y, which so cannot be independent.
+    // The crank is upright: its tip cannot move in y, so y cannot be independent.
     let error = m.choose_among(&[0, 2, 3], &mut q, &mut p).unwrap_err();
     assert!(matches!(error, ConstraintError::RankLoss { rank: 2, before: 3, .. }), "{error:?}");
     let error = m.choose_among(&[0, 1], &mut q, &mut p).unwrap_err();
     assert!(matches!(error, ConstraintError::RankLoss { rank: 2, before: 3, .. }), "{error:?}");
     m.choose_among(&[1, 2, 3], &mut q, &mut p).unwrap();
-    // No crank of 1 m reaches x = 5 m: the rates are not numbers, and the reason is kept.
+    // A crank of 1 m cannot reach x = 5 m: the rates are NaN, and `trouble` gives the reason.
     let mut far = vec![5.0, 1.0, 1.5, 2.5];
     let (mut qd, mut pd) = (m.neutral(), m.zero_momenta());
     m.rates_at(0.0, &far, &p, &mut qd, &mut pd);

@@ -1,4 +1,4 @@
-//! Motion with constraints: closing, staying closed, orders, energy, partitions.
+//! Motion with constraints: consistent states, stabilisation, orders, energy, coordinate partitions.
 
 mod closing;
 mod holding;

@@ -1,4 +1,4 @@
-//! Methods with multipliers of their own: RATTLE, Radau IIA of index 2.
+//! Methods that compute multipliers themselves: RATTLE, Radau IIA of index 2.
 
 use super::holding::{apart, held, march, State};
 use super::systems::*;
@@ -9,8 +9,8 @@ fn split<T: Model + Clone>(model: T) -> OpenAndClosed<Open<T>, Closed<T>> {
     OpenAndClosed { open: Open(model.clone()), closed: Closed::new(model) }
 }
 
-/// Both constraints at the end of every step; order 2, of a separable Hamiltonian and of one that is not; the exact motion is
-/// known of the latter.
+/// RATTLE satisfies the constraints of positions and velocities at the end of every step. It has order 2 for a
+/// separable Hamiltonian and for one that is not; for the latter the exact motion is known.
 #[test]
 fn rattle_has_order_two() {
     let mut y = split(Sticks::double());
@@ -41,8 +41,9 @@ fn rattle_has_order_two() {
     assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
 }
 
-/// The energy of 20 000 steps swings and does not drift: the means of the first and the last tenth differ by far less than
-/// it swings. (Runge-Kutta of order 2 would lose all of it.) A step back leads back.
+/// In 20 000 steps the energy oscillates but does not drift: its means over the first and the last tenth differ by far
+/// less than the oscillation. (A Runge-Kutta method of order 2 would lose all of the energy.) Steps backwards lead back
+/// to the start.
 #[test]
 fn rattle_is_symplectic() {
     let mut y = split(Polar);
@@ -74,7 +75,7 @@ fn rattle_is_symplectic() {
     assert!(apart(&q, &start) < 1e-12 && apart(&p, &[0.0; 4]) < 1e-11, "{q:?} {p:?}");
 }
 
-/// Redundant rows, and a body on its group: closed, of order 2.
+/// RATTLE with redundant rows, and on the Lie group of a body: states are closed, and the order is 2.
 #[test]
 fn rattle_elsewhere() {
     let mut y = split(Sticks::pendulum(2));
@@ -102,8 +103,8 @@ fn rattle_elsewhere() {
     assert!((errors[0] / errors[1] - 4.0).abs() < 0.3, "{errors:?}");
 }
 
-/// Order 5 in the state, 3 in the multipliers; velocities meet the constraints at the end of every step, and positions with the
-/// projection around it.
+/// Radau IIA has order 5 in the state and 3 in the multipliers. Velocities satisfy the constraints at the end of every
+/// step; positions do so with projection.
 #[test]
 fn radau_has_order_five() {
     let mut y = split(Sticks::double());
@@ -122,7 +123,7 @@ fn radau_has_order_five() {
             (apart(&end.0, &reference.0), method.method().lambda().clone())
         });
         assert!((errors[0].0 / errors[1].0).log2() > 4.5, "{errors:?}");
-        // Of the multipliers by the differences between step sizes.
+        // The order of the multipliers follows from differences between three step sizes.
         let found = (apart(&errors[0].1, &errors[1].1) / apart(&errors[1].1, &errors[2].1)).log2();
         assert!(found > 2.6, "{found} {errors:?}");
     }

@@ -1,4 +1,4 @@
-//! Small systems with constraints, written down by hand.
+//! Small systems with constraints, written by hand.
 
 use mbd_runtime::constrained::{close, Closing, ConstraintError};
 use mbd_runtime::system::{LieGroup, LieJoint, Row};
@@ -7,14 +7,14 @@ use mbd_runtime::{Conjugate, Constrained, Energetic, System};
 /// Gravity, m/s².
 pub const G: f64 = 9.81;
 
-/// What tells one open system with constraints from another: everything else follows from it.
+/// Description of a system with constraints, from which [`Open`] and [`Closed`] compute everything else.
 pub trait Model {
     fn lie_joints(&self) -> &[LieJoint] {
         &[]
     }
     fn neutral(&self) -> Vec<f64>;
     fn nv(&self) -> usize;
-    /// `M⁻¹ p` and `M v`; masses are diagonal.
+    /// The diagonal of `M`, which has no other entries.
     fn masses(&self, q: &[f64]) -> Vec<f64>;
     /// `ṗ` at momenta `p` and velocities `v`, without constraints.
     fn forces(&self, q: &[f64], p: &[f64], v: &[f64]) -> Vec<f64>;
@@ -22,25 +22,26 @@ pub trait Model {
     fn coordinate_rates(&self, _q: &[f64], v: &[f64]) -> Vec<f64> {
         v.to_vec()
     }
-    /// Residuals and rows of `Φ`, all columns.
+    /// Residuals, and rows of `Φ` with all columns.
     fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
     fn holonomic(&self) -> bool {
         true
     }
-    /// `∂(σᵀ Φ v)/∂q` less `d(Φᵀ)/dt σ`, plus the latter: what `σ` adds to `ṗ⁺` beside the forces at `p⁺`.
+    /// The part of `ṗ⁺` that is due to `σ`, in addition to `forces` at `p⁺`. It is `Φ̇ᵀσ` if `forces` does not depend
+    /// on momenta.
     fn turning(&self, q: &[f64], v: &[f64], sigma: &[f64]) -> Vec<f64>;
-    /// Which columns a row can have, for its entries.
+    /// For each row of `Φ`, the columns of its entries.
     fn pattern(&self) -> Vec<Vec<usize>>;
     fn constraint(&self, row: usize) -> usize {
         row
     }
 }
 
-/// The open system: constraints are not looked at.
+/// The system without its constraints.
 #[derive(Clone, Debug)]
 pub struct Open<T>(pub T);
 
-/// With its constraints.
+/// The system with its constraints.
 #[derive(Clone, Debug)]
 pub struct Closed<T> {
     pub model: T,
@@ -60,7 +61,7 @@ impl<T: Model> Closed<T> {
         Closed { model, rows, columns, solves: 0 }
     }
 
-    /// `A x = b` with `A = Φ M⁻¹ Φᵀ`, redundant rows left out; the pivots.
+    /// Solves `A x = b` with `A = Φ M⁻¹ Φᵀ`, where redundant rows are left out. Returns `x` and the pivots.
     fn solve(&mut self, masses: &[f64], phi: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, Vec<f64>) {
         self.solves += 1;
         let m = b.len();
@@ -96,7 +97,7 @@ impl<T: Model> Closed<T> {
         (x, pivots)
     }
 
-    /// Velocities and multipliers of a state, with `Φ`.
+    /// Velocities, multipliers `σ` and `Φ` of a state.
     pub fn velocities(&mut self, q: &[f64], p: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<Vec<f64>>) {
         let (masses, (_, phi)) = (self.model.masses(q), self.model.constraint_residuals(q));
         let free: Vec<f64> = p.iter().zip(&masses).map(|(p, m)| p / m).collect();
@@ -107,7 +108,7 @@ impl<T: Model> Closed<T> {
         (v.collect(), sigma, phi)
     }
 
-    /// The largest residual, of positions and of velocities.
+    /// The largest residual of positions and the largest of velocities.
     pub fn off(&mut self, q: &[f64], p: &[f64]) -> (f64, f64) {
         let (v, _, phi) = self.velocities(q, p);
         let residual = self.model.constraint_residuals(q).0;
@@ -115,13 +116,13 @@ impl<T: Model> Closed<T> {
         (residual.iter().fold(0.0, |m, x| m.max(x.abs())), rates.fold(0.0, |m, x| m.max(x.abs())))
     }
 
-    #[allow(clippy::ptr_arg)] // what the trait takes
+    #[allow(clippy::ptr_arg)] // The trait takes these types.
     pub fn energy(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> f64 {
         let (t, v) = self.energies(q, p);
         t + v
     }
 
-    /// Closed, from a guess.
+    /// Closed coordinates near a guess.
     pub fn closed(&mut self, guess: &[f64], held: &[bool]) -> Result<Vec<f64>, ConstraintError> {
         let mut q = guess.to_vec();
         close(self, &mut q, &Closing::holding(held)).map(|_| q)
@@ -230,7 +231,7 @@ impl<T: Model> Constrained for Closed<T> {
     }
 }
 
-/// An end of a stick: a point, or a place that does not move.
+/// An end of a stick: a moving point, or a fixed position.
 #[derive(Clone, Copy, Debug)]
 pub enum End {
     Point(usize),
@@ -238,7 +239,8 @@ pub enum End {
 }
 pub use End::{Fixed, Point};
 
-/// Points in the plane with masses, held at distances by sticks: `φ = (d² − l²) / 2l`. Gravity along −y.
+/// Point masses in the plane at fixed distances, which are sticks without mass: `φ = (d² − l²) / 2l`. Gravity acts
+/// along −y.
 #[derive(Clone, Debug)]
 pub struct Sticks {
     pub masses: Vec<f64>,
@@ -262,16 +264,16 @@ impl Sticks {
             Fixed(_) => None,
         })
     }
-    /// A pendulum of 1 m and 1 kg, its stick `n` times.
+    /// A pendulum of 1 m and 1 kg whose stick is present `n` times.
     pub fn pendulum(n: usize) -> Self {
         Sticks { masses: vec![1.0], sticks: vec![(Fixed([0.0; 2]), Point(0), 1.0); n], gravity: G }
     }
-    /// A double pendulum, 1 m and 1 kg each.
+    /// A double pendulum with two sticks of 1 m and two masses of 1 kg.
     pub fn double() -> Self {
         let sticks = vec![(Fixed([0.0; 2]), Point(0), 1.0), (Point(0), Point(1), 1.0)];
         Sticks { masses: vec![1.0; 2], sticks, gravity: G }
     }
-    /// A four-bar: crank, coupler, rocker; ground from the origin to (`ground`, 0).
+    /// A four-bar linkage of crank, coupler and rocker. The ground reaches from the origin to (`ground`, 0).
     pub fn four_bar([crank, coupler, rocker, ground]: [f64; 4]) -> Self {
         let sticks = vec![
             (Fixed([0.0; 2]), Point(0), crank),
@@ -330,13 +332,14 @@ impl Model for Sticks {
     }
 }
 
-/// A mass of 1 kg in polar coordinates `(r, θ)` on the line `r cos θ = 1` with a spring of 4 N/m towards its foot: the place on
-/// the line, `r sin θ`, swings with 2 rad/s. The mass matrix depends on the position.
+/// A mass of 1 kg on the line `r cos θ = 1` in polar coordinates `(r, θ)`, with a spring of 4 N/m towards the point of
+/// the line nearest to the origin. Its position on the line, `r sin θ`, oscillates with 2 rad/s. The mass matrix
+/// depends on `r`.
 #[derive(Clone, Debug)]
 pub struct Polar;
 
 impl Polar {
-    /// At rest in the place `s` on the line.
+    /// Coordinates of the position `s` on the line.
     pub fn at(s: f64) -> Vec<f64> {
         vec![(1.0 + s * s).sqrt(), s.atan()]
     }
@@ -356,7 +359,7 @@ impl Model for Polar {
         vec![1.0, q[0] * q[0]]
     }
     fn forces(&self, q: &[f64], _: &[f64], v: &[f64]) -> Vec<f64> {
-        // V = 2 (r sin θ)²
+        // The potential energy is V = 2 (r sin θ)².
         let (s, c) = q[1].sin_cos();
         vec![q[0] * v[1] * v[1] - 4.0 * q[0] * s * s, -4.0 * q[0] * q[0] * s * c]
     }
@@ -376,13 +379,14 @@ impl Model for Polar {
     }
 }
 
-/// A top of 1 kg as a free body with a point pinned to the origin: three rows in ground axes, which add nothing to `ṗ⁺`.
+/// A top of 1 kg: a free body with a spherical joint at the origin as constraint. Its three rows, in ground axes, add
+/// nothing to `ṗ⁺`.
 #[derive(Clone, Debug)]
 pub struct Top {
     groups: [LieJoint; 1],
     pub inertia: [f64; 3],
-    /// Of the pinned point in the body, from its centre of mass.
-    pub pin: [f64; 3],
+    /// Position of the joint in the body, from its centre of mass.
+    pub joint: [f64; 3],
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
@@ -400,19 +404,19 @@ fn rotation(q: &[f64]) -> [[f64; 3]; 3] {
 
 impl Top {
     pub fn new() -> Self {
-        Top { groups: [LieJoint::new(LieGroup::SE3, 0, 0)], inertia: [0.02, 0.03, 0.01], pin: [0.0, 0.0, -0.3] }
+        Top { groups: [LieJoint::new(LieGroup::SE3, 0, 0)], inertia: [0.02, 0.03, 0.01], joint: [0.0, 0.0, -0.3] }
     }
-    /// Upright but for a lean about x, rad, pinned.
+    /// Coordinates of the closed state in which the top leans by an angle about x, rad.
     pub fn leaning(&self, angle: f64) -> Vec<f64> {
         let (s, c) = (0.5 * angle).sin_cos();
         let mut q = vec![0.0, 0.0, 0.0, s, 0.0, 0.0, c];
         let r = rotation(&q[3..]);
         for i in 0..3 {
-            q[i] = -(0..3).map(|j| r[i][j] * self.pin[j]).sum::<f64>();
+            q[i] = -(0..3).map(|j| r[i][j] * self.joint[j]).sum::<f64>();
         }
         q
     }
-    /// Angular momentum about the vertical through the pin, which is the origin.
+    /// Angular momentum about the vertical through the joint, which is at the origin.
     pub fn vertical(&self, q: &[f64], p: &[f64]) -> f64 {
         let r = rotation(&q[3..]);
         let out = |p: &[f64]| [0, 1, 2].map(|i| (0..3).map(|j| r[i][j] * p[j]).sum::<f64>());
@@ -455,10 +459,10 @@ impl Model for Top {
         out
     }
     fn constraint_residuals(&self, q: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let (r, c) = (rotation(&q[3..]), self.pin);
+        let (r, c) = (rotation(&q[3..]), self.joint);
         (0..3)
             .map(|i| {
-                // n · R (v + ω × c) = Rᵀn · v + (c × Rᵀn) · ω
+                // The row follows from n · R (v + ω × c) = Rᵀn · v + (c × Rᵀn) · ω.
                 let about = cross(c, r[i]);
                 (q[i] + (0..3).map(|j| r[i][j] * c[j]).sum::<f64>(), r[i].into_iter().chain(about).collect())
             })

@@ -1,4 +1,4 @@
-//! Adams methods: order, start, restart, evaluations; energy projection.
+//! Adams methods: order, start, restart, number of evaluations; energy projection.
 
 mod projection;
 mod systems;
@@ -10,11 +10,11 @@ use mbd_runtime::{Energetic, System};
 
 use systems::{apart, body, pendulum, top, turned, walk, walk_on, Top};
 
-/// The highest order there is.
+/// The method of the highest order.
 type Abm12<Y> = AdamsMoulton<Y, 12>;
 
-/// The order that halvings of the step show: over a time of 2 s with the first step, and in the first `K + 2` steps, whose
-/// error is of one order more, with the second one. Errors near round-off do not count.
+/// Two measurements of the order by halving the step: over 2 s, beginning with the step `h`, and over the first `K + 2`
+/// steps, whose error has one order more, beginning with `h_first`. Errors near round-off do not count.
 fn orders<Y: System<Scalar = f64>, M: Stepper<Y>>(
     make: fn(&Y) -> M,
     scene: &dyn Fn() -> (Y, Y::Coordinates, Y::Momenta),
@@ -22,7 +22,7 @@ fn orders<Y: System<Scalar = f64>, M: Stepper<Y>>(
 ) -> [f64; 2] {
     let make = || make(&scene().0);
     let error = |h: f64, n: u32| {
-        // A method of another kind tells.
+        // The reference is a method of another kind.
         let reference = walk(Verner9::new(&scene().0), scene(), h * f64::from(n) / 400.0, 400);
         apart(&walk(make(), scene(), h, n), &reference)
     };
@@ -40,7 +40,7 @@ fn orders<Y: System<Scalar = f64>, M: Stepper<Y>>(
 
 macro_rules! order_tests {
     ($($method:ident $order:literal $pendulum:expr, $top:expr, $body:expr;)*) => {$(
-        // Steps so large that the order shows before round-off does.
+        // Steps are so large that errors are above round-off.
         let found = [
             orders($method::new, &pendulum::<f64>, $pendulum),
             orders($method::new, &|| top(3.0), $top),
@@ -71,7 +71,7 @@ fn evaluations_and_restarts() {
     let mut method = Ab6::new(&y);
     for i in 0..100 {
         method.step(&mut y, 0.0, 0.005, &mut q, &mut p).unwrap();
-        // Five of the start with nine more each.
+        // Each of the five steps of the start takes nine more evaluations.
         let expected = i + 1 + 9 * (i + 1).min(5);
         assert_eq!(method.statistics().evaluations, expected);
     }
@@ -80,7 +80,7 @@ fn evaluations_and_restarts() {
     walk_on(&mut moulton, &mut y, 0.005, 100, &mut (start_q, start_p));
     assert_eq!(moulton.statistics().evaluations, 5 * 10 + 95 * 2);
 
-    // Another step, or a state from elsewhere: as if begun there, to the last bit.
+    // After a change of the step or of the state, the method restarts, with the bits of a new method.
     let elsewhere = ([q[0] + 1e-9, q[1]], p);
     for (h, state) in [(0.004, (q, p)), (0.005, elsewhere)] {
         let (mut old, mut new) = (method.clone(), Ab6::new(&y));
@@ -89,17 +89,17 @@ fn evaluations_and_restarts() {
         walk_on(&mut old, &mut y, h, 20, &mut a);
         walk_on(&mut new, &mut y, h, 20, &mut b);
         assert_eq!(a, b);
-        // The start rate is not known before either.
+        // Neither of the methods knows the rate at the start in advance.
         assert_eq!(old.statistics().evaluations - before, new.statistics().evaluations);
     }
-    // A step that differs by rounding goes on.
+    // A step that differs by rounding does not restart the method.
     let before = method.statistics().evaluations;
     method.step(&mut y, 0.0, 0.005 * (1.0 + 1e-12), &mut q, &mut p).unwrap();
     assert_eq!(method.statistics().evaluations - before, 1);
 }
 
 #[test]
-fn a_solver_asks_no_more_evaluations() {
+fn a_solver_needs_no_more_evaluations() {
     let (mut y, q, p) = pendulum::<f64>();
     let method = Ab4::new(&y);
     let mut solver = Solver::new(&mut y, method, Step::Fixed(0.005), 0.0, &q, &p).unwrap();
@@ -108,7 +108,7 @@ fn a_solver_asks_no_more_evaluations() {
     let (mut a, mut b) = ((q, p), (q, p));
     solver.state(&y, &mut a.0, &mut a.1);
     walk_on(&mut Ab4::new(&y), &mut y, 0.005, 200, &mut b);
-    // The last step is what is left of the time: it differs by rounding.
+    // The solver's last step is the remaining time, which differs from the step by rounding.
     assert!(apart(&a.0, &b.0) < 1e-14 && apart(&a.1, &b.1) < 1e-13, "{a:?} {b:?}");
 }
 
@@ -120,7 +120,7 @@ fn a_free_rotor_keeps_its_momentum() {
         let mut state = (q, p);
         walk_on(method, &mut y, 0.01, n, &mut state);
         let off = apart(&outer(&q, &p), &outer(&state.0, &state.1));
-        // A rounding of the rate (some 4 N m, of terms that cancel) a step, all in one direction at worst, over 1000 s.
+        // At worst, each step rounds the rate (terms of some 4 N m that cancel) in the same direction, over 1000 s.
         assert!(off < 1000.0 * 4.0 * 2.0 * f64::EPSILON, "{off}");
         assert!(apart(&q, &state.0) > 0.1);
     }
@@ -131,7 +131,7 @@ fn a_free_rotor_keeps_its_momentum() {
     run(&mut VariableAdams::new(&y), 100_000);
 }
 
-/// State at 5 s by a tolerance, and the work.
+/// State at 5 s for a tolerance, and the work.
 fn solve<Y: System<Scalar = f64>>(
     method: impl Stepper<Y>,
     (mut y, mut q, mut p): (Y, Y::Coordinates, Y::Momenta),
@@ -144,7 +144,7 @@ fn solve<Y: System<Scalar = f64>>(
     (q.as_ref().iter().chain(p.as_ref()).copied().collect(), solver.statistics())
 }
 
-/// Errors within `factor` of the tolerance, with fewer evaluations than Verner's method takes for it.
+/// Errors are within `factor` times the tolerance, with fewer evaluations than Verner's method takes.
 fn tolerances<Y: System<Scalar = f64>>(scene: impl Fn() -> (Y, Y::Coordinates, Y::Momenta), factor: f64) {
     let reference = walk(Verner9::new(&scene().0), scene(), 1e-3, 5000);
     for k in 3..=12 {
@@ -154,7 +154,8 @@ fn tolerances<Y: System<Scalar = f64>>(scene: impl Fn() -> (Y, Y::Coordinates, Y
         let (_, more) = solve(Verner9::new(&scene().0), scene(), tolerance);
         assert!(error < factor, "{tolerance:e}: {error}");
         assert!(100 * work.evaluations < 85 * more.evaluations, "{tolerance:e}: {work:?} {more:?}");
-        // One evaluation at the prediction, one at the start; one more for the choice of the first step.
+        // Each try takes one evaluation at the predicted state and each step one at its start; the choice of the first
+        // step takes one more.
         let tries = work.steps + work.rejections;
         assert_eq!(work.evaluations, tries + work.steps + 1, "{work:?}");
     }
@@ -164,7 +165,8 @@ fn tolerances<Y: System<Scalar = f64>>(scene: impl Fn() -> (Y, Y::Coordinates, Y
 fn tolerances_are_met() {
     tolerances(pendulum::<f64>, 30.0);
     tolerances(|| top(3.0), 5.0);
-    // Falling ever faster, it magnifies errors some hundred times; Verner's method has up to 110.
+    // The body falls ever faster and magnifies errors some hundred times; errors of Verner's method reach 110
+    // tolerances.
     tolerances(body, 500.0);
 }
 
@@ -184,7 +186,7 @@ fn points_within_a_step() {
             times.push(t + theta * h);
             points.push((q, p));
         }
-        // The end of the step, and rates that are evaluated once.
+        // Dense output must give the end of the step, and the rates there are evaluated only once.
         let end = (q, p);
         solver.state(&y, &mut q, &mut p);
         assert!(apart(&end.0, &q) < 1e-14 && apart(&end.1, &p) < 1e-13);
@@ -203,7 +205,8 @@ fn points_within_a_step() {
 
 #[test]
 fn single_precision() {
-    // A minute at 1 kHz; relative to the largest kinetic energy, some 40 J. Plain sums lose a rounding of the state a step.
+    // A minute at 1 kHz; errors are relative to the largest kinetic energy, some 40 J. Sums without compensation lose a
+    // rounding of the state in every step.
     let worst = |compensated: bool| {
         let (mut y, mut q, mut p) = pendulum::<f32>();
         let mut exact = pendulum::<f64>().0;

@@ -1,25 +1,25 @@
-//! Energy projection.
+//! Energy projection after steps of multistep methods.
 
 use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, EnergyProjection, Field, Point, Rk4, Stepper};
 use mbd_runtime::Energetic;
 
 use super::systems::{body, pendulum, top, Sledge};
 
-/// The gradient from the rates against differences of the energy.
+/// Compares the gradient of the energy, which follows from the rates, with differences of the energy.
 fn gradient<Y: Energetic<Scalar = f64> + Clone>((mut y, q, p): (Y, Y::Coordinates, Y::Momenta)) {
     let mut field = Field::new(&y, false);
     field.load(&y, 0.0, &q, &p).unwrap();
     let n = p.as_ref().len();
     let (mut at, mut rate) = (Point::zero(&y), Point::zero(&y));
-    // Away from the start, as at the end of a step.
+    // The state is displaced from the start, as at the end of a step.
     for (k, x) in at.parts_mut().into_iter().flatten().enumerate() {
         *x = 0.05 * f64::cos(k as f64);
     }
     field.rates(&mut y, 0.0, &at, &mut rate);
     let chart: Chart<Y> = field.chart().clone();
     chart.gradient(&y, &at, &mut rate);
-    let group = |k: usize| y.lie_joints().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
-    let fixed: Vec<bool> = (0..2 * n).map(|k| k >= n && group(k - n)).collect();
+    let on_lie_group = |k: usize| y.lie_joints().iter().any(|g| (g.v..g.v + g.kind.sizes().1).contains(&k));
+    let fixed: Vec<bool> = (0..2 * n).map(|k| k >= n && on_lie_group(k - n)).collect();
     let found: Vec<f64> = rate.parts().concat();
     let mut energy = |k: usize, e: f64| {
         let (mut moved, mut q, mut p) = (at.clone(), q.clone(), p.clone());
@@ -33,13 +33,13 @@ fn gradient<Y: Energetic<Scalar = f64> + Clone>((mut y, q, p): (Y, Y::Coordinate
         let difference =
             (8.0 * (energy(k, e) - energy(k, -e)) - (energy(k, 2.0 * e) - energy(k, -2.0 * e))) / (12.0 * e);
         let expected = if fixed[k] { 0.0 } else { difference };
-        // Energies of some 20 J, differences over 2e-4.
+        // The bound is rounding of energies of some 20 J in differences over 2e-4.
         assert!((found[k] - expected).abs() < 1e-10, "{k}: {} {expected}", found[k]);
     }
 }
 
 #[test]
-fn rates_tell_the_gradient_of_the_energy() {
+fn the_gradient_of_the_energy_follows_from_the_rates() {
     gradient(pendulum());
     gradient(top(3.0));
     gradient(body());
@@ -91,6 +91,6 @@ fn projection_costs_no_evaluation() {
     for _ in 0..100 {
         projection.step(&mut method, &mut y, 0.0, 0.005, &mut q, &mut p).unwrap();
     }
-    // The last one is that of the step to come.
+    // The last evaluation is that of the next step.
     assert_eq!(method.statistics().evaluations, 100 + 3 * 4 + 1);
 }

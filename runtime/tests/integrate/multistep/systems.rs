@@ -1,10 +1,11 @@
-//! Mechanisms written out by hand, and steps of them.
+//! Mechanisms written by hand, and functions that integrate them.
 
 use mbd_runtime::integrate::Stepper;
 use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::{Energetic, Real, Scalar, System};
 
-/// Two bars of length and mass 1, all mass at the ends: `H` is not a sum of parts of `q` and `p`.
+/// A double pendulum of two bars of length and mass 1, with all mass at the ends. `H` is not a sum of functions of `q`
+/// and `p`.
 #[derive(Clone, Debug)]
 pub struct Pendulum<S>(core::marker::PhantomData<S>);
 
@@ -27,7 +28,7 @@ impl<S: Real> System for Pendulum<S> {
         let (s, c) = (q[0] - q[1]).sin_cos();
         let d = S::one() / (S::one() + s * s);
         *qd = [(p[0] - c * p[1]) * d, (p[1] + p[1] - c * p[0]) * d];
-        // By the difference of the angles, at momenta that stay.
+        // The derivative of the kinetic energy with respect to the difference of the angles, at constant momenta.
         let turn = s * qd[0] * qd[1];
         *pd = [-turn - (g + g) * q[0].sin_cos().0, turn - g * q[1].sin_cos().0];
     }
@@ -46,12 +47,12 @@ impl<S: Real> Energetic for Pendulum<S> {
     }
 }
 
-/// Spin of a top or of a body in a fluid: `(a, b, a × b)`.
+/// The cross product `a × b`.
 pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// `Rᵀ u`, or `R u` with `sign` −1, of the unit quaternion `q`.
+/// `Rᵀ u` for the rotation `R` of the unit quaternion `q`; `R u` if `sign` is −1.
 pub fn turned(q: &[f64], u: [f64; 3], sign: f64) -> [f64; 3] {
     let r = [sign * q[0], sign * q[1], sign * q[2]];
     let t = cross(u, r).map(|x| 2.0 * x);
@@ -67,7 +68,7 @@ pub fn spin(q: &[f64], w: [f64; 3], qd: &mut [f64]) {
     qd[3] = -0.5 * (q[0] * w[0] + q[1] * w[1] + q[2] * w[2]);
 }
 
-/// A top on a ball joint, its weight times its arm given; zero: a free rotor.
+/// A top on a spherical joint with the given product of weight and arm. If it is zero, the top is a free rotor.
 #[derive(Clone, Debug)]
 pub struct Top(f64);
 pub const TOP: [f64; 3] = [1.0, 2.0, 2.5];
@@ -103,7 +104,8 @@ impl Energetic for Top {
     }
 }
 
-/// A body in a fluid that is carried along (Kirchhoff), in gravity: momenta of a pose that do not point along its velocity.
+/// A falling body that accelerates the fluid around it (Kirchhoff's equations). Its linear momentum is not parallel to
+/// its velocity.
 #[derive(Clone, Debug)]
 pub struct Body;
 pub const ADDED: [f64; 6] = [1.0, 2.0, 3.0, 0.5, 0.8, 0.9];
@@ -144,7 +146,7 @@ impl Energetic for Body {
     }
 }
 
-/// The same in the plane: along its sides it carries different masses.
+/// Such a body in the plane, with different masses of fluid along its two axes.
 #[derive(Clone, Debug)]
 pub struct Sledge;
 pub const PLANE: [LieJoint; 1] = [LieJoint::new(LieGroup::SE2, 0, 0)];

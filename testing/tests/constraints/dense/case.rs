@@ -1,4 +1,4 @@
-//! Random systems in a state, and what is compared of them.
+//! Random systems with constraints in a state, and the errors of comparisons.
 
 use mbd_codegen::plan::Plan;
 use mbd_runtime::{Constrained, Interpreter, System};
@@ -8,24 +8,25 @@ use mbd_testing::random::{Distribution, Rng};
 
 use super::{Matrix, Truth, Vector};
 
-/// Seeds; a few systems of them are left out.
+/// Number of seeds. The systems of a few seeds are left out.
 pub const SYSTEMS: u64 = 510;
 
-/// A system in a state, its motion by the reference, and what is tested.
+/// A system in a state, its motion by the reference, and the interpreter under test.
 pub struct Case {
     pub seed: u64,
     pub system: LoopSystem,
     pub i: Interpreter<f64>,
     pub p: Vector,
     pub truth: Truth,
-    /// The smallest part of a row that rows before it leave and that still counts.
+    /// Smallest pivot of the elimination of rows in `Φ M⁻¹Φᵀ`, relative to the diagonal entry; redundant rows do not
+    /// count.
     pub pivot: f64,
 }
 
 pub fn system(seed: u64) -> LoopSystem {
     match seed % 5 {
         0 => random_loops(seed, &LoopKnobs::plain()),
-        // Whole joints in a plane: two or three rows of each count.
+        // In a plane, only two or three rows of each joint that closes a loop are independent.
         1 => {
             let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5, 0.0];
             let tree = Distribution {
@@ -45,7 +46,7 @@ pub fn plan_of(system: &LoopSystem, seed: u64) -> Plan {
 }
 
 impl Case {
-    /// Nothing where drives and loops contradict one another, or the rank is about to change.
+    /// `None` if drives and loops contradict each other, if the rank is about to change, or if it is unclear.
     pub fn new(seed: u64) -> Option<Case> {
         Case::of(seed, system(seed))
     }
@@ -67,7 +68,7 @@ impl Case {
         self.system.state.q.clone()
     }
 
-    /// Coordinates moved along velocities, quaternions of unit length.
+    /// Coordinates moved along velocities; quaternions are scaled to unit length.
     pub fn moved(&self, v: &Vector) -> Vec<f64> {
         let mut q: Vec<f64> = self.q().iter().zip(self.coordinate_rates(v).iter()).map(|(q, qd)| q + qd).collect();
         for at in self.i.quaternions() {
@@ -86,7 +87,7 @@ impl Case {
         kept.map(|(k, pivot)| pivot / a[(k, k)]).fold(1.0, f64::min)
     }
 
-    /// Entries of `Φ` as the interpreter has them.
+    /// Residuals and `Φ` of the interpreter.
     pub fn phi(&mut self, q: &[f64]) -> (Vec<f64>, Matrix) {
         let (mut residual, mut entries) = (self.i.zero_rows(), self.i.zero_entries());
         self.i.constraint_residuals(&q.to_vec(), &mut residual, &mut entries);
@@ -112,7 +113,7 @@ impl Case {
     }
 }
 
-/// Errors of one comparison, all systems.
+/// Errors of one comparison on all systems.
 pub struct Errors {
     what: &'static str,
     tolerance: f64,
@@ -131,8 +132,8 @@ impl Errors {
         self.all.push((error, c.seed, c.truth.dense.condition(), c.pivot));
     }
 
-    /// Rows are eliminated one after the other in `Φ M⁻¹Φᵀ`: where the ones before leave only a small part of a row, its
-    /// digits are lost by that factor.
+    /// Fails if an error exceeds the tolerance. Rows are eliminated one after the other in `Φ M⁻¹Φᵀ`: where earlier
+    /// rows leave only a small part of a row, that factor is lost in accuracy, so a small pivot raises the tolerance.
     pub fn done(mut self) {
         self.all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let n = self.all.len();

@@ -1,14 +1,15 @@
-//! Minimal coordinates by dense matrices: `p_ind = Bᵀ M v` with `v = B v_ind`, and every way to choose the independents.
+//! Minimal coordinates by dense matrices: `p_ind = Bᵀ M v` with `v = B v_ind`, and all choices of independent
+//! velocities.
 
 use mbd_testing::closed::LoopSystem;
 use nalgebra::SVD;
 
 use super::{Dense, Matrix, Truth, Vector};
 
-/// Velocities that depend on others, in order.
+/// Indices of dependent velocities, in order.
 pub type Dependents = Vec<usize>;
 
-/// All choices of `k` out of `n`.
+/// All choices of `k` out of `n` indices.
 pub fn choices(n: usize, k: usize) -> Vec<Vec<usize>> {
     if k == 0 {
         return vec![Vec::new()];
@@ -21,12 +22,13 @@ pub fn others(n: usize, some: &[usize]) -> Vec<usize> {
     (0..n).filter(|k| !some.contains(k)).collect()
 }
 
-/// Solves `a x = b`, which has a solution, in the least squares.
+/// Solves `a x = b`, which has a solution, by least squares.
 pub fn least(a: &Matrix, b: &Matrix) -> Matrix {
     SVD::new(a.clone(), true, true).solve(b, 1e-11).expect("singular vectors are there")
 }
 
-/// Singular values of `Φ_d` beside those of `Φ`, both with rows of unit length: the smallest that counts.
+/// Smallest singular value of `Φ_d`, the columns of dependent velocities of `Φ` with rows of unit length. As many
+/// singular values count as the rank of `Φ`.
 pub fn pivot(dense: &Dense, dependents: &[usize]) -> f64 {
     let mut phi = dense.phi.clone();
     for k in 0..phi.nrows() {
@@ -62,7 +64,8 @@ pub fn full(p: &Vector, n: usize, dependents: &[usize]) -> Vector {
     all
 }
 
-/// `d/dt (Bᵀ M v)` of a motion that starts with independent momenta `p` (and none of the dependents): no multipliers enter.
+/// `d/dt (Bᵀ M v)` of the motion that starts with independent momenta `p` and zero dependent momenta. It needs no
+/// multipliers.
 pub fn rates(system: &LoopSystem, truth: &Truth, dependents: &[usize]) -> Vector {
     let dense = &truth.dense;
     let b = tangents(&dense.phi, dependents);

@@ -1,5 +1,5 @@
-//! Constrained motion by dense matrices: `M` of the open tree, `Φ` from the definitions of the constraints, Cholesky and
-//! singular values. Nothing is eliminated joint by joint.
+//! Constrained motion by dense matrices: `M` of the open tree, `Φ` from the definitions of the constraints, Cholesky
+//! and singular values. Nothing is eliminated joint by joint.
 
 #![allow(dead_code)]
 
@@ -15,13 +15,14 @@ pub mod thesis;
 pub type Matrix = DMatrix<f64>;
 pub type Vector = DVector<f64>;
 
-/// Singular values of `Φ L⁻ᵀ`, its rows of unit length, below this are zero; those of real systems between it and
-/// [`CLEAR`] belong to mechanisms that no method tells from redundant ones by its digits.
+/// Singular values of `Φ L⁻ᵀ` with rows of unit length count as zero below this limit. If one is between this limit and
+/// [`CLEAR`], rounding errors make it unclear whether the mechanism has redundant rows.
 pub const ZERO: f64 = 1e-6;
-/// And above this they are clearly not.
+/// Singular values above this limit are clearly not zero.
 pub const CLEAR: f64 = 1e-3;
 
-/// Rows of `Φ`, which come from unit directions and arms of about one metre, smaller than this are rounding.
+/// Rows of `Φ` with smaller entries are rounding errors: the entries come from unit directions and arms of about one
+/// metre.
 const NOTHING: f64 = 1e-12;
 
 /// Mass matrix and constraints of a system in its state.
@@ -46,9 +47,9 @@ pub struct Dense {
 /// Solution of `M x + Φᵀ y = f`, `Φ x = b`.
 pub struct Solution {
     pub x: Vector,
-    /// One of the possible ones.
+    /// One of the possible solutions for `y`.
     pub y: Vector,
-    /// The same for all.
+    /// `Φᵀ y`, the same for all solutions.
     pub force: Vector,
 }
 
@@ -69,12 +70,12 @@ impl Dense {
         let (rows, nv) = phi.shape();
         let lower = m.clone().cholesky().expect("M is positive definite").l();
         let mut w = lower.solve_lower_triangular(&phi.transpose()).expect("L is regular").transpose();
-        // A row that nothing moves along is zero, not what rounding left of it.
+        // A row of rounding errors is set to zero.
         let lengths = Vector::from_fn(rows, |k, _| if phi.row(k).amax() > NOTHING { w.row(k).norm() } else { 0.0 });
         for k in 0..rows {
             w.row_mut(k).scale_mut(if lengths[k] > 0.0 { 1.0 / lengths[k] } else { 0.0 });
         }
-        // Padded with zero rows, so that all right singular vectors come out.
+        // Rows of zeros are added so that the decomposition gives all right singular vectors.
         let padded = w.resize_vertically(rows.max(nv), 0.0);
         let svd = padded.svd(true, true);
         let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
@@ -82,7 +83,8 @@ impl Dense {
         Dense { m, phi, b, driven, lower, lengths, u, v_t, singular: svd.singular_values, rank }
     }
 
-    /// How the singular values that count compare with one; infinite where some are neither zero nor not.
+    /// One over the smallest singular value that counts, at least one. Infinite if it is unclear which singular values
+    /// are zero.
     pub fn condition(&self) -> f64 {
         let smallest = self.singular.iter().copied().filter(|s| *s > ZERO).fold(1.0, f64::min);
         if smallest < CLEAR || self.singular.iter().any(|s| *s <= ZERO && *s > 1e-12) {
@@ -91,7 +93,7 @@ impl Dense {
         1.0 / smallest
     }
 
-    /// Column `k` of the left singular vectors, for the rows of `Φ` as they are.
+    /// Column `k` of the left singular vectors, scaled for the original rows of `Φ`.
     fn left(&self, k: usize) -> Vector {
         Vector::from_fn(
             self.lengths.len(),
@@ -99,7 +101,7 @@ impl Dense {
         )
     }
 
-    /// What of a right-hand side no velocity can meet, relative to it.
+    /// The part of a right-hand side that no velocity can satisfy, relative to the right-hand side.
     pub fn contradiction(&self, b: &Vector) -> f64 {
         let scaled = Vector::from_fn(b.len(), |i, _| if self.lengths[i] > 0.0 { b[i] / self.lengths[i] } else { b[i] });
         let mut rest = scaled.clone();
@@ -144,13 +146,13 @@ impl Dense {
         Matrix::from_columns(&columns).qr().q()
     }
 
-    /// Whether the rank is that of the neighbourhood, as far as the motion with `Φ̇` can tell: what leaves the redundant rows
-    /// goes to the range of the others.
+    /// Whether the rank stays the same along a motion with this `Φ̇`: redundant rows must remain combinations of the
+    /// others to first order.
     pub fn lasting(&self, phi_rate: &Matrix) -> bool {
         let allowed = self.allowed();
         let scale = phi_rate.norm().max(1e-3);
         let rows = self.lengths.len();
-        // Combinations of rows that give nothing: what the kept left vectors do not span.
+        // The combinations of rows that are zero: all that the kept left singular vectors do not span.
         let mut rest = Matrix::identity(rows, rows);
         for k in self.kept() {
             let u = self.u.column(k).rows(0, rows).clone_owned();
@@ -164,7 +166,7 @@ impl Dense {
     }
 }
 
-/// The open tree's view of the constraints.
+/// The constraints of a system, computed from the motion of its open tree.
 pub fn rows(system: &LoopSystem) -> Rows<'_> {
     Rows { plan: &system.open, model: &system.model, state: &system.state }
 }
@@ -177,7 +179,7 @@ pub fn matrix(rows: &[Vec<f64>], nv: usize) -> Matrix {
 pub struct Truth {
     pub dense: Dense,
     pub v: Vector,
-    /// `M⁻¹ p⁺`, the scale of what the constraints take away.
+    /// `M⁻¹ p⁺`, the velocities without constraints. They are the scale of errors in velocities.
     pub unbound: Vector,
     pub sigma: Vector,
     /// `Φᵀσ`.
@@ -188,7 +190,7 @@ pub struct Truth {
     pub open_rates: Vector,
     /// `v̇`, one of the multipliers `λ`, and `Φᵀλ`.
     pub motion: Solution,
-    /// `M⁻¹(τ − h)`.
+    /// `M⁻¹(τ − h)`, the accelerations without constraints.
     pub unbound_motion: Vector,
     /// `γ` of `Φ v̇ + γ = 0`.
     pub gamma: Vector,
@@ -234,12 +236,13 @@ impl Truth {
         }
     }
 
-    /// `ṗ⁺` but for `Φᵀσ̇`, which is nobody's business: `d/dt (M v) = ṗ − Φᵀλ`, so `d/dt (M v + Φᵀσ) = ṗ + Φ̇ᵀσ + Φᵀ(σ̇ − λ)`.
+    /// `ṗ⁺` up to terms `Φᵀ x`, which change multipliers but not the motion. As `d/dt (M v) = ṗ − Φᵀλ`,
+    /// `d/dt (M v + Φᵀσ) = ṗ + Φ̇ᵀσ + Φᵀ(σ̇ − λ)`.
     pub fn momentum_rates(&self) -> Vector {
         &self.open_rates + self.phi_rate.transpose() * &self.sigma
     }
 
-    /// Whether drives and loops agree, in rates and in accelerations, and the rank will last.
+    /// Whether drives and loops agree in velocities and accelerations, and the rank does not change along the motion.
     pub fn regular(&self) -> bool {
         self.dense.contradiction(&self.dense.b) < 1e-9
             && self.dense.contradiction(&self.gamma) < 1e-9

@@ -1,5 +1,6 @@
-//! Section 5.3.3 of the thesis as it stands there (with the errata): minimal coordinates of a serial chain with one loop to the
-//! ground, by recursion with constraint matrices, for any choice of whole joints as dependents.
+//! Section 5.3.3 of the thesis with its errata, written down literally: minimal coordinates of a serial chain with one
+//! loop to the ground, by a recursion with constraint matrices. The velocities of any choice of whole joints are the
+//! dependent ones.
 
 use mbd_codegen::model::{ConstraintKind, JointKind, LoopKind};
 use mbd_runtime::spatial::cross;
@@ -15,7 +16,7 @@ use mbd_testing::value;
 use super::minimal::least;
 use super::{Matrix, Vector};
 
-/// The chain in a configuration: everything in body axes.
+/// The chain in a configuration, in body axes.
 pub struct Chain {
     /// Model joint of every link.
     joints: Vec<usize>,
@@ -23,13 +24,14 @@ pub struct Chain {
     first: Vec<usize>,
     /// Pose of every body in the ground.
     poses: Vec<Pose<f64>>,
-    /// `X` from the link before.
+    /// `X` from the previous link to each link.
     x: Vec<Matrix>,
     e: Vec<Matrix>,
     mass: Vec<Matrix>,
-    /// `X` from the last body to the cut: in the axes of the frame on the ground, at the origin of that on the body.
+    /// `X` from the last body to the cut: to the axes of the loop's frame on the ground, at the origin of its frame on
+    /// the body.
     cut: Matrix,
-    /// `E_c`, constant there.
+    /// `E_c`, constant in these axes.
     cut_rows: Matrix,
 }
 
@@ -41,7 +43,7 @@ fn square(r: &[[f64; 3]; 3]) -> Matrix {
     Matrix::from_row_slice(3, 3, &r.concat())
 }
 
-/// Velocities of frame `a` as seen at frame `b`.
+/// The transform `X` of velocities at frame `a` to velocities at frame `b`.
 fn transform(a: &Pose<f64>, b: &Pose<f64>) -> Matrix {
     let (ra, rb) = (square(&a.axes), square(&b.axes));
     let turn = rb.transpose() * &ra;
@@ -62,7 +64,7 @@ fn crossed(o: &Vector, p: &Vector) -> Vector {
     Vector::from_vec(vec![a[0], a[1], a[2], b[0] + c[0], b[1] + c[1], b[2] + c[2]])
 }
 
-/// `E_c` of the kinds that have a constant one in the axes of the frame at rest.
+/// `E_c` of the kinds of loops for which it is constant in the axes of the frame at rest.
 pub fn cut_rows(kind: &LoopKind) -> Option<Matrix> {
     let lin = |n: [f64; 3]| vec![n[0], n[1], n[2], 0.0, 0.0, 0.0];
     let ang = |n: [f64; 3]| vec![0.0, 0.0, 0.0, n[0], n[1], n[2]];
@@ -83,7 +85,7 @@ pub fn cut_rows(kind: &LoopKind) -> Option<Matrix> {
 }
 
 impl Chain {
-    /// The chain of a system whose only constraint goes from the ground to its last body; at other coordinates than its own.
+    /// The chain of a system whose only constraint connects the ground and its last body, at coordinates `q`.
     pub fn new(system: &LoopSystem, q: &[f64]) -> Chain {
         let (plan, params) = (&system.open, &system.state.params);
         let mut frames = vec![FrameState::ground(); plan.frames.len()];
@@ -179,7 +181,8 @@ impl Chain {
     }
 }
 
-/// Serial chains with one loop to the ground, as section 5.3.3 wants them: nothing hangs on their joints but drives of force.
+/// A serial chain with one loop to the ground, as section 5.3.3 requires: its joints have joint forces, but no springs,
+/// dampers or rotors.
 pub fn chain(seed: u64) -> LoopSystem {
     let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
     let kinds = if seed.is_multiple_of(2) { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
@@ -211,11 +214,11 @@ struct Node {
     d: Matrix,
     m_after: Matrix,
     d_after: Matrix,
-    /// Known momentum, and zeros beside it.
+    /// The known momentum in the first column, zeros in the others.
     p: Matrix,
 }
 
-/// Velocities and `ṗ_ind`, from independent momenta given in full arrays.
+/// Velocities and `ṗ_ind` from independent momenta. All arrays have entries for all velocities.
 pub fn motion(system: &LoopSystem, p: &Vector, dependents: &[usize]) -> (Vector, Vector) {
     let chain = Chain::new(system, &system.state.q);
     let bars = chain.constraint_matrices(dependents);
@@ -224,7 +227,7 @@ pub fn motion(system: &LoopSystem, p: &Vector, dependents: &[usize]) -> (Vector,
     (v, rates)
 }
 
-/// One step of the backward recursion; the momentum of a dependent joint counts as zero, its `p^d` terms cancel.
+/// One step of the backward recursion. The momentum of a dependent joint counts as zero because its `p^d` terms cancel.
 fn node(e: &Matrix, p: Matrix, m: Matrix, d: Matrix) -> Node {
     let u = &m * e;
     let inverse = (e.transpose() * &u).try_inverse().expect("the freedoms move inertia");
@@ -233,7 +236,7 @@ fn node(e: &Matrix, p: Matrix, m: Matrix, d: Matrix) -> Node {
     Node { u, inverse, d, m_after, d_after, p }
 }
 
-/// (5.180) to (5.187).
+/// Velocities by (5.180) to (5.187).
 fn velocities(chain: &Chain, bars: &[Matrix], p: &Vector, dependents: &[usize]) -> Vector {
     let n = chain.links();
     let unknown: usize = bars.iter().map(Matrix::ncols).sum();
@@ -264,7 +267,8 @@ fn velocities(chain: &Chain, bars: &[Matrix], p: &Vector, dependents: &[usize]) 
         }
         nodes[k] = Some(done);
     }
-    // Velocities of the last body: constant, by the dependent momenta, by the velocity before the innermost dependent.
+    // The velocity of the last body as an affine function: a constant, then the columns of the dependent momenta, then
+    // those of the velocity of the link before the innermost dependent one.
     let mut affine = Matrix::zeros(6, 1 + unknown + 6);
     affine.columns_mut(1 + unknown, 6).fill_with_identity();
     for k in innermost..n {
@@ -274,12 +278,13 @@ fn velocities(chain: &Chain, bars: &[Matrix], p: &Vector, dependents: &[usize]) 
         known = known.resize_horizontally(1 + unknown + 6, 0.0);
         affine = &hat + &chain.e[k] * (&done.inverse * (known - done.u.transpose() * &hat));
     }
-    // Not by the normal equations of (5.186), which square the condition.
+    // This replaces the normal equations of (5.186), which square the condition.
     let rows = chain.cut_rows.transpose() * &chain.cut;
     let solver = -least(&(&rows * affine.columns(1, unknown)), &rows);
     let constant = &solver * affine.column(0);
     let by_velocity = &solver * affine.columns(1 + unknown, 6);
-    // On inward as if the loop were open: the momenta are those of the velocity there.
+    // From here to the base the recursion is that of an open chain: the dependent momenta are affine in the velocity of
+    // the link before the innermost dependent one.
     let (by_p, rest) = (d.columns(1, unknown).clone_owned(), d.column(0).clone_owned());
     m += &by_p * &by_velocity;
     let mut d = Matrix::from_columns(&[rest + by_p * &constant]);
@@ -310,7 +315,7 @@ fn velocities(chain: &Chain, bars: &[Matrix], p: &Vector, dependents: &[usize]) 
     v
 }
 
-/// (5.177) to (5.179).
+/// Momentum rates by (5.177) to (5.179).
 fn momentum_rates(system: &LoopSystem, chain: &Chain, bars: &[Matrix], v: &Vector, dependents: &[usize]) -> Vector {
     let n = chain.links();
     let rate = |k: usize| v.rows(chain.first[k], chain.e[k].ncols()).clone_owned();
@@ -351,7 +356,7 @@ fn momentum_rates(system: &LoopSystem, chain: &Chain, bars: &[Matrix], v: &Vecto
     out.into()
 }
 
-/// Weight of a body at its frame.
+/// Force of gravity on a body, and its moment about the origin of the body frame.
 fn weight(system: &LoopSystem, chain: &Chain, k: usize) -> Vector {
     let body = &system.model.bodies[system.model.joints[chain.joints[k]].child];
     let m = value(body.mass, &system.state.params);
@@ -362,7 +367,8 @@ fn weight(system: &LoopSystem, chain: &Chain, k: usize) -> Vector {
     Vector::from_vec([f, n].concat())
 }
 
-/// `Ė` of a link's joint: the first axis of a universal joint turns back with the second angle.
+/// `Ė` of a link's joint. It is zero except for a universal joint, whose first axis rotates in body axes against the
+/// second angle.
 fn joint_rate(system: &LoopSystem, chain: &Chain, k: usize, v: &Vector) -> Matrix {
     let e = &chain.e[k];
     let mut rate = Matrix::zeros(6, e.ncols());
@@ -376,7 +382,7 @@ fn joint_rate(system: &LoopSystem, chain: &Chain, k: usize, v: &Vector) -> Matri
     rate
 }
 
-/// `d/dt C̄_q` in body axes, by differences of fourth order.
+/// `d/dt C̄_q` in body axes, by central differences of fourth order.
 fn bar_rates(system: &LoopSystem, v: &Vector, dependents: &[usize]) -> Vec<Matrix> {
     let q = &system.state.q;
     let mut qd = vec![0.0; q.len()];

@@ -1,5 +1,5 @@
-//! Generates the code of every mechanism, and writes `NAME.loop` with its description for Pinocchio, plain numbers, into the folder
-//! that `RIVALS_MODELS` names; `RIVALS_ONLY` chooses some.
+//! Generates the code of every mechanism, and writes its description for Pinocchio to `NAME.loop` in the folder that
+//! the environment variable `RIVALS_MODELS` names. `RIVALS_ONLY` selects some of the mechanisms.
 
 mod mechanisms;
 mod rods;
@@ -38,7 +38,7 @@ fn write(file: &str, text: &str) {
     std::fs::write(format!("{out}/{file}"), text).expect("written");
 }
 
-/// Where each of our coordinates and velocities stands among theirs; and the start, in our order.
+/// For each of our coordinates and velocities, its index in Pinocchio's state; and the start in our order.
 fn order(ours: &Model, plan: &Plan, theirs: &Model) -> (Vec<usize>, Vec<usize>, Vec<f64>) {
     let (mut q, mut v) = (vec![0; plan.dims.nq], vec![0; plan.dims.nv]);
     let mut start = vec![0.0; plan.dims.nq];
@@ -68,7 +68,7 @@ fn door(lib: &mut String, name: &str, model: &Model, theirs: &Model, far: f64) {
     write(&format!("{name}.rs"), &generated.source);
     let plan = search::plan(model, PlanOptions::default());
     let (q, v, start) = order(model, &plan, theirs);
-    let count = |group: Output| generated.counts.iter().find(|c| c.0 == group).map_or(0, |c| c.1.total());
+    let count = |output: Output| generated.counts.iter().find(|c| c.0 == output).map_or(0, |c| c.1.total());
     let (rates, accelerations) = (count(Rates), count(Accelerations));
     let (nq, nv, rows) = (q.len(), v.len(), plan.dims.rows);
     let _ = write!(
@@ -112,8 +112,8 @@ pub mod {name} {{
         super::state(&mut Kernel::new(), &start, {far:?}, seed, &mut *q.cast(), &mut *v.cast())
     }}
 
-    /// Numbers of coordinates, velocities and rows; operations of the rates and of the accelerations; where our coordinates and
-    /// velocities stand in Pinocchio's state.
+    /// Numbers of coordinates, velocities and rows; operations of the rates and of the accelerations; where our
+    /// coordinates and velocities stand in Pinocchio's state.
     ///
     /// # Safety
     /// A pointer to 5 + {nq} + {nv} numbers.

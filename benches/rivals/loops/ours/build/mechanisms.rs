@@ -1,4 +1,4 @@
-//! What races: mechanisms of `models/`, closed chains, and the Delta robot with its rods as bodies.
+//! The mechanisms of the comparison: some of `models/`, closed chains, and the Delta robot with its rods as bodies.
 
 use std::fmt::Write as _;
 
@@ -10,9 +10,9 @@ use crate::rods::with_rods;
 pub struct Mechanism {
     pub name: &'static str,
     pub ours: Model,
-    /// Pinocchio's model where it is another.
+    /// The model for Pinocchio, if it differs from ours.
     pub theirs: Option<Model>,
-    /// How far random states are from the start, rad and m.
+    /// Largest distance of coordinates of random states from the start, rad and m.
     pub far: f64,
 }
 
@@ -37,8 +37,9 @@ pub fn all() -> Vec<Mechanism> {
     ]
 }
 
-/// A model without springs and dampers, which Pinocchio's algorithm does not know, and with axes turned round that point
-/// against a coordinate axis, for which it has no fast joint; those coordinates change their sign.
+/// A model without springs and dampers, which Pinocchio's algorithm does not have. Joint axes that point against a
+/// coordinate axis are reversed, because Pinocchio has fast joints for coordinate axes only; the coordinates of these
+/// joints change sign.
 fn model(path: &str, text: &str) -> Model {
     let mut model = read::model(path, text, &ImportOptions::default()).unwrap_or_else(|findings| panic!("{findings}")).model;
     for (k, joint) in model.joints.iter_mut().enumerate() {
@@ -59,7 +60,7 @@ fn model(path: &str, text: &str) -> Model {
     model
 }
 
-/// Turns an axis round if it points against a coordinate axis; whether it did.
+/// Reverses an axis if it points against a coordinate axis. Returns whether it did.
 fn backwards(axis: &mut [f64; 3]) -> bool {
     let found = axis.iter().filter(|x| **x != 0.0).count() == 1 && axis.iter().sum::<f64>() < 0.0;
     if found {
@@ -68,7 +69,8 @@ fn backwards(axis: &mut [f64; 3]) -> bool {
     found
 }
 
-/// Planar chain of equal slender links (thesis 7.2: 10 g, 50 mm) in an arc, its last tip pinned to the ground where it starts.
+/// Planar chain of equal slender links (thesis 7.2: 10 g, 50 mm) in an arc. A revolute joint connects its tip to the
+/// ground at the tip's position at the start.
 fn closed_chain(n: usize) -> String {
     let (mut text, mut tip, mut before) = (format!("name = \"closed{n}\"\ngravity = [0, -9.81, 0]\n"), [0.0; 2], 0.0);
     let across = 0.01 * 0.05 * 0.05 / 12.0;

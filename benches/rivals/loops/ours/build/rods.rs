@@ -1,18 +1,18 @@
-//! Massless rods as bodies: Pinocchio's rigid constraints know no distances.
+//! Replaces constraints of distance by rods as bodies, because Pinocchio's rigid constraints have no distances.
 
 use mbd_codegen::model::{
     Body, Constraint, ConstraintKind, Joint, JointKind, LoopKind, Model, Mount, Placement, Rotation, Value,
 };
 
-/// Mass of a rod of the Delta robot, half of it at either end, kg.
+/// Mass of a rod of the Delta robot, kg. Each end has half of it.
 const ROD: f64 = 0.1;
 
 fn number(x: Value) -> f64 {
     x.constant().expect("a constant")
 }
 
-/// The same mechanism and the same masses at the same places: every distance becomes a rod on a universal joint, whose other end is
-/// a ball; the halves of its mass leave the bodies that carried them.
+/// The same mechanism with the same masses at the same positions. Every distance becomes a rod on a universal joint,
+/// with a spherical loop at its other end. The halves of the rod's mass are subtracted from the bodies that had them.
 pub fn with_rods(model: &Model) -> Model {
     let mut out = model.clone();
     out.constraints.clear();
@@ -61,7 +61,7 @@ fn point(m: f64, [x, y, z]: [f64; 3]) -> [f64; 6] {
     [y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z].map(|e| m * e)
 }
 
-/// Takes a point mass from a body.
+/// Subtracts a point mass from a body.
 fn lighten(body: &mut Body, place: [f64; 3], m: f64) {
     assert_eq!(body.inertia_axes, Rotation::NONE, "{}", body.name);
     let (mass, com) = (number(body.mass), body.com.map(number));

@@ -1,4 +1,4 @@
-//! A mechanism for Pinocchio, as plain numbers: `race.cpp` reads them.
+//! Description of a mechanism for Pinocchio as plain numbers, which `race.cpp` reads.
 
 use std::fmt::Write as _;
 
@@ -14,7 +14,7 @@ fn product(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// By rows.
+/// Rotation matrix, by rows.
 fn rotation(r: &Rotation) -> [[f64; 3]; 3] {
     let Rotation::Rpy(angles) = r else { panic!("a rotation about an axis") };
     let [(sr, cr), (sp, cp), (sy, cy)] = angles.map(|a| number(a).sin_cos());
@@ -30,13 +30,13 @@ fn numbers(out: &mut String, x: impl IntoIterator<Item = f64>) {
     });
 }
 
-/// Rotation by rows, then the place.
+/// Writes the rotation matrix by rows, then the position.
 fn placement(out: &mut String, p: &Placement) {
     numbers(out, rotation(&p.rotation).into_iter().flatten());
     numbers(out, p.xyz.map(number));
 }
 
-/// Its joint there; 0 for the ground.
+/// Pinocchio's index of the joint of a body; 0 for the ground.
 fn joint_of(model: &Model, body: Option<usize>) -> usize {
     body.map_or(0, |b| 1 + model.joints.iter().position(|j| j.child == b).expect("a joint"))
 }
@@ -65,8 +65,9 @@ fn inertia(out: &mut String, body: &Body) {
     numbers(out, [xx, xy, xz, xy, yy, yz, xz, yz, zz]);
 }
 
-/// Name, numbers of joints and of loops, gravity; a line for each joint: kind, parent, placement, axes, mass, mass centre, inertia,
-/// armature; a line for each loop: twice joint and placement. All loops are of points: in the plane a pin is one.
+/// The description. The first line has name, numbers of joints and of loops, and gravity. Then there is a line for each
+/// joint (kind, parent, placement, axes, mass, centre of mass, inertia, armature) and one for each loop (joint and
+/// placement of both ends). All loops are spherical joints, which in planar mechanisms replace revolute ones.
 pub fn text(name: &str, model: &Model) -> String {
     let Gravity::Constant(gravity) = model.gravity else { panic!("{name}: gravity is constant") };
     let mut out = format!("{name} {} {}", model.joints.len(), model.constraints.len());
@@ -82,7 +83,7 @@ pub fn text(name: &str, model: &Model) -> String {
     for constraint in &model.constraints {
         let ConstraintKind::Loop { kind, first, second } = &constraint.kind else { panic!("{name}: loops only") };
         assert!(matches!(kind, LoopKind::Revolute { .. } | LoopKind::Spherical), "{name}: {}", kind.word());
-        // Their first joint is to be that of a body.
+        // Pinocchio's constraint must begin with the end on a body.
         let mut ends: Vec<&Mount> = vec![first, second];
         ends.sort_by_key(|m| m.body.is_none());
         out.push('\n');
