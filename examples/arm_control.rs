@@ -15,7 +15,8 @@ const NV: usize = Ur5::NV;
 /// Period of the controller, s.
 const PERIOD: f64 = 1e-3;
 
-/// Joint angles (rad) of the path at time `t` (s), their rates and accelerations: half a turn of every joint to and fro.
+/// Joint angles (rad) of the path at time `t` (s), their rates and accelerations: half a turn of every joint to and
+/// fro.
 fn path(t: f64) -> [[f64; NV]; 3] {
     let (s, c) = t.sin_cos();
     let size: [f64; NV] = core::array::from_fn(|k| 0.5 - 0.05 * k as f64);
@@ -47,7 +48,8 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("gravity compensation: the arm moved by {moved:.1e} rad in 2 s");
     assert!(moved < 1e-9);
 
-    // Computed torque: the inverse dynamics of the path's acceleration, corrected by what is off; 20 rad/s, critically damped.
+    // Computed torque: the inverse dynamics of the path's acceleration, corrected by what is off; 20 rad/s, critically
+    // damped.
     let (stiffness, damping) = (400.0, 40.0);
     (q, p) = (arm.neutral(), arm.zero_momenta());
     q[0] = 0.1; // an error to begin with

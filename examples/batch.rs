@@ -1,4 +1,5 @@
-//! Many motions of one robot at once: eight states side by side in vector registers, and a block of columns for every thread.
+//! Many motions of one robot at once: eight states side by side in vector registers, and a block of columns for every
+//! thread.
 //!
 //! `cargo run --release --example batch`
 

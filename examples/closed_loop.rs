@@ -10,7 +10,8 @@ multibody::mbd_model! { path = "models/mechanisms/fourbar.toml", name = Fourbar 
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut bars = Fourbar::new();
 
-    // The description holds the crank at 60 degrees; the other two angles are where the search for a closed loop begins.
+    // The description holds the crank at 60 degrees; the other two angles are where the search for a closed loop
+    // begins.
     let mut q = Fourbar::START;
     let closed = close(&mut bars, &mut q, &Closing::holding(&Fourbar::HELD))?;
     println!("closed in {} iterations; {} independent rows of {}", closed.iterations, closed.rank, Fourbar::ROWS);

@@ -1,12 +1,11 @@
 //! Stiff methods of the crate [`diffsol`](::diffsol) on any [`System`](crate::runtime::System): feature `diffsol`.
 //!
-//! BDF of variable order 1 to 5, and two singly diagonally implicit Runge-Kutta pairs. They see the state as plain components,
-//! `y = (q, p)`. Rates are evaluated at quaternions scaled to unit length, and what is given back is scaled as well; so the
-//! norm can drift within the tolerances only, unlike in the methods of
-//! [`runtime::integrate`](crate::runtime::integrate), which are what to prefer on joints with quaternions. Without joints with
-//! quaternions and planar joints the derivatives are the exact ones of
-//! [`Differentiable`]; with them, differences of the rates: they serve Newton's
-//! iteration alone, whose result does not depend on them.
+//! BDF of variable order 1 to 5, and two singly diagonally implicit Runge-Kutta pairs. They see the state as plain
+//! components, `y = (q, p)`. Rates are evaluated at quaternions scaled to unit length, and what is given back is scaled
+//! as well; so the norm can drift within the tolerances only, unlike in the methods of
+//! [`runtime::integrate`](crate::runtime::integrate), which are what to prefer on joints with quaternions. Without
+//! joints with quaternions and planar joints the derivatives are the exact ones of [`Differentiable`]; with them,
+//! differences of the rates: they serve Newton's iteration alone, whose result does not depend on them.
 //!
 //! ```
 //! use multibody::diffsol::{Diffsol, Stiff};

@@ -76,17 +76,18 @@ pub use mbd_runtime as runtime;
 ///
 /// # What is made
 /// A type `Arm` with `new()`, a function for each output, the constants `NQ` and `NV` (numbers of coordinates and of
-/// velocities), names and indices of the coordinates (`Arm::Q_ELBOW`), and fields for what is given beside the state: joint
-/// forces `tau`, prescribed motions, wrenches, parameters. With `rates` among the outputs it is a
+/// velocities), names and indices of the coordinates (`Arm::Q_ELBOW`), and fields for what is given beside the state:
+/// joint forces `tau`, prescribed motions, wrenches, parameters. With `rates` among the outputs it is a
 /// [`System`](runtime::System) for the integrators. States are described in `docs/model-format.md`.
 ///
 /// The expansion needs no standard library. A crate without one depends on `mbd-macros` and on `mbd-runtime` with
 /// `default-features = false` and calls `mbd_macros::mbd_model!`.
 ///
 /// # Errors
-/// Everything wrong with the file is reported at the path, with its place in the file; what is wrong with the arguments,
-/// at the arguments. Warnings about the file are shown as uses of something deprecated, so `#[allow(deprecated)]` on a
-/// module around the call silences them. The file is watched: a change compiles the type anew.
+/// Everything wrong with the file is reported at the path, with its place in the file; what is wrong with the
+/// arguments, at the arguments. Warnings about the file are shown as uses of something deprecated, so
+/// `#[allow(deprecated)]` on a module around the call silences them. The file is watched: a change compiles the type
+/// anew.
 ///
 /// Compile time grows with the model, in `cargo check` too. Large ones, more than some twenty velocities, are better
 /// generated once into a file.

@@ -1,7 +1,7 @@
 //! What most programs use: `use multibody::prelude::*;`.
 //!
-//! The macro, the traits of mechanisms, the interpreter, the way of going through a time with a method for each need. Everything else is
-//! named by its module.
+//! The macro, the traits of mechanisms, the interpreter, the way of going through a time with a method for each need.
+//! Everything else is named by its module.
 
 #[cfg(feature = "macros")]
 pub use crate::mbd_model;

@@ -1,7 +1,7 @@
 //! The command `mbd`: every subcommand takes its arguments and a writer, and returns an error if it fails.
 //!
-//! This library serves the executable and the project's own experiments. Its interface may change in any release; programs should
-//! use `multibody`.
+//! This library serves the executable and the project's own experiments. Its interface may change in any release;
+//! programs should use `multibody`.
 
 mod args;
 mod check;
@@ -67,7 +67,8 @@ pub fn main() -> ExitCode {
     reported(|out| run(arguments.command, out))
 }
 
-/// Runs a command on standard output and reports its failure on standard error. Exit status 0: done; 1: findings or a failure.
+/// Runs a command on standard output and reports its failure on standard error. Exit status 0: done; 1: findings or a
+/// failure.
 pub fn reported(command: impl FnOnce(&mut dyn Write) -> Outcome) -> ExitCode {
     let mut out = std::io::BufWriter::new(std::io::stdout().lock());
     let result = command(&mut out).and_then(|()| Ok(out.flush()?));

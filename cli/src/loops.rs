@@ -102,8 +102,8 @@ pub fn assemble(path: &Path, plan: &Plan, interpreter: &mut Interpreter<f64>, st
 }
 
 /// Velocities that satisfy the constraints. Those of `held` joints stay and the others follow from them; where that is
-/// impossible, or no joint is held, the nearest velocities in the metric of the mass matrix. `stated` says that the velocities
-/// are given by the user, so that a change is reported.
+/// impossible, or no joint is held, the nearest velocities in the metric of the mass matrix. `stated` says that the
+/// velocities are given by the user, so that a change is reported.
 pub fn velocities(
     plan: &Plan,
     interpreter: &mut Interpreter<f64>,

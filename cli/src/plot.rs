@@ -15,7 +15,8 @@ pub struct Panel {
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Factor by which the plot is drawn larger than it is shown. The backend rounds to whole units; the factor keeps lines smooth.
+/// Factor by which the plot is drawn larger than it is shown. The backend rounds to whole units; the factor keeps lines
+/// smooth.
 pub const SCALE: u32 = 3;
 const WIDTH: u32 = 1100 * SCALE;
 /// Width of the legend, pixels.
@@ -81,7 +82,8 @@ fn draw(
     Ok(())
 }
 
-/// Colours in the order of the lines. They are far apart, and their lightness alternates, so that neighbours also differ in print.
+/// Colours in the order of the lines. They are far apart, and their lightness alternates, so that neighbours also
+/// differ in print.
 pub fn colour(k: usize) -> HSLColor {
     let hue = (0.61 + k as f64 * 0.381_966) % 1.0;
     HSLColor(hue, 0.75, [0.42, 0.3, 0.55][k % 3])

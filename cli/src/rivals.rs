@@ -1,7 +1,7 @@
 //! Published operation counts of the forward dynamics of serial chains of revolute joints.
 //!
-//! J. Naudet, *Forward Dynamics of Multibody Systems: A Recursive Hamiltonian Approach* (2005), table 4.1: additions and
-//! multiplications for a chain of `n ≥ 3` bodies with revolute joints, given there as upper bounds.
+//! J. Naudet, *Forward Dynamics of Multibody Systems: A Recursive Hamiltonian Approach* (2005), table 4.1: additions
+//! and multiplications for a chain of `n ≥ 3` bodies with revolute joints, given there as upper bounds.
 
 use multibody::codegen::model::{JointKind, JointMotion};
 use multibody::codegen::plan::Plan;

@@ -20,8 +20,8 @@ use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::{loops, picture, source, Failure, Outcome};
 
-/// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at the
-/// end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
+/// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at
+/// the end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
 const METHOD: &str = "verner9";
 const TOLERANCE: f64 = 1e-9;
 /// Default number of rows of the table.

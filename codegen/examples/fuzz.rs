@@ -4,8 +4,9 @@
 //! cargo run --release -p mbd-codegen --example fuzz -- --seconds 600 [--format toml|urdf] [--seed 1] [--save DIR]
 //! ```
 //!
-//! Inputs that panic, take longer than a second, or give neither model nor error are written to the folder of `--save` (default
-//! `target/fuzz`) and named by their seed; the exit status is 1 if there were any. A seed gives the same input as long as the corpus stays the same.
+//! Inputs that panic, take longer than a second, or give neither model nor error are written to the folder of `--save`
+//! (default `target/fuzz`) and named by their seed; the exit status is 1 if there were any. A seed gives the same input
+//! as long as the corpus stays the same.
 
 #[path = "../tests/readers/mutate.rs"]
 mod mutate;

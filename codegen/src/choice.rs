@@ -1,6 +1,7 @@
 //! Options that are one of a few words: the macro, manifests and the command line read the same lists.
 
-/// Declares an enum whose values have words. The first value is the default, and the doc comments are the command line's help too.
+/// Declares an enum whose values have words. The first value is the default, and the doc comments are the command
+/// line's help too.
 macro_rules! choice {
     ($(#[doc = $about:literal])+ pub enum $name:ident { $($(#[doc = $meaning:literal])+ $value:ident = $word:literal,)+ }) => {
         $(#[doc = $about])+

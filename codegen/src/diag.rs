@@ -14,7 +14,8 @@ pub enum Severity {
     Notice,
 }
 
-/// One finding, shown as `file:line:column: error: message` and a help line. Lines and columns start at 1; 0 means the file as a whole.
+/// One finding, shown as `file:line:column: error: message` and a help line. Lines and columns start at 1; 0 means the
+/// file as a whole.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Diagnostic {

@@ -1,8 +1,8 @@
 //! Base parameters: the combinations of dynamic parameters that a motion can identify.
 //!
 //! The regressor is evaluated at random motions. A column that depends on those before it has no effect of its own: its
-//! parameter only adds to theirs (M. Gautier, *Numerical calculation of the base inertial parameters of robots*, Journal of
-//! Robotic Systems 8(4), 1991).
+//! parameter only adds to theirs (M. Gautier, *Numerical calculation of the base inertial parameters of robots*,
+//! Journal of Robotic Systems 8(4), 1991).
 
 use std::fmt;
 
@@ -22,8 +22,8 @@ pub struct BaseParameter {
     pub others: Vec<(usize, f64)>,
 }
 
-/// The parameters of a mechanism, sorted by what a motion tells about them. Its `Display` names the base parameters, one to a
-/// line, with factors of six decimals.
+/// The parameters of a mechanism, sorted by what a motion tells about them. Its `Display` names the base parameters,
+/// one to a line, with factors of six decimals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identifiable {
     /// Names of all dynamic parameters, [`Plan::parameter_names`].

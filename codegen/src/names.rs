@@ -8,8 +8,8 @@ const KEYWORDS: &[&str] = &[
     "true", "try", "type", "typeof", "union", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
 ];
 
-/// A name of a model as a Rust identifier, its case kept: anything but ASCII letters and digits turns into `_`, a leading digit gets a `_`
-/// in front, a keyword one behind.
+/// A name of a model as a Rust identifier, its case kept: anything but ASCII letters and digits turns into `_`, a
+/// leading digit gets a `_` in front, a keyword one behind.
 pub fn rust_name(name: &str) -> String {
     let mut out: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if out.is_empty() || out.starts_with(|c: char| c.is_ascii_digit()) {

@@ -16,7 +16,8 @@ choice! {
 choice! {
     /// Arithmetic of the generated code.
     pub enum Arithmetic {
-        /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger errors.
+        /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger
+        /// errors.
         Fast = "fast",
         /// The operations of the sweeps unchanged, which give the bits of the interpreter.
         Exact = "exact",
@@ -38,10 +39,11 @@ choice! {
 choice! {
     /// Strategy by which the elimination of the joints is chosen.
     pub enum EliminationStrategy {
-        /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model, of
-        /// those whose rounding errors are not much larger than those of one joint at a time.
+        /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model,
+        /// of those whose rounding errors are not much larger than those of one joint at a time.
         Fastest = "fastest",
-        /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding errors.
+        /// Branch by branch the elimination for which the rates have the fewest operations, whatever its rounding
+        /// errors.
         Fewest = "fewest",
         /// One joint at a time.
         Single = "single",

@@ -21,10 +21,11 @@ pub struct Reading {
     pub findings: Diagnostics,
 }
 
-/// Reads and checks a description in the format its file name ends in: `.toml`, `.urdf`, or `.xml` with a `<robot>` in it.
+/// Reads and checks a description in the format its file name ends in: `.toml`, `.urdf`, or `.xml` with a `<robot>` in
+/// it.
 ///
-/// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text does not; nothing
-/// is read from disk.
+/// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
+/// does not; nothing is read from disk.
 ///
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.

@@ -1,5 +1,5 @@
-//! Generates the code of a robot before the crate is compiled: it is made once for each change of the description, and an
-//! editor that checks the crate does not generate it again, as it does with `mbd_model!`.
+//! Generates the code of a robot before the crate is compiled: it is made once for each change of the description, and
+//! an editor that checks the crate does not generate it again, as it does with `mbd_model!`.
 
 use std::path::{Path, PathBuf};
 

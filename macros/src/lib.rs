@@ -1,7 +1,7 @@
 //! The `mbd_model!` macro.
 //!
-//! Depend on `multibody` and call `multibody::mbd_model!`, which is documented there, or, without the standard library, on
-//! this crate and on `mbd-runtime` with `default-features = false`.
+//! Depend on `multibody` and call `multibody::mbd_model!`, which is documented there, or, without the standard library,
+//! on this crate and on `mbd-runtime` with `default-features = false`.
 
 mod args;
 mod expand;

@@ -4,11 +4,12 @@ use alloc::vec::Vec;
 
 use crate::system::{system_within, Accelerated, Conjugate, Energetic, LieJoint, System};
 
-/// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] with velocities in place of momenta, which every
-/// integrator can run. A comparison with the [`System`] itself shows the effect of momenta as state variables.
+/// A mechanism in acceleration form, `(q, v) → (N(q) v, v̇)`: a [`System`] with velocities in place of momenta, which
+/// every integrator can run. A comparison with the [`System`] itself shows the effect of momenta as state variables.
 ///
-/// Velocities of joints with quaternions and of planar joints are in body axes, and their rates are integrated component by
-/// component. Momenta that are conserved exactly in canonical form are therefore not conserved exactly here.
+/// Velocities of joints with quaternions and of planar joints are in body axes, and their rates are integrated
+/// component by component. Momenta that are conserved exactly in canonical form are therefore not conserved exactly
+/// here.
 #[derive(Clone, Debug)]
 pub struct AccelerationForm<Y> {
     /// The mechanism, with its inputs.

@@ -55,7 +55,8 @@ fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, BatchError>
     }
 }
 
-/// Reads states `at..at + L` of the columns. Places after the last state are filled with the last state, which is valid.
+/// Reads states `at..at + L` of the columns. Places after the last state are filled with the last state, which is
+/// valid.
 #[inline(always)]
 fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usize, block: &mut [[T; L]; N]) {
     for (column, lanes) in columns.iter().zip(block) {

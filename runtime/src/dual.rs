@@ -6,8 +6,8 @@ use crate::Scalar;
 
 /// `re + ε du` with `ε² = 0`: a value and its derivative along one direction, exact to rounding.
 ///
-/// A sweep that runs on dual numbers computes its own derivative: from `q + ε q̇` and `v + ε v̇` it computes the momenta
-/// `p + ε ṗ`. Dual numbers can be nested: `Dual<Dual<f64>>` carries second derivatives.
+/// A sweep that runs on dual numbers computes its own derivative: from `q + ε q̇` and `v + ε v̇` it computes the
+/// momenta `p + ε ṗ`. Dual numbers can be nested: `Dual<Dual<f64>>` carries second derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dual<S> {
     /// Value.

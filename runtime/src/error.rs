@@ -157,7 +157,8 @@ pub enum ConstraintError {
         constraint: usize,
         /// Its residual, m or rad.
         residual: f64,
-        /// Number of rows that are independent of one another where the search ended, coordinates that are held left out.
+        /// Number of rows that are independent of one another where the search ended, coordinates that are held left
+        /// out.
         rank: usize,
         /// Number of rows.
         rows: usize,

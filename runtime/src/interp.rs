@@ -181,40 +181,41 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.inverse_dynamics(q, v, a, &inputs!(self), &mut self.work, tau);
     }
 
-    /// Regressor `Y` of the joint forces, `(q, v, v̇) → Y` with `τ = Y π`, row by row: one row for each velocity, one column for
-    /// each of [`Tree::dynamic_parameters`]. Springs, rotor inertias and external wrenches are not in it.
+    /// Regressor `Y` of the joint forces, `(q, v, v̇) → Y` with `τ = Y π`, row by row: one row for each velocity, one
+    /// column for each of [`Tree::dynamic_parameters`]. Springs, rotor inertias and external wrenches are not in it.
     pub fn regressor(&mut self, q: &[S], v: &[S], a: &[S], out: &mut [S]) {
         let sweeps = Sweeps { tree: &self.physical, trace: &() };
         sweeps.regressor(q, v, a, &inputs!(self), &mut self.work, out);
     }
 
-    /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`: products of velocities, prescribed accelerations and gravity, less
-    /// springs, dampers and external wrenches.
+    /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`: products of velocities, prescribed accelerations and gravity,
+    /// less springs, dampers and external wrenches.
     pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.bias(q, v, &inputs!(self), &mut self.work, h);
     }
 
     /// `q →` Jacobian of every frame of [`Tree::frames`], `6 × nv` each, row by row: `J v` is the frame's velocity
-    /// `[linear; angular]` in its own axes, at its origin, as far as it comes from `v`. In ground axes it is `R J`, with
-    /// the rotation of [`Interpreter::frames`] on both halves.
+    /// `[linear; angular]` in its own axes, at its origin, as far as it comes from `v`. In ground axes it is `R J`,
+    /// with the rotation of [`Interpreter::frames`] on both halves.
     pub fn jacobians(&mut self, q: &[S], out: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.jacobians(q, &inputs!(self), &mut self.work, self.tree.frames.iter(), out);
     }
 
-    /// `(q, v) →` acceleration `[linear; angular]` of every frame of [`Tree::frames`] at `v̇ = 0`, in its own axes: that of
-    /// the origin as the ground sees it, and angular; the frame accelerates by `J v̇` more. In ground axes, with the
-    /// rotation on both halves, it is `J̇ v` of the Jacobian in ground axes. Prescribed motions are included.
+    /// `(q, v) →` acceleration `[linear; angular]` of every frame of [`Tree::frames`] at `v̇ = 0`, in its own axes:
+    /// that of the origin as the ground sees it, and angular; the frame accelerates by `J v̇` more. In ground axes,
+    /// with the rotation on both halves, it is `J̇ v` of the Jacobian in ground axes. Prescribed motions are included.
     pub fn bias_accelerations(&mut self, q: &[S], v: &[S], out: &mut [[S; 6]]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
         sweeps.bias_accelerations(q, v, &inputs!(self), &mut self.work, frames);
     }
 
-    /// `(q, v) →` centre of mass in the ground (3 numbers, m), centroidal momentum matrix `A` (`6 × nv`, row by row) and bias
-    /// (6 numbers): the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, is `A v`, and
-    /// changes at the rate `A v̇ + bias`. Prescribed rates add to the momentum; prescribed accelerations are in the bias.
+    /// `(q, v) →` centre of mass in the ground (3 numbers, m), centroidal momentum matrix `A` (`6 × nv`, row by row)
+    /// and bias (6 numbers): the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes,
+    /// is `A v`, and changes at the rate `A v̇ + bias`. Prescribed rates add to the momentum; prescribed accelerations
+    /// are in the bias.
     pub fn centroidal(&mut self, q: &[S], v: &[S], center: &mut [S], matrix: &mut [S], bias: &mut [S]) {
         let sweeps = Sweeps { tree: &self.physical, trace: &() };
         sweeps.centroidal(q, v, &inputs!(self), &mut self.work, center, matrix, bias);
@@ -226,7 +227,8 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.mass_matrix(q, &inputs!(self), &mut self.work, m);
     }
 
-    /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of [`Interpreter::tree`].
+    /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of
+    /// [`Interpreter::tree`].
     pub fn momentum_derivatives(&mut self, q: &[S], v: &[S], d: &mut Derivatives<S>, out: &mut MomentumDerivatives<S>) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.momentum_derivatives(q, v, &inputs!(self), &mut self.work, d, out);

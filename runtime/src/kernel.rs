@@ -1,8 +1,8 @@
 //! Generated code for the instructions of the processor: one source text, compiled for several levels.
 //!
-//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it in
-//! the version for the best level that the processor supports. With feature `std` the level is detected at run time, once,
-//! so that a plain `cargo build --release` is fast everywhere. Without it, kernels are plain code of the target.
+//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it
+//! in the version for the best level that the processor supports. With feature `std` the level is detected at run time,
+//! once, so that a plain `cargo build --release` is fast everywhere. Without it, kernels are plain code of the target.
 //!
 //! | arithmetic | `a · b + c` | where |
 //! | --- | --- | --- |
@@ -13,8 +13,9 @@
 //! compiler vectorises this loop. If the processor has AVX-512 and the compiler is 1.89 or later, lanes that fill its
 //! registers use it.
 //!
-//! The only `unsafe` code of the project is at the end of this file. It calls functions that are compiled for more than the
-//! baseline of the target. This is sound because every call first asks [`level`] which instructions the processor has.
+//! The only `unsafe` code of the project is at the end of this file. It calls functions that are compiled for more than
+//! the baseline of the target. This is sound because every call first asks [`level`] which instructions the processor
+//! has.
 
 /// The arithmetic of a kernel: how `a · b + c` is rounded. The numbers are `f64` or `f32` in every case.
 pub trait Arithmetic: Copy {
@@ -62,7 +63,8 @@ impl Arithmetic for Fused {
 
 /// Body number `ID` of a generated type, for `L` lanes.
 ///
-/// `run` must be `#[inline(always)]`: it is then compiled as part of its caller, for the instructions that the caller enables.
+/// `run` must be `#[inline(always)]`: it is then compiled as part of its caller, for the instructions that the caller
+/// enables.
 pub trait Kernel<const ID: usize, const L: usize, Arguments> {
     /// Runs it.
     fn run<A: Arithmetic>(arguments: Arguments);
@@ -132,8 +134,8 @@ macro_rules! places {
 places!(f64);
 places!(f32);
 
-/// A local array of a kernel: `N` rows of `L` lanes, aligned so that no vector crosses a cache line. (Without `std` there are
-/// no wide vectors, and stack memory is scarce; the array is then not aligned.)
+/// A local array of a kernel: `N` rows of `L` lanes, aligned so that no vector crosses a cache line. (Without `std`
+/// there are no wide vectors, and stack memory is scarce; the array is then not aligned.)
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "std", repr(align(64)))]
 pub struct Rows<T, const L: usize, const N: usize>(pub [[T; L]; N]);
@@ -226,7 +228,8 @@ mod processor {
     pub fn call<K: Kernel<ID, L, X>, const ID: usize, const L: usize, X, const WIDE: bool>(arguments: X) {
         #[cfg(all(target_feature = "avx2", target_feature = "fma"))]
         if !WIDE {
-            // The whole program is compiled for such a processor: nothing has to be detected, and the kernel can be inlined.
+            // The whole program is compiled for such a processor: nothing has to be detected, and the kernel can be
+            // inlined.
             return K::run::<Fused>(arguments);
         }
         match level() {

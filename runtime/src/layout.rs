@@ -1,7 +1,7 @@
 //! States in the order and representation of other programs ("there"), and their conversion to this project's ("here").
 //!
-//! Velocities, momenta and joint forces are permuted. Coordinates are also converted where the other program represents a
-//! rotation differently. Both layouts describe the same frames, so that nothing else changes.
+//! Velocities, momenta and joint forces are permuted. Coordinates are also converted where the other program represents
+//! a rotation differently. Both layouts describe the same frames, so that nothing else changes.
 
 use alloc::vec::Vec;
 
@@ -56,7 +56,8 @@ pub struct Part {
 
 /// A correspondence of states in two layouts.
 ///
-/// The slices that are converted must have the lengths of their layouts. Entries that no joint refers to are not changed.
+/// The slices that are converted must have the lengths of their layouts. Entries that no joint refers to are not
+/// changed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.

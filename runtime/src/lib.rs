@@ -1,9 +1,9 @@
 //! Sweeps, interpreter and integrators of the multibody project.
 //!
-//! The crate is `no_std` by default and does not allocate on the hot path. Generated code needs [`System`], [`integrate`],
-//! [`kernel`], [`batch`] and [`trig`] only. The tree, its workspace and the interpreter (feature `alloc`) allocate their
-//! vectors once, when they are made. With feature `std`, generated code uses the vector instructions that it detects at run
-//! time.
+//! The crate is `no_std` by default and does not allocate on the hot path. Generated code needs [`System`],
+//! [`integrate`], [`kernel`], [`batch`] and [`trig`] only. The tree, its workspace and the interpreter (feature
+//! `alloc`) allocate their vectors once, when they are made. With feature `std`, generated code uses the vector
+//! instructions that it detects at run time.
 #![no_std]
 
 #[cfg(feature = "alloc")]

@@ -19,15 +19,16 @@
 //! | `T*_i` | `T*` | | external wrench on the subtree |
 //! | `q, v, p, τ` | `q, q̇, p, τ` | `q, q̇, –, τ` | coordinates, velocities, canonical momenta, joint forces |
 //!
-//! Two identities hold by structure and are never computed: `EᵀM' = 0` and `EᵀD' = p` (with a rotor's inertia `I_a` on the
-//! joint they are `I_a kᵀ` and `p − I_a e`). Gravity acts on subtrees as a force through their first moments. The canonical
-//! form has no acceleration to which it could be added, as other algorithms add it to the acceleration of the base.
+//! Two identities hold by structure and are never computed: `EᵀM' = 0` and `EᵀD' = p` (with a rotor's inertia `I_a` on
+//! the joint they are `I_a kᵀ` and `p − I_a e`). Gravity acts on subtrees as a force through their first moments. The
+//! canonical form has no acceleration to which it could be added, as other algorithms add it to the acceleration of the
+//! base.
 //!
-//! Generated code writes the letters in ASCII behind the body: `m` is `M*`, `mp` `M'`, `u`, `k` and `rho` are `U`, `k` and `1 / Mj`,
-//! `d`, `dp` and `e` are `D`, `D'` and `(p − d) / Mj`, `hat` and `omega` are `Ω̂` and `Ω`, `v` is the rate of the joint, `p` is `P*`,
-//! `g` gravity, `s` the first moment of the subtree. Entries are `x`, `y`, `z` of the linear and `rx`, `ry`, `rz` of the angular
-//! part, pairs of them in inertias: `forearm_m_rx_z`. A name with `minus` is the negative; `t0`, `t1` are sums and products on
-//! the way.
+//! Generated code writes the letters in ASCII behind the body: `m` is `M*`, `mp` `M'`, `u`, `k` and `rho` are `U`, `k`
+//! and `1 / Mj`, `d`, `dp` and `e` are `D`, `D'` and `(p − d) / Mj`, `hat` and `omega` are `Ω̂` and `Ω`, `v` is the
+//! rate of the joint, `p` is `P*`, `g` gravity, `s` the first moment of the subtree. Entries are `x`, `y`, `z` of the
+//! linear and `rx`, `ry`, `rz` of the angular part, pairs of them in inertias: `forearm_m_rx_z`. A name with `minus` is
+//! the negative; `t0`, `t1` are sums and products on the way.
 //!
 //! Joints whose velocities are not coordinate rates (spherical, floating, planar) take velocities and momenta in body
 //! axes: `π = EᵀP*` and `π̇ = Eᵀ(T* − Ω × P*) + τ`, `q̇ = N(q) v` with (A.58) for unit quaternions `(x, y, z, w)`.

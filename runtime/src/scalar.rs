@@ -3,9 +3,9 @@
 use crate::constant::Constant;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A number type with the four operations, sine, cosine, square root and a guarded reciprocal. There is no comparison and no
-/// conversion to `f64`. A sweep over a `Scalar` therefore cannot branch on a value: with every type it performs the same
-/// operations in the same order.
+/// A number type with the four operations, sine, cosine, square root and a guarded reciprocal. There is no comparison
+/// and no conversion to `f64`. A sweep over a `Scalar` therefore cannot branch on a value: with every type it performs
+/// the same operations in the same order.
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
@@ -20,9 +20,9 @@ pub trait Scalar:
     fn sin_cos(self) -> (Self, Self);
     /// Square root.
     fn sqrt(self) -> Self;
-    /// `1 / self` where `self` is above `floor`, and zero elsewhere: the inverse of the pivot of a row that may be redundant.
-    /// Zero leaves the row out, where too little of its diagonal entry remains. `floor` must not be negative. If `self` is
-    /// NaN, so is the result.
+    /// `1 / self` where `self` is above `floor`, and zero elsewhere: the inverse of the pivot of a row that may be
+    /// redundant. Zero leaves the row out, where too little of its diagonal entry remains. `floor` must not be
+    /// negative. If `self` is NaN, so is the result.
     fn reciprocal_above(self, floor: Self) -> Self;
     /// Fraction of a row's diagonal entry: where less than this fraction remains after the rows before it have been
     /// eliminated, the rest counts as round-off.
@@ -30,8 +30,9 @@ pub trait Scalar:
         Self::constant(1e-10)
     }
 
-    /// The node of a graph of operations that a symbolic scalar stands for, and whether it stands for the negative. Numbers
-    /// have none. Only for [`Trace::name`](crate::sweep::Trace::name): a sweep that asked would not be the same on numbers.
+    /// The node of a graph of operations that a symbolic scalar stands for, and whether it stands for the negative.
+    /// Numbers have none. Only for [`Trace::name`](crate::sweep::Trace::name): a sweep that asked would not be the same
+    /// on numbers.
     #[inline]
     fn node(self) -> Option<(u32, bool)> {
         None
@@ -70,7 +71,8 @@ impl Scalar for f64 {
     }
     #[inline]
     fn reciprocal_above(self, floor: Self) -> Self {
-        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the floor.
+        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the
+        // floor.
         let reciprocal = 1.0 / self;
         if self <= floor {
             0.0
@@ -103,7 +105,8 @@ impl Scalar for f32 {
     }
     #[inline]
     fn reciprocal_above(self, floor: Self) -> Self {
-        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the floor.
+        // This compiles to a mask on the quotient, without a branch, so that lanes vectorise. NaN is not below the
+        // floor.
         let reciprocal = 1.0 / self;
         if self <= floor {
             0.0

@@ -248,7 +248,8 @@ pub trait Differentiable: System {
 
     /// A zero matrix.
     fn square(&self) -> Self::Square;
-    /// Whether the rates change with time at a fixed state. Rosenbrock methods then evaluate them twice more in each step.
+    /// Whether the rates change with time at a fixed state. Rosenbrock methods then evaluate them twice more in each
+    /// step.
     fn depends_on_time(&self) -> bool {
         false
     }

@@ -1,8 +1,8 @@
 //! The mechanism in the form on which the sweeps run: a tree of nodes whose constants are scalars of any type.
 //!
 //! A node is one joint and the rigid body that it carries. Joints whose motion consists of independent rotations and
-//! translations (universal, cylindrical) are two nodes with a massless body between them. All other joints have a constant
-//! motion subspace `E` in the node frame; rotations are about, and translations along, its z axis.
+//! translations (universal, cylindrical) are two nodes with a massless body between them. All other joints have a
+//! constant motion subspace `E` in the node frame; rotations are about, and translations along, its z axis.
 
 mod elimination;
 mod map;
@@ -401,16 +401,16 @@ impl<S: Scalar> Tree<S> {
         tree
     }
 
-    /// Number of columns of the regressor: ten inertial parameters of every moving joint's child body, with what is fixed to it,
-    /// a damping and a dry friction of every velocity.
+    /// Number of columns of the regressor: ten inertial parameters of every moving joint's child body, with what is
+    /// fixed to it, a damping and a dry friction of every velocity.
     pub fn regressor_columns(&self) -> usize {
         self.joint_nodes.len() * INERTIAL_PARAMETERS + 2 * self.dims.nv
     }
 
-    /// The dynamic parameters `π` of the [regressor](crate::sweep::Sweeps::regressor), of a tree that was not regrouped: for
-    /// every moving joint, in joint order, [`RigidInertia::parameters`] of its child body with what is fixed to it, at the
-    /// child's frame; the damping of every velocity, N m s or N s/m; the dry friction of every velocity, N m or N, which is
-    /// zero in a model.
+    /// The dynamic parameters `π` of the [regressor](crate::sweep::Sweeps::regressor), of a tree that was not
+    /// regrouped: for every moving joint, in joint order, [`RigidInertia::parameters`] of its child body with what is
+    /// fixed to it, at the child's frame; the damping of every velocity, N m s or N s/m; the dry friction of every
+    /// velocity, N m or N, which is zero in a model.
     pub fn dynamic_parameters(&self) -> Vec<S> {
         let mut damping = alloc::vec![S::zero(); 2 * self.dims.nv];
         for node in &self.nodes {

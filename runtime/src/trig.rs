@@ -1,35 +1,37 @@
 //! Sine and cosine together, in plain additions and multiplications: the same bits on every target.
 //!
-//! `core` has no trigonometric functions, and `libm` computes its single-precision versions in double precision, which a
-//! Cortex-M4F has to emulate. The functions of this module compute `f32` in `f32`. Their main path has no table and no branch,
-//! so that a loop over lanes vectorises; one branch sends large, infinite and NaN arguments to an exact integer reduction.
+//! `core` has no trigonometric functions, and `libm` computes its single-precision versions in double precision, which
+//! a Cortex-M4F has to emulate. The functions of this module compute `f32` in `f32`. Their main path has no table and
+//! no branch, so that a loop over lanes vectorises; one branch sends large, infinite and NaN arguments to an exact
+//! integer reduction.
 //!
-//! The functions are generic over an [`Arithmetic`]. Single calls use plain arithmetic and give the same bits everywhere;
-//! kernels use fused multiply-adds where the processor has them. Generated code has all its angles at the start of a function
-//! and computes their sines and cosines together in vector registers ([`pairs_f64`], [`pairs_f32`]).
+//! The functions are generic over an [`Arithmetic`]. Single calls use plain arithmetic and give the same bits
+//! everywhere; kernels use fused multiply-adds where the processor has them. Generated code has all its angles at the
+//! start of a function and computes their sines and cosines together in vector registers ([`pairs_f64`],
+//! [`pairs_f32`]).
 //!
 //! Main path (|x| <= 10^6 for `f64`, <= 1600 for `f32`):
 //! 1. `n = round(x · 2/π)` by adding and subtracting 1.5 · 2^(mantissa bits); the low bits of the sum are the quadrant.
 //! 2. `y0 + y1 = x − n·π/2` with π/2 in four parts (Cody and Waite). The first three have so few bits that their
-//!    products with `n` are exact. The rounding errors of the two subtractions are recovered exactly; together with the last part
-//!    they are `y1`. The error of the reduced argument is therefore well below an ulp even next to a multiple of π/2. With fused
-//!    multiply-adds, the first part is a whole float and three parts suffice: `x − n·p1` is below 1 and a multiple of the last
-//!    place of `p1` or `x`, so that it is exact.
+//!   products with `n` are exact. The rounding errors of the two subtractions are recovered exactly; together with the
+//!   last part they are `y1`. The error of the reduced argument is therefore well below an ulp even next to a multiple
+//!   of π/2. With fused multiply-adds, the first part is a whole float and three parts suffice: `x − n·p1` is below 1
+//!   and a multiple of the last place of `p1` or `x`, so that it is exact.
 //! 3. Polynomials for both functions on |y| <= π/4; for `f64` those of fdlibm, in both cases with fdlibm's use of `y1`.
 //! 4. Quadrant: exchange by a select, signs by their bit.
 //!
 //! Larger arguments use the reduction of Payne and Hanek: only the bits of 2/π that contribute to `x · 2/π mod 4` are
 //! multiplied, as integers.
 //!
-//! The largest errors that the tests of this module find over random and difficult arguments, plain and fused, are 0.80 units
-//! in the last place for `f64` and 0.82 for `f32`.
+//! The largest errors that the tests of this module find over random and difficult arguments, plain and fused, are 0.80
+//! units in the last place for `f64` and 0.82 for `f32`.
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
 #![allow(clippy::excessive_precision, clippy::approx_constant)]
 
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
 
-/// Whether angles are computed in blocks. Without vector instructions, the unused lanes of a block would cost as much as the
-/// others.
+/// Whether angles are computed in blocks. Without vector instructions, the unused lanes of a block would cost as much
+/// as the others.
 const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
 /// 2/π as a binary fraction after 64 zero bits, with enough bits for the largest `f64`.
@@ -129,8 +131,8 @@ macro_rules! sincos {
             (sin, cos)
         }
 
-        /// The main path: blocks as wide as the widest vectors, then the rest in narrower blocks. Returns whether an angle is
-        /// beyond the main path.
+        /// The main path: blocks as wide as the widest vectors, then the rest in narrower blocks. Returns whether an
+        /// angle is beyond the main path.
         #[inline(always)]
         fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
             if !VECTORS {
@@ -209,8 +211,8 @@ macro_rules! sincos {
             }
             // The product is exact; so is the difference, by Sterbenz's lemma.
             let a = x - n * $p1;
-            // The products are exact. `a` and `b` are multiples of the last place of `w` and `v`, so that both remainders are
-            // exact.
+            // The products are exact. `a` and `b` are multiples of the last place of `w` and `v`, so that both
+            // remainders are exact.
             let w = n * $p2;
             let b = a - w;
             let lost_b = (a - b) - w;
@@ -220,8 +222,8 @@ macro_rules! sincos {
             $kernel::<A>(c, (lost_b + lost_c) - n * $p4, shifted.to_bits())
         }
 
-        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4. `y1` is at most some ulps of `y0`,
-        /// except where both are tiny.
+        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4. `y1` is at most some ulps of
+        /// `y0`, except where both are tiny.
         #[inline(always)]
         fn $kernel<A: Arithmetic>(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
             let z = y0 * y0;
@@ -239,7 +241,8 @@ macro_rules! sincos {
             };
             let odd = quadrant & 1 != 0;
             let (s, c) = (if odd { cos } else { sin }, if odd { sin } else { cos });
-            // Bit 1 of the quadrant is the sign of the sine; the sign of the cosine is the same bit of the next quadrant.
+            // Bit 1 of the quadrant is the sign of the sine; the sign of the cosine is the same bit of the next
+            // quadrant.
             let to_sign = |bits: $uint| (bits & 2) << ($uint::BITS - 2);
             (
                 <$float>::from_bits(s.to_bits() ^ to_sign(quadrant)),
@@ -260,15 +263,17 @@ macro_rules! sincos {
                 return (<$float>::NAN, <$float>::NAN);
             }
             let m = (magnitude & ((1 << MANT) - 1)) | (1 << MANT);
-            // x = m · 2^e. Bits of 2/π with a value of 4·2^-e or more only add full turns. The window starts after them and is
-            // three words long: x · 2/π mod 4 = (m · window mod 2^(3 BITS)) · 2^(2 − 3 BITS), with an error below
-            // 2^(MANT + 3 − 3 BITS). Here e >= −MANT + 10, and the 64 zero bits at the start of the table keep `at` positive.
+            // x = m · 2^e. Bits of 2/π with a value of 4·2^-e or more only add full turns. The window starts after them
+            // and is three words long: x · 2/π mod 4 = (m · window mod 2^(3 BITS)) · 2^(2 − 3 BITS), with an error
+            // below 2^(MANT + 3 − 3 BITS). Here e >= −MANT + 10, and the 64 zero bits at the start of the table keep
+            // `at` positive.
             let at = biased.wrapping_add(62).wrapping_sub(BIAS + MANT);
             let word = |k: u32| $wide::from($chunk(at.wrapping_add(k * BITS)));
             let low = $wide::from(m).wrapping_mul(word(2));
             let mid = $wide::from(m).wrapping_mul(word(1)).wrapping_add(low >> BITS);
             let high = $wide::from(m).wrapping_mul(word(0)).wrapping_add(mid >> BITS) as $uint;
-            // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around the nearest.
+            // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around
+            // the nearest.
             let quadrant = high >> (BITS - 2);
             let fraction = ($wide::from(high) << (BITS + 2)) | ((mid as $uint as $wide) << 2) | ((low as $uint >> (BITS - 2)) as $wide);
             let negative = fraction >> (2 * BITS - 1) != 0;
@@ -310,8 +315,8 @@ sincos! {
     scalar sincos_f64;
     /// [`sincos_f64`] of each lane, with the same bits.
     lanes sincos_lanes_f64;
-    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last place.
-    /// It uses the instructions of the processor, so that the last bits depend on the machine.
+    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last
+    /// place. It uses the instructions of the processor, so that the last bits depend on the machine.
     slice sincos_slice_f64, SliceF64;
     /// [`sincos_f64`] for kernels.
     pair pair_f64;
@@ -334,8 +339,8 @@ sincos! {
     scalar sincos_f32;
     /// [`sincos_f32`] of each lane, with the same bits.
     lanes sincos_lanes_f32;
-    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last place.
-    /// It uses the instructions of the processor, so that the last bits depend on the machine.
+    /// Sines and cosines of as many angles, rad, as the shortest of the slices has, each within one unit in the last
+    /// place. It uses the instructions of the processor, so that the last bits depend on the machine.
     slice sincos_slice_f32, SliceF32;
     /// [`sincos_f32`] for kernels.
     pair pair_f32;

@@ -10,13 +10,13 @@ use crate::{Real, Scalar};
 
 /// A double-double number of about 106 bits.
 ///
-/// Sums, products, quotients and roots have a relative error of at most 1e-31. Sines and cosines of angles below 1000 rad
-/// have an absolute error of at most 1e-31; of larger angles, an error of the size of the angle's last bit. They are NaN above
-/// 2⁵⁰ rad.
+/// Sums, products, quotients and roots have a relative error of at most 1e-31. Sines and cosines of angles below 1000
+/// rad have an absolute error of at most 1e-31; of larger angles, an error of the size of the angle's last bit. They
+/// are NaN above 2⁵⁰ rad.
 ///
-/// With `COARSE`, sines and cosines are those that a program on doubles computes for the angle rounded to a double. They are
-/// then the same inputs of the following operations in both programs, and a comparison shows the roundings of these
-/// operations only.
+/// With `COARSE`, sines and cosines are those that a program on doubles computes for the angle rounded to a double.
+/// They are then the same inputs of the following operations in both programs, and a comparison shows the roundings of
+/// these operations only.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Wide<const COARSE: bool = false>(pub TwoFloat);
 
@@ -37,8 +37,8 @@ operator!(Mul, mul);
 
 impl<const COARSE: bool> Div for Wide<COARSE> {
     type Output = Self;
-    /// Long division, one double after the other. (The crate's own division computes the residual of a reciprocal without a
-    /// fused multiply-add, which leaves an error of 1e-16.)
+    /// Long division, one double after the other. (The crate's own division computes the residual of a reciprocal
+    /// without a fused multiply-add, which leaves an error of 1e-16.)
     fn div(self, other: Self) -> Self {
         let (above, below) = (self.0, other.0);
         let first = above.hi() / below.hi();

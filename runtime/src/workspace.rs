@@ -137,7 +137,8 @@ pub struct Factor<S> {
     /// Diagonal of `Φ M⁻¹Φᵀ` of every multiplier, before other multipliers are taken out of it; with the nodes of one
     /// constraint's cycle as far as they are done.
     pub whole: Vec<S>,
-    /// For every row of a constraint, those that are open when it is eliminated and meet it: all others are independent.
+    /// For every row of a constraint, those that are open when it is eliminated and meet it: all others are
+    /// independent.
     pub later: Vec<Vec<usize>>,
 }
 
@@ -157,11 +158,11 @@ pub struct RowState<S> {
 /// Constraints at the configuration.
 #[derive(Clone, Debug)]
 pub struct Constraints<S> {
-    /// Rotation to and position in the innermost common node, along the path to each frame of a constraint as far as it is
-    /// done.
+    /// Rotation to and position in the innermost common node, along the path to each frame of a constraint as far as it
+    /// is done.
     pub reach: Vec<[(Mat3<S>, Vec3<S>); 2]>,
-    /// For every node the constraints that act through it: number of the constraint with 0 or 1 for a cut whose path to the
-    /// first or second frame has the node, or with the number of a coupling's term.
+    /// For every node the constraints that act through it: number of the constraint with 0 or 1 for a cut whose path to
+    /// the first or second frame has the node, or with the number of a coupling's term.
     pub through: Vec<Vec<(usize, usize)>>,
     /// Wrenches at each constraint's frames, carried inward along the paths.
     pub end_wrenches: Vec<[Force<S>; 2]>,
@@ -358,7 +359,8 @@ fn through<S>(tree: &Tree<S>, i: usize) -> Vec<(usize, usize)> {
     parts.collect()
 }
 
-/// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it then.
+/// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it
+/// then.
 fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
     let mut meets = vec![BTreeSet::new(); tree.unknowns.len()];
     let mut join = |all: &[usize]| {

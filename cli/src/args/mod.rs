@@ -341,8 +341,8 @@ pub struct SimulateArgs {
     /// Choose steps by the errors of the coordinates alone, not of the momenta
     #[arg(long, conflicts_with = "step")]
     pub partial: bool,
-    /// Project every step onto the energy of the start, for motion that neither gains nor loses energy. The error of the
-    /// motion hardly changes
+    /// Project every step onto the energy of the start, for motion that neither gains nor loses energy. The error of
+    /// the motion hardly changes
     #[arg(long)]
     pub project: bool,
     /// Fixed step, s; shortened if the time is not a multiple of it

@@ -252,7 +252,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports quaternions and cosine-sine pairs that do not have unit length, because their results would be meaningless.
+    /// Reports quaternions and cosine-sine pairs that do not have unit length, because their results would be
+    /// meaningless.
     fn units(&mut self, place: &str, q: &[f64], units: Vec<Unit>) {
         for unit in units {
             let norm = q[unit.at..unit.at + unit.len].iter().fold(0.0_f64, |n, x| n.hypot(*x));

@@ -80,7 +80,8 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         let opacity = 0.14 + 0.86 * fade * fade * fade;
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
         let mut lines = shapes.lines(frames);
-        // Nearer parts are drawn over those behind them; parts at the same distance keep their order in spite of rounding.
+        // Nearer parts are drawn over those behind them; parts at the same distance keep their order in spite of
+        // rounding.
         let depth = |line: &Line| (view.depth(line.middle()) / (1e-6 * page.size())).round();
         lines.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         for line in &lines {

@@ -351,8 +351,8 @@ fn closed_standard_output_is_no_failure() {
     }
 }
 
-/// An arm with six revolute joints, the first along gravity, has one base inertial parameter of the first link and seven of each
-/// other one (M. Gautier, W. Khalil, 1990): 36. A damping and a dry friction of every joint come to them.
+/// An arm with six revolute joints, the first along gravity, has one base inertial parameter of the first link and
+/// seven of each other one (M. Gautier, W. Khalil, 1990): 36. A damping and a dry friction of every joint come to them.
 #[test]
 fn base_parameters_are_named() {
     let output = good(run(&["identifiable", "models/ur5.urdf"]));

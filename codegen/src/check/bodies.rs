@@ -10,7 +10,8 @@ use crate::import::source::Span;
 use crate::import::words::quote;
 use crate::model::{Body, Joint, Rotation, Value};
 
-/// Slack of the triangle inequality and of positivity, relative to the largest moment: numbers written with seven digits pass.
+/// Slack of the triangle inequality and of positivity, relative to the largest moment: numbers written with seven
+/// digits pass.
 const ROUNDING: f64 = 1e-6;
 
 /// Up to here a violation is laid to few digits (a flat plate written with three) and warned about.
@@ -151,7 +152,8 @@ pub(super) fn sizes(raw: &RawModel, bodies: &[Body], joints: &[Joint], numbers: 
             );
             numbers.findings.warning(at.span, message, "inertia is in kg m²: 1 kg mm² is 1e-6, 1 g cm² is 1e-7");
         }
-        // The ball with this mass and moment: r² = 5/2 I/m. No body of that mass and largest moment is less dense in its ball than this.
+        // The ball with this mass and moment: r² = 5/2 I/m. No body of that mass and largest moment is less dense in
+        // its ball than this.
         let ball = (2.5 * large / mass).sqrt();
         let density = mass / (4.0 / 3.0 * std::f64::consts::PI * ball.powi(3));
         if density > 1e6 {

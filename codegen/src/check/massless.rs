@@ -8,7 +8,8 @@ use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Placement, Rota
 
 type Mat3 = [[f64; 3]; 3];
 
-/// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2 leaves 1e-11.
+/// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2
+/// leaves 1e-11.
 const NOTHING: f64 = 1e-10;
 
 /// Mass, first moment and inertia about the origin, in the axes of one frame.
@@ -19,7 +20,8 @@ struct Inertia {
     about_origin: Mat3,
 }
 
-/// Reports free joints that carry nothing heavy, and leaves that do not resist one of their freedoms. `order` gives the file index of each joint.
+/// Reports free joints that carry nothing heavy, and leaves that do not resist one of their freedoms. `order` gives the
+/// file index of each joint.
 pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &mut Findings) {
     let n = model.joints.len();
     let mut carrier = vec![0; model.bodies.len()];
@@ -32,7 +34,8 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
             leads[leader] = true;
         }
     }
-    // What rides on each joint, from the leaves inwards: is anything heavy, is anything moving, and (while nothing moves) its inertia.
+    // What rides on each joint, from the leaves inwards: is anything heavy, is anything moving, and (while nothing
+    // moves) its inertia.
     let mut heavy: Vec<bool> = model.joints.iter().map(|j| is_heavy(&model.bodies[j.child])).collect();
     let mut moving = vec![false; n];
     let mut reported = vec![false; n];
@@ -136,8 +139,8 @@ fn sum(a: Inertia, b: Inertia) -> Inertia {
     }
 }
 
-/// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates. Of the directions across an axis any
-/// two will do: the mass is the same along all.
+/// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates. Of the directions
+/// across an axis any two will do: the mass is the same along all.
 fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
     const AXES: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut columns = Vec::new();
@@ -155,7 +158,8 @@ fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
     columns
 }
 
-/// What resists each freedom when the ones before it may follow freely: the pivots of the joint's own block of the mass matrix.
+/// What resists each freedom when the ones before it may follow freely: the pivots of the joint's own block of the mass
+/// matrix.
 fn resistance(i: &Inertia, columns: &[([f64; 3], [f64; 3])], armature: &[f64]) -> Vec<f64> {
     let momentum = |(v, w): ([f64; 3], [f64; 3])| {
         let a = cross(w, i.first);

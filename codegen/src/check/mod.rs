@@ -18,10 +18,11 @@ use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
 use crate::model::{Constraint, ConstraintKind, Frame, Gravity, Joint, JointMotion, Model, Param, Value, Wrench};
 
-/// Checks `raw`; a model only where no error was found, neither here nor before. The model takes its name from the file of the findings
-/// if it states none.
+/// Checks `raw`; a model only where no error was found, neither here nor before. The model takes its name from the file
+/// of the findings if it states none.
 ///
-/// Joints come out depth first from the ground, the children of a body in file order; all else keeps the order of the file.
+/// Joints come out depth first from the ground, the children of a body in file order; all else keeps the order of the
+/// file.
 pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     let name = names::model_name(raw, findings);
     let names = Names::collect(raw, findings);

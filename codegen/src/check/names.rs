@@ -86,7 +86,8 @@ impl<'r> Names<'r> {
         names
     }
 
-    /// Whether a body is the one its name stands for (a second one of that name is reported, and one called like the ground).
+    /// Whether a body is the one its name stands for (a second one of that name is reported, and one called like the
+    /// ground).
     pub(super) fn is_first(&self, body: usize) -> bool {
         let name = self.raw.bodies[body].name.value.as_str();
         name != GROUND && self.bodies.get(name) == Some(&body)
@@ -97,8 +98,8 @@ impl<'r> Names<'r> {
         name == GROUND || self.bodies.contains_key(name)
     }
 
-    /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` (empty, or with a space behind) and `what` as in
-    /// ``joint `elbow`: parent `upper_am` is not a body``.
+    /// The body called so, `Some(None)` for the ground; `None` if there is none. `role` (empty, or with a space behind)
+    /// and `what` as in ``joint `elbow`: parent `upper_am` is not a body``.
     pub(super) fn body(
         &self,
         name: &Spanned<String>,

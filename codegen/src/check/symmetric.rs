@@ -1,14 +1,15 @@
 //! Eigenvalues of a symmetric 3 x 3 matrix.
 //!
-//! Written here and not taken from a linear algebra crate because this crate is built into every macro expansion: 30 lines are cheaper than
-//! that dependency in every user's build.
+//! Written here and not taken from a linear algebra crate because this crate is built into every macro expansion: 30
+//! lines are cheaper than that dependency in every user's build.
 
 /// A full symmetric matrix from `[xx, yy, zz, xy, xz, yz]`.
 pub(super) fn full(s: [f64; 6]) -> [[f64; 3]; 3] {
     [[s[0], s[3], s[4]], [s[3], s[1], s[5]], [s[4], s[5], s[2]]]
 }
 
-/// Eigenvalues of `[xx, yy, zz, xy, xz, yz]` in rising order, to rounding relative to the largest (cyclic Jacobi); `None` unless all entries are finite.
+/// Eigenvalues of `[xx, yy, zz, xy, xz, yz]` in rising order, to rounding relative to the largest (cyclic Jacobi);
+/// `None` unless all entries are finite.
 pub(super) fn eigenvalues(s: [f64; 6]) -> Option<[f64; 3]> {
     let scale = s.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     if s.iter().any(|x| !x.is_finite()) {

@@ -36,7 +36,8 @@ pub(super) fn links(raw: &RawModel, names: &Names, findings: &mut Findings) -> V
     links
 }
 
-/// Joint indices depth first from the ground, children in file order; `None` if the joints form no tree over all bodies.
+/// Joint indices depth first from the ground, children in file order; `None` if the joints form no tree over all
+/// bodies.
 pub(super) fn order(raw: &RawModel, names: &Names, links: &[Link], findings: &mut Findings) -> Option<Vec<usize>> {
     let carrier = carriers(raw, names, links, findings);
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); raw.bodies.len() + 1];

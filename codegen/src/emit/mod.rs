@@ -36,8 +36,8 @@ pub struct Input<'a> {
     pub sizes: Sizes,
 }
 
-/// Source of one type with a function for each program, and implementations of the runtime's traits for which it has the
-/// functions.
+/// Source of one type with a function for each program, and implementations of the runtime's traits for which it has
+/// the functions.
 pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates: &OutputProgram<Code>) -> String {
     let Input { plan, options, .. } = *input;
     let mut out = String::new();

@@ -63,9 +63,9 @@ pub struct Names {
 }
 
 impl Names {
-    /// Names of a program's values, all different. A value that the sweeps have named is named after its body, its letter
-    /// and its component, `link5_m_xx`, further ones of that name `link5_m_xx_2`; sums and products on the way to such
-    /// values are numbered, `link5_t0`. `body` is the name of a body, `input` that of an input.
+    /// Names of a program's values, all different. A value that the sweeps have named is named after its body, its
+    /// letter and its component, `link5_m_xx`, further ones of that name `link5_m_xx_2`; sums and products on the way
+    /// to such values are numbered, `link5_t0`. `body` is the name of a body, `input` that of an input.
     pub fn of(
         mut self,
         program: &Program,

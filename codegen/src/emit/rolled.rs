@@ -13,7 +13,8 @@ use crate::plan::Plan;
 use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
 use crate::symbolic::{Op, ProgramResult};
 
-/// Largest size of the rows of eight lanes on the stack, bytes. If they are larger, lanes are computed one after the other.
+/// Largest size of the rows of eight lanes on the stack, bytes. If they are larger, lanes are computed one after the
+/// other.
 const ROWS: usize = 1 << 19;
 
 /// Writes the function of a rolled program.

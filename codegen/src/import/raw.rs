@@ -102,7 +102,8 @@ pub struct RawMimic {
     pub offset: Option<RawNumber>,
 }
 
-/// A joint. The checks report entries that its type does not use; a reader whose format always has them leaves them out.
+/// A joint. The checks report entries that its type does not use; a reader whose format always has them leaves them
+/// out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawJoint {
     /// Name.

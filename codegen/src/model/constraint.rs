@@ -100,8 +100,8 @@ pub enum LoopKind {
         /// Direction across the edge.
         axis: [f64; 3],
     },
-    /// `row · [velocity; angular velocity] = 0` for the motion of the second frame relative to the first, in the axes and
-    /// at the origin of the second.
+    /// `row · [velocity; angular velocity] = 0` for the motion of the second frame relative to the first, in the axes
+    /// and at the origin of the second.
     Pfaffian {
         /// Coefficients.
         row: [Value; 6],

@@ -1,4 +1,5 @@
-//! The table of outputs, which options, tracing, rolled code, emission, the macro, the command and the documentation read.
+//! The table of outputs, which options, tracing, rolled code, emission, the macro, the command and the documentation
+//! read.
 
 mod program;
 mod spec;
@@ -99,19 +100,19 @@ outputs! {
     /// They are velocity products and gravity, less springs, dampers and external wrenches.
     Bias = Spec::new("bias", &[Q, V], &[Array::new("h", &[Nv])]);
     /// Regressor `Y` of the joint forces: `τ = Y π`, by rows.
-    /// The columns are ten inertial parameters of every moving body, then a damping and a dry friction for every velocity
-    /// (`REGRESSOR`). Springs, rotor inertias and external wrenches are not in it.
+    /// The columns are ten inertial parameters of every moving body, then a damping and a dry friction for every
+    /// velocity (`REGRESSOR`). Springs, rotor inertias and external wrenches are not in it.
     Regressor = Spec::new("regressor", &[Q, V, A], &[Array::new("y", &[Nv, Parameters])]);
     /// Jacobians `J` of frames.
     /// `J v` is the frame's velocity `[linear; angular]` in its own axes, at its origin.
     Jacobians = Spec::new("jacobians", &[Q], &[Array::new("jacobian", &[Frames, Const(6), Nv])]);
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     BiasAccelerations = Spec::new("bias_accelerations", &[Q, V], &[Array::new("bias", &[Frames, Const(6)])]);
     /// Centre of mass in the ground, m, centroidal momentum matrix `A`, and its bias.
-    /// `A v` is the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, kg m/s and kg m²/s;
-    /// it changes at the rate `A v̇ + bias`. Bodies fixed to the ground and rotor inertias do not count.
+    /// `A v` is the momentum `[linear; angular]` of all bodies about the centre of mass, in ground axes, kg m/s and
+    /// kg m²/s; it changes at the rate `A v̇ + bias`. Bodies fixed to the ground and rotor inertias do not count.
     Centroidal = Spec::new("centroidal", &[Q, V], &[
         Array::new("center", &[Const(3)]),
         Array::new("matrix", &[Const(6), Nv]),

@@ -2,7 +2,8 @@
 
 use super::{Array, Sizes, Spec};
 
-/// One array of inputs of generated code. Its entries are inputs of the program, numbered consecutively over all arrays.
+/// One array of inputs of generated code. Its entries are inputs of the program, numbered consecutively over all
+/// arrays.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputArray {
     /// Name of the argument (`q`) or of the field of the generated type (`tau`).

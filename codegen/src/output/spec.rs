@@ -1,4 +1,5 @@
-//! The specification of an output: arguments and results of its function, the models that have it, the search that it uses.
+//! The specification of an output: arguments and results of its function, the models that have it, the search that it
+//! uses.
 
 /// The dimensions and the numbers behind them, from one list.
 macro_rules! dimensions {

@@ -1,4 +1,5 @@
-//! Paths of the tree that are eliminated or rolled together: chains to the tips, unbranched paths, runs of parallel joints.
+//! Paths of the tree that are eliminated or rolled together: chains to the tips, unbranched paths, runs of parallel
+//! joints.
 
 use mbd_runtime::tree::{Kind, Source, Unknown};
 
@@ -60,8 +61,8 @@ pub fn unbranched_paths(plan: &Plan, least: usize) -> Vec<Vec<usize>> {
     paths
 }
 
-/// Runs of revolute joints about parallel axes: the nodes whose frames need not rotate, because all that they carry next
-/// rotates about the same axis.
+/// Runs of revolute joints about parallel axes: the nodes whose frames need not rotate, because all that they carry
+/// next rotates about the same axis.
 pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     let swings = |i: usize| {
         let node = &plan.nodes[i];
@@ -81,8 +82,8 @@ pub fn parallel_runs(plan: &Plan) -> Vec<Vec<usize>> {
     runs
 }
 
-/// Whether one of these nodes, or of their children, is laid out for rolled code: a non-rotating frame leaves its rotation
-/// to its children.
+/// Whether one of these nodes, or of their children, is laid out for rolled code: a non-rotating frame leaves its
+/// rotation to its children.
 pub fn touches_rolled(plan: &Plan, nodes: &[usize]) -> bool {
     let touches = |k: usize, i: usize| k == i || plan.nodes[k].parent == Some(i);
     (0..plan.nodes.len()).any(|k| plan.nodes[k].rolled && nodes.iter().any(|&i| touches(k, i)))

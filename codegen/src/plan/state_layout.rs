@@ -5,8 +5,8 @@ use mbd_runtime::tree::Source;
 
 use crate::plan::{Plan, Slot};
 
-/// The places of the joints in Pinocchio's model of the same URDF: depth first, the children of a link in the alphabetical
-/// order of their joints; angles of planar and unbounded joints as cosine and sine.
+/// The places of the joints in Pinocchio's model of the same URDF: depth first, the children of a link in the
+/// alphabetical order of their joints; angles of planar and unbounded joints as cosine and sine.
 pub fn pinocchio(plan: &Plan) -> Layout {
     let mut order: Vec<&Slot> = Vec::new();
     visit(plan, None, &mut order);
@@ -18,8 +18,8 @@ pub fn pinocchio(plan: &Plan) -> Layout {
     })
 }
 
-/// The places of the joints in a MuJoCo model whose bodies have the order of this one: quaternions w, x, y, z, the linear
-/// velocity of a free joint in world axes.
+/// The places of the joints in a MuJoCo model whose bodies have the order of this one: quaternions w, x, y, z, the
+/// linear velocity of a free joint in world axes.
 pub fn mujoco(plan: &Plan) -> Layout {
     let order: Vec<&Slot> = plan.slots.iter().collect();
     layout(plan, &order, |plan, slot| {

@@ -127,8 +127,9 @@ pub enum PlanBond {
     Cut {
         /// What it binds.
         kind: LoopKind,
-        /// First and second frame, axes along z, or along x and y for a universal joint. The ground, if it is one of them
-        /// and the kind is that of a joint, is the first: rows are constants of the body then. Of a rod it is the second.
+        /// First and second frame, axes along z, or along x and y for a universal joint. The ground, if it is one of
+        /// them and the kind is that of a joint, is the first: rows are constants of the body then. Of a rod it is the
+        /// second.
         frames: Box<[PlanFrame; 2]>,
         /// Nodes from the innermost common one, which is left out, to those of the frames.
         paths: [Vec<usize>; 2],
@@ -185,8 +186,8 @@ impl Plan {
         self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
     }
 
-    /// Names of the dynamic parameters, the columns of the regressor: `forearm.m`, `forearm.mx` (first moment), `forearm.ixx`
-    /// (inertia at the frame of the body) and so on, `elbow.damping`, `elbow.friction`.
+    /// Names of the dynamic parameters, the columns of the regressor: `forearm.m`, `forearm.mx` (first moment),
+    /// `forearm.ixx` (inertia at the frame of the body) and so on, `elbow.damping`, `elbow.friction`.
     pub fn parameter_names(&self) -> Vec<String> {
         const INERTIAL: [&str; INERTIAL_PARAMETERS] = ["m", "mx", "my", "mz", "ixx", "ixy", "iyy", "ixz", "iyz", "izz"];
         let bodies = self.frames.iter().take(self.joint_nodes.len());

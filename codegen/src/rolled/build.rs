@@ -1,5 +1,5 @@
-//! From a plan to blocks: finds the runs, walks the passes, keeps what is needed, and cuts it into straight-line pieces and
-//! loops.
+//! From a plan to blocks: finds the runs, walks the passes, keeps what is needed, and cuts it into straight-line pieces
+//! and loops.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,5 +1,5 @@
-//! One turn of a run by itself: a dummy node in the place of the rest of the tree, and the links of one period behind it,
-//! taken through the passes with symbols for what they carry in.
+//! One turn of a run by itself: a dummy node in the place of the rest of the tree, and the links of one period behind
+//! it, taken through the passes with symbols for what they carry in.
 
 use mbd_runtime::spatial::RigidInertia;
 use mbd_runtime::sweep::pass::Pass;
@@ -121,8 +121,8 @@ impl<'g, 'a> Link<'g, 'a> {
         Some(Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) })
     }
 
-    /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a constant of
-    /// the loop; the rest become symbols.
+    /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
+    /// constant of the loop; the rest become symbols.
     pub fn pass(&mut self, pass: usize, direction: SweepDirection, first: &[Expr<'_>]) {
         let number = self.passes.len();
         let mut known: Vec<Option<f64>> =

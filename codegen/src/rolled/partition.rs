@@ -1,5 +1,5 @@
-//! The graph of one turn cut into loop bodies: what depends on constants alone goes into the table, sines and cosines into
-//! a loop of their own, everything else into the first pass that can compute it.
+//! The graph of one turn cut into loop bodies: what depends on constants alone goes into the table, sines and cosines
+//! into a loop of their own, everything else into the first pass that can compute it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

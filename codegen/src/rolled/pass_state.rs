@@ -1,5 +1,5 @@
-//! A tree on its way through the passes of an output, one node at a time: the whole tree or one link alone. The order is
-//! that of the runtime's lists ([`SweepList`]), and so are the operations.
+//! A tree on its way through the passes of an output, one node at a time: the whole tree or one link alone. The order
+//! is that of the runtime's lists ([`SweepList`]), and so are the operations.
 
 use mbd_runtime::sweep::pass::{Arguments, Context, Pass, Results, Sweep, SweepList};
 use mbd_runtime::sweep::{Accelerations, Sweeps};
@@ -128,8 +128,8 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.with(given, |list, cx| passes[pass].sweeps.iter().for_each(|&k| f(&list.sweeps[k], cx)));
     }
 
-    /// Before the first node of a pass. Steps of all joints are made ahead of the first one, because screws that are carried
-    /// outward need the joints of the whole tree.
+    /// Before the first node of a pass. Steps of all joints are made ahead of the first one, because screws that are
+    /// carried outward need the joints of the whole tree.
     pub fn begin(&mut self, pass: usize, given: &SymbolicInputs<'g>) {
         if pass == 0 {
             self.with(given, |_, cx| cx.articulate());
@@ -147,8 +147,8 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.end)(cx));
     }
 
-    /// Calls `visit` with what a pass carries through node `i`: from tip to base what its children hand to it, from base to
-    /// tip what it hands to its children.
+    /// Calls `visit` with what a pass carries through node `i`: from tip to base what its children hand to it, from
+    /// base to tip what it hands to its children.
     pub fn carried(&mut self, pass: usize, i: usize, given: &SymbolicInputs<'g>, mut visit: impl FnMut(&mut Expr<'g>)) {
         self.each(pass, given, |sweep, cx| (sweep.carried)(cx, i, &mut visit));
     }

@@ -1,8 +1,8 @@
 //! Runs of like links: where a branch repeats itself.
 //!
 //! Links are alike if their joints are of one kind and their placements, inertias and passive elements have zeros and
-//! ones in the same places; a run may repeat two to four different links in turn. Where a branch is not strictly regular,
-//! links are also taken for alike after identity steps and zeros have been let in, if that costs little.
+//! ones in the same places; a run may repeat two to four different links in turn. Where a branch is not strictly
+//! regular, links are also taken for alike after identity steps and zeros have been let in, if that costs little.
 
 use std::ops::Range;
 
@@ -209,7 +209,8 @@ fn compatible(a: &Node<f64>, b: &Node<f64>) -> bool {
     same_joint(a, b) && merged(&a.place, &b.place).is_some()
 }
 
-/// The longer placement, if the other is the same but for shifts left out. A shift by zero is exact; a turn by zero rounds.
+/// The longer placement, if the other is the same but for shifts left out. A shift by zero is exact; a turn by zero
+/// rounds.
 fn merged(a: &[ElementaryTransform<f64>], b: &[ElementaryTransform<f64>]) -> Option<Vec<ElementaryTransform<f64>>> {
     let (long, short) = if a.len() >= b.len() { (a, b) } else { (b, a) };
     let mut rest = short.iter().peekable();

@@ -1,5 +1,5 @@
-//! The search over a whole tree, branch by branch: each chain that ends at a tip is searched together with its ancestors
-//! only, and the result is used for every branch that is alike.
+//! The search over a whole tree, branch by branch: each chain that ends at a tip is searched together with its
+//! ancestors only, and the result is used for every branch that is alike.
 
 use super::chain::{Candidate, ChainSearch};
 use super::objective::Objective;

@@ -8,7 +8,8 @@ use crate::plan::{ChainElimination, Plan};
 use crate::rolled;
 use crate::symbolic::Cost;
 
-/// The longest block that is tried. With longer blocks, the columns cost more than they save, and the rounding errors grow.
+/// The longest block that is tried. With longer blocks, the columns cost more than they save, and the rounding errors
+/// grow.
 const LONGEST: usize = 10;
 
 /// The shortest chain that is tried as rolled code.

@@ -4,7 +4,8 @@
 use super::objective::Objective;
 use crate::plan::{parallel_runs, Plan};
 
-/// Chooses, cycle by cycle, whether frames rotate and whether momenta are accumulated; `single` has one joint at a time.
+/// Chooses, cycle by cycle, whether frames rotate and whether momenta are accumulated; `single` has one joint at a
+/// time.
 pub fn choose(plan: &mut Plan, single: &Plan, objective: Objective) {
     let runs = parallel_runs(plan);
     for cycle in cycles(plan) {

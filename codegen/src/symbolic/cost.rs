@@ -15,7 +15,8 @@ const CACHE: f64 = 32768.0;
 const FETCH: f64 = 24.0;
 
 /// Cost of a program, as [`Rewrite::Shortest`](super::passes::Rewrite::Shortest) will regroup and fuse it. Sines and
-/// cosines are part of the critical path, and left out of all other numbers, because eliminations do not differ in them.
+/// cosines are part of the critical path, and left out of all other numbers, because eliminations do not differ in
+/// them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// Additions, multiplications and divisions.
@@ -32,8 +33,9 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Estimated cycles for one of several successive states: [`machine::cycles`](super::machine::cycles), and the time of
-    /// fetching long code. Within 20 % of times measured on Zen 5, for chains and robots of 3 to 35 degrees of freedom.
+    /// Estimated cycles for one of several successive states: [`machine::cycles`](super::machine::cycles), and the time
+    /// of fetching long code. Within 20 % of times measured on Zen 5, for chains and robots of 3 to 35 degrees of
+    /// freedom.
     pub fn cycles(&self) -> f64 {
         let ideal = super::machine::cycles(self.critical_path, self.throughput, self.instructions);
         ideal + (self.bytes - CACHE).max(0.0) / FETCH

@@ -96,7 +96,8 @@ impl Program {
         busiest.max(self.instructions() as f64 / f64::from(WIDTH))
     }
 
-    /// Number of operations that become instructions: all except inputs, sines and cosines; a fused product and sum is one.
+    /// Number of operations that become instructions: all except inputs, sines and cosines; a fused product and sum is
+    /// one.
     pub fn instructions(&self) -> usize {
         self.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_) | Op::Sin(_) | Op::Cos(_))).count()
     }

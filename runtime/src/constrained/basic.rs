@@ -39,8 +39,8 @@ impl<S: Real> Basic<S> {
         }
     }
 
-    /// The displacement of least norm after which the residuals are least, velocities of `held` left out; the rank of the rows.
-    /// Rows that bind velocities alone do not stand in the way of displacements.
+    /// The displacement of least norm after which the residuals are least, velocities of `held` left out; the rank of
+    /// the rows. Rows that bind velocities alone do not stand in the way of displacements.
     pub fn least(&mut self, entries: &[S], held: &[bool], residual: &[S], dq: &mut [S]) -> usize {
         self.blocks.fill(entries);
         self.blocks.hold(held);
@@ -72,8 +72,8 @@ impl<S: Real> Basic<S> {
         rank
     }
 
-    /// Chooses dependent velocities and the rows to solve for them, by complete pivoting, from the entries that were taken last.
-    /// The rank.
+    /// Chooses dependent velocities and the rows to solve for them, by complete pivoting, from the entries that were
+    /// taken last. The rank.
     pub fn choose(&mut self) -> usize {
         (0..self.blocks.list.len()).map(|k| self.choose_of(k)).sum()
     }
@@ -139,7 +139,8 @@ impl<S: Real> Basic<S> {
         }
     }
 
-    /// The largest of `B = −Φ_d⁻¹ Φ_ind` of a factored block: its size, the index of its dependent, its independent column.
+    /// The largest of `B = −Φ_d⁻¹ Φ_ind` of a factored block: its size, the index of its dependent, its independent
+    /// column.
     pub fn largest(&mut self, k: usize) -> (S, usize, usize) {
         let (block, pairs) = (&self.blocks.list[k], &self.pairs[k]);
         let (n, b) = (block.columns.len(), &mut self.b[..pairs.len()]);

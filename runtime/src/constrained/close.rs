@@ -55,9 +55,9 @@ fn square<S: Real>(x: &[S]) -> f64 {
     x.iter().fold(0.0, |sum, x| sum + x.to_f64() * x.to_f64())
 }
 
-/// Moves coordinates to the nearest ones that close the constraints, by Newton's method with steps of least norm, shortened
-/// where they would not bring the residuals down; where rows depend on one another, or there is no way to close them all, by
-/// that of Gauss and Newton. The start decides between branches. Rotations are moved on their group.
+/// Moves coordinates to the nearest ones that close the constraints, by Newton's method with steps of least norm,
+/// shortened where they would not bring the residuals down; where rows depend on one another, or there is no way to
+/// close them all, by that of Gauss and Newton. The start decides between branches. Rotations are moved on their group.
 ///
 /// Where it fails `q` is where the residuals could not be brought down any further.
 ///
@@ -128,13 +128,13 @@ where
     pairs.fold(0.0, |sum, (r, c)| sum - 2.0 * r.to_f64() * c.to_f64())
 }
 
-/// Changes velocities by as little as possible so that they meet the constraints at coordinates `q` and time `t` (s), those
-/// of `held` staying as they are. Momenta follow by [`Conjugate`](crate::Conjugate); where none are held,
+/// Changes velocities by as little as possible so that they meet the constraints at coordinates `q` and time `t` (s),
+/// those of `held` staying as they are. Momenta follow by [`Conjugate`](crate::Conjugate); where none are held,
 /// [`Constrained::project_momenta`] alone does it, least in the metric of the mass matrix.
 ///
 /// # Errors
-/// [`ConstraintError::Incompatible`] where what is held leaves no way, more than `tolerance` relative to the largest velocity
-/// away; [`ConstraintError::NotFinite`]. Velocities are then as they were.
+/// [`ConstraintError::Incompatible`] where what is held leaves no way, more than `tolerance` relative to the largest
+/// velocity away; [`ConstraintError::NotFinite`]. Velocities are then as they were.
 pub fn complete<Y>(
     system: &mut Y,
     t: Y::Scalar,

@@ -28,7 +28,8 @@ pub struct Switch {
     pub pivot: f64,
 }
 
-/// A constrained system in minimal coordinates (5.3): method 1 in the gauge in which dependent freedoms have no momenta,
+/// A constrained system in minimal coordinates (5.3): method 1 in the gauge in which dependent freedoms have no
+/// momenta,
 ///
 /// `ṗ_ind = ṗ⁺_ind − Φ_indᵀ y`, `Φ_dᵀ y = ṗ⁺_dep`, `p_dep = 0`.
 ///
@@ -106,8 +107,8 @@ where
         Ok(())
     }
 
-    /// Takes the dependents as given, by indices of velocities, in groups of rows as far as they are enough for each; for
-    /// coordinates and momenta as [`CoordinatePartition::choose`].
+    /// Takes the dependents as given, by indices of velocities, in groups of rows as far as they are enough for each;
+    /// for coordinates and momenta as [`CoordinatePartition::choose`].
     ///
     /// # Errors
     /// As [`CoordinatePartition::new`], and [`ConstraintError::RankLoss`] where the other velocities do not determine
@@ -164,7 +165,8 @@ where
     /// Dependent coordinates by Newton's method from those that are given.
     ///
     /// # Errors
-    /// [`ConstraintError::NotClosed`], [`ConstraintError::RankLoss`], [`ConstraintError::NotFinite`]; `q` is then as it was.
+    /// [`ConstraintError::NotClosed`], [`ConstraintError::RankLoss`], [`ConstraintError::NotFinite`]; `q` is then as it
+    /// was.
     pub fn close(&mut self, q: &mut Y::Coordinates) -> Result<(), ConstraintError> {
         self.find(q)?;
         q.as_mut().copy_from_slice(self.q.as_ref());
@@ -357,9 +359,9 @@ where
 /// partition before the next one where it has become poor.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Repartition {
-    /// Whether each step starts with `σ = 0` instead of `p_dep = 0`: `p_dep` is then that of `M v`, and constant during the
-    /// step. This costs one more solve in each step. Where the mechanism is nearly singular, the multipliers of the gauge
-    /// `p_dep = 0` grow without bound. Not for methods that use rates of past steps, whose gauge must not change.
+    /// Whether each step starts with `σ = 0` instead of `p_dep = 0`: `p_dep` is then that of `M v`, and constant during
+    /// the step. This costs one more solve in each step. Where the mechanism is nearly singular, the multipliers of the
+    /// gauge `p_dep = 0` grow without bound. Not for methods that use rates of past steps, whose gauge must not change.
     pub project_momenta: bool,
 }
 

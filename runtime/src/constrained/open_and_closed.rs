@@ -79,7 +79,8 @@ impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     }
 }
 
-/// A constrained system that also gives its rates without constraints, for methods that find the multipliers themselves.
+/// A constrained system that also gives its rates without constraints, for methods that find the multipliers
+/// themselves.
 pub trait Unconstrained: Constrained
 where
     Self::Scalar: Real,

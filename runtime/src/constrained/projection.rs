@@ -34,8 +34,8 @@ pub enum Stabilisation {
 pub struct Effort {
     /// Largest number of iterations at the end of a step.
     pub iterations: u32,
-    /// Residual, m and rad, below which positions are not corrected. With 0, all iterations are always done, and the last
-    /// residual is not judged.
+    /// Residual, m and rad, below which positions are not corrected. With 0, all iterations are always done, and the
+    /// last residual is not judged.
     pub tolerance: f64,
 }
 
@@ -175,8 +175,8 @@ where
         Projection { room: Room::new(system), policy: FixedWork }
     }
 
-    /// The largest residual, m or rad, of the last state that was corrected, at the end of a step or inside it, before the
-    /// correction.
+    /// The largest residual, m or rad, of the last state that was corrected, at the end of a step or inside it, before
+    /// the correction.
     pub fn drift(&self) -> Y::Scalar {
         self.policy.found
     }

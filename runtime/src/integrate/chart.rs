@@ -88,8 +88,8 @@ impl<Y: System> Point<Y> {
     }
 }
 
-/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as `out`:
-/// where the compiler cannot know that, there must not be a panic path either.
+/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as
+/// `out`: where the compiler cannot know that, there must not be a panic path either.
 #[inline(always)]
 fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
     // The sum starts at minus zero: minus zero plus a term is that term, and the compiler removes this addition. It
@@ -137,8 +137,8 @@ pub struct Chart<Y: System> {
     carry: Option<Point<Y>>,
 }
 
-/// Iterates over the stretches of the state that are moved by addition, positions of Lie joints included, each with the Lie
-/// joint at its end.
+/// Iterates over the stretches of the state that are moved by addition, positions of Lie joints included, each with the
+/// Lie joint at its end.
 struct Stretches<'a> {
     groups: core::slice::Iter<'a, LieJoint>,
     at: (usize, usize),
@@ -247,7 +247,8 @@ where
         }
     }
 
-    /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its momenta.
+    /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its
+    /// momenta.
     #[inline]
     pub fn rates(
         &self,
@@ -269,8 +270,9 @@ where
         }
     }
 
-    /// From the rate at a displacement, in canonical form and without forces that do work: the derivatives of the energy by
-    /// the displacement, Hamilton's equations turned round. Derivatives by momenta of groups are left out, as zeros.
+    /// From the rate at a displacement, in canonical form and without forces that do work: the derivatives of the
+    /// energy by the displacement, Hamilton's equations turned round. Derivatives by momenta of groups are left out, as
+    /// zeros.
     pub fn gradient(&self, system: &Y, point: &Point<Y>, rate: &mut Point<Y>) {
         let (gx, gp) = (rate.x.as_mut(), rate.p.as_mut());
         for (x, p) in gx.iter_mut().zip(gp.iter_mut()) {
@@ -390,8 +392,8 @@ where
         for_positions(system, x.len(), |k| x[k] = x[k] - step.x.as_ref()[k]);
     }
 
-    /// What a past point of the motion, `x` from the chart's state, and its rate become when the chart's state is moved by
-    /// `step`. Of the displacement only the coordinates are kept up, its momenta are not read.
+    /// What a past point of the motion, `x` from the chart's state, and its rate become when the chart's state is moved
+    /// by `step`. Of the displacement only the coordinates are kept up, its momenta are not read.
     pub fn follow(system: &Y, step: &Point<Y>, point: &mut Point<Y>, rate: &mut Point<Y>) {
         let (step, x) = (step.x.as_ref(), point.x.as_mut());
         for group in system.lie_joints() {
@@ -420,8 +422,8 @@ fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S])
     }
 }
 
-/// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing truncation
-/// errors*, 1965.
+/// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing
+/// truncation errors*, 1965.
 #[inline]
 fn sum<S: Real>(total: &mut S, x: S, carry: Option<&mut S>) {
     match carry {

@@ -9,8 +9,9 @@
 //! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point
 //! iteration is faster for generated code of mechanisms that are not.
 //!
-//! Gauss methods are symplectic and symmetric where displacements are plain sums. With joints on Lie groups they keep their
-//! order, but the chart of a step is that at its start and not at its middle, so that a step back does not return exactly.
+//! Gauss methods are symplectic and symmetric where displacements are plain sums. With joints on Lie groups they keep
+//! their order, but the chart of a step is that at its start and not at its middle, so that a step back does not return
+//! exactly.
 
 use super::chart::{Chart, Point};
 use super::integrator::{Attempt, FromSystem, Scheme};
@@ -267,8 +268,8 @@ where
             if self.eta * change <= 1.0 || change == 0.0 {
                 return Ok(());
             }
-            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell. On an
-            // ill-conditioned mechanism it is far above that of the numbers.
+            // No further: at round-off that is the solution, and how large it is only the iteration itself can tell. On
+            // an ill-conditioned mechanism it is far above that of the numbers.
             let noise = libm::pow(Y::Scalar::epsilon(), 0.3);
             if scale.is_none() && grown > 0 && noise * FLOOR * change <= 1.0 {
                 return Ok(());

@@ -9,9 +9,10 @@ use crate::Scalar;
 /// Corrects steps so that the energy stays what it was: for motion that loses and gains none.
 ///
 /// The new point is moved along the gradient of the energy, which needs no derivatives: rates at the new point are the
-/// gradient turned by a right angle (Hairer, Lubich, Wanner, *Geometric Numerical Integration*, IV.4; Hamilton's equations).
-/// The rates there are those that the next step begins with, so nothing but the energy is evaluated, once an iteration and
-/// once at the end. Momenta of groups are not moved, so the momentum of what floats freely stays as the method has it.
+/// gradient turned by a right angle (Hairer, Lubich, Wanner, *Geometric Numerical Integration*, IV.4; Hamilton's
+/// equations). The rates there are those that the next step begins with, so nothing but the energy is evaluated, once
+/// an iteration and once at the end. Momenta of groups are not moved, so the momentum of what floats freely stays as
+/// the method has it.
 ///
 /// It keeps the energy and little else: the error of the trajectory hardly changes.
 #[derive(Clone, Debug)]
@@ -28,8 +29,8 @@ where
     Y: Energetic,
     Y::Scalar: Real,
 {
-    /// Projection onto the energy of the state `(q, p)`, in at most `iterations` iterations a step; one is enough where steps are
-    /// small.
+    /// Projection onto the energy of the state `(q, p)`, in at most `iterations` iterations a step; one is enough where
+    /// steps are small.
     pub fn new(system: &mut Y, q: &Y::Coordinates, p: &Y::Momenta, iterations: u32) -> Self {
         let (kinetic, potential) = system.energies(q, p);
         EnergyProjection {
@@ -46,8 +47,8 @@ where
         self.target
     }
 
-    /// Corrects the displacement of the last attempt of a method, before it is accepted. Returns by how much the energy was
-    /// off before, J. The rate at the end stays as it was found at the uncorrected point.
+    /// Corrects the displacement of the last attempt of a method, before it is accepted. Returns by how much the energy
+    /// was off before, J. The rate at the end stays as it was found at the uncorrected point.
     pub fn correct<M: Stepper<Y>>(&mut self, method: &mut M, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Y::Scalar {
         let rate = method.end_rate(system, t, h);
         self.gradient.copy_from(rate);
@@ -75,8 +76,8 @@ where
         first
     }
 
-    /// One corrected step; see [`Stepper::step`]. A method's own evaluations and one at the end, which the next step begins
-    /// with: with Adams-Bashforth methods one in all.
+    /// One corrected step; see [`Stepper::step`]. A method's own evaluations and one at the end, which the next step
+    /// begins with: with Adams-Bashforth methods one in all.
     ///
     /// # Errors
     /// [`StepError`]; `q` and `p` are then as they were.

@@ -39,8 +39,8 @@ pub trait Events<Y: System, const N: usize> {
     /// The functions at time `t` (s) and a state.
     fn values(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> [Y::Scalar; N];
 
-    /// Called for every event, in the order of time, those that end the run included, with the state there. What the rates
-    /// depend on must not be changed here: end the run for that.
+    /// Called for every event, in the order of time, those that end the run included, with the state there. What the
+    /// rates depend on must not be changed here: end the run for that.
     fn happened(&mut self, _system: &mut Y, _event: usize, _t: Y::Scalar, _q: &Y::Coordinates, _p: &Y::Momenta) {}
 }
 
@@ -111,10 +111,11 @@ where
     Y::Scalar: Real,
     M: Stepper<Y>,
 {
-    /// Takes steps until `t_end` (s) or a terminal event is reached, exactly. Times of events are found to about four units
-    /// in the last place of the time, on the dense output, whose own error adds to that; the state is given just behind the
-    /// event, or on it. Having ended a run, an event does not end the next one by the same zero, even if the state was
-    /// changed in between (by [`Solver::restart`] at the same time): a function that starts on zero has no side to leave.
+    /// Takes steps until `t_end` (s) or a terminal event is reached, exactly. Times of events are found to about four
+    /// units in the last place of the time, on the dense output, whose own error adds to that; the state is given just
+    /// behind the event, or on it. Having ended a run, an event does not end the next one by the same zero, even if the
+    /// state was changed in between (by [`Solver::restart`] at the same time): a function that starts on zero has no
+    /// side to leave.
     ///
     /// Dense output makes its extra evaluations in every step here.
     ///

@@ -151,8 +151,8 @@ where
         }
     }
 
-    /// The rates that rows of dense output are over. The last stage may be the rate at the end; then it stands once, and
-    /// may not have been evaluated as a stage.
+    /// The rates that rows of dense output are over. The last stage may be the rate at the end; then it stands once,
+    /// and may not have been evaluated as a stage.
     fn rates_of_rows<'a>(
         k: &'a [Point<Y>; S],
         end: &'a Point<Y>,

@@ -9,10 +9,10 @@ use crate::system::{Real, System};
 
 /// A collocation method with the same number of iterations in every step: for real time.
 ///
-/// A step starts from the solution of the linearised equations, which costs no evaluation, and makes `n` iterations. With
-/// derivatives this is one evaluation of them, one factorisation and `n` evaluations of the rates for each stage, whatever
-/// happens. It cannot fail to converge; what is not converged counts as an error of the method. It is in single precision
-/// throughout if the system is, which matters to small processors.
+/// A step starts from the solution of the linearised equations, which costs no evaluation, and makes `n` iterations.
+/// With derivatives this is one evaluation of them, one factorisation and `n` evaluations of the rates for each stage,
+/// whatever happens. It cannot fail to converge; what is not converged counts as an error of the method. It is in
+/// single precision throughout if the system is, which matters to small processors.
 #[derive(Clone, Debug)]
 pub struct FixedIterations<C> {
     method: C,

@@ -46,8 +46,8 @@ formulas! {
         "Radau IIA of order 5 with the error estimate of `RADAU5`: L-stable, for stiff mechanisms.";
 }
 
-/// Gauss-Legendre of order 12 by fixed-point iteration, which needs no derivatives: symplectic and symmetric; for long regular motion, with
-/// compensated sums.
+/// Gauss-Legendre of order 12 by fixed-point iteration, which needs no derivatives: symplectic and symmetric; for long
+/// regular motion, with compensated sums.
 pub type Gauss12FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss12, FixedPoint, 6>>;
 /// [`Gauss6`] by fixed-point iteration, which needs no derivatives.
 pub type Gauss6FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss6, FixedPoint, 3>>;

@@ -155,8 +155,8 @@ fn orders_by_halving_the_step() {
     order("Gauss 6 inserted", 6.0, [0.03; 3], Gauss6FixedPoint::new);
     order("Radau 5", 5.0, [0.02; 3], Radau5::new);
     order("Rodas5P", 5.0, [0.02; 3], Rodas5P::new);
-    // At order twelve the window between long steps and round-off is narrow, and single estimates on the third scene scatter
-    // from 11.3 to 14 between 0.09 and 0.15 s: two terms of its error cancel on the way.
+    // At order twelve the window between long steps and round-off is narrow, and single estimates on the third scene
+    // scatter from 11.3 to 14 between 0.09 and 0.15 s: two terms of its error cancel on the way.
     order("Gauss 12", 12.0, [0.11, 0.14, 0.13], Gauss12FixedPoint::new);
 }
 
@@ -184,8 +184,8 @@ fn order_under_a_force_that_depends_on_time() {
     assert!((order - 5.0).abs() < 0.3, "{order}");
 }
 
-/// 1e8 N/m at a step of 1 ms: 2000 times longer than the fast motion's, which an L-stable method takes out at once and an
-/// A-stable one does not let grow.
+/// 1e8 N/m at a step of 1 ms: 2000 times longer than the fast motion's, which an L-stable method takes out at once and
+/// an A-stable one does not let grow.
 #[test]
 fn stiff_springs_do_no_harm() {
     let system = Oscillator { mass: 1.0, stiffness: 1e8, damping: 1e3, force: 0.0, rate: 0.0 };
@@ -239,8 +239,8 @@ fn adaptive<M: Stepper<I>>(scene: &Scene<f64>, method: M, tolerance: f64, end: f
     ([q, p].concat(), solver.statistics())
 }
 
-/// Relative to the largest component of the state, an error of at most fifty times the tolerance after a second; the steps
-/// number a few times those of a non-stiff motion.
+/// Relative to the largest component of the state, an error of at most fifty times the tolerance after a second; the
+/// steps number a few times those of a non-stiff motion.
 #[test]
 fn tolerances_are_met() {
     for scene in three().into_iter().chain([stiff()]) {
@@ -395,7 +395,8 @@ fn a_free_body_keeps_its_momenta() {
         ("Radau 5", run(&scene, Radau5::new(&scene.i))),
         ("Rodas5P", run(&scene, Rodas5P::new(&scene.i))),
     ] {
-        // A thousand steps whose sums are rounded; the moment about the origin has the drift's product with the momentum.
+        // A thousand steps whose sums are rounded; the moment about the origin has the drift's product with the
+        // momentum.
         let size =
             start.iter().fold(1.0_f64, |m, x| m.max(x.abs())) * q[..3].iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         let drift = off(&outer(&q, &p), &start);

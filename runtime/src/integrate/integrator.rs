@@ -29,8 +29,8 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// Nothing is known yet. Inlined, as are all constructors around it: otherwise the parts are built beside the whole and
-    /// copied, and take up twice the stack.
+    /// Nothing is known yet. Inlined, as are all constructors around it: otherwise the parts are built beside the whole
+    /// and copied, and take up twice the stack.
     #[inline(always)]
     fn new(system: &Y, compensated: bool) -> Self {
         Attempt {
@@ -89,7 +89,8 @@ where
     /// Whether rates of past steps are used. The history continues as long as each step starts from the state that the
     /// method returned last.
     const MULTISTEP: bool = false;
-    /// Whether the rate at the end of a step is always evaluated when the step is accepted, for the next one to start with.
+    /// Whether the rate at the end of a step is always evaluated when the step is accepted, for the next one to start
+    /// with.
     const ENDS_WITH_RATE: bool = false;
 
     /// Order of convergence.
@@ -163,8 +164,8 @@ pub trait FromSystem<Y: System> {
     fn new(system: &Y) -> Self;
 }
 
-/// A method of integration: a [`Scheme`] in the shell that all methods share. Take one by its name, [`Rk4`](super::Rk4) for
-/// example; a scheme of your own becomes one by [`Integrator::from_scheme`].
+/// A method of integration: a [`Scheme`] in the shell that all methods share. Take one by its name, [`Rk4`](super::Rk4)
+/// for example; a scheme of your own becomes one by [`Integrator::from_scheme`].
 #[derive(Clone, Debug)]
 pub struct Integrator<Y: System, S> {
     step: Attempt<Y>,

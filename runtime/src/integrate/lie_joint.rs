@@ -198,8 +198,8 @@ impl LieJoint {
         }
     }
 
-    /// Takes the displacement `step` off the front of `(x, p)`, of whose momenta those of `step` are taken off already: what
-    /// subtraction alone would get wrong.
+    /// Takes the displacement `step` off the front of `(x, p)`, of whose momenta those of `step` are taken off already:
+    /// what subtraction alone would get wrong.
     pub(super) fn relative<S: Scalar>(&self, step: &[S], x: &mut [S], p: &mut [S]) {
         self.refer(self.shift(step), p);
         if let Some(at) = self.phi() {
@@ -235,8 +235,8 @@ impl LieJoint {
         self.join((r.vector(linear), r.vector(angular)), out);
     }
 
-    /// Derivatives of the energy by the displacement, momenta held as they are in outer axes: of the parts of `x`. `p` are the
-    /// momenta there; `gx` and `gp` hold `-ṗ` and `ẋ`. Those by the momenta are set to zero.
+    /// Derivatives of the energy by the displacement, momenta held as they are in outer axes: of the parts of `x`. `p`
+    /// are the momenta there; `gx` and `gp` hold `-ṗ` and `ẋ`. Those by the momenta are set to zero.
     ///
     /// With `L = μ − x × π`, force and torque `π̇` and `μ̇ − x × π̇`: `∂H/∂x = ω × π − π̇` and
     /// `∂H/∂φ = ẋ × π + ω × L − μ̇ + x × π̇`, this by a turn from the displaced rotation.
@@ -264,8 +264,8 @@ impl LieJoint {
         self.join((r.vector_back(linear), r.vector_back(angular)), x);
     }
 
-    /// Changes a displacement from one that leads to the state `from` to one that leads to the state `to`: its rotation and
-    /// its momenta. Its positions are changed already, `before` is what they were.
+    /// Changes a displacement from one that leads to the state `from` to one that leads to the state `to`: its rotation
+    /// and its momenta. Its positions are changed already, `before` is what they were.
     pub(super) fn correct<S: Scalar>(
         &self,
         (q0, p0): (&[S], &[S]),

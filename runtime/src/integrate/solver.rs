@@ -372,8 +372,8 @@ where
         }
     }
 
-    /// First step, s, from the rates and how they change: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations
-    /// I*, II.4.
+    /// First step, s, from the rates and how they change: Hairer, Nørsett, Wanner, *Solving Ordinary Differential
+    /// Equations I*, II.4.
     fn first(&mut self, system: &mut Y, tolerances: &Tolerances, exponent: f64, rest: f64) -> f64 {
         if self.limits.first_step > 0.0 {
             return self.limits.first_step;

@@ -27,8 +27,8 @@ pub struct Statistics {
 /// A method that goes from one state to the next.
 ///
 /// A step has three parts, so that a [`Solver`](super::Solver) can examine it before it is accepted: [`Stepper::begin`]
-/// takes a state, [`Stepper::attempt`] computes a displacement from it, and [`Stepper::accept`] moves to the new state and
-/// prepares the next attempt. [`Stepper::step`] does all three, for loops that keep the state themselves.
+/// takes a state, [`Stepper::attempt`] computes a displacement from it, and [`Stepper::accept`] moves to the new state
+/// and prepares the next attempt. [`Stepper::step`] does all three, for loops that keep the state themselves.
 pub trait Stepper<Y>
 where
     Y: System,
@@ -37,7 +37,8 @@ where
     /// Order of convergence.
     fn order(&self) -> u32;
 
-    /// Order of the result whose error is estimated, if an error is estimated: the estimate is of one order more in `h`.
+    /// Order of the result whose error is estimated, if an error is estimated: the estimate is of one order more in
+    /// `h`.
     fn error_order(&self) -> Option<u32>;
 
     /// Starts from the state `(q, p)` at time `t` (s); past steps are forgotten.
@@ -81,8 +82,8 @@ where
     /// Rate at the start of the step, known after [`Stepper::begin`] and [`Stepper::accept`].
     fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y>;
 
-    /// Rate at the end of the last attempt, in the coordinates of its start. Evaluated when first asked for, used again by
-    /// the next attempt.
+    /// Rate at the end of the last attempt, in the coordinates of its start. Evaluated when first asked for, used again
+    /// by the next attempt.
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y>;
 
     /// Moves the state by the displacement of the last attempt, which may have been corrected slightly, and prepares
@@ -92,7 +93,8 @@ where
     /// [`StepError::NotFinite`]; the state has not moved then.
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
 
-    /// As [`Stepper::accept`], for callers who call [`Stepper::begin`] before the next attempt: nothing is prepared for it.
+    /// As [`Stepper::accept`], for callers who call [`Stepper::begin`] before the next attempt: nothing is prepared for
+    /// it.
     ///
     /// # Errors
     /// As [`Stepper::accept`].

@@ -36,8 +36,8 @@ impl<S: Scalar> RigidInertia<S> {
         RigidInertia { mass: o, moment: [o; 3], inertia: [o; 6] }
     }
 
-    /// From the ten standard parameters: `[m, m c_x, m c_y, m c_z, J_xx, J_xy, J_yy, J_xz, J_yz, J_zz]`, the inertia about the
-    /// frame origin.
+    /// From the ten standard parameters: `[m, m c_x, m c_y, m c_z, J_xx, J_xy, J_yy, J_xz, J_yz, J_zz]`, the inertia
+    /// about the frame origin.
     pub fn from_parameters(&[m, x, y, z, xx, xy, yy, xz, yz, zz]: &[S; 10]) -> Self {
         RigidInertia { mass: m, moment: [x, y, z], inertia: [xx, xy, xz, yy, yz, zz] }
     }

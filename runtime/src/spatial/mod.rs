@@ -1,7 +1,8 @@
 //! Spatial algebra in six dimensions: `[linear; angular]`, in body axes, taken at the frame origin.
 //!
-//! A transform stays factored into elementary transforms (a rotation about one axis, a displacement along one axis, or a full
-//! rotation). They are applied one by one, which keeps the zeros of the operands; a product with a 6×6 matrix would lose them.
+//! A transform stays factored into elementary transforms (a rotation about one axis, a displacement along one axis, or
+//! a full rotation). They are applied one by one, which keeps the zeros of the operands; a product with a 6×6 matrix
+//! would lose them.
 
 mod inertia;
 mod vector;

@@ -43,7 +43,8 @@ pub struct Force<S> {
     pub ang: Vec3<S>,
 }
 
-/// Components and sums, which motions and forces have in common. They are two types, because they transform differently.
+/// Components and sums, which motions and forces have in common. They are two types, because they transform
+/// differently.
 macro_rules! six_components {
     ($name:ident) => {
         impl<S: Scalar> $name<S> {

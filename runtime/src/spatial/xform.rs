@@ -1,8 +1,8 @@
 //! Elementary transforms, applied to each spatial quantity.
 //!
-//! A placement is a list of elementary transforms from the parent frame to the child frame. Velocities are transformed in the
-//! order of the list ([`ElementaryTransform::motion`]); momenta, wrenches and inertias in the reverse order, from child to
-//! parent ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
+//! A placement is a list of elementary transforms from the parent frame to the child frame. Velocities are transformed
+//! in the order of the list ([`ElementaryTransform::motion`]); momenta, wrenches and inertias in the reverse order,
+//! from child to parent ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
 
 use super::{cross, ArticulatedInertia, Force, Mat3, Motion, Vec3, SYM};
 use crate::Scalar;
@@ -233,8 +233,8 @@ impl<S: Scalar> ElementaryTransform<S> {
         }
     }
 
-    /// Appends this transform to the pose `(R, r)` of a frame: `R` takes the frame's components to those of the reference
-    /// frame, `r` is the frame's origin in the reference frame, m.
+    /// Appends this transform to the pose `(R, r)` of a frame: `R` takes the frame's components to those of the
+    /// reference frame, `r` is the frame's origin in the reference frame, m.
     pub fn pose(&self, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
         match self {
             ElementaryTransform::Turn { axis, c, s } => {

@@ -1,5 +1,5 @@
-//! Centre of mass, centroidal momentum matrix and its bias (D. E. Orin, A. Goswami, S.-H. Lee, *Centroidal dynamics of a
-//! humanoid robot*, Autonomous Robots 35, 2013).
+//! Centre of mass, centroidal momentum matrix and its bias (D. E. Orin, A. Goswami, S.-H. Lee, *Centroidal dynamics of
+//! a humanoid robot*, Autonomous Robots 35, 2013).
 
 use super::pass::{Arguments, Results, Sweep};
 use super::{Inputs, Quantity, Sweeps, Trace};

@@ -1,8 +1,8 @@
 //! Rows of the constraints between two frames: directions, residuals, and how both change with time.
 //!
-//! The frames are `A` and `B`; components are those of `B`, moments are about its origin. `turn` takes components in `A` to
-//! components in `B`, `d` goes from the origin of `A` to that of `B`. A row is a wrench `E` on `B` with
-//! `Eᵀ Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
+//! The frames are `A` and `B`; components are those of `B`, moments are about its origin. `turn` takes components in
+//! `A` to components in `B`, `d` goes from the origin of `A` to that of `B`. A row is a wrench `E` on `B` with `Eᵀ
+//! Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
 
 use crate::spatial::{add3, cross, dot3, scale3, Force, Motion, Vec3};
 use crate::tree::Closure;

@@ -260,15 +260,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Calls `visit` with every velocity that a constraint binds and what a wrench `f` on its second frame, the opposite on
-    /// its first, is along it.
+    /// Calls `visit` with every velocity that a constraint binds and what a wrench `f` on its second frame, the
+    /// opposite on its first, is along it.
     fn along_loop(&self, cut: &Cut<S>, ends: (Force<S>, Force<S>), poses: &Poses<S>, mut visit: impl FnMut(usize, S)) {
         for (path, f) in [(&cut.path_a, ends.0), (&cut.path_b, ends.1)] {
             path.iter().rev().fold(f, |f, &i| self.along_joint(i, &f, poses, &mut visit));
         }
     }
 
-    /// Calls `visit` with the velocities of node `i` and what a wrench `f` on it is along them; gives `f` on its parent.
+    /// Calls `visit` with the velocities of node `i` and what a wrench `f` on it is along them; gives `f` on its
+    /// parent.
     fn along_joint(&self, i: usize, f: &Force<S>, poses: &Poses<S>, visit: &mut impl FnMut(usize, S)) -> Force<S> {
         let node = &self.tree.nodes[i];
         if let Source::State { v, .. } = node.source {

@@ -1,5 +1,5 @@
-//! Articulated inertia, from tip to base. Every freedom is eliminated by itself; eliminating the freedoms of one joint one
-//! after the other is the `LDLᵀ` factorization of its `Mj`.
+//! Articulated inertia, from tip to base. Every freedom is eliminated by itself; eliminating the freedoms of one joint
+//! one after the other is the `LDLᵀ` factorization of its `Mj`.
 
 use super::pass::{each_node, visit_force, visit_inertia, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
@@ -48,8 +48,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Sets the columns and inertias of open unknowns to zero, only where they are read: the work grows with the sizes of the
-    /// loops, not with the square of the number of rows.
+    /// Sets the columns and inertias of open unknowns to zero, only where they are read: the work grows with the sizes
+    /// of the loops, not with the square of the number of rows.
     fn clear_open(&self, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
@@ -89,9 +89,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// `M*`, `U`, `Mj`, `M'` of node `i` (4.48, 4.44), after its children. For a plain revolute joint this reads: `U = M* E`,
-    /// `Mj = EᵀU`, `M' = M* − U Mj⁻¹ Uᵀ`, and `XᵀM'X` is added to `M*` of the parent. The rest is for unknowns that are solved
-    /// at another node than their joint's, and for joints that are eliminated in the frame before them.
+    /// `M*`, `U`, `Mj`, `M'` of node `i` (4.48, 4.44), after its children. For a plain revolute joint this reads: `U =
+    /// M* E`, `Mj = EᵀU`, `M' = M* − U Mj⁻¹ Uᵀ`, and `XᵀM'X` is added to `M*` of the parent. The rest is for unknowns
+    /// that are solved at another node than their joint's, and for joints that are eliminated in the frame before them.
     fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];

@@ -1,5 +1,5 @@
-//! Inverse dynamics `(q, v, v̇) → τ`, bias forces, and the wrenches that joints transmit: what the bodies need for their
-//! motion (`newton.rs`), summed from tip to base.
+//! Inverse dynamics `(q, v, v̇) → τ`, bias forces, and the wrenches that joints transmit: what the bodies need for
+//! their motion (`newton.rs`), summed from tip to base.
 
 use super::newton::Accelerations;
 use super::pass::{each_node, visit_force, Sweep};

@@ -19,9 +19,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         });
     }
 
-    /// Calls `add` with the number of a velocity and what it adds to its column of the Jacobian, for every freedom inboard of
-    /// a frame. The frame's pose is carried inward from node to node: only its ancestors are met, and each turns three axes
-    /// and one arm.
+    /// Calls `add` with the number of a velocity and what it adds to its column of the Jacobian, for every freedom
+    /// inboard of a frame. The frame's pose is carried inward from node to node: only its ancestors are met, and each
+    /// turns three axes and one arm.
     pub(super) fn jacobian_columns(&self, frame: &TreeFrame<S>, w: &Workspace<S>, mut add: impl FnMut(usize, [S; 6])) {
         let (o, one) = (S::zero(), S::one());
         self.trace.at(frame.node, Quantity::Jacobian);
@@ -50,7 +50,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         Some(m)
     }
 
-    /// Acceleration `[linear; angular]` of a frame in its own axes, after [`Sweep::NEWTON`](super::pass::Sweep::NEWTON).
+    /// Acceleration `[linear; angular]` of a frame in its own axes, after
+    /// [`Sweep::NEWTON`](super::pass::Sweep::NEWTON).
     pub(super) fn frame_acceleration(&self, frame: &TreeFrame<S>, w: &Workspace<S>) -> [S; 6] {
         let Some(m) = self.classic_frame_motion(frame, w) else { return [S::zero(); 6] };
         let ([ax, ay, az], [bx, by, bz]) = (m.accel, m.alpha);

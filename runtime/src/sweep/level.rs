@@ -1,8 +1,8 @@
 //! The three linear problems that the sweeps solve: where each keeps its right-hand side and its solution.
 //!
-//! For velocities the right-hand side is `p` and nothing else. For accelerations it is the joint force, and every body starts
-//! with the wrench that it needs for a reference motion (`acceleration.rs`). For the correction of positions it is zero, and
-//! the rows of the constraints ask for the negative of their residuals.
+//! For velocities the right-hand side is `p` and nothing else. For accelerations it is the joint force, and every body
+//! starts with the wrench that it needs for a reference motion (`acceleration.rs`). For the correction of positions it
+//! is zero, and the rows of the constraints ask for the negative of their residuals.
 
 use super::pass::{each_node, visit_force, visit_motion, visit_rows, Arguments, Context, Sweep};
 use super::{Quantity, Trace};

@@ -79,7 +79,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// An external wrench `[force, torque]` (N, N m) in the axes of the frame it acts at, as given or turned from the ground's.
+    /// An external wrench `[force, torque]` (N, N m) in the axes of the frame it acts at, as given or turned from the
+    /// ground's.
     pub(super) fn wrench_in_frame(&self, wrench: &TreeWrench<S>, given: &[S; 6], w: &Workspace<S>) -> Force<S> {
         let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
         if wrench.axes == WrenchAxes::Ground {

@@ -1,8 +1,9 @@
 //! Mass matrix by composite inertias.
 //!
-//! An entry is the product of a column `F = M E`, carried towards the base, and a screw `E` at its node. In a deep tree most
-//! of the work is to carry columns through the inner nodes. So the columns of the outer nodes stop at the depth
-//! [`Tree::matrix_depth`](crate::tree::Tree::matrix_depth), and the screws of the inner nodes are carried outward to them.
+//! An entry is the product of a column `F = M E`, carried towards the base, and a screw `E` at its node. In a deep tree
+//! most of the work is to carry columns through the inner nodes. So the columns of the outer nodes stop at the depth
+//! [`Tree::matrix_depth`](crate::tree::Tree::matrix_depth), and the screws of the inner nodes are carried outward to
+//! them.
 
 use super::{Inputs, Quantity, Sweeps, Trace};
 use crate::spatial::Force;

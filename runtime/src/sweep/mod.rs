@@ -6,9 +6,9 @@
 //! A coordinate shared by several joints (a mimic) keeps its column `F = M* E` open while the sweep goes on inward, and
 //! is eliminated where all its joints have met: exact, and still one pass.
 //!
-//! What a sweep does at one node is a function of its own (`factor_node`, `motion_node` ...), beside a [`Sweep`](pass::Sweep)
-//! that says in which direction it goes; `outputs.rs` has the order of the sweeps of every output. The generator runs the same
-//! lists over one link of a long chain.
+//! What a sweep does at one node is a function of its own (`factor_node`, `motion_node` ...), beside a
+//! [`Sweep`](pass::Sweep) that says in which direction it goes; `outputs.rs` has the order of the sweeps of every
+//! output. The generator runs the same lists over one link of a long chain.
 
 mod acceleration;
 mod articulate;
@@ -86,8 +86,8 @@ pub enum Quantity {
 pub trait Trace {
     /// The next operations belong to this node (`None`: the ground) and quantity.
     fn at(&self, _node: Option<usize>, _what: Quantity) {}
-    /// A value of the node where the sweep stands is an entry of something that has a letter: `m` and `xx`; the entry may be
-    /// empty.
+    /// A value of the node where the sweep stands is an entry of something that has a letter: `m` and `xx`; the entry
+    /// may be empty.
     #[inline]
     fn name<S: Scalar>(&self, _value: S, _letter: &'static str, _entry: &'static str) {}
 }
@@ -131,7 +131,8 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         self.steps(w, i).rev().fold(*f, |f, step| step.force(&f))
     }
 
-    /// Whether the frame of the parent of node `i` does not turn with its body: then the placement of node `i` in it does.
+    /// Whether the frame of the parent of node `i` does not turn with its body: then the placement of node `i` in it
+    /// does.
     fn placement_turns(&self, i: usize) -> bool {
         self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].elimination.non_rotating)
     }

@@ -1,6 +1,6 @@
-//! Names of what the sweeps store, for the listener: the letters of `notation` in ASCII, a prime as `p`, and the entry. Entries
-//! of spatial vectors are `x`, `y`, `z` of the linear and `rx`, `ry`, `rz` of the angular part; entries of inertias are pairs of
-//! them. Numbers have no names: on them nothing is left of these calls.
+//! Names of what the sweeps store, for the listener: the letters of `notation` in ASCII, a prime as `p`, and the entry.
+//! Entries of spatial vectors are `x`, `y`, `z` of the linear and `rx`, `ry`, `rz` of the angular part; entries of
+//! inertias are pairs of them. Numbers have no names: on them nothing is left of these calls.
 
 use super::Trace;
 use crate::spatial::{ArticulatedInertia, Force, Motion, Vec3};

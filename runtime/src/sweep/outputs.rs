@@ -179,8 +179,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.context(&Arguments::new(q, p, u), w, Results { v, qd, p: pd, ..Results::none() }).run(SweepList::RATES);
     }
 
-    /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's origin;
-    /// bodies that are fixed to the ground do not count.
+    /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's
+    /// origin; bodies that are fixed to the ground do not count.
     pub fn energy(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) -> (S, S) {
         let mut energy = [S::zero(); 2];
         self.context(&Arguments::new(q, p, u), w, Results { v, energy: &mut energy, ..Results::none() })
@@ -208,14 +208,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             .sweep([Sweep::VELOCITY, Sweep::MOMENTUM]);
     }
 
-    /// Joint forces `τ` that give the accelerations `a`: `(q, v, v̇) → τ = M v̇ + h`. The `τ` of the inputs is not read.
+    /// Joint forces `τ` that give the accelerations `a`: `(q, v, v̇) → τ = M v̇ + h`. The `τ` of the inputs is not
+    /// read.
     pub fn inverse_dynamics(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, tau: &mut [S]) {
         let given = Arguments { accelerations: Accelerations::Given(a), ..Arguments::new(q, v, u) };
         self.context(&given, w, Results { p: tau, ..Results::none() }).run(SweepList::INVERSE_DYNAMICS);
     }
 
-    /// Bias forces: the joint forces that keep `v̇` zero, `(q, v) → h` with `M v̇ + h = τ`. What products of velocities,
-    /// prescribed accelerations and gravity need, less what springs, dampers and external wrenches give.
+    /// Bias forces: the joint forces that keep `v̇` zero, `(q, v) → h` with `M v̇ + h = τ`. What products of
+    /// velocities, prescribed accelerations and gravity need, less what springs, dampers and external wrenches give.
     pub fn bias(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, h: &mut [S]) {
         self.context(&Arguments::new(q, v, u), w, Results { p: h, ..Results::none() }).run(SweepList::INVERSE_DYNAMICS);
     }
@@ -232,8 +233,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         lambda.copy_from_slice(&w.constraints.multipliers);
     }
 
-    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, at accelerations `a`
-    /// (4.66), on a tree that was not regrouped. The multipliers `λ` of constraints are those of the last
+    /// Wrench `[force; moment]` that every joint transmits to its child, in the child's body frame, at accelerations
+    /// `a` (4.66), on a tree that was not regrouped. The multipliers `λ` of constraints are those of the last
     /// [`Sweeps::accelerations`].
     pub fn reactions(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [[S; 6]]) {
         let given = Arguments { accelerations: Accelerations::Given(a), ..Arguments::new(q, v, u) };
@@ -308,9 +309,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Jacobians of frames, `q → J`: for each of `frames` one block of `out`, `6 × nv`, row by row. `J v` is the frame's
-    /// velocity `[linear; angular]` in its own axes, at its origin, as far as it comes from `v` (prescribed rates add
-    /// theirs).
+    /// Jacobians of frames, `q → J`: for each of `frames` one block of `out`, `6 × nv`, row by row. `J v` is the
+    /// frame's velocity `[linear; angular]` in its own axes, at its origin, as far as it comes from `v` (prescribed
+    /// rates add theirs).
     pub fn jacobians<'b>(
         &self,
         q: &[S],
@@ -329,8 +330,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `J̇ v` and its like for each of `frames`: acceleration `[linear; angular]` at `v̇ = 0`, prescribed accelerations
-    /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in ground
-    /// axes the frame accelerates by `R (J v̇ + bias)`.
+    /// included. The linear part is that of the origin as the ground sees it, both are in the axes of the frame: in
+    /// ground axes the frame accelerates by `R (J v̇ + bias)`.
     pub fn bias_accelerations<'b>(
         &self,
         q: &[S],

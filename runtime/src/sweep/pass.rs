@@ -1,9 +1,9 @@
 //! What a sweep is: a function of one node, the direction in which the nodes are visited, and what the visit of a node
 //! leaves for its neighbours. `outputs.rs` lists the sweeps of every output.
 //!
-//! A tree runs the sweeps of a list one after the other. Rolled code visits each node of a chain once for several sweeps
-//! together, in a [`Pass`]; [`passes`] says which sweeps share one. Both run the same functions in the same order, so they
-//! give the same bits.
+//! A tree runs the sweeps of a list one after the other. Rolled code visits each node of a chain once for several
+//! sweeps together, in a [`Pass`]; [`passes`] says which sweeps share one. Both run the same functions in the same
+//! order, so they give the same bits.
 
 use alloc::vec::Vec;
 
@@ -96,8 +96,8 @@ pub type Visit<'v, S> = &'v mut dyn FnMut(&mut S);
 pub struct Sweep<S, T> {
     /// Order of the nodes.
     pub direction: SweepDirection,
-    /// Whether it reads what a sweep of the other direction before it in the list computes. If not, it can share the first
-    /// pass in its own direction.
+    /// Whether it reads what a sweep of the other direction before it in the list computes. If not, it can share the
+    /// first pass in its own direction.
     pub waits: bool,
     /// Whether a tree has use for it.
     pub needed: fn(&Tree<S>) -> bool,
@@ -111,8 +111,8 @@ pub struct Sweep<S, T> {
     pub(super) tree: fn(&mut Context<'_, S, T>),
     /// Runs after the last node: what is eliminated or summed up at the ground.
     pub end: fn(&mut Context<'_, S, T>),
-    /// Visits what the sweep hands through a node: from tip to base the sum of what its children hand to it, from base to
-    /// tip what it hands to its children.
+    /// Visits what the sweep hands through a node: from tip to base the sum of what its children hand to it, from base
+    /// to tip what it hands to its children.
     pub carried: fn(&mut Context<'_, S, T>, usize, Visit<'_, S>),
     /// Visits what the sweep updates at every node: sums over all nodes so far, and multipliers.
     pub running: fn(&mut Context<'_, S, T>, Visit<'_, S>),
@@ -144,8 +144,8 @@ impl<S, T> Sweep<S, T> {
     }
 }
 
-/// A sweep that visits the nodes in a direction and does something at each, once as a function of a node and once with the
-/// loop over the tree, where the compiler can merge the two.
+/// A sweep that visits the nodes in a direction and does something at each, once as a function of a node and once with
+/// the loop over the tree, where the compiler can merge the two.
 macro_rules! each_node {
     (TipToBase, |$cx:ident, $i:ident| $at_node:expr) => {
         Sweep {
@@ -200,8 +200,8 @@ impl<S: Scalar, T: Trace> Context<'_, S, T> {
         self.sweeps.articulate(self.given.q, self.given.inputs.drive_q, &mut self.w.poses);
     }
 
-    /// Runs sweeps over the tree, one after the other. The loop is unrolled by hand, so that the compiler knows the functions
-    /// of a constant list and can merge them into the caller.
+    /// Runs sweeps over the tree, one after the other. The loop is unrolled by hand, so that the compiler knows the
+    /// functions of a constant list and can merge them into the caller.
     #[inline(always)]
     pub(super) fn sweep<const N: usize>(&mut self, sweeps: [Sweep<S, T>; N]) {
         macro_rules! unrolled {
@@ -235,8 +235,8 @@ pub struct Pass {
     pub sweeps: Vec<usize>,
 }
 
-/// The sweeps of a list that a tree needs, in as few passes as their directions allow: a sweep that waits shares the last
-/// pass or opens one, the others share the first pass in their direction.
+/// The sweeps of a list that a tree needs, in as few passes as their directions allow: a sweep that waits shares the
+/// last pass or opens one, the others share the first pass in their direction.
 pub fn passes<S, T>(list: &[Sweep<S, T>], tree: &Tree<S>) -> Vec<Pass> {
     let of = |waits: bool| {
         let all = list.iter().enumerate().filter(move |(_, sweep)| sweep.waits == waits && (sweep.needed)(tree));

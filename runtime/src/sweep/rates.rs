@@ -115,8 +115,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 }
 
-/// `z`-moment of `Ω × (M'Ω̂ + D')` with the products that cancel left out; `ω_z` does not enter, so `Ω̂` serves for `Ω`.
-/// The differences `Axx − Ayy` and the like are those the rotation of `M'` forms.
+/// `z`-moment of `Ω × (M'Ω̂ + D')` with the products that cancel left out; `ω_z` does not enter, so `Ω̂` serves for
+/// `Ω`. The differences `Axx − Ayy` and the like are those the rotation of `M'` forms.
 fn gyro_turn<S: Scalar>(m: &ArticulatedInertia<S>, w: &Motion<S>, d: &Force<S>) -> S {
     let ([vx, vy, vz], [wx, wy, wz]) = (w.lin, w.ang);
     let (a, h, j) = (&m.a, &m.h, &m.j);

@@ -1,5 +1,5 @@
-//! The regressor: joint forces as a linear function of the dynamic parameters, `τ = Y(q, v, v̇) π` (C. G. Atkeson, C. H. An,
-//! J. M. Hollerbach, *Estimation of inertial parameters of manipulator loads and links*, IJRR 5(3), 1986).
+//! The regressor: joint forces as a linear function of the dynamic parameters, `τ = Y(q, v, v̇) π` (C. G. Atkeson, C.
+//! H. An, J. M. Hollerbach, *Estimation of inertial parameters of manipulator loads and links*, IJRR 5(3), 1986).
 
 use super::pass::{Arguments, Results, Sweep};
 use super::{Accelerations, Inputs, Quantity, Sweeps, Trace};
@@ -10,8 +10,8 @@ use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Regressor `Y`, row by row: one row for each velocity, one column for each parameter of
-    /// [`Tree::dynamic_parameters`](crate::tree::Tree::dynamic_parameters), in that order. The column of a damping is the
-    /// velocity, that of a dry friction its sign.
+    /// [`Tree::dynamic_parameters`](crate::tree::Tree::dynamic_parameters), in that order. The column of a damping is
+    /// the velocity, that of a dry friction its sign.
     ///
     /// `Y π` are the joint forces that the motion takes, without springs, rotor inertias and external wrenches.
     pub fn regressor(&self, q: &[S], v: &[S], a: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [S]) {

@@ -1,7 +1,7 @@
 //! The linear problem behind both levels: momenta to velocities, forces to accelerations.
 //!
-//! With `M'`, `U`, `Mj` known, right-hand sides are carried from tip to base (`D`, 4.49, 4.45) and motions from base to tip
-//! (4.40). `level.rs` says what the right-hand sides are.
+//! With `M'`, `U`, `Mj` known, right-hand sides are carried from tip to base (`D`, 4.49, 4.45) and motions from base to
+//! tip (4.40). `level.rs` says what the right-hand sides are.
 
 use super::level::Load;
 use super::{name, Quantity, Sweeps, Trace};
@@ -17,7 +17,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Some(seeds) => sol.d.copy_from_slice(seeds),
             None => sol.d.fill(Force::zero()),
         }
-        // `unknown_rate` holds the bias momentum of unknowns that are still open, until the sweep of motions overwrites it.
+        // `unknown_rate` holds the bias momentum of unknowns that are still open, until the sweep of motions overwrites
+        // it.
         sol.unknown_rate.fill(S::zero());
     }
 
@@ -222,9 +223,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.leaving(poses, i).fold(f.m[i].times(&motion).plus(&d), |f, step| step.force_back(&f))
     }
 
-    /// The motion that `M'` of node `i` acts on and what is to be added to it, in the frame it is eliminated in: `Ω̂` and
-    /// `D'` with what the open coordinates add. A freedom that is solved further inboard leaves `M*` whole: then `Ω`
-    /// takes the place of `Ω̂`, and the freedom's own column, `M* E`, is in `M*` already.
+    /// The motion that `M'` of node `i` acts on and what is to be added to it, in the frame it is eliminated in: `Ω̂`
+    /// and `D'` with what the open coordinates add. A freedom that is solved further inboard leaves `M*` whole: then
+    /// `Ω` takes the place of `Ω̂`, and the freedom's own column, `M* E`, is in `M*` already.
     pub(super) fn acting(&self, first: &[usize], f: &Factor<S>, sol: &Solution<S>, i: usize) -> (Motion<S>, Force<S>) {
         let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
         let (mut motion, mut own) = (sol.hat[i], None);

@@ -2,25 +2,26 @@
 
 use alloc::vec::Vec;
 
-/// How the freedoms of a node are eliminated. The default is the articulated-body algorithm: each node solves its own freedoms, one
-/// joint at a time, in its own frame, and gets its momentum rates from quadratic forms. Numbers of unknowns are indices into
-/// [`Tree::unknowns`](super::Tree::unknowns).
+/// How the freedoms of a node are eliminated. The default is the articulated-body algorithm: each node solves its own
+/// freedoms, one joint at a time, in its own frame, and gets its momentum rates from quadratic forms. Numbers of
+/// unknowns are indices into [`Tree::unknowns`](super::Tree::unknowns).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Elimination {
     /// Unknown of the node's coordinate where several nodes share it, or where it is solved at another node.
     pub unknown: Option<usize>,
     /// The coordinate is this node's alone, only solved further inboard (with others, as a block).
     pub deferred: bool,
-    /// The freedom is eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is divided by does
-    /// not wait for the turn. Joints about or along z only.
+    /// The freedom is eliminated in the frame ahead of the joint's own motion, where the axis is the same: what is
+    /// divided by does not wait for the turn. Joints about or along z only.
     pub before_joint: bool,
-    /// The node frame does not rotate with the joint: a revolute joint whose children are all revolute joints about parallel axes,
-    /// placed by shifts alone. The body turns in the frame, by the sum of the angles since the last frame that rotated.
+    /// The node frame does not rotate with the joint: a revolute joint whose children are all revolute joints about
+    /// parallel axes, placed by shifts alone. The body turns in the frame, by the sum of the angles since the last
+    /// frame that rotated.
     pub non_rotating: bool,
     /// The momentum rate comes from the accumulated momentum `P*` instead of a quadratic form of the velocity.
     pub accumulates_momentum: bool,
-    /// Unknowns whose columns are not carried further inward, because the screws of all freedoms inboard that they meet are carried
-    /// outward to this node.
+    /// Unknowns whose columns are not carried further inward, because the screws of all freedoms inboard that they meet
+    /// are carried outward to this node.
     pub ends: Vec<usize>,
     /// Those screws, by the unknowns they belong to (each of a deferred freedom).
     pub screws: Vec<usize>,

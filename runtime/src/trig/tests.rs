@@ -331,7 +331,8 @@ fn every_single() {
     assert!(worst.0 <= BOUND);
 }
 
-/// Time a call beside the C library's. A report, not a gate: `cargo test --release -- --ignored --nocapture throughput`.
+/// Time a call beside the C library's. A report, not a gate: `cargo test --release -- --ignored --nocapture
+/// throughput`.
 #[test]
 #[ignore = "a timing"]
 fn throughput() {

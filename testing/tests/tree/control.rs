@@ -172,7 +172,8 @@ fn bias_accelerations_complete_the_accelerations_of_frames() {
     });
 }
 
-/// Centre of mass, momentum of the state's velocities about it and rate of all momentum, body by body from the motion of frames.
+/// Centre of mass, momentum of the state's velocities about it and rate of all momentum, body by body from the motion
+/// of frames.
 #[test]
 fn centroidal_momentum_is_that_of_the_bodies() {
     all("A v and A a + bias against the bodies' momenta", |c| {
@@ -218,8 +219,8 @@ fn centroidal_momentum_is_that_of_the_bodies() {
     });
 }
 
-/// `τ = Y π` of the model's own parameters, beside springs and rotors; a unit more of any inertial parameter changes `τ` by its
-/// column.
+/// `τ = Y π` of the model's own parameters, beside springs and rotors; a unit more of any inertial parameter changes
+/// `τ` by its column.
 #[test]
 fn regressor_times_parameters_is_inverse_dynamics() {
     all("Y pi + springs + rotors = tau", |c| {
@@ -283,8 +284,8 @@ fn regressor_times_parameters_is_inverse_dynamics() {
     });
 }
 
-/// The base parameters explain every joint force: putting each group together onto its first parameter changes nothing, and
-/// there are as many groups as the regressor has independent columns.
+/// The base parameters explain every joint force: putting each group together onto its first parameter changes nothing,
+/// and there are as many groups as the regressor has independent columns.
 #[test]
 fn base_parameters_replace_all_parameters() {
     let mut counted = [0; 2];

@@ -5,7 +5,8 @@ use super::super::words::{did_you_mean, quote};
 use super::table::Table;
 use crate::model::Words;
 
-/// The kind that `type` names, among `all`. `special` gives the help for words in lower case that belong to none of them.
+/// The kind that `type` names, among `all`. `special` gives the help for words in lower case that belong to none of
+/// them.
 pub(super) fn kind<T>(
     table: &Table,
     all: &'static [T],

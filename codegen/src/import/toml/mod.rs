@@ -16,8 +16,8 @@ use super::{Base, ImportOptions};
 
 const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling"];
 
-/// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the default,
-/// gravity replaces that of the file.
+/// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the
+/// default, gravity replaces that of the file.
 pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
     if options.base != Base::default() {
         let help = "leave the option out; in the file the joints to `ground` say how the model is attached";

@@ -65,7 +65,8 @@ impl Reader<'_, '_> {
         found
     }
 
-    /// The child elements of `node`, at most one of each name in `used`, in the order of `used`; a second one is an error.
+    /// The child elements of `node`, at most one of each name in `used`, in the order of `used`; a second one is an
+    /// error.
     pub fn single_children<'x, 'i, const N: usize>(
         &mut self,
         node: Node<'x, 'i>,

@@ -1,4 +1,5 @@
-//! Rounding errors of eliminations, measured on a few states. An elimination that loses too much accuracy is not chosen.
+//! Rounding errors of eliminations, measured on a few states. An elimination that loses too much accuracy is not
+//! chosen.
 //!
 //! Programs are run on doubles and compared with the interpreter on double-double numbers. The interpreter starts from
 //! the numbers of the model: constants that a program computes in advance are rounded, and eliminations differ in the
@@ -78,8 +79,8 @@ impl Errors {
 }
 
 impl ErrorEstimator {
-    /// An estimator for programs of one output (the rates, or the accelerations) of `plan`, which has one joint at a time.
-    /// Parameters have their default values.
+    /// An estimator for programs of one output (the rates, or the accelerations) of `plan`, which has one joint at a
+    /// time. Parameters have their default values.
     pub fn new(plan: &Plan, output: Output) -> ErrorEstimator {
         let mut estimator = ErrorEstimator { parts: Vec::new(), samples: Vec::new(), articulated: Vec::new() };
         let plan = &rotating(plan);
@@ -105,8 +106,8 @@ impl ErrorEstimator {
         estimator
     }
 
-    /// The error of a program of the same output, in multiples of that of one joint at a time: of the part that loses most,
-    /// in the mean, the median or the worst states.
+    /// The error of a program of the same output, in multiples of that of one joint at a time: of the part that loses
+    /// most, in the mean, the median or the worst states.
     pub fn loss(&self, program: &Program) -> f64 {
         let losses = self.errors(program).into_iter().zip(&self.articulated).map(|(e, a)| e.times(*a));
         losses.fold(0.0, f64::max)

@@ -1,5 +1,5 @@
-//! Collects constant factors: `c·(d·x)` becomes `(c·d)·x`, even where `d·x` is needed elsewhere too. The number of operations
-//! does not grow, and the critical path has one product less.
+//! Collects constant factors: `c·(d·x)` becomes `(c·d)·x`, even where `d·x` is needed elsewhere too. The number of
+//! operations does not grow, and the critical path has one product less.
 
 use super::rebuild::Rebuilt;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};

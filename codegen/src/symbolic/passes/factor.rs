@@ -1,8 +1,8 @@
 //! Takes common factors out of sums: `a·b + a·c` becomes `a·(b + c)`.
 //!
-//! Only products that are used once are split into factors. Every factor that is taken out of `n` terms then saves `n − 1`
-//! products, and nothing is computed twice. The factor that saves most is taken first; the sum in brackets is treated in the
-//! same way.
+//! Only products that are used once are split into factors. Every factor that is taken out of `n` terms then saves `n −
+//! 1` products, and nothing is computed twice. The factor that saves most is taken first; the sum in brackets is
+//! treated in the same way.
 
 use std::collections::BTreeMap;
 

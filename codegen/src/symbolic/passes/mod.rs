@@ -18,14 +18,15 @@ use schedule::Limits;
 /// Largest number of rounds of rewriting; two or three have been enough for all models so far.
 const ROUNDS: usize = 4;
 
-/// Number of values that a schedule keeps alive: of the 32 registers of AVX-512, or of 16 registers with some values in memory,
-/// which costs little.
+/// Number of values that a schedule keeps alive: of the 32 registers of AVX-512, or of 16 registers with some values in
+/// memory, which costs little.
 const LIMITS: Limits = Limits { registers: 24, search: 64 };
 
-/// Long programs keep the order of the sweeps if the work of their busiest pipe takes this many times as long as their critical
-/// path. There is then always an operation that is ready, and values that are used soon after they are computed stay in
-/// registers. (The derivatives of a general chain, of the Panda and of Solo12 take less time in this order, those of the last two
-/// a fifth less with fused operations; those of the iiwa, with fewer instructions, take more.)
+/// Long programs keep the order of the sweeps if the work of their busiest pipe takes this many times as long as their
+/// critical path. There is then always an operation that is ready, and values that are used soon after they are
+/// computed stay in registers. (The derivatives of a general chain, of the Panda and of Solo12 take less time in this
+/// order, those of the last two a fifth less with fused operations; those of the iiwa, with fewer instructions, take
+/// more.)
 const WIDE: f64 = 2.0;
 
 /// Number of instructions from which a program counts as long.

@@ -31,8 +31,8 @@ struct Made<'g> {
     most: f64,
 }
 
-/// A program of sums and products of integers. In every order of evaluation all numbers are small enough to be exact, so that
-/// a pass must give exactly the same values.
+/// A program of sums and products of integers. In every order of evaluation all numbers are small enough to be exact,
+/// so that a pass must give exactly the same values.
 pub fn integer_program(seed: u64, operations: usize) -> Program {
     let mut rng = Rng::new(seed);
     let graph = Graph::default();
@@ -67,8 +67,8 @@ pub fn integer_program(seed: u64, operations: usize) -> Program {
     Program::new(&graph, &outputs)
 }
 
-/// A well-conditioned program with every kind of operation: sums of positive numbers near one, averaged so that they stay
-/// there. In every order, the errors of its results are a few roundings for each operation.
+/// A well-conditioned program with every kind of operation: sums of positive numbers near one, averaged so that they
+/// stay there. In every order, the errors of its results are a few roundings for each operation.
 pub fn real_program(seed: u64, operations: usize) -> Program {
     use mbd_runtime::Scalar;
     let mut rng = Rng::new(seed);
@@ -77,8 +77,8 @@ pub fn real_program(seed: u64, operations: usize) -> Program {
     while pool.len() < operations {
         let (a, b) = (pool[rng.below(pool.len())], pool[pool.len() - 1 - rng.below(pool.len().min(9))]);
         let made = match rng.below(8) {
-            // Pivots that are kept and pivots that are dropped: all values are positive, and the floor is well below or well
-            // above them.
+            // Pivots that are kept and pivots that are dropped: all values are positive, and the floor is well below or
+            // well above them.
             6 => (a * b).reciprocal_above(Expr::Const(0.1) * a * b) + Expr::Const(1.0),
             7 => (b - a - b).reciprocal_above(b) + a,
             0 => a / b + Expr::Const(1.0),

@@ -266,7 +266,8 @@ mod tests {
 
     const LIMITS: Limits = Limits { registers: 16, search: 64 };
 
-    /// Largest number of values between definition and last use; inputs, sines and cosines are in memory and do not count.
+    /// Largest number of values between definition and last use; inputs, sines and cosines are in memory and do not
+    /// count.
     fn alive(program: &Program) -> usize {
         let mut last = std::collections::BTreeMap::new();
         for (at, (_, op, _)) in program.steps.iter().enumerate() {

@@ -1,7 +1,8 @@
 //! Adds pairs of terms that several sums have in common only once.
 //!
-//! Binary sums hide such pairs: `(a + b) + c` and `(a + c) + d` share `a + c`. Sums that are used once, by a sum, are therefore
-//! split into terms. The pair that most sums contain is taken first. A pair in `n` sums saves `n − 1` additions.
+//! Binary sums hide such pairs: `(a + b) + c` and `(a + c) + d` share `a + c`. Sums that are used once, by a sum, are
+//! therefore split into terms. The pair that most sums contain is taken first. A pair in `n` sums saves `n − 1`
+//! additions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,7 +36,8 @@ fn choose(opened: &Opened, sums: &mut BTreeMap<u32, Vec<(Operand, bool)>>, next:
     }
     places.retain(|_, at| at.len() > 1);
     let mut chosen = Vec::new();
-    // The most frequent pair comes first. Counts only decrease, except for pairs with a new operand; later rounds find these.
+    // The most frequent pair comes first. Counts only decrease, except for pairs with a new operand; later rounds find
+    // these.
     let mut queue: Vec<(usize, Pair)> = places.iter().map(|(pair, at)| (at.len(), *pair)).collect();
     queue.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.cmp(&b.1)));
     for (_, pair) in queue {

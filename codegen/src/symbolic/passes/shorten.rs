@@ -1,9 +1,9 @@
 //! Computes a shared product again where waiting for it lengthens the critical path.
 //!
-//! A product that several operations use is computed once. If it lies on the critical path, its users can become faster by
-//! using its factors instead: a sum fuses the product, and `M − u·(v·r)` with a late `r` becomes `M − (u·v)·r`. Each change
-//! costs one or two operations and saves the latency of a product. Only programs that are limited by latency are changed, and
-//! only changes that save time are kept.
+//! A product that several operations use is computed once. If it lies on the critical path, its users can become faster
+//! by using its factors instead: a sum fuses the product, and `M − u·(v·r)` with a late `r` becomes `M − (u·v)·r`. Each
+//! change costs one or two operations and saves the latency of a product. Only programs that are limited by latency are
+//! changed, and only changes that save time are kept.
 
 use super::rebuild::{by_id, uses};
 use super::sums::{regroup_copying, Copies, Regrouped};
@@ -64,8 +64,8 @@ mod tests {
     use super::*;
     use crate::symbolic::{Expr, Graph};
 
-    /// A continued fraction: every step waits for a quotient, a product with it that is used twice, and a sum. The other
-    /// operations only make the program long.
+    /// A continued fraction: every step waits for a quotient, a product with it that is used twice, and a sum. The
+    /// other operations only make the program long.
     fn staircase(graph: &Graph) -> Program {
         let x: Vec<Expr> = (0..8).map(|k| graph.input(k)).collect();
         let (mut late, mut others) = (x[0], Vec::new());

@@ -1,8 +1,8 @@
 //! Orders sums and products by the times at which their operands become available, and fuses products with sums.
 //!
-//! Many orders of addition give the same sum, up to rounding. The terms that are available first are added first, in two or
-//! three parallel chains where that is faster. In a product, the latest factor is multiplied last. A product that is used
-//! once, by a sum, is fused with its addition.
+//! Many orders of addition give the same sum, up to rounding. The terms that are available first are added first, in
+//! two or three parallel chains where that is faster. In a product, the latest factor is multiplied last. A product
+//! that is used once, by a sum, is fused with its addition.
 
 use super::chains::{best_plan, Arrival, Plan};
 use super::rebuild::Rebuilt;

@@ -6,8 +6,9 @@
 use core::arch::{asm, global_asm};
 use scenes::{Bits, End, Unusable};
 
-// The vector table (stack top, then handlers; every fault goes to one) and the reset handler. They are in assembly because they
-// must run before the first instruction that uses a float register, and before anything is on the stack that they paint.
+// The vector table (stack top, then handlers; every fault goes to one) and the reset handler. They are in assembly
+// because they must run before the first instruction that uses a float register, and before anything is on the stack
+// that they paint.
 global_asm!(
     "
     .section .vector_table, \"a\"
@@ -157,8 +158,8 @@ where
     exit(!wrapped)
 }
 
-/// The panic handler that the compiler requires. It calls a function that is not defined, so that an image in which anything can
-/// panic does not link.
+/// The panic handler that the compiler requires. It calls a function that is not defined, so that an image in which
+/// anything can panic does not link.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo) -> ! {
     extern "C" {

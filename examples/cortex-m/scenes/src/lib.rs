@@ -58,8 +58,8 @@ pub struct End<Y: System> {
     pub q: Y::Coordinates,
     /// Momenta.
     pub p: Y::Momenta,
-    /// Energies of the run of a minute, J, as the system itself computes them: energy at the start, largest change, largest
-    /// kinetic energy.
+    /// Energies of the run of a minute, J, as the system itself computes them: energy at the start, largest change,
+    /// largest kinetic energy.
     pub energy: Option<[Y::Scalar; 3]>,
     /// Number of steps.
     pub steps: u32,
@@ -67,8 +67,8 @@ pub struct End<Y: System> {
     pub evaluations: u64,
 }
 
-/// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a double,
-/// and passing it on would add a software conversion to the single-precision image.)
+/// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a
+/// double, and passing it on would add a software conversion to the single-precision image.)
 #[derive(Debug)]
 pub struct Unusable(pub u32);
 
@@ -85,8 +85,8 @@ where
     short(system, method)
 }
 
-/// The implicit midpoint rule with two iterations. Each step evaluates the derivatives of the dynamics once, factors their matrix
-/// once, and evaluates the dynamics twice.
+/// The implicit midpoint rule with two iterations. Each step evaluates the derivatives of the dynamics once, factors
+/// their matrix once, and evaluates the dynamics twice.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -99,8 +99,8 @@ where
     short(system, method)
 }
 
-/// A minute by Adams and Bashforth's method of order 6 with compensated sums, from rest at ±0.3 rad in turn: one evaluation of
-/// the dynamics in each step, and some more in the first five.
+/// A minute by Adams and Bashforth's method of order 6 with compensated sums, from rest at ±0.3 rad in turn: one
+/// evaluation of the dynamics in each step, and some more in the first five.
 ///
 /// # Errors
 /// [`Unusable`].
@@ -161,8 +161,8 @@ where
     Ok(End { energy: Some([start, change, largest]), ..end })
 }
 
-/// Three seconds of the four-bar from rest by the method of Runge and Kutta of order 4. The end of every step does the same
-/// work: one momentum projection and one position correction.
+/// Three seconds of the four-bar from rest by the method of Runge and Kutta of order 4. The end of every step does the
+/// same work: one momentum projection and one position correction.
 ///
 /// # Errors
 /// [`Unusable`].

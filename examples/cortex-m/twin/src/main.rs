@@ -1,5 +1,5 @@
-//! Prints the end of the run of a scene, as the firmware does: the bits of one number per line. For runs that evaluate the energy
-//! it also prints the true energy error, and for the four-bar the largest residual of the loop.
+//! Prints the end of the run of a scene, as the firmware does: the bits of one number per line. For runs that evaluate
+//! the energy it also prints the true energy error, and for the four-bar the largest residual of the loop.
 
 use mbd_runtime::{Constrained, Energetic};
 use scenes::{Bits, FourbarF32, FourbarF64, Ur5F32, Ur5F64};
@@ -44,8 +44,8 @@ impl Watch {
         self.largest = self.largest.max(kinetic);
     }
 
-    /// The largest change relative to the largest kinetic energy, which is also the difference between the energy of the start and
-    /// the lowest potential energy met.
+    /// The largest change relative to the largest kinetic energy, which is also the difference between the energy of
+    /// the start and the lowest potential energy met.
     fn error(&self, what: &str) -> f64 {
         let Watch { change, largest, .. } = self;
         eprintln!("{what}: energy off by {change:.2e} J at most, largest kinetic energy {largest:.2} J");

@@ -7,9 +7,9 @@ use crate::system::{Real, System};
 /// Columns at most: order 12.
 const COLUMNS: usize = 6;
 
-/// Extrapolation of the midpoint rule with 2, 4, 6 … substeps (Gragg, SIAM J. Numer. Anal. 2, 1965; Hairer, Nørsett, Wanner,
-/// *Solving Ordinary Differential Equations I*, II.9): its error has even powers of the substep alone, so every further
-/// number of substeps gives two orders more.
+/// Extrapolation of the midpoint rule with 2, 4, 6 … substeps (Gragg, SIAM J. Numer. Anal. 2, 1965; Hairer, Nørsett,
+/// Wanner, *Solving Ordinary Differential Equations I*, II.9): its error has even powers of the substep alone, so every
+/// further number of substeps gives two orders more.
 #[derive(Clone, Debug)]
 pub(super) struct Extrapolation<Y: System> {
     columns: [Point<Y>; COLUMNS],
@@ -28,8 +28,8 @@ where
         Extrapolation { columns: core::array::from_fn(|_| point()), points: [point(), point()], rate: point() }
     }
 
-    /// One step of order `order` or one more, at most 12: `⌈order / 2⌉²` evaluations of the rates. `start` is the rate at its
-    /// start.
+    /// One step of order `order` or one more, at most 12: `⌈order / 2⌉²` evaluations of the rates. `start` is the rate
+    /// at its start.
     pub fn step(
         &mut self,
         (field, system): (&mut Field<Y>, &mut Y),

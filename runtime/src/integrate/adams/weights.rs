@@ -9,8 +9,8 @@ pub(super) const NODES: usize = 15;
 /// Points of [`QUADRATURE`].
 const POINTS: usize = 8;
 
-/// Places and weights of Gauss-Legendre quadrature on [0, 1] with 8 points: the left half, the other lies opposite. Roots of
-/// the Legendre polynomial, to 36 digits.
+/// Places and weights of Gauss-Legendre quadrature on [0, 1] with 8 points: the left half, the other lies opposite.
+/// Roots of the Legendre polynomial, to 36 digits.
 const QUADRATURE: [(Constant, Constant); POINTS / 2] = [
     (decimal("0.0198550717512318841582195657152635048"), decimal("0.0506142681451881295762656771549810951")),
     (decimal("0.101666761293186630204223031762084782"), decimal("0.111190517226687235272177997213120442")),
@@ -18,11 +18,11 @@ const QUADRATURE: [(Constant, Constant); POINTS / 2] = [
     (decimal("0.40828267875217509753026192881990801"), decimal("0.181341891689180991482575224638597806")),
 ];
 
-/// What the rates at some places count in a step. Place 0 is that of the new rate, the others those of the past ones from
-/// the newest on; a list of weights has one for each.
+/// What the rates at some places count in a step. Place 0 is that of the new rate, the others those of the past ones
+/// from the newest on; a list of weights has one for each.
 ///
-/// The polynomials are Lagrange's: `1 / Π (zⱼ − zᵢ)` times the integral of a product of factors, by quadrature. No factor
-/// changes its sign where it is integrated, so the sums lose no digits, however unequal the steps are.
+/// The polynomials are Lagrange's: `1 / Π (zⱼ − zᵢ)` times the integral of a product of factors, by quadrature. No
+/// factor changes its sign where it is integrated, so the sums lose no digits, however unequal the steps are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights<S> {
     /// Of the integral to the end of the step of the polynomial through rates 1 to k. Weight 0 is zero.
@@ -35,9 +35,8 @@ pub(super) struct Weights<S> {
 }
 
 impl<S: Scalar> Weights<S> {
-    /// For `k` past rates, 1 to 13, at `places[1..]`, and the end of the step at `end`; time in any unit, from the start of the
-    /// step. The change at `m = k + 1` is found if there is
-    /// one place more; there are no others.
+    /// For `k` past rates, 1 to 13, at `places[1..]`, and the end of the step at `end`; time in any unit, from the
+    /// start of the step. The change at `m = k + 1` is found if there is one place more; there are no others.
     pub fn new(places: &[S], k: usize, end: S) -> Self {
         let zero = [S::zero(); NODES];
         let mut out = Weights { predictor: zero, corrector: zero, changes: [zero; 3] };
@@ -75,11 +74,12 @@ impl<S: Scalar> Weights<S> {
     }
 }
 
-/// Weights of order `k`, 1 to 12, for steps of one size, exact but for the last bits: of the rate at the end, then of the past
-/// ones from the newest on. `explicit` ones have no weight for the rate at the end.
+/// Weights of order `k`, 1 to 12, for steps of one size, exact but for the last bits: of the rate at the end, then of
+/// the past ones from the newest on. `explicit` ones have no weight for the rate at the end.
 ///
-/// Of backward differences: `γ₀ = 1`, `γₘ = e − Σ γₘ₋ᵢ / (i + 1)` with `e` 1 or 0, and weight j is `(−1)ʲ Σ C(m, j) γₘ` over m
-/// from j to k − 1 (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, III.1, eqs. 1.4 to 1.9).
+/// Of backward differences: `γ₀ = 1`, `γₘ = e − Σ γₘ₋ᵢ / (i + 1)` with `e` 1 or 0, and weight j is `(−1)ʲ Σ C(m, j) γₘ`
+/// over m from j to k − 1 (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*, III.1, eqs. 1.4 to
+/// 1.9).
 pub(super) const fn equal_steps(k: usize, explicit: bool) -> [Constant; NODES] {
     let mut weights = [Constant::ZERO; NODES];
     let mut differences = [Constant::integer(1); NODES];

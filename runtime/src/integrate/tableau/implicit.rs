@@ -4,7 +4,8 @@
 
 use crate::constant::{list, Constant};
 
-/// A collocation method with `S` stages: rates `k_i = f(t + c_i h, y + h Σ_j a_ij k_j)`, the new point `y + h Σ_i b_i k_i`.
+/// A collocation method with `S` stages: rates `k_i = f(t + c_i h, y + h Σ_j a_ij k_j)`, the new point `y + h Σ_i b_i
+/// k_i`.
 ///
 /// The point of every stage is of order `S`. Of Radau methods the last one is the new point.
 #[derive(Clone, Copy, Debug)]

@@ -66,8 +66,8 @@ pub static RKF45: Tableau<6> = Tableau {
 
 /// Cash and Karp 5(4).
 ///
-/// J. R. Cash, A. H. Karp, A variable order Runge-Kutta method for initial value problems with rapidly varying right-hand
-/// sides, ACM Transactions on Mathematical Software 16 (1990).
+/// J. R. Cash, A. H. Karp, A variable order Runge-Kutta method for initial value problems with rapidly varying
+/// right-hand sides, ACM Transactions on Mathematical Software 16 (1990).
 pub static CASH_KARP: Tableau<6> = Tableau {
     name: "Cash-Karp 5(4)",
     order: 5,
@@ -89,8 +89,8 @@ pub static CASH_KARP: Tableau<6> = Tableau {
 
 /// Dormand and Prince 5(4), the pair of MATLAB's `ode45`; the estimate is that of the formula of order 4.
 ///
-/// J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied Mathematics 6
-/// (1980).
+/// J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, Journal of Computational and Applied
+/// Mathematics 6 (1980).
 pub static DORMAND_PRINCE: Tableau<7> = Tableau {
     name: "Dormand-Prince 5(4)",
     order: 5,

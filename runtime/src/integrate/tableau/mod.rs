@@ -37,7 +37,8 @@ pub struct Tableau<const S: usize> {
     pub a: [[Constant; S]; S],
     /// Weights of the new point.
     pub b: [Constant; S],
-    /// Weights of error estimates `h Σ_i e_i k_i`: none, one, or two rows (of [`DOP853`], which says what becomes of them).
+    /// Weights of error estimates `h Σ_i e_i k_i`: none, one, or two rows (of [`DOP853`], which says what becomes of
+    /// them).
     pub error: &'static [[Constant; S]],
     /// The estimate behaves as h to this plus one: the order of the lower method. Zero without an estimate.
     pub error_order: u32,
@@ -51,9 +52,10 @@ pub struct Tableau<const S: usize> {
 ///
 /// `y(t + θ h) = cubic(θ) + h θ² (1 - θ)² Σ_i r_i(θ - 1/2) k_i`,
 ///
-/// where the cubic is that with the values and rates at both ends of the step. The sum runs over the stages, then the rate at
-/// the end (of a method that has it as its last stage this is not repeated), then the extra stages. In powers of θ the same
-/// polynomials have coefficients of up to 13,000 that cancel; so they lose nothing, and their ends are exact.
+/// where the cubic is that with the values and rates at both ends of the step. The sum runs over the stages, then the
+/// rate at the end (of a method that has it as its last stage this is not repeated), then the extra stages. In powers
+/// of θ the same polynomials have coefficients of up to 13,000 that cancel; so they lose nothing, and their ends are
+/// exact.
 #[derive(Clone, Copy, Debug)]
 pub struct Dense {
     /// Order of the points within the step.

@@ -4,11 +4,12 @@
 
 use crate::constant::{list, Constant};
 
-/// An eigenvalue `μ` of a method's matrix `A`, and its eigenvectors, real parts before imaginary ones. Of a pair of complex
-/// ones it is that with positive imaginary part.
+/// An eigenvalue `μ` of a method's matrix `A`, and its eigenvectors, real parts before imaginary ones. Of a pair of
+/// complex ones it is that with positive imaginary part.
 ///
-/// `A = Σ Re(right · μ · left)` over the modes. So the solution of `(1 − h A ⊗ J) z = r` is `z_i = Σ Re(right_i y)` with
-/// `(1 − h μ J) y = Σ_i left_i r_i`. E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.8.
+/// `A = Σ Re(right · μ · left)` over the modes. So the solution of `(1 − h A ⊗ J) z = r` is `z_i = Σ Re(right_i y)`
+/// with `(1 − h μ J) y = Σ_i left_i r_i`. E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section
+/// IV.8.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode<const S: usize> {
     /// The eigenvalue.

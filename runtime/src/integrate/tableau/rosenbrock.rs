@@ -35,9 +35,10 @@ pub struct Rosenbrock<const S: usize> {
 
 /// Rodas5P, eight stages of order 5, stiffly accurate; L-stable.
 ///
-/// G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia Differential
-/// Equations package, BIT Numerical Mathematics 63 (2023); digits of OrdinaryDiffEq.jl. Sixteen digits are published, and
-/// order conditions hold to 1e-14 (1e-12 within a step): in numbers of more precision that is as far as it goes.
+/// G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia
+/// Differential Equations package, BIT Numerical Mathematics 63 (2023); digits of OrdinaryDiffEq.jl. Sixteen digits are
+/// published, and order conditions hold to 1e-14 (1e-12 within a step): in numbers of more precision that is as far as
+/// it goes.
 pub static RODAS5P: Rosenbrock<8> = Rosenbrock {
     name: "Rodas5P",
     order: 5,

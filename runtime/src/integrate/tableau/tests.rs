@@ -1,4 +1,5 @@
-//! Order conditions, from rooted trees (J. C. Butcher; Hairer, Nørsett, Wanner, section II.2), in double-double numbers.
+//! Order conditions, from rooted trees (J. C. Butcher; Hairer, Nørsett, Wanner, section II.2), in double-double
+//! numbers.
 
 extern crate std;
 
@@ -142,7 +143,8 @@ fn check<const S: usize>(t: &Tableau<S>, rows: &[u32]) {
     }
 }
 
-/// Coefficients of 1, θ, θ², … of the weight of a rate: of the cubic, which has weights `b`, and of what is added to it.
+/// Coefficients of 1, θ, θ², … of the weight of a rate: of the cubic, which has weights `b`, and of what is added to
+/// it.
 fn powers(b: Number, at: [bool; 2], bend: &[Constant]) -> Vec<Number> {
     let number = |x: f64| Number::constant(x);
     let times = |p: &[Number], q: &[f64]| {

@@ -6,9 +6,9 @@
 //! spherical and floating joints. Rows are velocities and momentum rates. All blocks are `nv × nv`. `∂v/∂τ = 0` and
 //! `∂ṗ/∂τ = 1`.
 //!
-//! **Method.** At given velocities let `B = ∂p/∂q`, `C = ∂ṗ/∂q`, both by spatial algebra: with `s` the axis of a freedom,
-//! `ψ = Ω̂ × s`, `I*` the composite inertia, `P*` the momentum and `γ` gravity as a motion, and for every freedom `a` the
-//! columns `F = I* s`, `φ = I* ψ + s × P*`, carried inward to each freedom `b` on its path,
+//! **Method.** At given velocities let `B = ∂p/∂q`, `C = ∂ṗ/∂q`, both by spatial algebra: with `s` the axis of a
+//! freedom, `ψ = Ω̂ × s`, `I*` the composite inertia, `P*` the momentum and `γ` gravity as a motion, and for every
+//! freedom `a` the columns `F = I* s`, `φ = I* ψ + s × P*`, carried inward to each freedom `b` on its path,
 //!
 //! | | |
 //! | --- | --- |
@@ -25,10 +25,10 @@
 //! ∂ṗ/∂p = Yᵀ + G M⁻¹ + ad(v)    ∂ṗ/∂q = C − BᵀY − G Y
 //! ```
 //!
-//! At given velocities, without any solution, `∂p/∂v = M`, `∂p/∂q = B`, `∂ṗ/∂v = Bᵀ + G + ad(v) M`, `∂ṗ/∂q = C + ad(v) B`.
-//! `BᵀY` is symmetric and formed by halves; `G` and `ad` are small blocks: damping on the diagonal of `G`, and
-//! where velocities are not coordinate rates the commutators of the joint's own axes, `ad(v)_ab = (v × e_a)_b`,
-//! `G_ab = (e_b × e_a) · π`. Without those, `∂ṗ/∂p = −(∂v/∂q)ᵀ`: the canonical symmetry.
+//! At given velocities, without any solution, `∂p/∂v = M`, `∂p/∂q = B`, `∂ṗ/∂v = Bᵀ + G + ad(v) M`, `∂ṗ/∂q = C + ad(v)
+//! B`. `BᵀY` is symmetric and formed by halves; `G` and `ad` are small blocks: damping on the diagonal of `G`, and
+//! where velocities are not coordinate rates the commutators of the joint's own axes, `ad(v)_ab = (v × e_a)_b`, `G_ab =
+//! (e_b × e_a) · π`. Without those, `∂ṗ/∂p = −(∂v/∂q)ᵀ`: the canonical symmetry.
 
 mod dense;
 mod order;

@@ -1,8 +1,8 @@
 //! Which velocities are coupled, and through which others.
 //!
 //! `M = LᵀDL` eliminates from the last velocity to the first. Every velocity hangs on the one it is eliminated into, so
-//! velocities form a tree of their own (that of the joints, but for shared coordinates). What lies on different branches
-//! is coupled only through the common path: rows of `M⁻¹` and `M⁻¹B` follow from those few by a short product.
+//! velocities form a tree of their own (that of the joints, but for shared coordinates). What lies on different
+//! branches is coupled only through the common path: rows of `M⁻¹` and `M⁻¹B` follow from those few by a short product.
 
 use alloc::vec;
 use alloc::vec::Vec;
