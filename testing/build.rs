@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use mbd_codegen::model::{Gravity, Value};
-use mbd_codegen::search;
+use mbd_codegen::{search, Output};
 
 // The generator of random trees belongs to the crate that this script builds, so the script includes its source.
 #[path = "src/batch.rs"]
@@ -52,9 +52,13 @@ fn main() {
         let number = options.precision.name();
         let (frames, joints) = (plan.frames.len(), plan.joint_nodes.len());
         let params = model.params.len();
+        let derivatives = if options.outputs.contains(&Output::Derivatives) { "derivatives" } else { "" };
         let _ = writeln!(all, "pub mod tree{k} {{\n    include!({:?});\n}}", file.display().to_string());
-        let _ =
-            writeln!(all, "runner!(run{k}, tree{k}, {number}, [{}], {frames}, {joints}, {params});", fields.join(", "));
+        let _ = writeln!(
+            all,
+            "runner!(run{k}, tree{k}, {number}, [{}], [{derivatives}], {frames}, {joints}, {params});",
+            fields.join(", ")
+        );
     }
     let names: Vec<String> = (0..batch::TREES).map(|k| format!("run{k}")).collect();
     let _ = writeln!(all, "pub const RUNNERS: [Runner; {}] = [{}];", names.len(), names.join(", "));

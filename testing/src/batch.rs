@@ -19,26 +19,32 @@ pub fn is_single(k: u64) -> bool {
     k % 4 == 3
 }
 
+/// Largest number of velocities of a tree whose derivatives are generated: their code grows with the square of it, and
+/// most of the compiler's time would go into a few trees.
+const DERIVATIVES: usize = 8;
+
 /// Tree `k` and the options of its code.
 pub fn tree(k: u64) -> (Model, Options) {
     let seed = 5000 + k;
     let mut rng = Rng::new(seed, 5);
+    let efforts = rng.chance(0.8);
+    let (distribution, rolled) = match k.checked_sub(FIRST_CHAIN) {
+        Some(chain) => (self::chain(chain), RolledCode::Always),
+        None => (Distribution::everything(seed, 2 + k as usize % 4), RolledCode::Auto),
+    };
+    let model = random_model(seed, &distribution);
+    let velocities: usize = model.joints.iter().map(|joint| joint.kind.nv()).sum();
+    let derivatives = velocities <= DERIVATIVES && k < FIRST_CHAIN;
     let options = Options {
         arithmetic: Arithmetic::Exact,
         type_name: "Tree".to_string(),
-        outputs: Output::available(false).collect(),
+        outputs: Output::available(false).filter(|o| derivatives || !o.name().ends_with("derivatives")).collect(),
         precision: if is_single(k) { Precision::F32 } else { Precision::F64 },
-        efforts: rng.chance(0.8),
-        plan: PlanOptions {
-            rolled: if k < FIRST_CHAIN { RolledCode::Auto } else { RolledCode::Always },
-            ..PlanOptions::default()
-        },
+        efforts,
+        plan: PlanOptions { rolled, ..PlanOptions::default() },
         ..Options::default()
     };
-    if k >= FIRST_CHAIN {
-        return (random_model(seed, &chain(k - FIRST_CHAIN)), options);
-    }
-    (random_model(seed, &Distribution::everything(seed, 2 + k as usize % 4)), options)
+    (model, options)
 }
 
 /// Chains of revolute joints, of revolute joints at right angles with springs and dampers, of spherical joints, and of

@@ -52,7 +52,7 @@ mod batch {
     impl<T, S: RatesBatch<T, NQ, NV, NT>, const NQ: usize, const NV: usize, const NT: usize> Batch<T, NQ, NV, NT> for S {}
 
     macro_rules! runner {
-        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], $frames:literal, $joints:literal, $params:literal) => {
+        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], [$($derivatives:ident)?], $frames:literal, $joints:literal, $params:literal) => {
             pub fn $run(s: &State, p: &[f64]) -> Results {
                 use $tree::Tree;
                 const NQ: usize = Tree::NQ;
@@ -79,23 +79,15 @@ mod batch {
                 let mut m = [[0.0; NV]; NV];
                 tree.mass_matrix(&q, &mut m);
                 results.push(("M", numbers(&m.concat())));
-                let (mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp) = ([[0.0; NV]; NV], [[0.0; NV]; NV], [[0.0; NV]; NV], [[0.0; NV]; NV]);
-                tree.derivatives(&q, &p, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
-                results.push(("v beside derivatives", numbers(&out)));
-                results.push(("pd beside derivatives", numbers(&pd)));
-                for (name, block) in [("dv_dq", dv_dq), ("dv_dp", dv_dp), ("dpd_dq", dpd_dq), ("dpd_dp", dpd_dp)] {
-                    results.push((name, numbers(&block.concat())));
-                }
-                tree.momentum_derivatives(&q, &v, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
-                results.push(("p beside derivatives", numbers(&out)));
-                results.push(("pd beside derivatives, given v", numbers(&pd)));
-                for (name, block) in [("dp_dq", dv_dq), ("dp_dv", dv_dp), ("dpd_dq, given v", dpd_dq), ("dpd_dv", dpd_dp)] {
-                    results.push((name, numbers(&block.concat())));
-                }
-                let (mut dv, mut dpd) = ([[0.0; $params]; NV], [[0.0; $params]; NV]);
-                tree.parameter_derivatives(&q, &p, &mut dv, &mut dpd);
-                results.push(("dv_dparams", numbers(&dv.concat())));
-                results.push(("dpd_dparams", numbers(&dpd.concat())));
+                $(runner!(@$derivatives tree results q v p NV $params);)?
+                let (mut center, mut matrix, mut bias) = ([0.0; 3], [[0.0; NV]; 6], [0.0; 6]);
+                tree.centroidal(&q, &v, &mut center, &mut matrix, &mut bias);
+                results.push(("center", numbers(&center)));
+                results.push(("centroidal matrix", numbers(&matrix.concat())));
+                results.push(("centroidal bias", numbers(&bias)));
+                let mut y = [[0.0; 10 * $joints + 2 * NV]; NV];
+                tree.regressor(&q, &v, &p, &mut y);
+                results.push(("regressor", numbers(&y.concat())));
                 let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; $frames], [[0.0; 3]; $frames], [[0.0; 6]; $frames]);
                 tree.frames(&q, &v, &mut rotation, &mut position, &mut velocity);
                 results.push(("rotations", numbers(&rotation.concat().concat())));
@@ -146,6 +138,26 @@ mod batch {
                 results
             }
         };
+        (@derivatives $tree:ident $results:ident $q:ident $v:ident $p:ident $nv:ident $params:literal) => {{
+            let (mut out, mut pd) = ([0.0; $nv], [0.0; $nv]);
+            let (mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp) = ([[0.0; $nv]; $nv], [[0.0; $nv]; $nv], [[0.0; $nv]; $nv], [[0.0; $nv]; $nv]);
+            $tree.derivatives(&$q, &$p, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
+            $results.push(("v beside derivatives", numbers(&out)));
+            $results.push(("pd beside derivatives", numbers(&pd)));
+            for (name, block) in [("dv_dq", dv_dq), ("dv_dp", dv_dp), ("dpd_dq", dpd_dq), ("dpd_dp", dpd_dp)] {
+                $results.push((name, numbers(&block.concat())));
+            }
+            $tree.momentum_derivatives(&$q, &$v, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
+            $results.push(("p beside derivatives", numbers(&out)));
+            $results.push(("pd beside derivatives, given v", numbers(&pd)));
+            for (name, block) in [("dp_dq", dv_dq), ("dp_dv", dv_dp), ("dpd_dq, given v", dpd_dq), ("dpd_dv", dpd_dp)] {
+                $results.push((name, numbers(&block.concat())));
+            }
+            let (mut dv, mut dpd) = ([[0.0; $params]; $nv], [[0.0; $params]; $nv]);
+            $tree.parameter_derivatives(&$q, &$p, &mut dv, &mut dpd);
+            $results.push(("dv_dparams", numbers(&dv.concat())));
+            $results.push(("dpd_dparams", numbers(&dpd.concat())));
+        }};
         (@field tau $tree:ident $s:ident) => { $tree.tau = array(&$s.tau); };
         (@field drive_q $tree:ident $s:ident) => { $tree.drive_q = array(&$s.drive[0]); };
         (@field drive_v $tree:ident $s:ident) => { $tree.drive_v = array(&$s.drive[1]); };
@@ -218,6 +230,14 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     };
     results.push(("dv_dparams", rows(|c| &c.dv)));
     results.push(("dpd_dparams", rows(|c| &c.dpd)));
+    let (mut center, mut matrix, mut bias) = (of(&[0.0; 3]), of(&vec![0.0; 6 * v.len()]), of(&[0.0; 6]));
+    i.centroidal(&q, &v, &mut center, &mut matrix, &mut bias);
+    results.push(("center", back(&center)));
+    results.push(("centroidal matrix", back(&matrix)));
+    results.push(("centroidal bias", back(&bias)));
+    let mut y = of(&vec![0.0; i.tree().regressor_columns() * v.len()]);
+    i.regressor(&q, &v, &p, &mut y);
+    results.push(("regressor", back(&y)));
     let mut frames = vec![FrameState::ground(); plan.frames.len()];
     i.frames(&q, &v, &mut frames);
     let all = |f: &dyn Fn(&FrameState<S>) -> Vec<S>| back(&frames.iter().flat_map(f).collect::<Vec<S>>());
@@ -235,6 +255,11 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     i.bias_accelerations(&q, &v, &mut biases);
     results.push(("bias_accelerations", back(&biases.concat())));
     results
+}
+
+/// The result of a name.
+fn named<'a>(results: &'a Results, name: &str) -> &'a [f64] {
+    &results.iter().find(|(what, _)| *what == name).expect("both have a result of this name").1
 }
 
 /// Plan, state and momenta of tree `k`, both rounded to the precision of its code.
@@ -264,9 +289,11 @@ fn double_precision_is_the_same_bit_for_bit() {
     for (k, run) in (0..).zip(RUNNERS).filter(|(k, _)| !is_single(*k)) {
         for state in 0..5 {
             let (plan, s, p) = case(k, state);
-            for ((what, compiled), (_, expected)) in run(&s, &p).iter().zip(interpreted::<f64>(&plan, &s, &p)) {
+            let interpreted = interpreted::<f64>(&plan, &s, &p);
+            for (what, compiled) in &run(&s, &p) {
+                let expected = named(&interpreted, what);
                 assert_eq!(compiled.len(), expected.len(), "tree {k}: {what}");
-                for (a, b) in compiled.iter().zip(&expected) {
+                for (a, b) in compiled.iter().zip(expected) {
                     let same = (a + 0.0).to_bits() == (b + 0.0).to_bits() && a.is_finite();
                     assert!(same, "tree {k}, state {state}: {what}: {a:e} {b:e}\n{}", to_toml(&plan.model));
                     numbers += 1;
@@ -290,7 +317,8 @@ fn single_precision_is_as_good_as_the_interpreters() {
             let (plan, s, p) = case(k, state);
             let exact = interpreted::<f64>(&plan, &s, &p);
             let single = interpreted::<f32>(&plan, &s, &p);
-            for (((what, compiled), (_, single)), (_, exact)) in run(&s, &p).iter().zip(&single).zip(&exact) {
+            for (what, compiled) in &run(&s, &p) {
+                let [single, exact] = [&single, &exact].map(|results| named(results, what));
                 let size = exact.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
                 let off = |x: &[f64]| x.iter().zip(exact).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
                 let (ours, theirs) = (off(compiled), off(single));
