@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use mbd_codegen::model::{Gravity, Value};
-use mbd_codegen::{search, Output};
+use mbd_codegen::search;
 
 // The generator of random trees belongs to the crate that this script builds, so the script includes its source.
 #[path = "src/batch.rs"]
@@ -52,11 +52,12 @@ fn main() {
         let number = options.precision.name();
         let (frames, joints) = (plan.frames.len(), plan.joint_nodes.len());
         let params = model.params.len();
-        let derivatives = if options.outputs.contains(&Output::Derivatives) { "derivatives" } else { "" };
+        let outputs: Vec<&str> = options.outputs.iter().map(|output| output.name()).collect();
+        let outputs = outputs.join(", ");
         let _ = writeln!(all, "pub mod tree{k} {{\n    include!({:?});\n}}", file.display().to_string());
         let _ = writeln!(
             all,
-            "runner!(run{k}, tree{k}, {number}, [{}], [{derivatives}], {frames}, {joints}, {params});",
+            "runner!(run{k}, tree{k}, {number}, [{}], [{outputs}], {frames}, {joints}, {params});",
             fields.join(", ")
         );
     }

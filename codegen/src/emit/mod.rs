@@ -22,7 +22,7 @@ use crate::plan::Plan;
 use head::Head;
 use signature::Signature;
 
-pub use names::{identifier, quantity};
+pub use names::quantity;
 
 /// Input of the emission.
 pub struct Input<'a> {

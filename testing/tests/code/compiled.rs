@@ -51,58 +51,137 @@ mod batch {
     }
     impl<T, S: RatesBatch<T, NQ, NV, NT>, const NQ: usize, const NV: usize, const NT: usize> Batch<T, NQ, NV, NT> for S {}
 
+    /// Runs one output of a tree on a state and adds its results.
+    macro_rules! output {
+        (momenta, $x:ident) => {
+            let mut p = [0.0; NV];
+            $x.tree.momenta(&$x.q, &$x.v, &mut p);
+            $x.add("p", &p);
+        };
+        (rates, $x:ident) => {
+            let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
+            $x.tree.rates(&$x.q, &$x.p, &mut qd, &mut pd);
+            $x.add("qd", &qd);
+            $x.add("pd", &pd);
+        };
+        (velocities, $x:ident) => {
+            let mut v = [0.0; NV];
+            $x.tree.velocities(&$x.q, &$x.p, &mut v);
+            $x.add("v", &v);
+        };
+        (energy, $x:ident) => {
+            $x.add("energy", &$x.tree.energy(&$x.q, &$x.p));
+        };
+        (accelerations, $x:ident) => {
+            let mut a = [0.0; NV];
+            $x.tree.accelerations(&$x.q, &$x.v, &mut a);
+            $x.add("a", &a);
+        };
+        (reactions, $x:ident) => {
+            let mut reactions = [[0.0; 6]; JOINTS];
+            $x.tree.reactions(&$x.q, &$x.v, &mut reactions);
+            $x.add("reactions", &reactions.concat());
+        };
+        (mass_matrix, $x:ident) => {
+            let mut m = [[0.0; NV]; NV];
+            $x.tree.mass_matrix(&$x.q, &mut m);
+            $x.add("M", &m.concat());
+        };
+        (frames, $x:ident) => {
+            let (mut rotation, mut position, mut velocity) =
+                ([[[0.0; 3]; 3]; FRAMES], [[0.0; 3]; FRAMES], [[0.0; 6]; FRAMES]);
+            $x.tree.frames(&$x.q, &$x.v, &mut rotation, &mut position, &mut velocity);
+            $x.add("rotations", &rotation.concat().concat());
+            $x.add("positions", &position.concat());
+            $x.add("frame velocities", &velocity.concat());
+        };
+        (inverse_dynamics, $x:ident) => {
+            let mut tau = [0.0; NV];
+            $x.tree.inverse_dynamics(&$x.q, &$x.v, &$x.p, &mut tau);
+            $x.add("tau", &tau);
+        };
+        (bias, $x:ident) => {
+            let mut h = [0.0; NV];
+            $x.tree.bias(&$x.q, &$x.v, &mut h);
+            $x.add("h", &h);
+        };
+        (regressor, $x:ident) => {
+            let mut y = [[0.0; 10 * JOINTS + 2 * NV]; NV];
+            $x.tree.regressor(&$x.q, &$x.v, &$x.p, &mut y);
+            $x.add("regressor", &y.concat());
+        };
+        (jacobians, $x:ident) => {
+            let mut jacobian = [[[0.0; NV]; 6]; FRAMES];
+            $x.tree.jacobians(&$x.q, &mut jacobian);
+            $x.add("jacobians", &jacobian.concat().concat());
+        };
+        (bias_accelerations, $x:ident) => {
+            let mut bias = [[0.0; 6]; FRAMES];
+            $x.tree.bias_accelerations(&$x.q, &$x.v, &mut bias);
+            $x.add("bias accelerations", &bias.concat());
+        };
+        (centroidal, $x:ident) => {
+            let (mut center, mut matrix, mut bias) = ([0.0; 3], [[0.0; NV]; 6], [0.0; 6]);
+            $x.tree.centroidal(&$x.q, &$x.v, &mut center, &mut matrix, &mut bias);
+            $x.add("center", &center);
+            $x.add("centroidal matrix", &matrix.concat());
+            $x.add("centroidal bias", &bias);
+        };
+        (derivatives, $x:ident) => {
+            let (mut v, mut pd, mut d) = ([0.0; NV], [0.0; NV], [[[0.0; NV]; NV]; 4]);
+            let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &mut d;
+            $x.tree.derivatives(&$x.q, &$x.p, &mut v, &mut pd, dv_dq, dv_dp, dpd_dq, dpd_dp);
+            $x.add("v beside derivatives", &v);
+            $x.add("pd beside derivatives", &pd);
+            $x.add("derivatives", &d.concat().concat());
+        };
+        (momentum_derivatives, $x:ident) => {
+            let (mut p, mut pd, mut d) = ([0.0; NV], [0.0; NV], [[[0.0; NV]; NV]; 4]);
+            let [dp_dq, dp_dv, dpd_dq, dpd_dv] = &mut d;
+            $x.tree.momentum_derivatives(&$x.q, &$x.v, &mut p, &mut pd, dp_dq, dp_dv, dpd_dq, dpd_dv);
+            $x.add("p beside derivatives", &p);
+            $x.add("pd beside derivatives, given v", &pd);
+            $x.add("momentum derivatives", &d.concat().concat());
+        };
+        (parameter_derivatives, $x:ident) => {
+            let (mut dv, mut dpd) = ([[0.0; PARAMS]; NV], [[0.0; PARAMS]; NV]);
+            $x.tree.parameter_derivatives(&$x.q, &$x.p, &mut dv, &mut dpd);
+            $x.add("dv_dparams", &dv.concat());
+            $x.add("dpd_dparams", &dpd.concat());
+        };
+    }
+
+    /// A generated type, a state of it, and the results so far.
+    struct Run<Tree, T, const NQ: usize, const NV: usize> {
+        tree: Tree,
+        q: [T; NQ],
+        v: [T; NV],
+        p: [T; NV],
+        results: Results,
+    }
+
+    impl<Tree, T: Number, const NQ: usize, const NV: usize> Run<Tree, T, NQ, NV> {
+        fn add(&mut self, name: &'static str, values: &[T]) {
+            self.results.push((name, numbers(values)));
+        }
+    }
+
     macro_rules! runner {
-        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], [$($derivatives:ident)?], $frames:literal, $joints:literal, $params:literal) => {
+        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], [$($output:ident),*], $frames:literal, $joints:literal, $params:literal) => {
+            #[allow(unused)]
             pub fn $run(s: &State, p: &[f64]) -> Results {
                 use $tree::Tree;
                 const NQ: usize = Tree::NQ;
                 const NV: usize = Tree::NV;
-                #[allow(unused_mut)]
+                const FRAMES: usize = $frames;
+                const JOINTS: usize = $joints;
+                const PARAMS: usize = $params;
                 let mut tree = Tree::new();
                 $(runner!(@field $field tree s);)*
                 let (q, v, p): ([$t; NQ], [$t; NV], [$t; NV]) = (array(&s.q), array(&s.v), array(p));
-                let (mut qd, mut pd, mut out) = ([0.0; NQ], [0.0; NV], [0.0; NV]);
-                let mut results = Vec::new();
-                tree.momenta(&q, &v, &mut out);
-                results.push(("p", numbers(&out)));
-                tree.rates(&q, &p, &mut qd, &mut pd);
-                results.push(("qd", numbers(&qd)));
-                results.push(("pd", numbers(&pd)));
-                tree.velocities(&q, &p, &mut out);
-                results.push(("v", numbers(&out)));
-                results.push(("energy", numbers(&tree.energy(&q, &p))));
-                tree.accelerations(&q, &v, &mut out);
-                results.push(("a", numbers(&out)));
-                let mut reactions = [[0.0; 6]; $joints];
-                tree.reactions(&q, &v, &mut reactions);
-                results.push(("reactions", numbers(&reactions.concat())));
-                let mut m = [[0.0; NV]; NV];
-                tree.mass_matrix(&q, &mut m);
-                results.push(("M", numbers(&m.concat())));
-                $(runner!(@$derivatives tree results q v p NV $params);)?
-                let (mut center, mut matrix, mut bias) = ([0.0; 3], [[0.0; NV]; 6], [0.0; 6]);
-                tree.centroidal(&q, &v, &mut center, &mut matrix, &mut bias);
-                results.push(("center", numbers(&center)));
-                results.push(("centroidal matrix", numbers(&matrix.concat())));
-                results.push(("centroidal bias", numbers(&bias)));
-                let mut y = [[0.0; 10 * $joints + 2 * NV]; NV];
-                tree.regressor(&q, &v, &p, &mut y);
-                results.push(("regressor", numbers(&y.concat())));
-                let (mut rotation, mut position, mut velocity) = ([[[0.0; 3]; 3]; $frames], [[0.0; 3]; $frames], [[0.0; 6]; $frames]);
-                tree.frames(&q, &v, &mut rotation, &mut position, &mut velocity);
-                results.push(("rotations", numbers(&rotation.concat().concat())));
-                results.push(("positions", numbers(&position.concat())));
-                results.push(("frame velocities", numbers(&velocity.concat())));
-                let mut out = [0.0; NV];
-                tree.inverse_dynamics(&q, &v, &p, &mut out);
-                results.push(("tau", numbers(&out)));
-                tree.bias(&q, &v, &mut out);
-                results.push(("h", numbers(&out)));
-                let (mut jacobian, mut bias) = ([[[0.0; NV]; 6]; $frames], [[0.0; 6]; $frames]);
-                tree.jacobians(&q, &mut jacobian);
-                results.push(("jacobians", numbers(&jacobian.concat().concat())));
-                tree.bias_accelerations(&q, &v, &mut bias);
-                results.push(("bias_accelerations", numbers(&bias.concat())));
+                let mut x = Run { tree, q, v, p, results: Vec::new() };
+                $(output!($output, x);)*
+                let Run { tree, results, .. } = x;
                 // Lanes and batches must give the bits of single states. Neighbouring states differ, so that mixed-up
                 // lanes show.
                 const STATES: usize = 21;
@@ -211,17 +290,12 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     i.derivatives(&q, &p, &mut d);
     results.push(("v beside derivatives", back(&d.v)));
     results.push(("pd beside derivatives", back(&d.pd)));
-    for (name, block) in [("dv_dq", &d.dv_dq), ("dv_dp", &d.dv_dp), ("dpd_dq", &d.dpd_dq), ("dpd_dp", &d.dpd_dp)] {
-        results.push((name, back(block)));
-    }
+    results.push(("derivatives", back(&[&d.dv_dq[..], &d.dv_dp, &d.dpd_dq, &d.dpd_dp].concat())));
     let mut at = MomentumDerivatives::new(i.tree());
     i.momentum_derivatives(&q, &v, &mut Derivatives::new(&i.tree().clone()), &mut at);
     results.push(("p beside derivatives", back(&at.p)));
     results.push(("pd beside derivatives, given v", back(&at.pd)));
-    let blocks = [("dp_dq", &at.dp_dq), ("dp_dv", &at.dp_dv), ("dpd_dq, given v", &at.dpd_dq), ("dpd_dv", &at.dpd_dv)];
-    for (name, block) in blocks {
-        results.push((name, back(block)));
-    }
+    results.push(("momentum derivatives", back(&[&at.dp_dq[..], &at.dp_dv, &at.dpd_dq, &at.dpd_dv].concat())));
     let n = s.params.len();
     let columns: Vec<_> = (0..n).map(|k| parameter(plan, s, &i, &q, &d, k).0).collect();
     let rows = |half: fn(&ParameterDerivatives<S>) -> &Vec<S>| {
@@ -253,7 +327,7 @@ fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Resu
     i.jacobians(&q, &mut jacobians);
     results.push(("jacobians", back(&jacobians)));
     i.bias_accelerations(&q, &v, &mut biases);
-    results.push(("bias_accelerations", back(&biases.concat())));
+    results.push(("bias accelerations", back(&biases.concat())));
     results
 }
 
