@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use mbd_runtime::sweep::Quantity;
 
-use crate::names::identifier;
+pub use crate::names::identifier;
 
 use crate::plan::Plan;
 use crate::symbolic::{Entry, Label, Name, Op, Program};
