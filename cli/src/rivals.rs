@@ -39,8 +39,8 @@ impl Rival {
 pub fn chain_of_pins(plan: &Plan) -> Option<usize> {
     let serial = plan.nodes.iter().enumerate().all(|(k, node)| node.parent == k.checked_sub(1));
     let revolute = plan.model.joints.iter().all(|j| {
-        let pin = matches!(j.kind, JointKind::Revolute { .. }) && j.motion == JointMotion::Free;
-        pin || j.kind == JointKind::Fixed
+        let revolute = matches!(j.kind, JointKind::Revolute { .. }) && j.motion == JointMotion::Free;
+        revolute || j.kind == JointKind::Fixed
     });
     (serial && revolute && plan.nodes.len() >= 3).then_some(plan.nodes.len())
 }

@@ -19,7 +19,7 @@ use mbd_cli::plot::Panel;
 use mbd_cli::Outcome;
 
 /// Kind of the loops: a revolute joint. In planar mechanisms three of its five rows are redundant.
-const REVOLUTE: &str = "pin";
+const REVOLUTE: &str = "revolute";
 
 /// Kinds of systems, as the legends name them.
 const FAMILIES: [&str; 3] = ["open", "tree", "closed"];
@@ -262,8 +262,14 @@ impl crate::generated::VisitRates for Repeated<'_> {
 
 /// Time of the closed chain relative to the open one, for several kinds of loops.
 fn ratios(quick: bool, effort: &Effort) -> Outcome<String> {
-    let kinds = ["pin", "spherical", "point_on_line"];
-    let columns = ["links", "open, µs", "closed / open, pin (5 rows)", "ball joint (3 rows)", "point on line (2 rows)"];
+    let kinds = [REVOLUTE, "spherical", "point_on_line"];
+    let columns = [
+        "links",
+        "open, µs",
+        "closed / open, revolute joint (5 rows)",
+        "ball joint (3 rows)",
+        "point on line (2 rows)",
+    ];
     let mut text = head("Closed against open, rounds in turn", &columns);
     for &n in if quick { &[10][..] } else { &[10, 100, 400] } {
         let mut all = vec![mechanism::read(&texts::open(n))?];
@@ -290,7 +296,7 @@ fn space(effort: &Effort) -> Outcome<String> {
     };
     line("open", [texts::open(20), texts::crosswise(20)])?;
     line("closed by a ball joint", [texts::closed(20, "spherical", false), texts::closed(20, "spherical", true)])?;
-    line("closed by a pin", [texts::closed(20, REVOLUTE, false), texts::closed(20, REVOLUTE, true)])?;
+    line("closed by a revolute joint", [texts::closed(20, REVOLUTE, false), texts::closed(20, REVOLUTE, true)])?;
     let [crosswise, planar] = thesis::CHAIN20.map(|t| 1e6 * t);
     let cells =
         ["open, thesis".into(), format!("{planar}"), format!("{crosswise}"), format!("{:.2}", crosswise / planar)];

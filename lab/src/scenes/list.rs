@@ -256,7 +256,7 @@ pub(super) static REFUSED: [Refused; 2] = [
     },
     Refused {
         name: "point_on_axis",
-        title: "point mass on its own pin",
+        title: "point mass on its own revolute joint",
         file: "scenes/point_on_axis.toml",
         text: include_str!("../../../models/scenes/point_on_axis.toml"),
         finding: "`tip` has no inertia against turning about the axis, so the mass matrix is singular",

@@ -131,7 +131,7 @@ pub fn three<S: Real>() -> [Scene<S>; 3] {
     joint(&mut free, 1, Kind::Spherical, 0.0, 0.0);
     [
         Scene::new("revolute and prismatic", mixed, gravity(), 1),
-        Scene::new("spherical and pin", ball, gravity(), 2),
+        Scene::new("spherical and revolute", ball, gravity(), 2),
         Scene::new("floating, planar, spherical", free, gravity(), 3),
     ]
 }
