@@ -959,8 +959,8 @@ impl DoublePendulum {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     /// 6 operations: 2 additions, 4 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn bias_accelerations(&self, q: &[f64; 2], v: &[f64; 2], bias: &mut [[f64; 6]; 3]) {
@@ -1266,8 +1266,8 @@ impl<const LANES: usize> DoublePendulumLanes<LANES> {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     #[inline]
     pub fn bias_accelerations(&self, q: &[[f64; LANES]; 2], v: &[[f64; LANES]; 2], bias: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<DoublePendulum, 11, LANES, f64, _>((q, v, bias.as_flattened_mut(),));

@@ -3754,8 +3754,8 @@ impl Satellite {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     /// 85 operations: 33 additions, 52 multiplications, 0 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     #[inline]
     pub fn bias_accelerations(&self, q: &[f64; 7], v: &[f64; 6], bias: &mut [[f64; 6]; 3]) {
@@ -4265,8 +4265,8 @@ impl<const LANES: usize> SatelliteLanes<LANES> {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     #[inline]
     pub fn bias_accelerations(&self, q: &[[f64; LANES]; 7], v: &[[f64; LANES]; 6], bias: &mut [[[f64; LANES]; 6]; 3]) {
         ::multibody::runtime::kernel::call_lanes::<Satellite, 11, LANES, f64, _>((v, &self.drive_q, &self.drive_v, &self.drive_a, bias.as_flattened_mut(),));

@@ -1858,8 +1858,8 @@ impl SphericalPendulum {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     /// 35 operations: 10 additions, 25 multiplications, 0 divisions; apart: 0 square roots, 1 sine-cosine pairs.
     #[inline]
     pub fn bias_accelerations(&self, q: &[f64; 5], v: &[f64; 4], bias: &mut [[f64; 6]; 2]) {
@@ -2230,8 +2230,8 @@ impl<const LANES: usize> SphericalPendulumLanes<LANES> {
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
-    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of the
-    /// frame.
+    /// The linear part is the acceleration of the origin as seen from the ground. `J v̇ + bias` is the acceleration of
+    /// the frame.
     #[inline]
     pub fn bias_accelerations(&self, q: &[[f64; LANES]; 5], v: &[[f64; LANES]; 4], bias: &mut [[[f64; LANES]; 6]; 2]) {
         ::multibody::runtime::kernel::call_lanes::<SphericalPendulum, 11, LANES, f64, _>((q, v, bias.as_flattened_mut(),));

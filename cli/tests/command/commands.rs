@@ -327,7 +327,10 @@ fn the_tour() {
     let folder = folder("tour");
     let output = good(run_in(&folder, &[]));
     assert_eq!(files(&folder), ["mbd-tour.svg"]);
-    assert_eq!(agrees_with_pages(&[], out(&output)), 1, "the README shows it");
+    // The README shows a release build, which does not say what it is.
+    let lines = out(&output).lines().filter(|line| !line.contains("(this is a debug build"));
+    let printed: String = lines.flat_map(|line| [line, "\n"]).collect();
+    assert_eq!(agrees_with_pages(&[], &printed), 1, "the README shows it");
 }
 
 #[test]
