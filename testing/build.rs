@@ -54,10 +54,11 @@ fn main() {
         let params = model.params.len();
         let outputs: Vec<&str> = options.outputs.iter().map(|output| output.name()).collect();
         let outputs = outputs.join(", ");
+        let lanes = if batch::has_lanes(k) { "lanes" } else { "" };
         let _ = writeln!(all, "pub mod tree{k} {{\n    include!({:?});\n}}", file.display().to_string());
         let _ = writeln!(
             all,
-            "runner!(run{k}, tree{k}, {number}, [{}], [{outputs}], {frames}, {joints}, {params});",
+            "runner!(run{k}, tree{k}, {number}, [{}], [{outputs}], [{lanes}], {frames}, {joints}, {params});",
             fields.join(", ")
         );
     }

@@ -19,6 +19,12 @@ pub fn is_single(k: u64) -> bool {
     k % 4 == 3
 }
 
+/// Whether lanes and batches of tree `k` are compared with single states. The compiler makes them anew for every set of
+/// vector instructions.
+pub fn has_lanes(k: u64) -> bool {
+    k.is_multiple_of(3) || k >= FIRST_CHAIN
+}
+
 /// The outputs of tree `k`: those that lanes have, and of the others every third, in turn. All of them, on many more trees,
 /// run as text (`tests/code/bitwise.rs`); here it matters that the compiler reads the text in the same way. Derivatives of large trees are left out, because their code grows with
 /// the square of the number of velocities.

@@ -167,7 +167,7 @@ mod batch {
     }
 
     macro_rules! runner {
-        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], [$($output:ident),*], $frames:literal, $joints:literal, $params:literal) => {
+        ($run:ident, $tree:ident, $t:ty, [$($field:ident),*], [$($output:ident),*], [$($lanes:ident)?], $frames:literal, $joints:literal, $params:literal) => {
             #[allow(unused)]
             pub fn $run(s: &State, p: &[f64]) -> Results {
                 use $tree::Tree;
@@ -182,60 +182,42 @@ mod batch {
                 let mut x = Run { tree, q, v, p, results: Vec::new() };
                 $(output!($output, x);)*
                 let Run { tree, results, .. } = x;
-                // Lanes and batches must give the bits of single states. Neighbouring states differ, so that mixed-up
-                // lanes show.
-                const STATES: usize = 21;
-                let state = |s: usize| {
-                    let shift = <$t>::of(0.01 * s as f64);
-                    let (q, p) = (q.map(|x| x + shift), p.map(|x| x - shift));
-                    let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
-                    tree.rates(&q, &p, &mut qd, &mut pd);
-                    (q, p, qd, pd)
-                };
-                let states: [_; STATES] = std::array::from_fn(state);
-                let lanes = tree.lanes::<STATES>();
-                let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
-                let column = |get: &dyn Fn(usize) -> $t| -> [$t; STATES] { std::array::from_fn(get) };
-                let q: [_; NQ] = std::array::from_fn(|k| column(&|s| states[s].0[k]));
-                let p: [_; NV] = std::array::from_fn(|k| column(&|s| states[s].1[k]));
-                let expected = (
-                    std::array::from_fn(|k| column(&|s| states[s].2[k])),
-                    std::array::from_fn(|k| column(&|s| states[s].3[k])),
-                );
-                lanes.rates(&q, &p, &mut qd, &mut pd);
-                assert_eq!((qd, pd), expected, "lanes");
-                let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
-                let tau: [[$t; STATES]; NV] = std::array::from_fn(|k| [<$t>::of(s.tau[k]); STATES]);
-                let (mut qds, mut pds) = (qd.iter_mut(), pd.iter_mut());
-                tree.batch(&q, &p, &tau, std::array::from_fn(|_| &mut qds.next().unwrap()[..]), std::array::from_fn(|_| &mut pds.next().unwrap()[..]));
-                assert_eq!((qd, pd), expected, "batch");
-                let (mut m, mut a) = ([[[0.0; STATES]; NV]; NV], [[0.0; NV]; NV]);
-                lanes.mass_matrix(&q, &mut m);
-                tree.mass_matrix(&states[7].0, &mut a);
-                assert_eq!(m.map(|row| row.map(|x| x[7])), a, "mass matrix of a lane");
-                assert_eq!(lanes.energy(&q, &p).map(|x| x[20]), tree.energy(&states[20].0, &states[20].1));
+                $(runner!(@$lanes tree s q p $t);)?
                 results
             }
         };
-        (@derivatives $tree:ident $results:ident $q:ident $v:ident $p:ident $nv:ident $params:literal) => {{
-            let (mut out, mut pd) = ([0.0; $nv], [0.0; $nv]);
-            let (mut dv_dq, mut dv_dp, mut dpd_dq, mut dpd_dp) = ([[0.0; $nv]; $nv], [[0.0; $nv]; $nv], [[0.0; $nv]; $nv], [[0.0; $nv]; $nv]);
-            $tree.derivatives(&$q, &$p, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
-            $results.push(("v beside derivatives", numbers(&out)));
-            $results.push(("pd beside derivatives", numbers(&pd)));
-            for (name, block) in [("dv_dq", dv_dq), ("dv_dp", dv_dp), ("dpd_dq", dpd_dq), ("dpd_dp", dpd_dp)] {
-                $results.push((name, numbers(&block.concat())));
-            }
-            $tree.momentum_derivatives(&$q, &$v, &mut out, &mut pd, &mut dv_dq, &mut dv_dp, &mut dpd_dq, &mut dpd_dp);
-            $results.push(("p beside derivatives", numbers(&out)));
-            $results.push(("pd beside derivatives, given v", numbers(&pd)));
-            for (name, block) in [("dp_dq", dv_dq), ("dp_dv", dv_dp), ("dpd_dq, given v", dpd_dq), ("dpd_dv", dpd_dp)] {
-                $results.push((name, numbers(&block.concat())));
-            }
-            let (mut dv, mut dpd) = ([[0.0; $params]; $nv], [[0.0; $params]; $nv]);
-            $tree.parameter_derivatives(&$q, &$p, &mut dv, &mut dpd);
-            $results.push(("dv_dparams", numbers(&dv.concat())));
-            $results.push(("dpd_dparams", numbers(&dpd.concat())));
+        // Lanes and batches must give the bits of single states. Neighbouring states differ, so that mixed-up lanes show.
+        (@lanes $tree:ident $s:ident $q:ident $p:ident $t:ty) => {{
+            const STATES: usize = 21;
+            let state = |s: usize| {
+                let shift = <$t>::of(0.01 * s as f64);
+                let (q, p) = ($q.map(|x| x + shift), $p.map(|x| x - shift));
+                let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
+                $tree.rates(&q, &p, &mut qd, &mut pd);
+                (q, p, qd, pd)
+            };
+            let states: [_; STATES] = std::array::from_fn(state);
+            let lanes = $tree.lanes::<STATES>();
+            let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
+            let column = |get: &dyn Fn(usize) -> $t| -> [$t; STATES] { std::array::from_fn(get) };
+            let q: [_; NQ] = std::array::from_fn(|k| column(&|s| states[s].0[k]));
+            let p: [_; NV] = std::array::from_fn(|k| column(&|s| states[s].1[k]));
+            let expected = (
+                std::array::from_fn(|k| column(&|s| states[s].2[k])),
+                std::array::from_fn(|k| column(&|s| states[s].3[k])),
+            );
+            lanes.rates(&q, &p, &mut qd, &mut pd);
+            assert_eq!((qd, pd), expected, "lanes");
+            let (mut qd, mut pd) = ([[0.0; STATES]; NQ], [[0.0; STATES]; NV]);
+            let tau: [[$t; STATES]; NV] = std::array::from_fn(|k| [<$t>::of($s.tau[k]); STATES]);
+            let (mut qds, mut pds) = (qd.iter_mut(), pd.iter_mut());
+            $tree.batch(&q, &p, &tau, std::array::from_fn(|_| &mut qds.next().unwrap()[..]), std::array::from_fn(|_| &mut pds.next().unwrap()[..]));
+            assert_eq!((qd, pd), expected, "batch");
+            let (mut m, mut a) = ([[[0.0; STATES]; NV]; NV], [[0.0; NV]; NV]);
+            lanes.mass_matrix(&q, &mut m);
+            $tree.mass_matrix(&states[7].0, &mut a);
+            assert_eq!(m.map(|row| row.map(|x| x[7])), a, "mass matrix of a lane");
+            assert_eq!(lanes.energy(&q, &p).map(|x| x[20]), $tree.energy(&states[20].0, &states[20].1));
         }};
         (@field tau $tree:ident $s:ident) => { $tree.tau = array(&$s.tau); };
         (@field drive_q $tree:ident $s:ident) => { $tree.drive_q = array(&$s.drive[0]); };
