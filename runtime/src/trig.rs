@@ -13,10 +13,10 @@
 //! Main path (|x| <= 10^6 for `f64`, <= 1600 for `f32`):
 //! 1. `n = round(x · 2/π)` by adding and subtracting 1.5 · 2^(mantissa bits); the low bits of the sum are the quadrant.
 //! 2. `y0 + y1 = x − n·π/2` with π/2 in four parts (Cody and Waite). The first three have so few bits that their
-//!   products with `n` are exact. The rounding errors of the two subtractions are recovered exactly; together with the
-//!   last part they are `y1`. The error of the reduced argument is therefore well below an ulp even next to a multiple
-//!   of π/2. With fused multiply-adds, the first part is a whole float and three parts suffice: `x − n·p1` is below 1
-//!   and a multiple of the last place of `p1` or `x`, so that it is exact.
+//!    products with `n` are exact. The rounding errors of the two subtractions are recovered exactly; together with the
+//!    last part they are `y1`. The error of the reduced argument is therefore well below an ulp even next to a multiple
+//!    of π/2. With fused multiply-adds, the first part is a whole float and three parts suffice: `x − n·p1` is below 1
+//!    and a multiple of the last place of `p1` or `x`, so that it is exact.
 //! 3. Polynomials for both functions on |y| <= π/4; for `f64` those of fdlibm, in both cases with fdlibm's use of `y1`.
 //! 4. Quadrant: exchange by a select, signs by their bit.
 //!
