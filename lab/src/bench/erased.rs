@@ -70,7 +70,7 @@ type Rows<S> = StateDerivatives<Vec<S>, Vec<Vec<S>>>;
 type Derivatives<S> = Box<dyn FnMut(S, &[S], &[S], &mut Rows<S>)>;
 
 fn derivatives<Y: Dynamics + Differentiable + 'static>(mut y: Y) -> Derivatives<Y::Scalar> {
-    let (mut q, mut p, mut d) = (y.neutral(), y.rest(), y.zero_derivatives());
+    let (mut q, mut p, mut d) = (y.neutral(), y.zero_momenta(), y.zero_derivatives());
     Box::new(move |t, q_, p_, out| {
         q.as_mut().copy_from_slice(q_);
         p.as_mut().copy_from_slice(p_);
