@@ -27,9 +27,9 @@ struct Case {
 }
 
 /// All shipped mechanisms. Their mobility is Grübler's `f − r`, with `f` freedoms of the tree and `r` independent rows:
-/// planar four-bars and the slider-crank 3 − 2; Strandbeest leg 7 − 3·2; Stewart platform 6 + 6·3 − 6·3; Delta robot 3
-/// + 6 − 6; spring leg 9 − 2; disc 6 − 3; bicycle 9 − 2·3. A revolute joint that closes a loop has 5 rows, of which 3
-/// are redundant if the mechanism is planar.
+/// planar four-bars and the slider-crank 3 − 2; Strandbeest leg 7 − 3·2; Stewart platform 6 + 6·3 − 6·3; Delta robot
+/// 3 + 6 − 6; spring leg 9 − 2; disc 6 − 3; bicycle 9 − 2·3. A revolute joint that closes a loop has 5 rows, of which
+/// 3 are redundant if the mechanism is planar.
 const CASES: [Case; 10] = [
     Case { name: "fourbar", rows: 5, mobility: 1, time: 1.0, thrown: (0, 8.0) },
     Case { name: "fourbar_3d", rows: 5, mobility: 1, time: 1.0, thrown: (0, 8.0) },
