@@ -1,7 +1,7 @@
 //! Fuzzes the readers: mutates the shipped and the broken models and reports every panic.
 //!
 //! ```sh
-
+//! cargo run --release -p mbd-codegen --example fuzz -- --seconds 600 [--format toml|urdf] [--seed 1] [--save DIR]
 //! ```
 //!
 //! Inputs that panic, take longer than a second, or give neither model nor error are written to the folder of `--save`
