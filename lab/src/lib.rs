@@ -7,6 +7,7 @@ mod experiments;
 #[cfg(feature = "generated")]
 pub mod generated;
 pub mod scenes;
+pub mod stability;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -25,6 +26,7 @@ pub fn main() -> ExitCode {
 fn run(command: Command, out: &mut dyn Write) -> Outcome {
     match command {
         Command::Experiments(a) => experiments::run(&a, out),
+        Command::Stability(a) => stability::run(&a, out),
         #[cfg(feature = "generated")]
         Command::Bench(a) => bench::run(&a, out),
         #[cfg(not(feature = "generated"))]

@@ -197,6 +197,20 @@ pub enum ConstraintError {
         /// Last change relative to the state.
         change: f64,
     },
+    /// Closing the positions would change the kinetic energy by more than is allowed: the mechanism passes a singular
+    /// position, or the step was too large.
+    Energy {
+        /// The constraint with the largest residual.
+        constraint: usize,
+        /// Change of the kinetic energy in this step, J.
+        taken: f64,
+        /// Largest kinetic energy so far, J.
+        kinetic: f64,
+        /// Number of independent rows.
+        rank: usize,
+        /// Number of rows.
+        rows: usize,
+    },
 }
 
 impl ConstraintError {
@@ -232,6 +246,11 @@ impl ConstraintError {
             ConstraintError::NoConvergence { iterations, change } => write!(
                 f,
                 "the multipliers did not converge in {iterations} iterations (last change {change:.1e} of the state): reduce the step"
+            ),
+            ConstraintError::Energy { constraint, taken, kinetic, rank, rows } => write!(
+                f,
+                "closing {} would change the kinetic energy by {taken:.1e} J of {kinetic:.3e} J ({rank} of {rows} rows are independent there): reduce the step, keep the loops closed at every step, or look for a singular position",
+                label(constraint)
             ),
         }
     }

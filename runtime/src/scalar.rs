@@ -24,10 +24,13 @@ pub trait Scalar:
     /// redundant. Zero leaves the row out, where too little of its diagonal entry remains. `floor` must not be
     /// negative. If `self` is NaN, so is the result.
     fn reciprocal_above(self, floor: Self) -> Self;
-    /// Fraction of a row's diagonal entry: where less than this fraction remains after the rows before it have been
-    /// eliminated, the rest counts as round-off.
+    /// Fraction of the diagonal entries of the rows of a constraint: where less than this fraction remains of one row
+    /// after the rows before it have been eliminated, the row is left out. At a distance `s` from a position where a
+    /// row becomes dependent, `s²` remains of it; an error `φ` of the positions rotates the direction of motion there
+    /// by `φ/s²`. The row is therefore left out before round-off of the positions can do that, and not much earlier,
+    /// because the bodies are free along it while it is left out.
     fn rank_tolerance() -> Self {
-        Self::constant(1e-10)
+        Self::constant(4e-9)
     }
 
     /// The node of a graph of operations that a symbolic scalar stands for, and whether it stands for the negative.

@@ -6,7 +6,7 @@
 mod dynamics;
 pub mod experiments;
 mod list;
-mod text;
+pub(crate) mod text;
 
 pub use dynamics::Dynamics;
 

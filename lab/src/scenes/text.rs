@@ -3,10 +3,10 @@
 use std::fmt::Write;
 
 /// A model file under construction.
-pub(super) struct Text(String);
+pub(crate) struct Text(String);
 
 /// A body and the revolute joint that carries it.
-pub(super) struct Link<'a> {
+pub(crate) struct Link<'a> {
     /// Names of the body and of its parent, `None` for the ground.
     pub name: &'a str,
     pub parent: Option<&'a str>,
@@ -62,6 +62,11 @@ impl Text {
             self.0,
             "\n[[loop]]\nname = \"{name}\"\ntype = \"{kind}\"\nbetween = [\"{name}_a\", \"{name}_b\"]\n"
         );
+    }
+
+    /// Sets the axis of the last loop, in both frames.
+    pub fn along(&mut self, axis: [f64; 3]) {
+        let _ = writeln!(self.0, "axis = {axis:?}");
     }
 
     /// The text of the file.

@@ -17,6 +17,10 @@ pub(super) struct Basic<S> {
     /// For each block: dependent columns and the rows that are solved for them, a pair for each pivot.
     pub pairs: Vec<Vec<(usize, usize)>>,
     pub lus: Vec<Lu<S>>,
+    /// Number of independent rows of every block in the last solution.
+    ranks: Vec<usize>,
+    /// First row of the first block of which that number has changed since.
+    pub changed: Option<usize>,
     b: Vec<S>,
     x: Vec<S>,
     work: Vec<S>,
@@ -32,6 +36,8 @@ impl<S: Real> Basic<S> {
             bases: blocks.list.iter().map(|b| Basis::new(b.rows.len(), b.columns.len())).collect(),
             pairs: blocks.list.iter().map(|b| Vec::with_capacity(b.rows.len())).collect(),
             lus: blocks.list.iter().map(|b| Lu::new(b.rows.len())).collect(),
+            ranks: vec![0; blocks.list.len()],
+            changed: None,
             b: vec![S::zero(); m],
             x: vec![S::zero(); n],
             work: vec![S::zero(); mn],
@@ -58,9 +64,12 @@ impl<S: Real> Basic<S> {
     fn solve_least(&mut self, residual: &[S], dq: &mut [S]) -> usize {
         dq.fill(S::zero());
         let mut rank = 0;
-        for (block, basis) in self.blocks.list.iter().zip(&mut self.bases) {
+        self.changed = None;
+        for (k, (block, basis)) in self.blocks.list.iter().zip(&mut self.bases).enumerate() {
             let (m, n) = (block.rows.len(), block.columns.len());
-            rank += basis.factor(&block.a, m, n);
+            let own = basis.factor(&block.a, m, n);
+            note(&mut self.changed, &mut self.ranks[k], own, block);
+            rank += own;
             for (b, r) in self.b.iter_mut().zip(&block.rows) {
                 *b = -residual[*r];
             }
@@ -113,7 +122,9 @@ impl<S: Real> Basic<S> {
         self.blocks.fill(entries);
         dq.fill(S::zero());
         let rank = self.choose();
+        self.changed = None;
         for k in 0..self.pairs.len() {
+            note(&mut self.changed, &mut self.ranks[k], self.pairs[k].len(), &self.blocks.list[k]);
             // Pivots were found: the factors exist.
             self.factor(k);
             self.solve(k, residual, dq);
@@ -158,4 +169,12 @@ impl<S: Real> Basic<S> {
         }
         found
     }
+}
+
+/// Notes the rank of a block, and its first row if it is the first block whose rank differs from what it was.
+fn note<S>(changed: &mut Option<usize>, old: &mut usize, rank: usize, block: &Block<S>) {
+    if *old != rank && changed.is_none() {
+        *changed = block.rows.first().copied();
+    }
+    *old = rank;
 }

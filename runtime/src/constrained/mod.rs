@@ -32,6 +32,7 @@ mod blocks;
 mod close;
 #[cfg(feature = "alloc")]
 mod coordinate_partition;
+mod correction;
 #[cfg(feature = "alloc")]
 mod dense;
 mod open_and_closed;
@@ -46,9 +47,10 @@ pub use crate::error::ConstraintError;
 pub use close::{close, complete, Closed, Closing};
 #[cfg(feature = "alloc")]
 pub use coordinate_partition::{CoordinatePartition, Repartition, Switch};
+pub use correction::{Effort, RankChange, Stabilisation};
 pub use open_and_closed::{OpenAndClosed, Unconstrained};
 pub use post_step::{PostStep, WithPostStep};
-pub use projection::{Effort, FixedWork, Policy, Projection, Room, Stabilisation, ToTolerance};
+pub use projection::{FixedWork, Policy, Projection, Room, ToTolerance};
 pub use radau::{RadauIndex2, RadauIndex2Scheme};
 pub use rattle::{Rattle, RattleScheme};
 

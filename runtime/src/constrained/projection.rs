@@ -1,49 +1,12 @@
 //! Projection of states onto the constraints at the ends of steps.
 
-#[cfg(feature = "alloc")]
-use super::basic::Basic;
+use super::correction::{Corrector, Effort, RankChange, Stabilisation};
 use super::post_step::PostStep;
 use super::rows::{add_forces, named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
 use crate::system::{Constrained, Real};
 use crate::Scalar;
-
-/// What is done at the end of every step; see the module's table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Stabilisation {
-    /// Nothing is done: multipliers `σ` accumulate in the momenta, positions drift.
-    None,
-    /// Momenta are projected ([`Constrained::project_momenta`]); positions drift by the method's error.
-    Momenta,
-    /// As `Momenta`; then positions are corrected by the displacement that is least in the metric of the mass matrix
-    /// ([`Constrained::position_correction`]), and momenta stay.
-    #[default]
-    Mass,
-    /// As `Mass`, with the displacement of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
-    #[cfg(feature = "alloc")]
-    Gradient,
-    /// As `Mass`, with a displacement of dependent coordinates alone, which are chosen anew each time.
-    #[cfg(feature = "alloc")]
-    Partition,
-}
-
-/// The residual at which positions count as closed, and the number of iterations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Effort {
-    /// Largest number of iterations at the end of a step.
-    pub iterations: u32,
-    /// Residual, m and rad, below which positions are not corrected. With 0, all iterations are always done, and the
-    /// last residual is not judged.
-    pub tolerance: f64,
-}
-
-impl Default for Effort {
-    fn default() -> Self {
-        Effort { iterations: 3, tolerance: 1e-14 }
-    }
-}
 
 /// Projects the state onto the constraints where a step ends: the [`PostStep`] of any method. Momenta are
 /// projected first. Then positions are corrected with the momenta unchanged, which changes the energy least.
@@ -64,11 +27,11 @@ pub struct Projection<Y: Constrained, P = ToTolerance<Y>> {
 #[derive(Clone, Debug)]
 pub struct Room<Y: Constrained> {
     /// Velocities; displacement of an iteration.
-    v: Y::Momenta,
+    pub(super) v: Y::Momenta,
     sigma: Y::Rows,
-    residual: Y::Rows,
-    pivots: Y::Rows,
-    entries: Y::Entries,
+    pub(super) residual: Y::Rows,
+    pub(super) pivots: Y::Rows,
+    pub(super) entries: Y::Entries,
 }
 
 impl<Y: Constrained> Room<Y> {
@@ -82,22 +45,28 @@ impl<Y: Constrained> Room<Y> {
             entries: system.zero_entries(),
         }
     }
+
+    /// Adds to the momenta the multipliers of which they were freed, at positions that have been corrected since.
+    fn give_back(&mut self, system: &mut Y, q: &Y::Coordinates, p: &mut Y::Momenta) {
+        system.constraint_residuals(q, &mut self.residual, &mut self.entries);
+        add_forces(system, &self.entries, &self.sigma, p);
+    }
 }
 
 /// The work of a [`Projection`].
 pub trait Policy<Y: Constrained> {
-    /// Whether momenta are projected. `remembers` as in [`PostStep::close`].
-    fn frees_momenta(&self, remembers: bool) -> bool;
-
-    /// Corrects positions.
+    /// Projects the state `(q, p)` at time `t` (s). `remembers` as in [`PostStep::close`].
     ///
     /// # Errors
     /// [`ConstraintError`].
-    fn move_positions(
+    fn close(
         &mut self,
         room: &mut Room<Y>,
         system: &mut Y,
+        t: Y::Scalar,
+        remembers: bool,
         q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
 }
 
@@ -113,38 +82,72 @@ where
     Y::Scalar: Real,
 {
     #[inline]
-    fn frees_momenta(&self, _remembers: bool) -> bool {
-        true
-    }
-
-    #[inline]
-    fn move_positions(
+    fn close(
         &mut self,
         room: &mut Room<Y>,
         system: &mut Y,
+        t: Y::Scalar,
+        remembers: bool,
         q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
+        system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);
+        finite(p.as_ref())?;
         for _ in 0..N {
             system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
             Chart::displace(system, &mut room.v, q);
         }
-        finite(q.as_ref())
+        finite(q.as_ref())?;
+        if remembers {
+            room.give_back(system, q, p);
+        }
+        Ok(())
     }
 }
 
 /// Iterations of a [`Stabilisation`] until the residuals are small ([`Effort`]).
 #[derive(Clone, Debug)]
 pub struct ToTolerance<Y: Constrained> {
-    stabilisation: Stabilisation,
-    effort: Effort,
-    /// The largest pivot of every row so far.
-    most: Y::Rows,
-    /// Largest residual before the last correction.
-    found: Y::Scalar,
-    rank: Option<usize>,
-    changes: u32,
-    #[cfg(feature = "alloc")]
-    basic: Option<Basic<Y::Scalar>>,
+    corrector: Corrector<Y>,
+    /// [`Effort::energy`].
+    energy: f64,
+    ledger: Ledger<Y::Scalar>,
+    /// The state at closed positions, and the multipliers that its momenta are freed of.
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    sigma: Y::Rows,
+}
+
+/// What corrections would take from the kinetic energy, at the ends of the last two steps.
+#[derive(Clone, Copy, Debug)]
+struct Ledger<S> {
+    /// Time, s, and kinetic energy at closed positions less that of the state, J.
+    last: Option<(S, S)>,
+    before: Option<(S, S)>,
+    /// Largest kinetic energy so far, J.
+    most: S,
+}
+
+impl<S: Real> Ledger<S> {
+    /// Kinetic energy that the end of a step at time `t` (s) changes, J, where a correction changes it from `free` to
+    /// `closed`: what is more than at the end of the step before.
+    fn change(&self, t: S, [free, closed]: [S; 2]) -> S {
+        let from = if self.inside(t) { self.before } else { self.last };
+        closed - free - from.map_or(S::zero(), |(_, gap)| gap)
+    }
+
+    /// Notes the end of a step; states inside the last step are not noted. Nothing is left for the next step where the
+    /// correction was made.
+    fn note(&mut self, t: S, [free, closed]: [S; 2], closes: bool) {
+        if !self.inside(t) {
+            let gap = if closes { S::zero() } else { closed - free };
+            (self.before, self.last) = (self.last, Some((t, gap)));
+        }
+    }
+
+    fn inside(&self, t: S) -> bool {
+        self.last.is_some_and(|(last, _)| t <= last)
+    }
 }
 
 impl<Y> Projection<Y>
@@ -154,18 +157,14 @@ where
 {
     /// A projection for one system that iterates until the residuals are small.
     pub fn new(system: &Y, stabilisation: Stabilisation, effort: Effort) -> Self {
+        let zero = Y::Scalar::zero();
         let policy = ToTolerance {
-            stabilisation,
-            effort,
-            most: system.zero_rows(),
-            found: Y::Scalar::zero(),
-            rank: None,
-            changes: 0,
-            #[cfg(feature = "alloc")]
-            basic: match stabilisation {
-                Stabilisation::Gradient | Stabilisation::Partition => Some(Basic::new(system)),
-                _ => None,
-            },
+            corrector: Corrector::new(system, stabilisation, effort),
+            energy: effort.energy,
+            ledger: Ledger { last: None, before: None, most: zero },
+            q: system.neutral(),
+            p: system.zero_momenta(),
+            sigma: system.zero_rows(),
         };
         Projection { room: Room::new(system), policy }
     }
@@ -178,12 +177,17 @@ where
     /// The largest residual, m or rad, of the last state that was corrected, at the end of a step or inside it, before
     /// the correction.
     pub fn drift(&self) -> Y::Scalar {
-        self.policy.found
+        self.policy.corrector.found
     }
 
-    /// Number of independent rows at the last correction of positions, and how often it has changed.
+    /// Number of independent rows at the end of the last step, and how often it has changed.
     pub fn rank(&self) -> (Option<usize>, u32) {
-        (self.policy.rank, self.policy.changes)
+        (self.policy.corrector.noted(), self.policy.corrector.changes.0)
+    }
+
+    /// The last change of the number of independent rows.
+    pub fn rank_change(&self) -> Option<RankChange> {
+        self.policy.corrector.changes.1
     }
 }
 
@@ -204,37 +208,36 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent
-    /// rows.
-    fn correct(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates) -> usize {
-        #[cfg(feature = "alloc")]
-        if let Some(basic) = &mut self.basic {
-            system.constraint_residuals(q, &mut room.residual, &mut room.entries);
-            let (residual, entries, dq) = (room.residual.as_ref(), room.entries.as_ref(), room.v.as_mut());
-            return match self.stabilisation {
-                Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
-                _ => basic.dependent(entries, residual, dq),
-            };
+    /// Compares the kinetic energy of a state, `free` (J), with that of the same momenta at the closed positions in
+    /// `self.q`.
+    fn judge(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        free: Y::Scalar,
+        closes: bool,
+    ) -> Result<(), ConstraintError> {
+        system.project_momenta(t, &self.q, &mut self.p, &mut room.v, &mut self.sigma);
+        let closed = kinetic(self.p.as_ref(), room.v.as_ref());
+        if free > self.ledger.most {
+            self.ledger.most = free;
         }
-        system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
-        room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
+        let taken = self.ledger.change(t, [free, closed]).to_f64();
+        let kinetic = self.ledger.most.to_f64();
+        if taken.abs() <= self.energy * kinetic {
+            self.ledger.note(t, [free, closed], closes);
+            return Ok(());
+        }
+        let (at, _) = worst(room.residual.as_ref());
+        let (rank, rows) = (self.corrector.rank, system.rows().len());
+        Err(ConstraintError::Energy { constraint: named(system, at), taken, kinetic, rank, rows })
     }
+}
 
-    /// Whether the rows are much closer to linear dependence than before. Positions are not corrected then. Several
-    /// motions continue from a singular position; at a distance `s` from it, a correction by `φ/s` rotates the
-    /// direction of motion by `φ/s²`, which changes the energy, because the momenta stay. Pivots are proportional to
-    /// `s²`. The residual is corrected after the position has been passed.
-    fn near_fork(&mut self, pivots: &Y::Rows) -> bool {
-        let part = Y::Scalar::constant(libm::cbrt(Y::Scalar::epsilon()));
-        let mut near = false;
-        for (most, pivot) in self.most.as_mut().iter_mut().zip(pivots.as_ref()) {
-            if *pivot > *most {
-                *most = *pivot;
-            }
-            near |= *pivot < part * *most;
-        }
-        near
-    }
+/// Half the product of momenta and velocities: the kinetic energy, J, where `p = M v`.
+fn kinetic<S: Real>(p: &[S], v: &[S]) -> S {
+    S::constant(0.5) * p.iter().zip(v).fold(S::zero(), |sum, (p, v)| sum + *p * *v)
 }
 
 impl<Y> Policy<Y> for ToTolerance<Y>
@@ -242,62 +245,51 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
-    fn frees_momenta(&self, remembers: bool) -> bool {
-        match self.stabilisation {
-            Stabilisation::None => false,
-            Stabilisation::Momenta => !remembers,
-            _ => true,
-        }
-    }
-
-    fn move_positions(
+    fn close(
         &mut self,
         room: &mut Room<Y>,
         system: &mut Y,
+        t: Y::Scalar,
+        remembers: bool,
         q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
-        if self.stabilisation == Stabilisation::Momenta {
+        let stabilisation = self.corrector.stabilisation;
+        let closes = !matches!(stabilisation, Stabilisation::None | Stabilisation::Momenta);
+        let frees = closes || (stabilisation == Stabilisation::Momenta && !remembers);
+        let judged = self.energy < f64::INFINITY;
+        if !frees && !judged {
             return Ok(());
         }
-        let Effort { iterations, tolerance } = self.effort;
-        let flat = libm::sqrt(Y::Scalar::epsilon());
-        for k in 0..iterations {
-            let rank = self.correct(room, system, q);
-            let (at, size) = worst(room.residual.as_ref());
-            if k == 0 {
-                self.found = size;
-                self.changes += u32::from(self.rank.is_some_and(|before| before != rank));
-                self.rank = Some(rank);
-            }
-            if !size.is_finite() {
-                return Err(ConstraintError::NotFinite { index: at });
-            }
-            if tolerance > 0.0 && size.to_f64() <= tolerance {
-                return Ok(());
-            }
-            finite(room.v.as_ref())?;
-            if self.stabilisation == Stabilisation::Mass && self.near_fork(&room.pivots) && size.to_f64() <= flat {
-                return Ok(());
-            }
-            Chart::displace(system, &mut room.v, q);
+        self.p.as_mut().copy_from_slice(p.as_ref());
+        system.project_momenta(t, q, &mut self.p, &mut room.v, &mut room.sigma);
+        finite(self.p.as_ref())?;
+        let free = kinetic(self.p.as_ref(), room.v.as_ref());
+        if frees {
+            p.as_mut().copy_from_slice(self.p.as_ref());
         }
-        if tolerance <= 0.0 {
-            return Ok(());
+        if closes {
+            self.corrector.correct(room, system, q)?;
         }
-        // All iterations are used. The residual is round-off, or the step was too large.
-        system.constraint_residuals(q, &mut room.residual, &mut room.entries);
-        let (at, size) = worst(room.residual.as_ref());
-        let residual = size.to_f64();
-        if residual <= tolerance.max(flat) {
-            return Ok(());
+        if judged {
+            self.q.as_mut().copy_from_slice(q.as_ref());
+            if !closes {
+                self.corrector.correct(room, system, &mut self.q)?;
+            }
+            self.judge(room, system, t, free, closes)?;
         }
-        let (constraint, rows, rank) = (named(system, at), system.rows().len(), self.rank.unwrap_or(0));
-        Err(ConstraintError::NotClosed { constraint, residual, rank, rows, iterations })
+        if closes || judged {
+            self.corrector.note(system, t, &room.pivots);
+        }
+        if frees && remembers {
+            room.give_back(system, q, p);
+        }
+        Ok(())
     }
 }
 
 /// Whether all numbers are finite.
-fn finite<S: Real>(x: &[S]) -> Result<(), ConstraintError> {
+pub(super) fn finite<S: Real>(x: &[S]) -> Result<(), ConstraintError> {
     let (index, size) = worst(x);
     match size.is_finite() {
         true => Ok(()),
@@ -320,17 +312,6 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
-        let Projection { room, policy } = self;
-        if !policy.frees_momenta(remembers) {
-            return Ok(());
-        }
-        system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);
-        finite(p.as_ref())?;
-        policy.move_positions(room, system, q)?;
-        if remembers {
-            system.constraint_residuals(q, &mut room.residual, &mut room.entries);
-            add_forces(system, &room.entries, &room.sigma, p);
-        }
-        Ok(())
+        self.policy.close(&mut self.room, system, t, remembers, q, p)
     }
 }

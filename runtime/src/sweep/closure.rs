@@ -84,6 +84,18 @@ impl<S: Copy> Closure<S> {
         }
     }
 
+    /// Whether the residual of row `k` is an angle (rad); those of the other rows are lengths (m).
+    pub fn is_rotation(&self, k: usize) -> bool {
+        match self {
+            Closure::Revolute | Closure::Universal | Closure::Fixed => k >= 3,
+            Closure::Prismatic | Closure::Cylindrical => k >= 2,
+            // The last row compares a length with the pitch times an angle.
+            Closure::Helical { .. } => k == 2 || k == 3,
+            Closure::Planar => k >= 1,
+            _ => false,
+        }
+    }
+
     /// Whether the motions that the constraint allows form a group, as those of a joint do.
     pub fn is_joint(&self) -> bool {
         use Closure::{Cylindrical, Fixed, Helical, Planar, Prismatic, Revolute, Spherical};

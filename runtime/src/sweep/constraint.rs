@@ -40,6 +40,14 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
+    /// Whether the residual of row `k` is an angle; others are lengths, or one number in the unit of a coupling.
+    fn is_rotation(&self, k: usize) -> bool {
+        match &self.bond {
+            Bond::Cut(cut) => cut.closure.is_rotation(k),
+            Bond::Coupling { .. } => false,
+        }
+    }
+
     /// Whether it binds two frames.
     fn is_cut(&self) -> bool {
         matches!(self.bond, Bond::Cut(_))
@@ -234,15 +242,24 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Reciprocal pivot of row `r`, the unknown `g`: negative, or zero where the row is redundant. It is redundant if
-    /// what is left of its diagonal is too small a part of the diagonal at first (the row follows from rows before it)
-    /// or of the diagonals of all rows of its constraint (its bodies cannot move along it). Where the bodies can move
-    /// along none of the rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1
-    /// kg m² would give.
+    /// what is left of its diagonal is too small a part of the diagonals at first of all rows of its constraint with
+    /// its unit: it follows from rows before it, or its bodies cannot move along it. Its own diagonal alone is no
+    /// measure: where bars come to lie in one line, a row may vanish together with it. Where the bodies can move along
+    /// none of the rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1 kg m²
+    /// would give.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
-        let all = self.tree.constraint_of(r).slots.iter().fold(S::zero(), |sum, &h| sum + f.whole[h]);
-        let floor = tolerance * (f.whole[g] + tolerance * (all + S::one()));
+        let constraint = self.tree.constraint_of(r);
+        let own = constraint.is_rotation(r - constraint.first);
+        let (mut alike, mut all) = (S::zero(), S::zero());
+        for (k, &h) in constraint.slots.iter().enumerate() {
+            all = all + f.whole[h];
+            if constraint.is_rotation(k) == own {
+                alike = alike + f.whole[h];
+            }
+        }
+        let floor = tolerance * (alike + tolerance * (all + S::one()));
         -(-f.gram[g * ng + g]).reciprocal_above(floor)
     }
 

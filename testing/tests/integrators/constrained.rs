@@ -241,7 +241,7 @@ fn all_ways_lead_to_the_same_end() {
             assert!((errors[0] / errors[1]).log2() > 3.5, "{name} {policy:?}: {errors:?}");
         }
         // Projection with a fixed number of iterations costs four evaluations a step.
-        let two = Effort { iterations: 2, tolerance: 0.0 };
+        let two = Effort { iterations: 2, tolerance: 0.0, ..Effort::default() };
         let mut fixed = WithPostStep::new(&y, Rk4::new(&y), Projection::new(&y, Stabilisation::Mass, two));
         let mut steady = WithPostStep::new(&y, Rk4::new(&y), Projection::fixed_work::<2>(&y));
         let ends = (march(&mut y, &mut fixed, 200, end, &start), march(&mut y, &mut steady, 200, end, &start));

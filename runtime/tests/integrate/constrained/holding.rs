@@ -181,7 +181,7 @@ fn a_body_on_its_lie_group() {
 #[test]
 fn long_drift() {
     let (mut y, start) = double();
-    let hold = Projection::new(&y, Stabilisation::Mass, Effort { iterations: 2, tolerance: 0.0 });
+    let hold = Projection::new(&y, Stabilisation::Mass, Effort { iterations: 2, tolerance: 0.0, ..Effort::default() });
     let method = Rk4::new(&y);
     let mut method = WithPostStep::new(&y, method, hold);
     let ((mut q, mut p), mut worst) = (start, 0.0_f64);

@@ -1,0 +1,159 @@
+//! Energy of mechanisms that pass singular positions: how much is lost, and whether a run that loses it says so.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::Mutex;
+
+use multibody::codegen::options::PlanOptions;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::read::{self, ImportOptions};
+use multibody::codegen::search;
+use multibody::runtime::catalogue::{self, Start};
+use multibody::runtime::constrained::{
+    close, complete, Closing, ConstraintError, Effort, Projection, Stabilisation,
+};
+use multibody::runtime::integrate::{Step, StepError, Tolerances};
+use multibody::runtime::{Constrained, Interpreter, System};
+
+use super::mechanisms::Mechanism;
+
+/// A run is given up after so many steps.
+const MOST_STEPS: u64 = 40_000;
+
+/// A mechanism that has been read.
+pub struct Subject {
+    /// The mechanism.
+    pub mechanism: Mechanism,
+    plan: Plan,
+    start: Vec<f64>,
+}
+
+/// How runs are made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Way {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Tolerance of its steps.
+    pub tolerance: f64,
+    /// What is done at the ends of steps.
+    pub hold: Stabilisation,
+    /// Limit of the change of kinetic energy by the end of a step, as a multiple of the tolerance.
+    pub energy: f64,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// It reached its end.
+    Whole,
+    /// It stopped with an error.
+    Error(StepError),
+    /// It took more steps than are allowed here.
+    Steps,
+}
+
+/// One run.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// Velocity of the driver at the start.
+    pub speed: f64,
+    /// Largest change of the energy relative to the largest kinetic energy, at any step before the end.
+    pub energy: f64,
+    /// Steps.
+    pub steps: u64,
+    /// How it ended.
+    pub end: End,
+    /// How often the number of independent rows changed.
+    pub changes: u32,
+}
+
+impl Run {
+    /// Whether it stopped because energy would have been lost.
+    pub fn refused(&self) -> bool {
+        matches!(self.end, End::Error(StepError::Constraint { error: ConstraintError::NotClosed { .. }, .. }))
+    }
+}
+
+impl Subject {
+    /// Reads a mechanism and closes it at its start.
+    pub fn new(mechanism: Mechanism) -> Subject {
+        let read = read::model("model.toml", &mechanism.text, &ImportOptions::default());
+        let model = read.unwrap_or_else(|e| panic!("{}: {e}", mechanism.name)).model;
+        let plan = search::plan(&model, PlanOptions::default());
+        let mut start = plan.start();
+        let held = plan.held();
+        let closed = close(&mut interpreter(&plan), &mut start, &Closing::holding(&held));
+        closed.unwrap_or_else(|e| panic!("{}: {e}", mechanism.name));
+        Subject { mechanism, plan, start }
+    }
+
+    /// `n` velocities of the driver, spread over the range of the mechanism.
+    pub fn speeds(&self, n: usize) -> Vec<f64> {
+        let [least, most] = self.mechanism.speeds;
+        (0..n).map(|k| least + (most - least) * (k as f64 + 0.5) / n as f64).collect()
+    }
+
+    /// Makes a run for every speed, on all processors.
+    pub fn runs(&self, way: Way, speeds: &[f64]) -> Vec<Run> {
+        let (next, runs) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        std::thread::scope(|scope| {
+            for _ in 0..threads {
+                scope.spawn(|| {
+                    while let Some(speed) = speeds.get(next.fetch_add(1, Ordering::Relaxed)) {
+                        let run = self.run(way, *speed);
+                        runs.lock().expect("no run panics").push(run);
+                    }
+                });
+            }
+        });
+        let mut runs = runs.into_inner().expect("no run panics");
+        runs.sort_by(|a: &Run, b: &Run| a.speed.total_cmp(&b.speed));
+        runs
+    }
+
+    /// Runs once.
+    pub fn run(&self, way: Way, speed: f64) -> Run {
+        let mut system = interpreter(&self.plan);
+        let mut q = self.start.clone();
+        let (mut v, mut p) = (system.zero_momenta(), system.zero_momenta());
+        v[self.mechanism.driver] = speed;
+        let mut held = vec![false; v.len()];
+        held[self.mechanism.driver] = true;
+        complete(&mut system, 0.0, &q, &mut v, &held, 1e-9).expect("the driver can move");
+        system.momenta(&q, &v, &mut p);
+        let mut sigma = system.zero_rows();
+        system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
+        let mut observer = system.clone();
+        let (kinetic, potential) = observer.energy(&q, &p);
+        let begun = kinetic + potential;
+        let projection = Projection::new(&system, way.hold, Effort { energy: way.energy * way.tolerance, ..Effort::default() });
+        let start = Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(way.tolerance)), compensated: false };
+        let made = catalogue::implicit_with_post_step(way.method, &mut system, &start, projection.clone())
+            .or_else(|| catalogue::explicit_with_post_step(way.method, &mut system, &start, projection));
+        let mut solver = made.expect("a method of the catalogue").expect("a start that is closed");
+        let mut run = Run { speed, energy: 0.0, steps: 0, end: End::Whole, changes: 0 };
+        let (mut worst, mut most) = (0.0_f64, kinetic);
+        while solver.time() < self.mechanism.time {
+            if let Err(error) = solver.advance(&mut system, self.mechanism.time) {
+                run.end = End::Error(error);
+                break;
+            }
+            run.steps += 1;
+            if run.steps > MOST_STEPS {
+                run.end = End::Steps;
+                break;
+            }
+            solver.state(&system, &mut q, &mut p);
+            let (kinetic, potential) = observer.energy(&q, &p);
+            (worst, most) = (worst.max((kinetic + potential - begun).abs()), most.max(kinetic));
+        }
+        run.energy = worst / most;
+        run
+    }
+}
+
+fn interpreter(plan: &Plan) -> Interpreter<f64> {
+    let params = plan.default_params();
+    let gravity = plan.gravity(&params);
+    Interpreter::new(plan.tree(&params), gravity)
+}

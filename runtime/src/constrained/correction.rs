@@ -1,0 +1,195 @@
+//! Correction of positions.
+
+#[cfg(feature = "alloc")]
+use super::basic::Basic;
+use super::projection::{finite, Room};
+use super::rows::{named, worst};
+use super::ConstraintError;
+use crate::integrate::Chart;
+use crate::system::{Constrained, Real};
+#[cfg(feature = "alloc")]
+use crate::Scalar;
+
+/// What is done at the end of every step; see the module's table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Stabilisation {
+    /// Nothing is done: multipliers `σ` accumulate in the momenta, positions drift.
+    None,
+    /// Momenta are projected ([`Constrained::project_momenta`]); positions drift by the method's error.
+    Momenta,
+    /// As `Momenta`; then positions are corrected by the displacement that is least in the metric of the mass matrix
+    /// ([`Constrained::position_correction`]), and momenta stay.
+    #[default]
+    Mass,
+    /// As `Mass`, with the displacement of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
+    #[cfg(feature = "alloc")]
+    Gradient,
+    /// As `Mass`, with a displacement of dependent coordinates alone, which are chosen anew each time.
+    #[cfg(feature = "alloc")]
+    Partition,
+}
+
+/// The residual at which positions count as closed, and the number of iterations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Largest number of iterations at the end of a step.
+    pub iterations: u32,
+    /// Residual, m and rad, after which one correction more is the last. With 0, all iterations are always done, and the
+    /// last residual is not judged.
+    pub tolerance: f64,
+    /// Largest part of the kinetic energy that the end of one step may take or give. More is
+    /// [`ConstraintError::Energy`]. With `f64::INFINITY` it is not computed.
+    pub energy: f64,
+}
+
+impl Effort {
+    /// For steps that are chosen by a tolerance: the end of a step may change the kinetic energy by that part.
+    pub fn within(tolerance: f64) -> Self {
+        Effort { energy: tolerance, ..Effort::default() }
+    }
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort { iterations: 3, tolerance: 1e-14, energy: 1e-3 }
+    }
+}
+
+/// A change of the number of independent rows from the end of one step to the end of another: the mechanism passes a
+/// singular position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct RankChange {
+    /// End of the step, s.
+    pub time: f64,
+    /// The constraint, numbered as in [`Row::constraint`](crate::system::Row).
+    pub constraint: usize,
+    /// Number of independent rows of all constraints before.
+    pub before: usize,
+    /// The same at that time.
+    pub rank: usize,
+}
+
+/// Corrects positions by a [`Stabilisation`].
+#[derive(Clone, Debug)]
+pub(super) struct Corrector<Y: Constrained> {
+    pub stabilisation: Stabilisation,
+    effort: Effort,
+    /// Largest residual before the last correction.
+    pub found: Y::Scalar,
+    /// Number of independent rows then.
+    pub rank: usize,
+    /// Time of the last end of a step, s, and the number there.
+    noted: Option<(Y::Scalar, usize)>,
+    /// The pivots then.
+    pivots: Y::Rows,
+    /// Number of changes of the rank, and the last one.
+    pub changes: (u32, Option<RankChange>),
+    #[cfg(feature = "alloc")]
+    basic: Option<Basic<Y::Scalar>>,
+}
+
+impl<Y> Corrector<Y>
+where
+    Y: Constrained,
+    Y::Scalar: Real,
+{
+    pub fn new(system: &Y, stabilisation: Stabilisation, effort: Effort) -> Self {
+        Corrector {
+            stabilisation,
+            effort,
+            found: Y::Scalar::zero(),
+            rank: 0,
+            noted: None,
+            pivots: system.zero_rows(),
+            changes: (0, None),
+            #[cfg(feature = "alloc")]
+            basic: match stabilisation {
+                Stabilisation::Gradient | Stabilisation::Partition => Some(Basic::new(system)),
+                _ => None,
+            },
+        }
+    }
+
+    /// Number of independent rows at the last end of a step.
+    pub fn noted(&self) -> Option<usize> {
+        self.noted.map(|(_, rank)| rank)
+    }
+
+    /// Notes the rank of the last correction at the end of a step; states inside the last step are not noted.
+    pub fn note(&mut self, system: &Y, t: Y::Scalar, pivots: &Y::Rows) {
+        let rank = self.rank;
+        let zero = Y::Scalar::zero();
+        match self.noted {
+            Some((last, _)) if t <= last => return,
+            Some((_, before)) if rank != before => {
+                let both = self.pivots.as_ref().iter().zip(pivots.as_ref());
+                let row = both.into_iter().position(|(old, new)| (*old == zero) != (*new == zero));
+                #[cfg(feature = "alloc")]
+                let row = self.basic.as_ref().map_or(row, |basic| basic.changed);
+                let constraint = named(system, row.unwrap_or(0));
+                self.changes.0 += 1;
+                self.changes.1 = Some(RankChange { time: t.to_f64(), constraint, before, rank });
+            }
+            _ => {}
+        }
+        self.noted = Some((t, rank));
+        self.pivots.as_mut().copy_from_slice(pivots.as_ref());
+    }
+
+    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent
+    /// rows.
+    fn solve(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates) -> usize {
+        #[cfg(feature = "alloc")]
+        if let Some(basic) = &mut self.basic {
+            system.constraint_residuals(q, &mut room.residual, &mut room.entries);
+            let (residual, entries, dq) = (room.residual.as_ref(), room.entries.as_ref(), room.v.as_mut());
+            return match self.stabilisation {
+                Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
+                _ => basic.dependent(entries, residual, dq),
+            };
+        }
+        system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
+        room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
+    }
+
+    /// Corrects positions until the residuals are small, and once more: a residual below the tolerance is removed too,
+    /// because it rotates the direction of motion the more, the nearer a singular position is.
+    pub fn correct(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        q: &mut Y::Coordinates,
+    ) -> Result<(), ConstraintError> {
+        let Effort { iterations, tolerance, .. } = self.effort;
+        for k in 0..iterations {
+            let rank = self.solve(room, system, q);
+            let (at, size) = worst(room.residual.as_ref());
+            if k == 0 {
+                self.found = size;
+                self.rank = rank;
+            }
+            if !size.is_finite() {
+                return Err(ConstraintError::NotFinite { index: at });
+            }
+            finite(room.v.as_ref())?;
+            Chart::displace(system, &mut room.v, q);
+            if tolerance > 0.0 && size.to_f64() <= tolerance {
+                return Ok(());
+            }
+        }
+        if tolerance <= 0.0 {
+            return Ok(());
+        }
+        // All iterations are used. The residual is round-off, or the step was too large.
+        system.constraint_residuals(q, &mut room.residual, &mut room.entries);
+        let (at, size) = worst(room.residual.as_ref());
+        let residual = size.to_f64();
+        if residual <= tolerance.max(libm::sqrt(Y::Scalar::epsilon())) {
+            return Ok(());
+        }
+        let (constraint, rows, rank) = (named(system, at), system.rows().len(), self.rank);
+        Err(ConstraintError::NotClosed { constraint, residual, rank, rows, iterations })
+    }
+}
