@@ -219,9 +219,15 @@ pub fn named(plan: &Plan, error: &ConstraintError) -> Option<String> {
     let k = match *error {
         ConstraintError::NotClosed { constraint, .. }
         | ConstraintError::Incompatible { constraint, .. }
-        | ConstraintError::RankLoss { constraint, .. } => constraint,
+        | ConstraintError::RankLoss { constraint, .. }
+        | ConstraintError::Energy { constraint, .. } => constraint,
         _ => return None,
     };
+    title(plan, k)
+}
+
+/// Kind and name of constraint `k`.
+pub fn title(plan: &Plan, k: usize) -> Option<String> {
     let constraint = plan.model.constraints.get(k)?;
     Some(format!("{} `{}`", constraint.word(), constraint.name))
 }

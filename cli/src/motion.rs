@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::catalogue::{self, Drive, Start};
-use multibody::runtime::constrained::{ConstraintError, Effort, PostStep, Projection, Stabilisation};
-use multibody::runtime::integrate::{EnergyProjection, Statistics, Step, StepError};
+use multibody::runtime::constrained::{ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation};
+use multibody::runtime::integrate::{Control, EnergyProjection, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Interpreter};
 
 use super::timed::Timed;
@@ -30,6 +30,19 @@ pub struct Settings<'a> {
     /// How loops are kept closed.
     pub hold: Stabilisation,
 }
+
+impl Settings<'_> {
+    /// What the ends of steps may do.
+    fn effort(&self) -> Effort {
+        match self.step {
+            Step::Adaptive(t) if t.control == Control::Full => Effort::within(t.rotations),
+            _ => Effort::default(),
+        }
+    }
+}
+
+/// Number of singular positions that are shown.
+const SHOWN: usize = 4;
 
 /// Record of a simulation.
 #[derive(Default)]
@@ -55,14 +68,14 @@ pub struct Record {
 }
 
 /// Loops and couplings at the ends of steps.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Drift {
     /// Largest residual before the position correction, m or rad.
     pub found: f64,
     /// Largest residual after the position correction, m or rad.
     pub left: f64,
-    /// Largest and smallest number of independent rows.
-    pub ranks: Option<[usize; 2]>,
+    /// Number of singular positions, and the first of them.
+    pub singular: (u32, Vec<SingularPosition>),
 }
 
 /// Energy at the ends of steps.
@@ -165,9 +178,11 @@ impl PostStep<Timed> for Keeper {
         self.hold.close(system, t, remembers, q, p)?;
         let mut met = self.met.borrow_mut();
         met.found = met.found.max(self.hold.drift());
-        if let (Some(rank), _) = self.hold.rank() {
-            let [most, least] = met.ranks.unwrap_or([rank; 2]);
-            met.ranks = Some([most.max(rank), least.min(rank)]);
+        let (count, last) = self.hold.singular_positions();
+        if count > met.singular.0 {
+            met.singular.0 = count;
+            let room = met.singular.1.len() < SHOWN;
+            met.singular.1.extend(last.filter(|_| room));
         }
         Ok(())
     }
@@ -208,7 +223,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         false => catalogue::any(settings.method, &mut system, &start),
         true => {
             let keeper = |system: &Timed| Keeper {
-                hold: Projection::new(system, settings.hold, Effort::default()),
+                hold: Projection::new(system, settings.hold, settings.effort()),
                 met: met.clone(),
             };
             let post_step = keeper(&system);
@@ -230,8 +245,8 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let mut record = observer.record;
     record.statistics = driver.statistics();
     [record.spent.rates, record.spent.derivatives, record.spent.constraints, record.spent.clock] = system.seconds();
-    let met = *met.borrow();
-    (record.drift.found, record.drift.ranks) = (met.found, met.ranks);
+    let met = met.borrow();
+    (record.drift.found, record.drift.singular) = (met.found, met.singular.clone());
     record.spent.total = total;
     Ok(record)
 }
@@ -300,6 +315,11 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
     };
     let help = match (e, settings.step) {
         (StepError::NoEstimate { .. }, _) => "give --step, in s: for example --step 0.001".to_string(),
+        (StepError::Constraint { error: ConstraintError::Energy { .. }, .. }, _)
+            if matches!(settings.hold, Stabilisation::None | Stabilisation::Momenta) =>
+        {
+            format!("keep the loops closed at every step: --hold mass{before}; nothing was written")
+        }
         (_, Step::Fixed(h)) => {
             format!(
                 "the step was {h} s: lower --step, or leave it out for steps by the error{before}; nothing was written"

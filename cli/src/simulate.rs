@@ -9,7 +9,7 @@ use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search;
 use multibody::runtime::catalogue;
-use multibody::runtime::constrained::Stabilisation;
+use multibody::runtime::constrained::{SingularPosition, Stabilisation};
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
@@ -107,6 +107,9 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
     if assembly.is_some() {
         writeln!(out, "drift: {}", drift(&settings, &record.drift))?;
+        if let Some(text) = singular(&plan, &record.drift) {
+            writeln!(out, "singular positions: {text}")?;
+        }
     }
     writeln!(out, "work: {}", work(&record.statistics))?;
     writeln!(out, "time: {}", spent(args.time, &record.spent))?;
@@ -175,16 +178,32 @@ fn work(s: &Statistics) -> String {
 
 /// Report of the loops.
 fn drift(settings: &Settings, drift: &Drift) -> String {
-    let Drift { found, left, ranks } = drift;
+    let Drift { found, left, .. } = drift;
     let kept = matches!(settings.hold, Stabilisation::Mass | Stabilisation::Gradient | Stabilisation::Partition);
-    let mut text = match kept {
+    match kept {
         true => format!("loops open by up to {found:.1e} in a step (m or rad), and are closed again to {left:.1e}"),
         false => format!("loops open by up to {left:.1e} (m or rad); --hold says how they are kept closed"),
-    };
-    if let Some([most, least]) = ranks.filter(|[most, least]| most != least) {
-        let _ = write!(text, "; independent rows between {least} and {most}: it passes singular positions");
     }
-    text
+}
+
+/// Report of the singular positions, if there were any.
+fn singular(plan: &Plan, drift: &Drift) -> Option<String> {
+    let (count, first) = &drift.singular;
+    let one = |position: &SingularPosition| {
+        let SingularPosition { time, constraint, ranks: [before, rank], .. } = position;
+        let name = loops::title(plan, *constraint).unwrap_or_default();
+        match before == rank {
+            true => format!("t = {time:.4} s ({name})"),
+            false => format!("t = {time:.4} s ({name}, {rank} independent rows in place of {before})"),
+        }
+    };
+    let told: Vec<String> = first.iter().map(one).collect();
+    let more = match *count as usize - told.len() {
+        0 => String::new(),
+        n => format!(", and {n} more"),
+    };
+    let text = "passed at {}{}, where the mechanism may go on in more ways than one";
+    (*count > 0).then(|| text.replacen("{}", &told.join(", "), 1).replacen("{}", &more, 1))
 }
 
 /// Report of the computing times.

@@ -3,7 +3,7 @@
 use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use super::structure::{Plan, PlanFrame, Slot};
-use super::{constraints, elements, frames, shared};
+use super::{constraints, elements, frames, row_order, shared};
 use crate::model::{self, JointMotion, Model};
 
 impl Plan {
@@ -33,6 +33,7 @@ impl Plan {
         plan.wrenches = wrenches(model, &plan.frames);
         shared::share(&mut plan);
         constraints::constrain(&mut plan, framed.mounts);
+        row_order::order(&mut plan);
         plan
     }
 }

@@ -12,6 +12,7 @@ mod instantiate;
 mod paths;
 mod placement;
 mod rigid;
+mod row_order;
 mod shared;
 pub mod state_layout;
 mod structure;

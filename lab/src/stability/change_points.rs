@@ -8,9 +8,7 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::catalogue::{self, Start};
-use multibody::runtime::constrained::{
-    close, complete, Closing, ConstraintError, Effort, Projection, Stabilisation,
-};
+use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
 use multibody::runtime::integrate::{Step, StepError, Tolerances};
 use multibody::runtime::{Constrained, Interpreter, System};
 
@@ -62,15 +60,6 @@ pub struct Run {
     pub steps: u64,
     /// How it ended.
     pub end: End,
-    /// How often the number of independent rows changed.
-    pub changes: u32,
-}
-
-impl Run {
-    /// Whether it stopped because energy would have been lost.
-    pub fn refused(&self) -> bool {
-        matches!(self.end, End::Error(StepError::Constraint { error: ConstraintError::NotClosed { .. }, .. }))
-    }
 }
 
 impl Subject {
@@ -126,12 +115,13 @@ impl Subject {
         let mut observer = system.clone();
         let (kinetic, potential) = observer.energy(&q, &p);
         let begun = kinetic + potential;
-        let projection = Projection::new(&system, way.hold, Effort { energy: way.energy * way.tolerance, ..Effort::default() });
+        let projection =
+            Projection::new(&system, way.hold, Effort { energy: way.energy * way.tolerance, ..Effort::default() });
         let start = Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(way.tolerance)), compensated: false };
         let made = catalogue::implicit_with_post_step(way.method, &mut system, &start, projection.clone())
             .or_else(|| catalogue::explicit_with_post_step(way.method, &mut system, &start, projection));
         let mut solver = made.expect("a method of the catalogue").expect("a start that is closed");
-        let mut run = Run { speed, energy: 0.0, steps: 0, end: End::Whole, changes: 0 };
+        let mut run = Run { speed, energy: 0.0, steps: 0, end: End::Whole };
         let (mut worst, mut most) = (0.0_f64, kinetic);
         while solver.time() < self.mechanism.time {
             if let Err(error) = solver.advance(&mut system, self.mechanism.time) {

@@ -56,19 +56,27 @@ impl Default for Effort {
     }
 }
 
-/// A change of the number of independent rows from the end of one step to the end of another: the mechanism passes a
-/// singular position.
+/// A singular position that the motion has passed or reached: fewer rows are independent there, and several motions may
+/// continue from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub struct RankChange {
-    /// End of the step, s.
+pub struct SingularPosition {
+    /// Time, s.
     pub time: f64,
     /// The constraint, numbered as in [`Row::constraint`](crate::system::Row).
     pub constraint: usize,
-    /// Number of independent rows of all constraints before.
-    pub before: usize,
-    /// The same at that time.
-    pub rank: usize,
+    /// Number of independent rows of all constraints at the ends of the steps before and after; the same where a step
+    /// led past the position.
+    pub ranks: [usize; 2],
+}
+
+/// What is known of the end of a step.
+#[derive(Clone, Copy, Debug)]
+struct Noted<S> {
+    t: S,
+    /// Length of the step, if the end before it is known too.
+    step: Option<S>,
+    rank: usize,
 }
 
 /// Corrects positions by a [`Stabilisation`].
@@ -80,12 +88,12 @@ pub(super) struct Corrector<Y: Constrained> {
     pub found: Y::Scalar,
     /// Number of independent rows then.
     pub rank: usize,
-    /// Time of the last end of a step, s, and the number there.
-    noted: Option<(Y::Scalar, usize)>,
-    /// The pivots then.
-    pivots: Y::Rows,
-    /// Number of changes of the rank, and the last one.
-    pub changes: (u32, Option<RankChange>),
+    /// The last end of a step.
+    noted: Option<Noted<Y::Scalar>>,
+    /// Roots of the pivots at the last end and at the one before it. They go through zero with a change of sign.
+    roots: [Y::Rows; 2],
+    /// Number of singular positions, and the last one.
+    pub singular: (u32, Option<SingularPosition>),
     #[cfg(feature = "alloc")]
     basic: Option<Basic<Y::Scalar>>,
 }
@@ -102,8 +110,8 @@ where
             found: Y::Scalar::zero(),
             rank: 0,
             noted: None,
-            pivots: system.zero_rows(),
-            changes: (0, None),
+            roots: [system.zero_rows(), system.zero_rows()],
+            singular: (0, None),
             #[cfg(feature = "alloc")]
             basic: match stabilisation {
                 Stabilisation::Gradient | Stabilisation::Partition => Some(Basic::new(system)),
@@ -114,28 +122,52 @@ where
 
     /// Number of independent rows at the last end of a step.
     pub fn noted(&self) -> Option<usize> {
-        self.noted.map(|(_, rank)| rank)
+        self.noted.map(|noted| noted.rank)
     }
 
-    /// Notes the rank of the last correction at the end of a step; states inside the last step are not noted.
+    /// Notes the last correction at the end of a step; states inside the last step are not noted.
     pub fn note(&mut self, system: &Y, t: Y::Scalar, pivots: &Y::Rows) {
-        let rank = self.rank;
         let zero = Y::Scalar::zero();
-        match self.noted {
-            Some((last, _)) if t <= last => return,
-            Some((_, before)) if rank != before => {
-                let both = self.pivots.as_ref().iter().zip(pivots.as_ref());
-                let row = both.into_iter().position(|(old, new)| (*old == zero) != (*new == zero));
-                #[cfg(feature = "alloc")]
-                let row = self.basic.as_ref().map_or(row, |basic| basic.changed);
-                let constraint = named(system, row.unwrap_or(0));
-                self.changes.0 += 1;
-                self.changes.1 = Some(RankChange { time: t.to_f64(), constraint, before, rank });
+        let rank = self.rank;
+        let last = match self.noted {
+            Some(last) if t <= last.t => return,
+            last => last,
+        };
+        let step = last.map(|last| t - last.t);
+        let (mut found, mut left) = (None, None);
+        let [old, older] = &mut self.roots;
+        for (row, (pivot, (old, older))) in
+            pivots.as_ref().iter().zip(old.as_mut().iter_mut().zip(older.as_mut())).enumerate()
+        {
+            let mut root = pivot.sqrt();
+            if (root == zero) != (*old == zero) {
+                left = left.or(Some(row));
+            } else if let (Some(step), Some(before), true) = (step, last.and_then(|last| last.step), *older != zero) {
+                // The root is followed linearly over the step. Its sign changes if that leads beyond zero.
+                if root > zero && *old + (*old - *older) * (step / before) < zero {
+                    found = Some((row, t - step * (root / (root + *old))));
+                    root = -root;
+                }
             }
-            _ => {}
+            // Only the ratio of the signs matters.
+            (*older, *old) = if root < zero { (-*old, -root) } else { (*old, root) };
         }
-        self.noted = Some((t, rank));
-        self.pivots.as_mut().copy_from_slice(pivots.as_ref());
+        let event = match last {
+            // Where the rank rises, the position has been noted already.
+            Some(last) if last.rank < rank => None,
+            Some(last) if last.rank > rank => {
+                #[cfg(feature = "alloc")]
+                let left = self.basic.as_ref().map_or(left, |basic| basic.changed);
+                Some((left.unwrap_or(0), t, [last.rank, rank]))
+            }
+            _ => found.map(|(row, time)| (row, time, [rank; 2])),
+        };
+        if let Some((row, time, ranks)) = event {
+            let constraint = named(system, row);
+            self.singular.0 += 1;
+            self.singular.1 = Some(SingularPosition { time: time.to_f64(), constraint, ranks });
+        }
+        self.noted = Some(Noted { t, step, rank });
     }
 
     /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent

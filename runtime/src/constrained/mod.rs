@@ -47,7 +47,7 @@ pub use crate::error::ConstraintError;
 pub use close::{close, complete, Closed, Closing};
 #[cfg(feature = "alloc")]
 pub use coordinate_partition::{CoordinatePartition, Repartition, Switch};
-pub use correction::{Effort, RankChange, Stabilisation};
+pub use correction::{Effort, SingularPosition, Stabilisation};
 pub use open_and_closed::{OpenAndClosed, Unconstrained};
 pub use post_step::{PostStep, WithPostStep};
 pub use projection::{FixedWork, Policy, Projection, Room, ToTolerance};

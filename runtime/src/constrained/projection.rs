@@ -1,6 +1,6 @@
 //! Projection of states onto the constraints at the ends of steps.
 
-use super::correction::{Corrector, Effort, RankChange, Stabilisation};
+use super::correction::{Corrector, Effort, SingularPosition, Stabilisation};
 use super::post_step::PostStep;
 use super::rows::{add_forces, named, worst};
 use super::ConstraintError;
@@ -180,14 +180,16 @@ where
         self.policy.corrector.found
     }
 
-    /// Number of independent rows at the end of the last step, and how often it has changed.
-    pub fn rank(&self) -> (Option<usize>, u32) {
-        (self.policy.corrector.noted(), self.policy.corrector.changes.0)
+    /// Number of independent rows at the end of the last step.
+    pub fn rank(&self) -> Option<usize> {
+        self.policy.corrector.noted()
     }
 
-    /// The last change of the number of independent rows.
-    pub fn rank_change(&self) -> Option<RankChange> {
-        self.policy.corrector.changes.1
+    /// Number of singular positions that the ends of steps have met or passed, and the last one. Positions that a step
+    /// leads past are found by the stabilisations that compute pivots: not by [`Stabilisation::Gradient`] and
+    /// [`Stabilisation::Partition`].
+    pub fn singular_positions(&self) -> (u32, Option<SingularPosition>) {
+        self.policy.corrector.singular
     }
 }
 

@@ -8,4 +8,5 @@ mod dense;
 mod dense_reference;
 mod penalty;
 mod reactions;
+mod row_order;
 mod truth;
