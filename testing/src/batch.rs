@@ -1,5 +1,4 @@
-//! Trees for which the build script generates code. The build script and the test that runs the code both include this
-//! file.
+//! Trees for which the build script of `testing/compiled` generates code.
 
 use mbd_codegen::generate::{Arithmetic, Options, Precision};
 use mbd_codegen::model::Model;
@@ -8,7 +7,7 @@ use mbd_codegen::{Output, RolledCode};
 
 use crate::random::{random_model, Distribution, Rng};
 
-/// Number of trees: most of the time of the tests' build goes into them.
+/// Number of trees.
 pub const TREES: u64 = 32;
 
 /// From this index on, the trees are chains with rolled code wherever links repeat.
@@ -25,9 +24,9 @@ pub fn has_lanes(k: u64) -> bool {
     k.is_multiple_of(3) || k >= FIRST_CHAIN
 }
 
-/// The outputs of tree `k`: those that lanes have, and of the others every third, in turn. All of them, on many more trees,
-/// run as text (`tests/code/bitwise.rs`); here it matters that the compiler reads the text in the same way. Derivatives of large trees are left out, because their code grows with
-/// the square of the number of velocities.
+/// The outputs of tree `k`: those that lanes have, and of the others every third, in turn. All of them, on many more
+/// trees, run as text (`tests/code/bitwise.rs`); here it matters that the compiler reads the text in the same way.
+/// Derivatives of large trees are left out, because their code grows with the square of the number of velocities.
 fn outputs(k: u64, velocities: usize) -> Vec<Output> {
     let always = [Output::Rates, Output::Momenta, Output::Energy, Output::MassMatrix];
     let in_turn = Output::available(false).filter(|output| !always.contains(output)).enumerate();

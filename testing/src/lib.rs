@@ -20,6 +20,19 @@ pub fn value(v: Value, params: &[f64]) -> f64 {
     }
 }
 
+/// Asserts that results of a model are finite and the same bit for bit, except for the signs of zeros.
+///
+/// # Panics
+/// They are not; the message contains the model as TOML.
+pub fn assert_same_bits(whose: &str, what: &str, model: &Model, emitted: &[f64], interpreted: &[f64]) {
+    assert_eq!(emitted.len(), interpreted.len(), "{whose}: {what}");
+    for (k, (a, b)) in emitted.iter().zip(interpreted).enumerate() {
+        let same = (a + 0.0).to_bits() == (b + 0.0).to_bits() && a.is_finite();
+        let text = || toml::to_toml(model);
+        assert!(same, "{whose}: {what}[{k}]: emitted {a:e}, interpreted {b:e}\n{}", text());
+    }
+}
+
 /// The model with its parameters replaced by constants.
 pub fn substituted(model: &Model, params: &[f64]) -> Model {
     let of = |v: &mut Value| *v = Value::Const(value(*v, params));

@@ -1,5 +1,8 @@
 //! Random states and inputs of a plan.
 
+use std::collections::HashMap;
+
+use mbd_codegen::generate::InputArray;
 use mbd_codegen::model::{JointKind, Unit};
 use mbd_codegen::plan::Plan;
 use mbd_runtime::sweep::{Derivatives, ParameterDerivatives, Sweeps};
@@ -77,6 +80,30 @@ fn coordinates(rng: &mut Rng, kind: JointKind, q: &mut [f64]) {
 }
 
 impl State {
+    /// All inputs of generated functions by name, flat, with the given momenta and accelerations.
+    pub fn inputs<'a>(&'a self, p: &'a [f64], a: &'a [f64]) -> HashMap<&'static str, &'a [f64]> {
+        let [drive_q, drive_v, drive_a] = &self.drive;
+        HashMap::from([
+            ("q", &self.q[..]),
+            ("p", p),
+            ("v", &self.v),
+            ("a", a),
+            ("tau", &self.tau),
+            ("drive_q", drive_q),
+            ("drive_v", drive_v),
+            ("drive_a", drive_a),
+            ("wrenches", self.wrenches.as_flattened()),
+            ("params", &self.params),
+            ("gravity", &self.gravity),
+        ])
+    }
+
+    /// The inputs of a program in order. Inputs that the options leave out are empty.
+    pub fn inputs_of(&self, arrays: &[InputArray], p: &[f64], a: &[f64]) -> Vec<f64> {
+        let given = self.inputs(p, a);
+        arrays.iter().flat_map(|array| &given[array.name][..array.len()]).copied().collect()
+    }
+
     /// An interpreter of the plan with this state's inputs.
     pub fn interpreter(&self, plan: &Plan) -> Interpreter<f64> {
         self.interpreter_of(plan, |x, _| x)

@@ -7,6 +7,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use mbd_runtime::sweep::{Quantity, Trace};
 use mbd_runtime::Scalar;
 
+use super::hash::Words;
+
 /// An operand: the bits of a constant, or a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Operand {
@@ -117,7 +119,7 @@ struct Inner {
     labels: Vec<Label>,
     names: Vec<Option<Name>>,
     // Entries are looked up and never iterated; the order is that of `ops`.
-    memo: HashMap<Op, u32>,
+    memo: HashMap<Op, u32, Words>,
 }
 
 /// A graph of operations in the order of their first use. Equal operations exist once.

@@ -7,6 +7,7 @@
 mod cost;
 mod evaluate;
 mod expr;
+mod hash;
 pub mod machine;
 pub mod passes;
 mod program;

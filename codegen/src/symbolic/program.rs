@@ -149,35 +149,34 @@ impl Program {
 
     /// Replaces `−(a − b)` by `b − a` where it is used as a result only.
     pub(crate) fn turn_negated_differences(&mut self) {
-        let mut inner = std::collections::BTreeSet::new();
-        for (_, op, _) in &self.steps {
-            inner.extend(op.operands());
-        }
-        let mut signs = std::collections::BTreeMap::new();
+        let mut results = std::collections::BTreeMap::new();
         for output in &self.outputs {
             if let ProgramResult::Node(id, neg) = output {
-                signs.entry(*id).and_modify(|all| *all &= *neg).or_insert(*neg);
+                results.entry(*id).and_modify(|all| *all &= *neg).or_insert(*neg);
             }
         }
+        results.retain(|_, negative| *negative);
+        if results.is_empty() {
+            return;
+        }
+        for operand in self.steps.iter().flat_map(|(_, op, _)| op.operands()) {
+            if let Operand::Node(id) = operand {
+                results.remove(&id);
+            }
+        }
+        let mut turned = std::collections::BTreeSet::new();
         for (id, op, _) in &mut self.steps {
-            if let Op::Sub(a, b) = *op {
-                if signs.get(id) == Some(&true) && !inner.contains(&Operand::Node(*id)) {
-                    *op = Op::Sub(b, a);
-                } else {
-                    signs.remove(id);
-                }
-            } else {
-                signs.remove(id);
+            if let (Op::Sub(a, b), true) = (*op, results.contains_key(id)) {
+                *op = Op::Sub(b, a);
+                turned.insert(*id);
             }
         }
-        for (_, name) in self.names.iter_mut().filter(|(id, _)| signs.get(id) == Some(&true)) {
+        for (_, name) in self.names.iter_mut().filter(|(id, _)| turned.contains(id)) {
             name.minus = !name.minus;
         }
         for output in &mut self.outputs {
             if let ProgramResult::Node(id, neg) = output {
-                if signs.get(id) == Some(&true) {
-                    *neg = false;
-                }
+                *neg &= !turned.contains(id);
             }
         }
     }

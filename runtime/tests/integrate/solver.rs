@@ -127,14 +127,14 @@ fn statistics_do_not_change() {
     ];
     assert_eq!(found, expected);
     // RK4 takes four evaluations a step and none for the rate at the end.
-    for (method, steps, evaluations) in [(4, 10, 40), (4, 13, 52)] {
+    for steps in [10, 13] {
         let mut y = pendulum::<f64>();
         let rk4 = Rk4::new(&y);
         let (q, p) = ([2.0], [0.0]);
         let mut solver = Solver::new(&mut y, rk4, Step::Fixed(1.0 / 8.0), 0.0, &q, &p).expect("a start");
         run(&mut solver, &mut y, steps as f64 / 8.0).expect("a run");
         let statistics = solver.statistics();
-        assert_eq!((statistics.steps, statistics.evaluations), (steps, evaluations), "{method}");
+        assert_eq!((statistics.steps, statistics.evaluations), (steps, 4 * steps));
     }
 }
 

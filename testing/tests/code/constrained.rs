@@ -12,12 +12,13 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::search;
 use mbd_codegen::{GenerateError, RolledCode};
 use mbd_runtime::{Accelerated, Constrained, Dual, Interpreter, Scalar, System};
+use mbd_testing::assert_same_bits;
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::Rng;
 use mbd_testing::state::State;
 
-type Arrays = HashMap<String, Vec<f64>>;
+type Inputs<'a> = HashMap<&'static str, &'a [f64]>;
 
 struct Case {
     seed: u64,
@@ -63,34 +64,13 @@ impl Case {
         Some(Case { seed, plan, state, p, emitted: Emitted::parse(&source), derivatives })
     }
 
-    fn inputs(&self) -> Arrays {
-        let s = &self.state;
-        let fields = [
-            ("q", s.q.clone()),
-            ("p", self.p.clone()),
-            ("v", s.v.clone()),
-            ("tau", s.tau.clone()),
-            ("drive_q", s.drive[0].clone()),
-            ("drive_v", s.drive[1].clone()),
-            ("drive_a", s.drive[2].clone()),
-            ("wrenches", s.wrenches.concat()),
-            ("params", s.params.clone()),
-            ("gravity", s.gravity.to_vec()),
-        ];
-        fields.into_iter().map(|(name, a)| (name.to_string(), a)).collect()
-    }
-
     fn compare(&self, what: &str, emitted: &[f64], interpreted: &[f64]) {
-        assert_eq!(emitted.len(), interpreted.len(), "seed {}: {what}", self.seed);
-        for (k, (a, b)) in emitted.iter().zip(interpreted).enumerate() {
-            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
-            assert!(a.is_finite() && b.is_finite(), "seed {}: {what}[{k}] is {a} and {b}", self.seed);
-            assert!(same, "seed {}: {what}[{k}]: emitted {a:e}, interpreted {b:e}", self.seed);
-        }
+        assert_same_bits(&format!("seed {}", self.seed), what, &self.plan.model, emitted, interpreted);
     }
 
     fn check(&self) {
-        let (s, inputs) = (&self.state, self.inputs());
+        let s = &self.state;
+        let inputs = s.inputs(&self.p, &[]);
         let run = |output: Output| self.emitted.run(output.name(), &inputs);
         let mut i = s.interpreter(&self.plan);
         let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
@@ -155,7 +135,7 @@ impl Case {
         [v, pd]
     }
 
-    fn compare_derivatives(&self, inputs: &Arrays, [_, pd]: [&Vec<f64>; 2]) {
+    fn compare_derivatives(&self, inputs: &Inputs, [_, pd]: [&Vec<f64>; 2]) {
         let s = &self.state;
         let fixed = |x: &[f64]| x.iter().map(|x| Dual::constant(*x)).collect::<Vec<Dual<f64>>>();
         let moving = |x: &[f64], way: &[f64]| x.iter().zip(way).map(|(x, d)| Dual::new(*x, *d)).collect::<Vec<_>>();

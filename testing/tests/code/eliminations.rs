@@ -14,7 +14,7 @@
 
 use std::fmt::Write;
 
-use crate::wide::{inputs, model, Errors, Spread, Wide, MANY, MODELS};
+use crate::wide::{model, Errors, Spread, Wide, MANY, MODELS};
 use mbd_codegen::generate::{trace, OutputProgram};
 use mbd_codegen::model::{JointKind, Model};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
@@ -53,7 +53,7 @@ fn measure(plans: &[Plan], kinds: &[Kind], states: u64) -> Vec<[Spread; 3]> {
             let s = random_state(&plans[0], seed);
             let mut p = vec![0.0; plans[0].dims.nv];
             s.interpreter(&plans[0]).momenta(&s.q, &s.v, &mut p);
-            let given = inputs(&programs[0], &s, &p);
+            let given = s.inputs_of(&programs[0].inputs, &p, &s.v);
             let right = reference(&plans[0], output, &s, &p);
             for ((errors, program), &(_, arithmetic)) in all.iter_mut().zip(&programs).zip(kinds) {
                 let plain = program.program.evaluate(&given, |a, b, c| a * b + c);

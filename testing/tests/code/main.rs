@@ -2,7 +2,6 @@
 
 mod assembly;
 mod bitwise;
-mod compiled;
 mod constrained;
 mod counts;
 mod eliminations;

@@ -8,7 +8,7 @@
 //! states stay below at most 3 times. Errors below two roundings of the largest result are not compared: there the
 //! exact program may be exact by chance.
 
-use crate::wide::{inputs, model, Errors, Spread, Wide, MODELS};
+use crate::wide::{model, Errors, Spread, Wide, MODELS};
 use mbd_codegen::generate::trace;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
@@ -35,7 +35,7 @@ fn compare(name: &str, plan: &Plan, output: Output, states: u64) -> Spread {
         let s = random_state(plan, seed);
         let mut p = vec![0.0; plan.dims.nv];
         s.interpreter(plan).momenta(&s.q, &s.v, &mut p);
-        let given = inputs(&exact, &s, &p);
+        let given = s.inputs_of(&exact.inputs, &p, &s.v);
         let wide: Vec<Wide> = given.iter().map(|x| Wide::constant(*x)).collect();
         let reference = exact.program.evaluate(&wide, |a, b, c| a * b + c);
         let plain = |a: f64, b: f64, c: f64| a * b + c;

@@ -3,41 +3,18 @@
 //! In exact arithmetic, rolled code has the operations of the sweeps, so results are the same bit for bit on every
 //! tree.
 
-use mbd_codegen::generate::{trace, OutputProgram};
+use mbd_codegen::generate::trace;
 use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
-use mbd_codegen::rolled::{rolled, RolledProgram};
+use mbd_codegen::rolled::rolled;
 use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::Constrained;
+use mbd_testing::assert_same_bits;
 use mbd_testing::chains::{general, planar};
 use mbd_testing::random::{random_model, Distribution, Rng};
-use mbd_testing::state::{random_state, State};
+use mbd_testing::state::random_state;
 use mbd_testing::toml::to_toml;
-
-/// Inputs of a program in order.
-fn inputs(program: &OutputProgram<RolledProgram>, s: &State, p: &[f64], a: &[f64]) -> Vec<f64> {
-    let mut all = Vec::new();
-    for array in &program.inputs {
-        let values: &[f64] = match array.name {
-            "q" => &s.q,
-            "p" => p,
-            "v" => &s.v,
-            "a" => a,
-            "tau" => &s.tau,
-            "drive_q" => &s.drive[0],
-            "drive_v" => &s.drive[1],
-            "drive_a" => &s.drive[2],
-            "params" => &s.params,
-            "gravity" => &s.gravity,
-            "wrenches" => &[],
-            other => panic!("no input is named {other}"),
-        };
-        // An input that the options leave out is empty, and the state keeps its value.
-        all.extend(&values[..array.len()]);
-    }
-    all
-}
 
 /// Compares every output that has rolled code with the interpreter. Returns the largest number of rolled nodes of an
 /// output.
@@ -58,7 +35,7 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     for &output in Output::ALL {
         let Some(program) = rolled(&plan, output, options) else { continue };
         nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
-        let results = program.program.evaluate(&inputs(&program, &s, &p, &a), |a, b, c| a * b + c);
+        let results = program.program.evaluate(&s.inputs_of(&program.inputs, &p, &a), |a, b, c| a * b + c);
         let expected = match output {
             Output::Rates => {
                 i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
@@ -101,10 +78,7 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
             assert!(off <= 1e-11 * size, "seed {seed}: {output:?} is {off:e} off, size {size:e}\n{}", to_toml(model));
             continue;
         }
-        for (k, (a, b)) in results.iter().zip(&expected).enumerate() {
-            let same = (a + 0.0).to_bits() == (b + 0.0).to_bits();
-            assert!(same && a.is_finite(), "seed {seed}: {output:?}[{k}] is {a:e}, not {b:e}\n{}", to_toml(model));
-        }
+        assert_same_bits(&format!("seed {seed}"), output.name(), model, &results, &expected);
         let straight = trace(&plan, output, options).map(|g| g.program.counts().total()).unwrap_or_default();
         let more = program.program.counts().total();
         assert!(

@@ -3,33 +3,10 @@
 //! Sines and cosines are those that programs on doubles compute, rounded to 53 bits. They are the same for every
 //! elimination, and another test keeps their own errors within an ulp; the roundings after them are measured here.
 
-use mbd_codegen::generate::OutputProgram;
 use mbd_codegen::model::Model;
 use mbd_codegen::read::{self, Base, ImportOptions};
 pub use mbd_codegen::search::Wide;
-use mbd_codegen::symbolic::Program;
 use mbd_runtime::Scalar;
-use mbd_testing::state::State;
-
-/// Inputs of a program in their order.
-pub fn inputs(output: &OutputProgram<Program>, s: &State, p: &[f64]) -> Vec<f64> {
-    let array = |name: &str| -> Vec<f64> {
-        match name {
-            "q" => s.q.clone(),
-            "p" => p.to_vec(),
-            "v" | "a" => s.v.clone(),
-            "tau" => s.tau.clone(),
-            "drive_q" => s.drive[0].clone(),
-            "drive_v" => s.drive[1].clone(),
-            "drive_a" => s.drive[2].clone(),
-            "wrenches" => s.wrenches.concat(),
-            "params" => s.params.clone(),
-            "gravity" => s.gravity.to_vec(),
-            other => panic!("unknown input {other}"),
-        }
-    };
-    output.inputs.iter().flat_map(|a| array(a.name)).collect()
-}
 
 /// Models of the project, each with the connection of its base to the ground.
 pub const MODELS: [(&str, Base); 11] = [

@@ -237,12 +237,12 @@ mod batch {
 
 use batch::{Results, RUNNERS};
 use mbd_codegen::plan::Plan;
-use mbd_codegen::search;
+use mbd_codegen::{search, Output};
 use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives, ParameterDerivatives};
 use mbd_runtime::{Interpreter, Scalar};
-use mbd_testing::batch::{is_single, tree};
+use mbd_testing::assert_same_bits;
+use mbd_testing::batch::{is_single, tree, TREES};
 use mbd_testing::state::{parameter, random_state, State};
-use mbd_testing::toml::to_toml;
 
 /// Results of the interpreter for the given momenta.
 fn interpreted<S: Scalar + Into<f64>>(plan: &Plan, s: &State, p: &[f64]) -> Results {
@@ -340,6 +340,14 @@ fn case(k: u64, state: u64) -> (Plan, State, Vec<f64>) {
 }
 
 #[test]
+fn every_output_is_compiled() {
+    for output in Output::available(false) {
+        let has = |k: &u64| !is_single(*k) && tree(*k).1.outputs.contains(&output);
+        assert!((0..TREES).any(|k| has(&k)), "{}", output.name());
+    }
+}
+
+#[test]
 fn double_precision_is_the_same_bit_for_bit() {
     let mut numbers = 0;
     for (k, run) in (0..).zip(RUNNERS).filter(|(k, _)| !is_single(*k)) {
@@ -348,12 +356,8 @@ fn double_precision_is_the_same_bit_for_bit() {
             let interpreted = interpreted::<f64>(&plan, &s, &p);
             for (what, compiled) in &run(&s, &p) {
                 let expected = named(&interpreted, what);
-                assert_eq!(compiled.len(), expected.len(), "tree {k}: {what}");
-                for (a, b) in compiled.iter().zip(expected) {
-                    let same = (a + 0.0).to_bits() == (b + 0.0).to_bits() && a.is_finite();
-                    assert!(same, "tree {k}, state {state}: {what}: {a:e} {b:e}\n{}", to_toml(&plan.model));
-                    numbers += 1;
-                }
+                assert_same_bits(&format!("tree {k}, state {state}"), what, &plan.model, compiled, expected);
+                numbers += compiled.len();
             }
         }
     }

@@ -1,30 +1,14 @@
-//! Generates code for random trees as a user's build script would; `tests/code/compiled.rs` includes the code.
+//! Generates code for random trees as a user's build script would; `tests/compiled.rs` includes the code.
 
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use mbd_codegen::model::{Gravity, Value};
+use mbd_codegen::model::Gravity;
 use mbd_codegen::search;
-
-// The generator of random trees belongs to the crate that this script builds, so the script includes its source.
-#[path = "src/batch.rs"]
-mod batch;
-#[allow(dead_code, unused_imports)]
-#[path = "src/random/mod.rs"]
-mod random;
-
-/// The included modules call `crate::value`. This is a copy of that function of the crate.
-fn value(v: Value, params: &[f64]) -> f64 {
-    match v {
-        Value::Const(x) => x,
-        Value::Param(k) => params[k],
-    }
-}
+use mbd_testing::batch;
 
 fn main() {
-    for file in ["build.rs", "src/batch.rs", "src/random"] {
-        println!("cargo::rerun-if-changed={file}");
-    }
+    println!("cargo::rerun-if-changed=build.rs");
     let out = PathBuf::from(std::env::var("OUT_DIR").expect("cargo sets it"));
     let mut all = String::new();
     for k in 0..batch::TREES {
