@@ -39,13 +39,7 @@ pub struct ChangePointArgs {
     /// Tolerances, separated by commas
     #[arg(long, value_delimiter = ',', value_name = "LIST", default_values_t = [1e-6, 1e-9, 1e-11])]
     pub tolerances: Vec<f64>,
-    /// Limit of the change of kinetic energy by the end of a step, as a multiple of the tolerance
-    #[arg(long, value_name = "X", default_value_t = 1.0)]
-    pub energy: f64,
     /// File for the report; without it the tables are only printed
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
-    /// Prints every run
-    #[arg(long)]
-    pub verbose: bool,
 }

@@ -34,8 +34,6 @@ pub struct Way {
     pub tolerance: f64,
     /// What is done at the ends of steps.
     pub hold: Stabilisation,
-    /// Limit of the change of kinetic energy by the end of a step, as a multiple of the tolerance.
-    pub energy: f64,
 }
 
 /// How a run ended.
@@ -62,7 +60,38 @@ pub struct Run {
     pub end: End,
 }
 
+/// What runs of one way lost.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// Number of runs that reached their end, and whose energy errs by more than it may.
+    pub lost: usize,
+    /// Number of runs that stopped with an error.
+    pub refused: usize,
+    /// Number of runs that were given up.
+    pub capped: usize,
+    /// Largest error of the energy of the runs that reached their end, relative to the largest kinetic energy.
+    pub error: f64,
+    /// Mean number of steps of those.
+    pub steps: u64,
+}
+
 impl Subject {
+    /// Runs at all speeds, and compares the energy with the tolerance and with `smooth`, what the same method loses on a
+    /// mechanism without singular positions.
+    pub fn judged(&self, way: Way, speeds: &[f64], smooth: f64) -> Judged {
+        let allowed = (100.0 * way.tolerance).max(10.0 * smooth);
+        let runs = self.runs(way, speeds);
+        let whole: Vec<&Run> = runs.iter().filter(|run| run.end == End::Whole).collect();
+        Judged {
+            // An error that is not a number is lost too.
+            lost: whole.iter().filter(|run| !(run.energy <= allowed)).count(),
+            refused: runs.iter().filter(|run| matches!(run.end, End::Error(_))).count(),
+            capped: runs.iter().filter(|run| run.end == End::Steps).count(),
+            error: whole.iter().fold(0.0, |most, run| run.energy.max(most)),
+            steps: whole.iter().map(|run| run.steps).sum::<u64>() / whole.len().max(1) as u64,
+        }
+    }
+
     /// Reads a mechanism and closes it at its start.
     pub fn new(mechanism: Mechanism) -> Subject {
         let read = read::model("model.toml", &mechanism.text, &ImportOptions::default());
@@ -115,8 +144,7 @@ impl Subject {
         let mut observer = system.clone();
         let (kinetic, potential) = observer.energy(&q, &p);
         let begun = kinetic + potential;
-        let projection =
-            Projection::new(&system, way.hold, Effort { energy: way.energy * way.tolerance, ..Effort::default() });
+        let projection = Projection::new(&system, way.hold, Effort::within(way.tolerance));
         let start = Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(way.tolerance)), compensated: false };
         let made = catalogue::implicit_with_post_step(way.method, &mut system, &start, projection.clone())
             .or_else(|| catalogue::explicit_with_post_step(way.method, &mut system, &start, projection));

@@ -6,6 +6,8 @@ use crate::scenes::text::{Link, Text};
 pub struct Mechanism {
     /// Name in tables.
     pub name: &'static str,
+    /// What it is.
+    pub title: &'static str,
     /// Text of the model.
     pub text: String,
     /// Index of the velocity that is given; the others follow from the constraints.
@@ -21,20 +23,34 @@ const CRANKS: [f64; 2] = [2.0, 20.0];
 /// The mechanism without singular positions, with which the others are compared.
 pub fn smooth() -> Mechanism {
     let text = include_str!("../../../models/mechanisms/fourbar.toml").to_string();
-    Mechanism { name: "fourbar", text, driver: 0, speeds: CRANKS, time: 3.0 }
+    Mechanism { name: "fourbar", title: "Crank and rocker.", text, driver: 0, speeds: CRANKS, time: 3.0 }
 }
 
 /// All mechanisms that pass singular positions.
 pub fn singular() -> Vec<Mechanism> {
-    let crank = |name, text| Mechanism { name, text, driver: 0, speeds: CRANKS, time: 3.0 };
+    let crank = |name, title, text| Mechanism { name, title, text, driver: 0, speeds: CRANKS, time: 3.0 };
     vec![
-        crank("fourbar_equal", EQUAL.to_string()),
-        crank("unequal_masses", unequal_masses()),
-        crank("skew_axes", skew_axes()),
-        crank("two_parallelograms", parallelograms(2)),
-        crank("singular_leg", singular_leg()),
-        Mechanism { name: "stewart", text: stewart(), driver: 5, speeds: [1.0, 10.0], time: 1.0 },
-        Mechanism { name: "four_rods", text: four_rods(), driver: 5, speeds: [0.5, 5.0], time: 2.0 },
+        crank("fourbar_equal", "The shipped parallelogram; speeds of its crank from 2 to 20 rad/s.", EQUAL.to_string()),
+        crank("unequal_masses", "The same with a rocker of 0.9 kg and a coupler of 0.1 kg.", unequal_masses()),
+        crank("skew_axes", "The same with closing frames turned by 0.6 rad: no row vanishes, two become dependent.", skew_axes()),
+        crank("two_parallelograms", "Two parallelograms: the rocker of the first is the crank of the second.", parallelograms(2)),
+        crank("singular_leg", "The shipped Strandbeest leg with an upper rod at which its first loop has a change point.", singular_leg()),
+        Mechanism {
+            name: "stewart",
+            title: "The shipped Stewart platform, twisted about its vertical axis by 1 to 10 rad/s.",
+            text: include_str!("../../../models/mechanisms/stewart.toml").to_string(),
+            driver: 5,
+            speeds: [1.0, 10.0],
+            time: 1.0,
+        },
+        Mechanism {
+            name: "four_rods",
+            title: "A plate on four equal rods, twisted by 0.5 to 5 rad/s: where it is not twisted the rods are parallel, and one row is redundant.",
+            text: four_rods(),
+            driver: 5,
+            speeds: [0.5, 5.0],
+            time: 2.0,
+        },
     ]
 }
 
@@ -94,12 +110,6 @@ fn singular_leg() -> String {
     let leg = include_str!("../../../models/mechanisms/strandbeest_leg.toml");
     let length = 0.415 + 0.38_f64.hypot(0.078) - 0.15;
     replaced(leg, "xyz = [0.5, 0, 0]", 0, &format!("xyz = [{length:?}, 0, 0]"))
-}
-
-/// The Stewart platform without the offset of its start, which is then twisted quickly: it passes the pose, turned by a
-/// quarter, in which its legs support it no longer.
-fn stewart() -> String {
-    include_str!("../../../models/mechanisms/stewart.toml").to_string()
 }
 
 /// A plate on four equal rods, which are parallel when it is not twisted: the rods then allow one motion more.

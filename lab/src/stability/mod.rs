@@ -2,8 +2,8 @@
 //! its tables into `reports/`; tests run reduced versions of them.
 
 pub mod change_points;
-mod mechanisms;
-mod tables;
+pub mod mechanisms;
+pub mod tables;
 
 use std::io::Write;
 

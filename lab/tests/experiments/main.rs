@@ -6,6 +6,7 @@ mod biped;
 mod documented;
 #[path = "../../../cli/tests/command/run.rs"]
 mod run;
+mod stability;
 
 use std::path::Path;
 

@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
+use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::search::{self, Wide};
 use mbd_runtime::system::Real;
-use mbd_runtime::{Accelerated, Constrained, Interpreter, Scalar, System};
+use mbd_runtime::{Accelerated, Constrained, Interpreter, System};
 
 /// A chain of four bodies on revolute joints about changing axes, and couplings with given rows.
 fn text(rows: &[[f64; 4]]) -> String {
@@ -29,38 +30,43 @@ fn text(rows: &[[f64; 4]]) -> String {
     text
 }
 
-const Q: [f64; 4] = [0.4, -0.7, 1.1, 0.3];
-const P: [f64; 4] = [0.2, 0.5, -0.3, 0.1];
+/// Number of states in which an order is judged: in one of them its rounding errors may cancel.
+const STATES: usize = 6;
 
-/// Velocities that meet the constraints, accelerations, and the number of independent rows.
-fn motion<S: Real>(plan: &Plan) -> (Vec<f64>, usize) {
+/// Velocities that meet the constraints, accelerations, and the number of independent rows, in one of the states.
+fn motion<S: Real>(plan: &Plan, state: usize) -> ([Vec<f64>; 2], usize) {
     let params: Vec<S> = plan.default_params().iter().map(|x| S::constant(*x)).collect();
     let gravity = plan.gravity(&plan.default_params()).map(S::constant);
     let mut y = Interpreter::<S>::new(plan.tree(&params), gravity);
-    let of = |x: [f64; 4]| x.map(S::constant).to_vec();
-    let (q, mut p) = (of(Q), of(P));
+    let numbers =
+        |first: usize| (0..4).map(|k| S::constant((0.7 + 1.3 * (first + k + 8 * state) as f64).sin())).collect();
+    let (q, mut p): (Vec<S>, Vec<S>) = (numbers(0), numbers(4));
     let (mut v, mut a, mut sigma) = (y.zero_momenta(), y.zero_momenta(), y.zero_rows());
     y.project_momenta(S::zero(), &q, &mut p, &mut v, &mut sigma);
     y.generalized_accelerations(&q, &v, &mut a);
     let (mut residual, mut dq, mut pivots) = (y.zero_rows(), y.zero_momenta(), y.zero_rows());
     y.position_correction(&q, &mut residual, &mut dq, &mut pivots);
     let rank = pivots.iter().filter(|pivot| pivot.to_f64() != 0.0).count();
-    (v.iter().chain(&a).map(|x| x.to_f64()).collect(), rank)
+    ([v, a].map(|x| x.iter().map(|x| x.to_f64()).collect()), rank)
 }
 
-/// Error of velocities and accelerations in doubles, relative to the largest, and the rank.
-fn error(rows: &[[f64; 4]]) -> (f64, usize) {
+/// Largest error of velocities and accelerations in doubles, relative to the largest of each; whether three rows are
+/// independent in all states.
+fn error(rows: &[[f64; 4]], plan: impl Fn(&Model) -> Plan) -> (f64, bool) {
     let read = read::model("coupled.toml", &text(rows), &ImportOptions::default());
-    let model = read.unwrap_or_else(|e| panic!("{e}")).model;
-    let plan = search::plan(&model, Default::default());
-    let (found, rank) = motion::<f64>(&plan);
-    let (exact, _) = motion::<Wide>(&plan);
-    let largest = |half: &[f64]| half.iter().fold(0.0_f64, |m, x| x.abs().max(m));
-    let parts = found.chunks(4).zip(exact.chunks(4)).map(|(found, exact)| {
-        let off: Vec<f64> = found.iter().zip(exact).map(|(a, b)| a - b).collect();
-        largest(&off) / largest(exact)
-    });
-    (parts.fold(0.0, f64::max), rank)
+    let plan = plan(&read.unwrap_or_else(|e| panic!("{e}")).model);
+    let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| x.abs().max(m));
+    let (mut worst, mut three) = (0.0_f64, true);
+    for state in 0..STATES {
+        let (found, rank) = motion::<f64>(&plan, state);
+        let (exact, _) = motion::<Wide>(&plan, state);
+        three &= rank == 3;
+        for (found, exact) in found.iter().zip(&exact) {
+            let off: Vec<f64> = found.iter().zip(exact).map(|(a, b)| a - b).collect();
+            worst = worst.max(largest(&off) / largest(exact));
+        }
+    }
+    (worst, three)
 }
 
 /// All orders of four rows.
@@ -74,26 +80,33 @@ fn rows(a: [f64; 4], u: [f64; 4], w: [f64; 4], delta: f64) -> [[f64; 4]; 4] {
     [a, std::array::from_fn(|k| a[k] + delta * u[k]), u, w]
 }
 
-#[test]
-fn nearly_dependent_rows_may_come_in_any_order() {
+fn any_order(plan: impl Fn(&Model) -> Plan + Copy, deltas: &[f64]) {
     let (a, u, w) = ([1.0, -2.0, 0.5, 0.3], [0.2, 1.0, -1.0, 0.7], [0.5, 0.1, 1.0, 1.0]);
     // In the second set `u` binds the outer joints alone, in the third it binds the inner ones.
-    let sets = [u, [0.0, 0.0, -1.0, 0.7], [0.6, -1.0, 0.0, 0.0]];
-    for u in sets {
-        for delta in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
+    for u in [u, [0.0, 0.0, -1.0, 0.7], [0.6, -1.0, 0.0, 0.0]] {
+        for &delta in deltas {
             let rows = rows(a, u, w, delta);
             let errors: Vec<f64> = orders()
                 .iter()
                 .map(|order| {
-                    let (error, rank) = error(&order.map(|k| rows[k]));
-                    assert_eq!(rank, 3, "{order:?}, {u:?}, {delta:e}");
+                    let (error, three) = error(&order.map(|k| rows[k]), plan);
+                    assert!(three, "{order:?}, {u:?}, {delta:e}");
                     error
                 })
                 .collect();
             let [best, worst] = [f64::min, f64::max].map(|of| errors.iter().copied().reduce(of).expect("orders"));
             println!("u = {u:?}, δ = {delta:e}: errors between {best:.1e} and {worst:.1e}");
-            // Rounding of a dozen operations is the least that any order has.
-            assert!(worst <= 10.0 * best.max(1e-15), "{u:?}, {delta:e}: {errors:?}");
+            assert!(worst <= 10.0 * best, "{u:?}, {delta:e}: {errors:?}");
         }
     }
+}
+
+#[test]
+fn nearly_dependent_rows_may_come_in_any_order() {
+    any_order(|model| Plan::new(model, 0.0), &[1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7]);
+}
+
+#[test]
+fn and_with_the_elimination_that_is_searched() {
+    any_order(|model| search::plan(model, Default::default()), &[1e-4]);
 }
