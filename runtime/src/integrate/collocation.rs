@@ -23,14 +23,21 @@ use crate::constant::Constant;
 use crate::system::{Real, System};
 use crate::Scalar;
 
+/// As [`Stepper::share`](super::Stepper::share), of methods that estimate their error.
+const SHARE: f64 = 1.0 / 16.0;
 /// Fraction of the allowed error that may remain after the iteration.
 const PART: f64 = 0.01;
 /// Round-off, in epsilons of the state, down to which a fixed step is iterated, and at which a single change that is
 /// not smaller than the one before ends it.
 const FLOOR: f64 = 0.25;
 const STUCK: f64 = 16.0;
-/// Derivatives are used for another step if the iteration contracted as well as this with them.
-const KEEP: f64 = 0.02;
+/// Derivatives are used for another step if the iteration contracted as well as this with them: the default of Hairer's
+/// program RADAU5.
+const KEEP: f64 = 1e-3;
+/// Fewest iterations in a step under error control with derivatives of an earlier step. The first change is mostly the
+/// error of the extrapolated stages, so that its ratio to the second says little about the ones that follow; and what
+/// old derivatives leave can have the same sign in all steps.
+const FEWEST: u32 = 3;
 
 /// The state at which the derivatives in use were evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -249,6 +256,8 @@ where
         let mut mean = 0.0;
         self.keep = true;
         let limit = I::LIMITS[usize::from(scale.is_some())];
+        let old = I::DERIVATIVES && self.derivatives == Derivatives::Old && scale.is_some();
+        let fewest = if old { FEWEST } else { 1 };
         for k in 1..=limit {
             self.iterate(step, system, t, h);
             let sum = self.r.iter().map(|r| norm(r, &self.weight)).fold(0.0, |sum, x| sum + x * x);
@@ -265,7 +274,7 @@ where
                 }
                 grown = if theta < 1.0 { 0 } else { grown + 1 };
             }
-            if self.eta * change <= 1.0 || change == 0.0 {
+            if (k >= fewest && self.eta * change <= 1.0) || change == 0.0 {
                 return Ok(());
             }
             // No further: at round-off that is the solution, and how large it is only the iteration itself can tell. On
@@ -438,6 +447,14 @@ where
 
     fn error_order(&self) -> Option<u32> {
         T::ERROR.map(|_| 3)
+    }
+
+    fn share(&self) -> f64 {
+        if T::ERROR.is_some() {
+            SHARE
+        } else {
+            1.0
+        }
     }
 
     fn begin(&mut self) {

@@ -11,9 +11,9 @@ use crate::Scalar;
 
 /// Highest order of the predictor.
 const HIGHEST: usize = 12;
-/// Share of the tolerance that a step may use up: for the same error a Runge-Kutta method takes an eighth as many
-/// steps, and the errors of all add up.
-const SHARE: f64 = 0.05;
+/// As [`Stepper::share`](crate::integrate::Stepper::share): for the same error a Runge-Kutta method takes an eighth as
+/// many steps, and the errors of all add up.
+const SHARE: f64 = 0.005;
 /// Share of that which the next step aims at.
 const AIM: f64 = 0.1;
 /// Smallest and largest factor by which a step changes.
@@ -98,7 +98,7 @@ where
             self.errors[i] = f64::INFINITY;
             if known {
                 self.history.combine(&weights[..k + i], &step.end, &mut self.work);
-                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale) / SHARE;
+                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale);
             }
         }
     }
@@ -119,6 +119,10 @@ where
     /// Of the next attempt.
     fn error_order(&self) -> Option<u32> {
         Some(self.order as u32)
+    }
+
+    fn share(&self) -> f64 {
+        SHARE
     }
 
     fn begin(&mut self) {
