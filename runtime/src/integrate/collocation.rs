@@ -9,12 +9,13 @@
 //! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point
 //! iteration is faster for generated code of mechanisms that are not.
 //!
-//! Gauss methods are symplectic and symmetric where displacements are plain sums. With joints on Lie groups they keep
-//! their order, but the chart of a step is that at its start and not at its middle, so that a step back does not return
-//! exactly.
+//! Gauss methods are symmetric: their rotations are displaced in the chart about the middle of the step
+//! ([`super::middle`]), so that a step back returns and the energy of reversible motion does not drift. Where
+//! displacements are plain sums they are symplectic as well.
 
 use super::chart::{Chart, Point};
 use super::integrator::{Attempt, FromSystem, Scheme};
+use super::middle::{turns, Middle};
 use super::newton::Iteration;
 use super::stepper::{hermite, norm};
 use super::tableau::{self, Mode};
@@ -86,6 +87,8 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     past: [Point<Y>; S],
     origin: Point<Y>,
     past_h: Y::Scalar,
+    /// For symmetric methods of systems with rotations: the chart in which the equations of the stages hold.
+    middle: Option<Middle<Y>>,
     formula: core::marker::PhantomData<T>,
 }
 
@@ -103,6 +106,8 @@ where
         let point = || Point::zero(system);
         let points = || core::array::from_fn(|_| point());
         let c = tableau.c.map(|x| x.get());
+        // A collocation method is symmetric if its nodes lie so.
+        let symmetric = (0..S).all(|i| (tableau.c[i].hi() + tableau.c[S - 1 - i].hi() - 1.0).abs() < 1e-15);
         Collocation {
             iteration: I::new(system, T::MODES),
             a: tableau.a.map(|row| row.map(|x| x.get())),
@@ -121,6 +126,7 @@ where
             past: points(),
             origin: point(),
             past_h: Y::Scalar::zero(),
+            middle: (symmetric && turns(system)).then(|| Middle::new(system)),
             formula: core::marker::PhantomData,
         }
     }
@@ -170,10 +176,13 @@ where
             z.scale(h * *c);
         }
         self.iteration.correct(&mut self.z);
+        if let Some(middle) = &mut self.middle {
+            middle.begin(system, &self.last, &self.z);
+        }
     }
 
     /// Stages on the last step's polynomial.
-    fn extrapolate(&mut self, h: Y::Scalar) {
+    fn extrapolate(&mut self, system: &Y, h: Y::Scalar) {
         for (z, c) in self.z.iter_mut().zip(&self.c) {
             let (weights, origin) = polynomial(&self.c, Y::Scalar::one() + *c * (h / self.past_h));
             z.clear();
@@ -182,12 +191,18 @@ where
             }
             z.add(origin, &self.origin);
         }
+        if let Some(middle) = &mut self.middle {
+            middle.begin(system, &self.last, &self.z);
+        }
     }
 
     /// One iteration: rates of all stages, residuals, changes.
     fn iterate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
-        for ((z, f), c) in self.z.iter().zip(&mut self.f).zip(&self.c) {
+        for ((z, f), c) in self.z.iter_mut().zip(&mut self.f).zip(&self.c) {
             step.field.rates(system, t + *c * h, z, f);
+            if let Some(middle) = &mut self.middle {
+                middle.enter(system, &mut z.x, &mut f.x);
+            }
         }
         for ((r, row), z) in self.r.iter_mut().zip(&self.a).zip(&self.z) {
             r.clear();
@@ -200,6 +215,14 @@ where
         self.iteration.correct(&mut self.r);
         for (z, r) in self.z.iter_mut().zip(&self.r) {
             z.add(Y::Scalar::one(), r);
+        }
+        if let Some(middle) = &mut self.middle {
+            if I::DERIVATIVES {
+                middle.end(Y::Scalar::one(), &self.last, &self.z);
+            } else {
+                middle.end(h, &self.b, &self.f);
+            }
+            middle.leave(system, &mut self.z);
         }
         step.statistics.iterations += 1;
     }
@@ -312,7 +335,7 @@ where
         self.linearise(step, system, t);
         self.factor(step, system, t, h)?;
         if self.past_h != Y::Scalar::zero() {
-            self.extrapolate(h);
+            self.extrapolate(system, h);
             let result = self.converge(step, system, t, h, scale);
             if result.is_ok() {
                 return result;
@@ -367,24 +390,20 @@ where
             }
             _ => 0.0,
         };
-        self.displace(step, h);
+        self.displace(step, system, h);
         error
     }
 
     /// Displacement of the step from those of the stages.
-    fn displace(&mut self, step: &mut Attempt<Y>, h: Y::Scalar) {
-        step.delta.clear();
+    fn displace(&mut self, step: &mut Attempt<Y>, system: &Y, h: Y::Scalar) {
         if I::DERIVATIVES {
-            for (z, w) in self.z.iter().zip(&self.last) {
-                if *w != Y::Scalar::zero() {
-                    step.delta.add(*w, z);
-                }
-            }
+            end(&self.z, &self.last, &mut step.delta);
         } else {
-            for (f, b) in self.f.iter().zip(&self.b) {
-                step.delta.add(*b, f);
-            }
+            end(&self.f, &self.b, &mut step.delta);
             step.delta.scale(h);
+        }
+        if let Some(middle) = &mut self.middle {
+            middle.give_end(system, &mut step.delta.x);
         }
     }
 
@@ -415,6 +434,19 @@ where
             return norm(estimate, scale);
         }
         error
+    }
+}
+
+/// `out = Σ wᵢ pᵢ` over the stages.
+fn end<Y: System, const S: usize>(points: &[Point<Y>; S], weights: &[Y::Scalar; S], out: &mut Point<Y>)
+where
+    Y::Scalar: Real,
+{
+    out.clear();
+    for (point, w) in points.iter().zip(weights) {
+        if *w != Y::Scalar::zero() {
+            out.add(*w, point);
+        }
     }
 }
 
@@ -522,7 +554,13 @@ where
             return hermite(h, theta, &step.delta, [&self.first, &step.end], out);
         }
         for (z, w) in self.z.iter().zip(polynomial(&self.c, theta).0) {
-            out.add(w, z);
+            match &mut self.middle {
+                None => out.add(w, z),
+                Some(middle) => out.add(w, middle.seen_from(system, z)),
+            }
+        }
+        if let Some(middle) = &self.middle {
+            middle.to_start(system, &mut out.x);
         }
     }
 }

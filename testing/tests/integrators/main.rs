@@ -6,6 +6,7 @@ mod free_motion;
 mod microcontroller;
 mod orders;
 mod precision;
+mod symmetry;
 mod tolerances;
 #[allow(dead_code)]
 #[path = "../code/wide.rs"]
