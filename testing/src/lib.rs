@@ -5,6 +5,7 @@ pub mod chains;
 pub mod closed;
 pub mod eliminations;
 pub mod kkt;
+pub mod motions;
 pub mod newton;
 pub mod random;
 pub mod state;

@@ -137,6 +137,10 @@ where
         self.method.error_order()
     }
 
+    fn share(&self) -> f64 {
+        self.method.share()
+    }
+
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
         self.end_known = false;
         self.method.begin(system, t, q, p)

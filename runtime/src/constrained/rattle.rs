@@ -3,7 +3,7 @@
 use super::open_and_closed::Unconstrained;
 use super::rows::{add_forces, worst};
 use super::ConstraintError;
-use crate::integrate::{Attempt, Chart, FromSystem, Integrator, Point, Scheme, StepError};
+use crate::integrate::{turns, Attempt, Chart, FromSystem, Integrator, Middle, Point, Scheme, StepError};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -12,8 +12,8 @@ const ITERATIONS: u32 = 100;
 
 /// RATTLE (H. C. Andersen, 1983) for Hamiltonians that are not separable (E. Hairer, C. Lubich, G. Wanner, *Geometric
 /// Numerical Integration*, VII.1.4, (1.26)), order 2: positions and velocities satisfy the constraints at the end of
-/// each step. Without joints with quaternions the method is symplectic and symmetric, so that the energy does not
-/// drift.
+/// each step. The method is symmetric, so that the energy of reversible motion does not drift, and without joints with
+/// quaternions symplectic.
 ///
 /// `p½ = p₀ + h/2 (ṗ(q₀, p½) − Φ₀ᵀλ)`, `q₁ = q₀ + h/2 (q̇(q₀, p½) + q̇(q₁, p½))` with `φ(q₁) = 0`;
 /// `p₁ = p½ + h/2 (ṗ(q₁, p½) − Φ₁ᵀμ)` with `Φ₁ v₁ = 0`.
@@ -47,6 +47,8 @@ where
     other: Y::Momenta,
     work: [Y::Momenta; 2],
     qd: Y::Coordinates,
+    /// For rotations: the chart in which the rates at both ends are added.
+    middle: Option<Middle<Y>>,
 }
 
 impl<Y> FromSystem<Y> for RattleScheme<Y>
@@ -70,6 +72,7 @@ where
             other: system.zero_momenta(),
             work: [system.zero_momenta(), system.zero_momenta()],
             qd: system.neutral(),
+            middle: turns(system).then(|| Middle::new(system)),
         }
     }
 }
@@ -133,9 +136,16 @@ where
         step.delta.p.as_mut().copy_from_slice(self.half.p.as_ref());
         self.open(step, system, t + h, true);
         self.other.as_mut().copy_from_slice(step.delta.x.as_ref());
+        if let Some(middle) = &mut self.middle {
+            middle.rates_of_ends(system, &step.delta.x, [&mut self.first.x, &mut self.second.x]);
+        }
         let rates = self.first.x.as_ref().iter().zip(self.second.x.as_ref());
         for (x, (first, second)) in step.delta.x.as_mut().iter_mut().zip(rates) {
             *x = half * (*first + *second);
+        }
+        if let Some(middle) = &mut self.middle {
+            middle.place_half(&step.delta.x);
+            middle.to_start(system, &mut step.delta.x);
         }
         let size = worst(self.start.0.as_ref()).1.to_f64().max(worst(step.delta.x.as_ref()).1.to_f64());
         for (old, new) in self.other.as_mut().iter_mut().zip(step.delta.x.as_ref()) {
@@ -232,6 +242,9 @@ where
         // The iteration starts from the multipliers of the last step, which change little, or from zero.
         self.half.clear();
         step.delta.clear();
+        if let Some(middle) = &mut self.middle {
+            middle.place_half(&step.delta.x);
+        }
         self.solve(step, system, t, h).map_err(wrong)?;
         self.open(step, system, t + h, true);
         let half = Y::Scalar::constant(0.5) * h;

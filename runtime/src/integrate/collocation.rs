@@ -9,12 +9,13 @@
 //! Newton iteration pays where an evaluation is dear, as with the interpreter, or the mechanism stiff; fixed-point
 //! iteration is faster for generated code of mechanisms that are not.
 //!
-//! Gauss methods are symplectic and symmetric where displacements are plain sums. With joints on Lie groups they keep
-//! their order, but the chart of a step is that at its start and not at its middle, so that a step back does not return
-//! exactly.
+//! Gauss methods are symmetric: their rotations are displaced in the chart about the middle of the step
+//! ([`super::middle`]), so that a step back returns and the energy of reversible motion does not drift. Where
+//! displacements are plain sums they are symplectic as well.
 
 use super::chart::{Chart, Point};
 use super::integrator::{Attempt, FromSystem, Scheme};
+use super::middle::{turns, Middle};
 use super::newton::Iteration;
 use super::stepper::{hermite, norm};
 use super::tableau::{self, Mode};
@@ -23,14 +24,21 @@ use crate::constant::Constant;
 use crate::system::{Real, System};
 use crate::Scalar;
 
+/// As [`Stepper::share`](super::Stepper::share), of methods that estimate their error.
+const SHARE: f64 = 1.0 / 16.0;
 /// Fraction of the allowed error that may remain after the iteration.
 const PART: f64 = 0.01;
 /// Round-off, in epsilons of the state, down to which a fixed step is iterated, and at which a single change that is
 /// not smaller than the one before ends it.
 const FLOOR: f64 = 0.25;
 const STUCK: f64 = 16.0;
-/// Derivatives are used for another step if the iteration contracted as well as this with them.
-const KEEP: f64 = 0.02;
+/// Derivatives are used for another step if the iteration contracted as well as this with them: the default of Hairer's
+/// program RADAU5.
+const KEEP: f64 = 1e-3;
+/// Fewest iterations in a step under error control with derivatives of an earlier step. The first change is mostly the
+/// error of the extrapolated stages, so that its ratio to the second says little about the ones that follow; and what
+/// old derivatives leave can have the same sign in all steps.
+const FEWEST: u32 = 3;
 
 /// The state at which the derivatives in use were evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +87,8 @@ pub struct Collocation<Y: System, T, I, const S: usize> {
     past: [Point<Y>; S],
     origin: Point<Y>,
     past_h: Y::Scalar,
+    /// For symmetric methods of systems with rotations: the chart in which the equations of the stages hold.
+    middle: Option<Middle<Y>>,
     formula: core::marker::PhantomData<T>,
 }
 
@@ -96,6 +106,8 @@ where
         let point = || Point::zero(system);
         let points = || core::array::from_fn(|_| point());
         let c = tableau.c.map(|x| x.get());
+        // A collocation method is symmetric if its nodes lie so.
+        let symmetric = (0..S).all(|i| (tableau.c[i].hi() + tableau.c[S - 1 - i].hi() - 1.0).abs() < 1e-15);
         Collocation {
             iteration: I::new(system, T::MODES),
             a: tableau.a.map(|row| row.map(|x| x.get())),
@@ -114,6 +126,7 @@ where
             past: points(),
             origin: point(),
             past_h: Y::Scalar::zero(),
+            middle: (symmetric && turns(system)).then(|| Middle::new(system)),
             formula: core::marker::PhantomData,
         }
     }
@@ -163,10 +176,13 @@ where
             z.scale(h * *c);
         }
         self.iteration.correct(&mut self.z);
+        if let Some(middle) = &mut self.middle {
+            middle.begin(system, &self.last, &self.z);
+        }
     }
 
     /// Stages on the last step's polynomial.
-    fn extrapolate(&mut self, h: Y::Scalar) {
+    fn extrapolate(&mut self, system: &Y, h: Y::Scalar) {
         for (z, c) in self.z.iter_mut().zip(&self.c) {
             let (weights, origin) = polynomial(&self.c, Y::Scalar::one() + *c * (h / self.past_h));
             z.clear();
@@ -175,12 +191,18 @@ where
             }
             z.add(origin, &self.origin);
         }
+        if let Some(middle) = &mut self.middle {
+            middle.begin(system, &self.last, &self.z);
+        }
     }
 
     /// One iteration: rates of all stages, residuals, changes.
     fn iterate(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
-        for ((z, f), c) in self.z.iter().zip(&mut self.f).zip(&self.c) {
+        for ((z, f), c) in self.z.iter_mut().zip(&mut self.f).zip(&self.c) {
             step.field.rates(system, t + *c * h, z, f);
+            if let Some(middle) = &mut self.middle {
+                middle.enter(system, &mut z.x, &mut f.x);
+            }
         }
         for ((r, row), z) in self.r.iter_mut().zip(&self.a).zip(&self.z) {
             r.clear();
@@ -193,6 +215,14 @@ where
         self.iteration.correct(&mut self.r);
         for (z, r) in self.z.iter_mut().zip(&self.r) {
             z.add(Y::Scalar::one(), r);
+        }
+        if let Some(middle) = &mut self.middle {
+            if I::DERIVATIVES {
+                middle.end(Y::Scalar::one(), &self.last, &self.z);
+            } else {
+                middle.end(h, &self.b, &self.f);
+            }
+            middle.leave(system, &mut self.z);
         }
         step.statistics.iterations += 1;
     }
@@ -249,6 +279,8 @@ where
         let mut mean = 0.0;
         self.keep = true;
         let limit = I::LIMITS[usize::from(scale.is_some())];
+        let old = I::DERIVATIVES && self.derivatives == Derivatives::Old && scale.is_some();
+        let fewest = if old { FEWEST } else { 1 };
         for k in 1..=limit {
             self.iterate(step, system, t, h);
             let sum = self.r.iter().map(|r| norm(r, &self.weight)).fold(0.0, |sum, x| sum + x * x);
@@ -265,7 +297,7 @@ where
                 }
                 grown = if theta < 1.0 { 0 } else { grown + 1 };
             }
-            if self.eta * change <= 1.0 || change == 0.0 {
+            if (k >= fewest && self.eta * change <= 1.0) || change == 0.0 {
                 return Ok(());
             }
             // No further: at round-off that is the solution, and how large it is only the iteration itself can tell. On
@@ -303,7 +335,7 @@ where
         self.linearise(step, system, t);
         self.factor(step, system, t, h)?;
         if self.past_h != Y::Scalar::zero() {
-            self.extrapolate(h);
+            self.extrapolate(system, h);
             let result = self.converge(step, system, t, h, scale);
             if result.is_ok() {
                 return result;
@@ -358,24 +390,20 @@ where
             }
             _ => 0.0,
         };
-        self.displace(step, h);
+        self.displace(step, system, h);
         error
     }
 
     /// Displacement of the step from those of the stages.
-    fn displace(&mut self, step: &mut Attempt<Y>, h: Y::Scalar) {
-        step.delta.clear();
+    fn displace(&mut self, step: &mut Attempt<Y>, system: &Y, h: Y::Scalar) {
         if I::DERIVATIVES {
-            for (z, w) in self.z.iter().zip(&self.last) {
-                if *w != Y::Scalar::zero() {
-                    step.delta.add(*w, z);
-                }
-            }
+            end(&self.z, &self.last, &mut step.delta);
         } else {
-            for (f, b) in self.f.iter().zip(&self.b) {
-                step.delta.add(*b, f);
-            }
+            end(&self.f, &self.b, &mut step.delta);
             step.delta.scale(h);
+        }
+        if let Some(middle) = &mut self.middle {
+            middle.give_end(system, &mut step.delta.x);
         }
     }
 
@@ -409,6 +437,19 @@ where
     }
 }
 
+/// `out = Σ wᵢ pᵢ` over the stages.
+fn end<Y: System, const S: usize>(points: &[Point<Y>; S], weights: &[Y::Scalar; S], out: &mut Point<Y>)
+where
+    Y::Scalar: Real,
+{
+    out.clear();
+    for (point, w) in points.iter().zip(weights) {
+        if *w != Y::Scalar::zero() {
+            out.add(*w, point);
+        }
+    }
+}
+
 /// Weights at `θ` of the values at the nodes `c`, and of that at 0, in the polynomial through all of them.
 fn polynomial<N: Real, const S: usize>(c: &[N; S], theta: N) -> ([N; S], N) {
     let mut weights = [N::one(); S];
@@ -438,6 +479,14 @@ where
 
     fn error_order(&self) -> Option<u32> {
         T::ERROR.map(|_| 3)
+    }
+
+    fn share(&self) -> f64 {
+        if T::ERROR.is_some() {
+            SHARE
+        } else {
+            1.0
+        }
     }
 
     fn begin(&mut self) {
@@ -505,7 +554,13 @@ where
             return hermite(h, theta, &step.delta, [&self.first, &step.end], out);
         }
         for (z, w) in self.z.iter().zip(polynomial(&self.c, theta).0) {
-            out.add(w, z);
+            match &mut self.middle {
+                None => out.add(w, z),
+                Some(middle) => out.add(w, middle.seen_from(system, z)),
+            }
+        }
+        if let Some(middle) = &self.middle {
+            middle.to_start(system, &mut out.x);
         }
     }
 }

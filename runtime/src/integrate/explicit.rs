@@ -193,6 +193,10 @@ where
         (!T::TABLEAU.error.is_empty()).then_some(T::TABLEAU.error_order)
     }
 
+    fn share(&self) -> f64 {
+        T::TABLEAU.share
+    }
+
     fn attempt(
         &mut self,
         step: &mut Attempt<Y>,

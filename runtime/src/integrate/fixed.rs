@@ -46,6 +46,10 @@ where
         self.method.error_order()
     }
 
+    fn share(&self) -> f64 {
+        self.method.share()
+    }
+
     fn begin(&mut self) {
         self.method.begin();
     }

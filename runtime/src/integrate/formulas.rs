@@ -20,7 +20,7 @@ macro_rules! formulas {
                 const ERROR: Option<[Constant; $stages]> = $error;
             })*
 
-            /// Gauss-Legendre of order 12: A-stable, symplectic, symmetric.
+            /// Gauss-Legendre of order 12: A-stable, symmetric, without quaternions symplectic.
             #[derive(Clone, Copy, Debug)]
             pub struct Gauss12;
             impl Formula<6> for Gauss12 {
@@ -37,17 +37,17 @@ formulas! {
     BackwardEuler 1 1 0 BACKWARD_EULER BACKWARD_EULER_MODES None,
         "Backward Euler, order 1: L-stable, takes energy out.";
     ImplicitMidpoint 1 1 0 IMPLICIT_MIDPOINT IMPLICIT_MIDPOINT_MODES None,
-        "The implicit midpoint rule, order 2: A-stable, symplectic, symmetric.";
+        "The implicit midpoint rule, order 2: A-stable, symmetric, without quaternions symplectic.";
     Gauss4 2 0 1 GAUSS4 GAUSS4_MODES None,
-        "Gauss-Legendre of order 4: A-stable, symplectic, symmetric.";
+        "Gauss-Legendre of order 4: A-stable, symmetric, without quaternions symplectic.";
     Gauss6 3 1 1 GAUSS6 GAUSS6_MODES None,
-        "Gauss-Legendre of order 6: A-stable, symplectic, symmetric.";
+        "Gauss-Legendre of order 6: A-stable, symmetric, without quaternions symplectic.";
     Radau5 3 1 1 RADAU5 RADAU5_MODES Some(RADAU5_ERROR),
         "Radau IIA of order 5 with the error estimate of `RADAU5`: L-stable, for stiff mechanisms.";
 }
 
-/// Gauss-Legendre of order 12 by fixed-point iteration, which needs no derivatives: symplectic and symmetric; for long
-/// regular motion, with compensated sums.
+/// Gauss-Legendre of order 12 by fixed-point iteration, which needs no derivatives: symmetric, without quaternions
+/// symplectic; for long regular motion, with compensated sums.
 pub type Gauss12FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss12, FixedPoint, 6>>;
 /// [`Gauss6`] by fixed-point iteration, which needs no derivatives.
 pub type Gauss6FixedPoint<Y> = Integrator<Y, Collocation<Y, formula::Gauss6, FixedPoint, 3>>;

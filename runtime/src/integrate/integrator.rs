@@ -101,6 +101,11 @@ where
         None
     }
 
+    /// As [`Stepper::share`].
+    fn share(&self) -> f64 {
+        1.0
+    }
+
     /// Discards past steps; the next step starts from a new state.
     fn begin(&mut self) {}
 
@@ -226,6 +231,10 @@ where
 
     fn error_order(&self) -> Option<u32> {
         self.scheme.error_order()
+    }
+
+    fn share(&self) -> f64 {
+        self.scheme.share()
     }
 
     fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {

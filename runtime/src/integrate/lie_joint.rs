@@ -291,6 +291,48 @@ impl LieJoint {
         }
     }
 
+    /// The rotation of a displacement `x` in the chart about the middle of a step, `R = cay(ζ − ξ) cay(ξ) R₀` with half
+    /// the step's rotation `ξ` in `half`, rewritten in the chart about its start.
+    pub(super) fn from_middle<S: Scalar>(&self, half: &[S], x: &mut [S]) {
+        if let Some(at) = self.phi() {
+            let half = three(half, at);
+            put(x, at, from(sub3(three(x, at), half), scale3(-S::one(), half)));
+        }
+    }
+
+    /// Inverse of [`LieJoint::from_middle`].
+    pub(super) fn to_middle<S: Scalar>(&self, half: &[S], x: &mut [S]) {
+        if let Some(at) = self.phi() {
+            let half = three(half, at);
+            put(x, at, add3(half, from(three(x, at), half)));
+        }
+    }
+
+    /// The rate `xd` of a rotation, which stands in `start` in the chart about the start and in `middle` in that about
+    /// the middle, rewritten from the former to the latter.
+    pub(super) fn rate_to_middle<S: Scalar>(&self, half: &[S], start: &[S], middle: &[S], xd: &mut [S]) {
+        if let Some(at) = self.phi() {
+            let spin = angular(three(start, at), three(xd, at));
+            put(xd, at, phi_rate(sub3(three(middle, at), three(half, at)), spin));
+        }
+    }
+
+    /// Copies the rotation of a displacement.
+    pub(super) fn copy_rotation<S: Scalar>(&self, from: &[S], to: &mut [S]) {
+        if let Some(at) = self.phi() {
+            put(to, at, three(from, at));
+        }
+    }
+
+    /// Half of the rotation `x`: `cay(half)² = cay(x)`.
+    pub(super) fn halve<S: Scalar>(&self, x: &[S], half: &mut [S]) {
+        if let Some(at) = self.phi() {
+            let whole = three(x, at);
+            let root = (S::one() + S::constant(0.25) * dot3(whole, whole)).sqrt();
+            put(half, at, scale3(S::one() / (S::one() + root), whole));
+        }
+    }
+
     /// Rewrites a past rotation in `x` and the rates when the base has moved by `step`.
     pub(super) fn follow<S: Scalar>(&self, step: &[S], x: &mut [S], xd: &mut [S], pd: &mut [S]) {
         if let Some(at) = self.phi() {

@@ -41,6 +41,7 @@ mod integrator;
 mod jacobian;
 mod lie_joint;
 mod linear;
+mod middle;
 mod newton;
 mod rosenbrock;
 #[cfg(test)]
@@ -66,6 +67,7 @@ pub use formulas::{
     formula, BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
 };
 pub use integrator::{Attempt, FromSystem, Integrator, Scheme};
+pub(crate) use middle::{turns, Middle};
 pub use newton::{FixedPoint, Iteration, Newton};
 pub use rosenbrock::{Rodas5P, Rosenbrock};
 pub use semi_implicit::{SemiImplicit, SemiImplicitEuler};

@@ -9,6 +9,9 @@ use crate::Scalar;
 
 /// The next step as a fraction of the step that the error would allow.
 const SAFETY: f64 = 0.9;
+/// Rounding error of a component in a step, in epsilons of the largest one's size, below which a method's share of the
+/// tolerance does not take the allowed error.
+const ROUNDING: f64 = 4.0;
 /// Smallest step, s.
 const LEAST: f64 = 1e-15;
 /// A step changes by at most these factors.
@@ -355,20 +358,25 @@ where
                 *size = *size + (h * *rate).abs();
             }
         }
-        let largest = self.size.p.as_ref().iter().fold(0.0_f64, |m, p| m.max(p.to_f64()));
-        let allowed = |t: Tolerance, size: f64| Y::Scalar::constant(t.absolute + t.relative * size);
+        // The method's share of what is allowed, but no less than rounding takes anyway: that of the largest component,
+        // from which rates of small ones may come by cancellation.
+        let (share, rounding) = (self.method.share(), ROUNDING * Y::Scalar::epsilon());
+        let part = |allowed: f64, most: f64| Y::Scalar::constant((share * allowed).max(allowed.min(rounding * most)));
+        let largest = |part: &[Y::Scalar]| part.iter().fold(0.0_f64, |m, x| m.max(x.to_f64()));
+        let (most_x, most_p) = (largest(self.size.x.as_ref()), largest(self.size.p.as_ref()));
+        let allowed = |t: Tolerance, size: f64, most: f64| part(t.absolute + t.relative * size, most);
         for (scale, size) in self.scale.x.as_mut().iter_mut().zip(self.size.x.as_ref()) {
-            *scale = allowed(tolerances.coordinates, size.to_f64());
+            *scale = allowed(tolerances.coordinates, size.to_f64(), most_x);
         }
         for group in system.lie_joints() {
             for k in group.kind.positions()..group.kind.sizes().1 {
-                self.scale.x.as_mut()[group.v + k] = Y::Scalar::constant(tolerances.rotations);
+                self.scale.x.as_mut()[group.v + k] = part(tolerances.rotations, 1.0);
             }
         }
         let full = tolerances.control == Control::Full;
         for (scale, size) in self.scale.p.as_mut().iter_mut().zip(self.size.p.as_ref()) {
-            let size = size.to_f64().max(1e-3 * largest);
-            *scale = if full { allowed(tolerances.momenta, size) } else { Y::Scalar::zero() };
+            let size = size.to_f64().max(1e-3 * most_p);
+            *scale = if full { allowed(tolerances.momenta, size, most_p) } else { Y::Scalar::zero() };
         }
     }
 

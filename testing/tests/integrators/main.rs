@@ -6,6 +6,8 @@ mod free_motion;
 mod microcontroller;
 mod orders;
 mod precision;
+mod symmetry;
+mod tolerances;
 #[allow(dead_code)]
 #[path = "../code/wide.rs"]
 mod wide;

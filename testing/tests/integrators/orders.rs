@@ -73,16 +73,16 @@ fn methods_of_velocities() -> Vec<Row<AccelerationForm<Interpreter<f64>>>> {
     ]
 }
 
-struct Scene {
-    name: &'static str,
-    i: Interpreter<f64>,
+pub(super) struct Scene {
+    pub name: &'static str,
+    pub i: Interpreter<f64>,
     wide: Interpreter<Wide>,
-    q: Vec<f64>,
-    p: Vec<f64>,
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
     v: Vec<f64>,
     /// Step that resolves the motion, s. It is small compared with the periods, but errors of RK4 are well above
     /// round-off.
-    h: f64,
+    pub h: f64,
 }
 
 impl Scene {
@@ -151,7 +151,7 @@ where
     Ok(([q, p].concat(), drift / size))
 }
 
-fn scenes() -> [Scene; 3] {
+pub(super) fn scenes() -> [Scene; 3] {
     [
         Scene::new("revolute and prismatic joints", 21, 256, [3.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         Scene::new("planar, helical, universal", 22, 2048, [0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]),

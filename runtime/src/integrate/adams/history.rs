@@ -86,21 +86,35 @@ where
     /// `out = w₀ new + Σ wⱼ fⱼ₋₁`: `weights[0]` is that of a rate newer than all.
     #[inline]
     pub fn combine(&self, weights: &[Y::Scalar], new: &Point<Y>, out: &mut Point<Y>) {
+        self.sums([weights], new, [out]);
+    }
+
+    /// As [`History::combine`] with two lists of weights of one length: each rate is read once.
+    #[inline]
+    pub fn combine_twice(&self, weights: [&[Y::Scalar]; 2], new: &Point<Y>, out: [&mut Point<Y>; 2]) {
+        self.sums(weights, new, out);
+    }
+
+    #[inline(always)]
+    fn sums<const M: usize>(&self, weights: [&[Y::Scalar]; M], new: &Point<Y>, mut out: [&mut Point<Y>; M]) {
         let rate = |j: usize| if j == 0 { new } else { self.rate(j - 1) };
-        out.clear();
-        let fours = weights.chunks_exact(4);
-        for (w, j) in fours.clone().zip((0..).step_by(4)) {
-            // Four terms at once need fewer loads and stores.
-            let rates = [0, 1, 2, 3].map(|i| rate(j + i).parts());
-            for (part, out) in out.parts_mut().into_iter().enumerate() {
-                let [a, b, c, d] = rates.map(|rate| &rate[part][..out.len()]);
-                for i in 0..out.len() {
-                    out[i] = out[i] + ((w[0] * a[i] + w[1] * b[i]) + (w[2] * c[i] + w[3] * d[i]));
+        let count = weights.iter().map(|w| w.len()).min().unwrap_or(0);
+        let part = |j: usize, m: usize| weights[m].get(j).copied().unwrap_or(Y::Scalar::zero());
+        out.iter_mut().for_each(|out| out.clear());
+        for j in (0..count).step_by(4) {
+            // Four terms at once need fewer loads and stores. What is beyond the last one counts nothing.
+            let w: [[Y::Scalar; 4]; M] = core::array::from_fn(|m| [0, 1, 2, 3].map(|i| part(j + i, m)));
+            let rates = [0, 1, 2, 3].map(|i| rate((j + i).min(count - 1)).parts());
+            for p in 0..2 {
+                let [a, b, c, d] = rates.map(|rate| rate[p]);
+                for (w, out) in w.iter().zip(&mut out) {
+                    let out = &mut *out.parts_mut()[p];
+                    let (a, b, c, d) = (&a[..out.len()], &b[..out.len()], &c[..out.len()], &d[..out.len()]);
+                    for i in 0..out.len() {
+                        out[i] = out[i] + ((w[0] * a[i] + w[1] * b[i]) + (w[2] * c[i] + w[3] * d[i]));
+                    }
                 }
             }
-        }
-        for (w, j) in fours.remainder().iter().zip(weights.len() / 4 * 4..) {
-            out.add(*w, rate(j));
         }
     }
 }

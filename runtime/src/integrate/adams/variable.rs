@@ -11,11 +11,13 @@ use crate::Scalar;
 
 /// Highest order of the predictor.
 const HIGHEST: usize = 12;
-/// Share of the tolerance that a step may use up: for the same error a Runge-Kutta method takes an eighth as many
-/// steps, and the errors of all add up.
-const SHARE: f64 = 0.05;
+/// As [`Stepper::share`](crate::integrate::Stepper::share): for the same error a Runge-Kutta method takes an eighth as
+/// many steps, and the errors of all add up.
+const SHARE: f64 = 0.005;
 /// Share of that which the next step aims at.
 const AIM: f64 = 0.1;
+/// The order is looked at every so many steps.
+const REST: u32 = 3;
 /// Smallest and largest factor by which a step changes.
 const SHRINK: f64 = 0.5;
 const GROW: f64 = 2.0;
@@ -25,10 +27,10 @@ const GROW: f64 = 2.0;
 ///
 /// It needs the fewest evaluations of all explicit methods here where the motion is smooth, some half of those of
 /// Verner's pair of order 9 for the same tolerance, and a restart at every jump. Its own work at order 12 is some 700
-/// multiplications and 130 for every coordinate a step, so it saves time where the rates cost more than that. With
-/// tolerances looser than 1e-3 its energy may grow without bound in violent motion; use a Runge-Kutta method there. It
-/// is made for error control. With fixed steps the order rises from one, and the error of the first steps remains; use
-/// [`Adams`](super::Adams) for fixed steps.
+/// multiplications, most of them in vector instructions, and 95 for every coordinate a step, so it saves time where the
+/// rates cost more than that. With tolerances looser than 1e-3 its energy may grow without bound in violent motion; use
+/// a Runge-Kutta method there. It is made for error control. With fixed steps the order rises from one, and the error of
+/// the first steps remains; use [`Adams`](super::Adams) for fixed steps.
 ///
 /// Orders and errors after Shampine and Gordon, *Computer Solution of Ordinary Differential Equations*, 1975, chapters
 /// 5 to 7: the error is estimated at the predictor's order, the corrector's result is kept. Weights are found for every
@@ -48,6 +50,8 @@ pub struct AdamsOfVariableOrder<Y: System> {
     starting: bool,
     /// Errors of the last attempt at orders `used − 1` to `used + 1`; infinite where not known.
     errors: [f64; 3],
+    /// Steps until another order is looked for again.
+    rest: u32,
     work: Point<Y>,
 }
 
@@ -63,6 +67,7 @@ where
             used: 1,
             starting: true,
             errors: [f64::INFINITY; 3],
+            rest: 0,
             work: Point::zero(system),
         }
     }
@@ -76,11 +81,11 @@ where
     /// Weights at the order of the last attempt, up to `theta` of a step of `h`.
     fn weights(&self, h: Y::Scalar, theta: Y::Scalar) -> Weights<Y::Scalar> {
         let mut places = [Y::Scalar::one(); NODES];
-        let count = (self.used + 1).min(self.history.len());
+        let (count, scale) = ((self.used + 1).min(self.history.len()), -Y::Scalar::one() / h);
         for (j, place) in places[1..=count].iter_mut().enumerate() {
-            *place = -(self.history.age(j) / h);
+            *place = self.history.age(j) * scale;
         }
-        Weights::new(&places[..=count], self.used, theta)
+        Weights::new(&places, self.used, theta)
     }
 
     /// Integral up to `theta` of the polynomial through the past rates and that at the end; to `work`.
@@ -90,16 +95,27 @@ where
         self.work.scale(h);
     }
 
-    /// Errors of the last attempt at the orders around its own: by how much one rate more changes the integral.
+    /// Error of the last attempt by the sum of the rates with `weights`: how much one rate more changes the integral.
+    fn error(&mut self, weights: &[Y::Scalar], step: &Attempt<Y>, h: Y::Scalar, scale: &Point<Y>) -> f64 {
+        self.history.combine(weights, &step.end, &mut self.work);
+        h.abs().to_f64() * norm(&self.work, scale)
+    }
+
+    /// Errors of the last attempt at the orders around its own, which has the error in `work`.
     fn estimate(&mut self, step: &Attempt<Y>, weights: &Weights<Y::Scalar>, h: Y::Scalar, scale: &Point<Y>) {
         let k = self.used;
-        let known = [k > 1, true, k < self.history.len()];
-        for (i, (weights, known)) in weights.changes.iter().zip(known).enumerate() {
-            self.errors[i] = f64::INFINITY;
-            if known {
-                self.history.combine(&weights[..k + i], &step.end, &mut self.work);
-                self.errors[i] = h.abs().to_f64() * norm(&self.work, scale) / SHARE;
+        let error = h.abs().to_f64() * norm(&self.work, scale);
+        self.errors = [f64::INFINITY, error, f64::INFINITY];
+        // Another order pays over many steps, so it is not looked for in each; but after an error that is too large.
+        self.rest = self.rest.saturating_sub(1);
+        if self.starting || self.rest == 0 || error.is_nan() || error > 1.0 {
+            if k > 1 {
+                self.errors[0] = self.error(&weights.change_below()[..k], step, h, scale);
             }
+            if k < self.history.len() && !self.starting {
+                self.errors[2] = self.error(&weights.change_above()[..k + 2], step, h, scale);
+            }
+            self.rest = REST;
         }
     }
 }
@@ -121,6 +137,10 @@ where
         Some(self.order as u32)
     }
 
+    fn share(&self) -> f64 {
+        SHARE
+    }
+
     fn begin(&mut self) {
         (self.order, self.starting) = (1, true);
         self.history.keep(0);
@@ -139,11 +159,15 @@ where
         let k = self.used;
         let weights = self.weights(h, Y::Scalar::one());
         self.history.predict(step, h, &weights.predictor[..=k]);
-        self.history.correct(step, system, t, h, &weights.corrector[..=k]);
         let Some(scale) = scale else {
+            self.history.correct(step, system, t, h, &weights.corrector[..=k]);
             self.order = (k + 1).min(HIGHEST);
             return Ok(0.0);
         };
+        step.field.rates(system, t + h, &step.delta, &mut step.end);
+        let sums = [&weights.corrector[..=k], &weights.change[..=k]];
+        self.history.combine_twice(sums, &step.end, [&mut step.delta, &mut self.work]);
+        step.delta.scale(h);
         self.estimate(step, &weights, h, scale);
         let [lower, error, _] = self.errors;
         // An error that is not a number counts as too large.

@@ -21,57 +21,117 @@ const QUADRATURE: [(Constant, Constant); POINTS / 2] = [
 /// What the rates at some places count in a step. Place 0 is that of the new rate, the others those of the past ones
 /// from the newest on; a list of weights has one for each.
 ///
-/// The polynomials are Lagrange's: `1 / Π (zⱼ − zᵢ)` times the integral of a product of factors, by quadrature. No
-/// factor changes its sign where it is integrated, so the sums lose no digits, however unequal the steps are.
+/// The polynomials are Newton's: integrals of the products of factors `s − zᵢ`, by quadrature, and the products of the
+/// places' differences, by Horner's rule. All terms of a sum have one sign, so that the sums lose no digits, however
+/// unequal the steps are. Weight 0 of the corrector is one integral by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights<S> {
     /// Of the integral to the end of the step of the polynomial through rates 1 to k. Weight 0 is zero.
     pub predictor: [S; NODES],
     /// The same through rates 0 to k.
     pub corrector: [S; NODES],
-    /// By how much that integral changes if one rate more is taken: through rates 0 to m against 0 to m − 1, for m of
-    /// k − 1, k, k + 1.
-    pub changes: [[S; NODES]; 3],
+    /// By how much that integral changes if rate k is taken, too: through rates 0 to k against 0 to k − 1.
+    pub change: [S; NODES],
+    places: [S; NODES],
+    k: usize,
+    /// `1 / Π (zⱼ − zᵢ)` over the other places to k; the integrals `∫ (s − z₀) Π (s − zᵢ)` over i from 1 to m − 1.
+    inverses: [S; NODES],
+    integrals: [S; NODES],
 }
 
 impl<S: Scalar> Weights<S> {
     /// For `k` past rates, 1 to 13, at `places[1..]`, and the end of the step at `end`; time in any unit, from the
-    /// start of the step. The change at `m = k + 1` is found if there is one place more; there are no others.
-    pub fn new(places: &[S], k: usize, end: S) -> Self {
-        let zero = [S::zero(); NODES];
-        let mut out = Weights { predictor: zero, corrector: zero, changes: [zero; 3] };
-        // By the basis of one node more, where it is wanted, that of the others.
-        let (all, mut basis) = (inverses(places), [S::zero(); NODES]);
-        for j in 0..=k {
-            basis[j] = places[k + 1..].iter().fold(all[j], |all, next| all * (places[j] - *next));
-        }
-        let products = Products::new(places, k, end);
-        let mut right = [S::one(); POINTS];
-        for j in (1..=k).rev() {
-            let (mut past, mut all) = (S::zero(), S::zero());
-            for g in 0..POINTS {
-                let but_one = products.left[j][g] * right[g];
-                past = past + but_one;
-                all = all + but_one * (products.at[g] - places[0]);
-                right[g] = right[g] * (products.at[g] - places[j]);
+    /// start of the step. The places after `k` are those that [`Weights::change_above`] may take.
+    pub fn new(places: &[S; NODES], k: usize, end: S) -> Self {
+        let (zero, one) = (S::zero(), S::one());
+        let mut out = Weights {
+            predictor: [zero; NODES],
+            corrector: [zero; NODES],
+            change: [zero; NODES],
+            places: *places,
+            k,
+            inverses: [one; NODES],
+            integrals: [zero; NODES],
+        };
+        let past = out.integrate(end);
+        // Row m holds `zⱼ − zₘ` for all j at once: loops of a fixed length, which become vector instructions.
+        let mut sums = [zero; NODES];
+        for m in 0..=k {
+            let mut row = [zero; NODES];
+            for j in 0..NODES {
+                row[j] = places[j] - places[m];
             }
-            out.predictor[j] = past * basis[j] * (places[j] - places[0]);
-            out.corrector[j] = all * basis[j];
+            for j in 0..NODES {
+                sums[j] = sums[j] * row[j] + out.integrals[m];
+            }
+            // The sum of place m begins here, and it is not among the differences of its own.
+            (sums[m], row[m]) = (out.integrals[m], one);
+            for j in 0..NODES {
+                out.inverses[j] = out.inverses[j] * row[j];
+            }
         }
-        out.corrector[0] = products.left[k + 1].into_iter().fold(S::zero(), |sum, x| sum + x) * basis[0];
-        let (before, now) = (products.all(k.max(2) - 1, places[0]), products.all(k, places[0]));
         for j in 0..=k {
-            out.changes[0][j] = before * basis[j] * (places[j] - places[k]);
-            out.changes[1][j] = now * basis[j];
+            out.inverses[j] = one / out.inverses[j];
+            out.corrector[j] = sums[j] * out.inverses[j];
+            out.change[j] = out.integrals[k] * out.inverses[j];
+            // The polynomial through rate 0, too, is that through the others and a product that vanishes at them.
+            out.predictor[j] = out.corrector[j] - past * out.inverses[j];
         }
-        if places.len() > k + 1 {
-            let next = products.all(k + 1, places[0]);
-            for j in 0..=k + 1 {
-                out.changes[2][j] = next * all[j];
+        (out.predictor[0], out.corrector[0]) = (zero, past * out.inverses[0]);
+        out
+    }
+
+    /// Integrals to `end`, by quadrature: to `integrals`, and `∫ Π (s − zᵢ)` over i from 1 to k, which is returned.
+    fn integrate(&mut self, end: S) -> S {
+        let (mut at, mut product) = ([S::zero(); POINTS], [S::zero(); POINTS]);
+        for (g, (place, weight)) in QUADRATURE.into_iter().enumerate() {
+            (at[g], at[POINTS - 1 - g]) = (end * place.get(), end * (S::one() - place.get()));
+            (product[g], product[POINTS - 1 - g]) = (end * weight.get(), end * weight.get());
+        }
+        let ahead = at.map(|at| at - self.places[0]);
+        for m in 1..=self.k + 1 {
+            let mut terms = product;
+            for g in 0..POINTS {
+                terms[g] = terms[g] * ahead[g];
+            }
+            self.integrals[m] = sum(&terms);
+            if m <= self.k {
+                for g in 0..POINTS {
+                    product[g] = product[g] * (at[g] - self.places[m]);
+                }
+            }
+        }
+        sum(&product)
+    }
+
+    /// As [`Weights::change`] for k − 1: through rates 0 to k − 1 against 0 to k − 2. Zero for k = 1.
+    pub fn change_below(&self) -> [S; NODES] {
+        let mut out = [S::zero(); NODES];
+        if let Some(integral) = self.k.checked_sub(1).filter(|m| *m > 0).map(|m| self.integrals[m]) {
+            for j in 0..self.k {
+                out[j] = integral * self.inverses[j] * (self.places[j] - self.places[self.k]);
             }
         }
         out
     }
+
+    /// As [`Weights::change`] for k + 1: through rates 0 to k + 1 against 0 to k.
+    pub fn change_above(&self) -> [S; NODES] {
+        let (k, mut out) = (self.k, [S::zero(); NODES]);
+        let (integral, last) = (self.integrals[k + 1], self.places[k + 1]);
+        let mut own = S::one();
+        for j in 0..=k {
+            out[j] = integral * self.inverses[j] / (self.places[j] - last);
+            own = own * (last - self.places[j]);
+        }
+        out[k + 1] = integral / own;
+        out
+    }
+}
+
+/// Sum of the terms of a quadrature.
+fn sum<S: Scalar>(x: &[S; POINTS]) -> S {
+    ((x[0] + x[1]) + (x[2] + x[3])) + ((x[4] + x[5]) + (x[6] + x[7]))
 }
 
 /// Weights of order `k`, 1 to 12, for steps of one size, exact but for the last bits: of the rate at the end, then of
@@ -107,57 +167,6 @@ pub(super) const fn equal_steps(k: usize, explicit: bool) -> [Constant; NODES] {
     weights
 }
 
-/// Products `Π (s − zᵢ)` from 1 on, at the points of the quadrature, times its weights.
-struct Products<S> {
-    at: [S; POINTS],
-    /// `left[j]`: over all i from 1 to j − 1.
-    left: [[S; POINTS]; NODES],
-}
-
-impl<S: Scalar> Products<S> {
-    fn new(places: &[S], k: usize, end: S) -> Self {
-        let mut products = Products { at: [S::zero(); POINTS], left: [[S::zero(); POINTS]; NODES] };
-        for (g, (place, weight)) in QUADRATURE.into_iter().enumerate() {
-            products.at[g] = end * place.get();
-            products.at[POINTS - 1 - g] = end * (S::one() - place.get());
-            products.left[1][g] = end * weight.get();
-            products.left[1][POINTS - 1 - g] = end * weight.get();
-        }
-        for j in 1..=k {
-            for g in 0..POINTS {
-                products.left[j + 1][g] = products.left[j][g] * (products.at[g] - places[j]);
-            }
-        }
-        products
-    }
-
-    /// `∫ Π (s − zᵢ)` over i from 0 to m − 1, with `first` for place 0.
-    fn all(&self, m: usize, first: S) -> S {
-        let mut sum = S::zero();
-        for g in 0..POINTS {
-            sum = sum + self.left[m][g] * (self.at[g] - first);
-        }
-        sum
-    }
-}
-
-/// `1 / Π (zⱼ − zᵢ)` over the other places.
-fn inverses<S: Scalar>(places: &[S]) -> [S; NODES] {
-    let mut products = [S::one(); NODES];
-    let n = places.len().min(NODES);
-    for i in 0..n {
-        for j in i + 1..n {
-            let apart = places[i] - places[j];
-            products[i] = products[i] * apart;
-            products[j] = -(products[j] * apart);
-        }
-    }
-    for x in &mut products[..n] {
-        *x = S::one() / *x;
-    }
-    products
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -173,11 +182,17 @@ mod tests {
         }
     }
 
+    /// Weights for the first places of a list.
+    fn weights<S: Scalar>(places: &[S], k: usize, end: S) -> Weights<S> {
+        let mut all = [S::one(); NODES];
+        all[..places.len()].copy_from_slice(places);
+        Weights::new(&all, k, end)
+    }
+
     #[test]
     fn equal_steps_give_the_known_methods() {
         let places: [f64; NODES] = core::array::from_fn(|j| 1.0 - j as f64);
-        let (predictor, corrector) =
-            (Weights::new(&places[..5], 4, 1.0).predictor, Weights::new(&places[..4], 3, 1.0).corrector);
+        let (predictor, corrector) = (weights(&places[..5], 4, 1.0).predictor, weights(&places[..4], 3, 1.0).corrector);
         // (C.19), (C.20).
         for (w, known) in predictor[1..5].iter().zip([55.0, -59.0, 37.0, -9.0]) {
             assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
@@ -186,8 +201,8 @@ mod tests {
             assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
         }
         let single: [f32; NODES] = places.map(|x| x as f32);
-        let single = Weights::new(&single[..13], 12, 1.0).predictor;
-        let double = Weights::new(&places[..13], 12, 1.0).predictor;
+        let single = weights(&single[..13], 12, 1.0).predictor;
+        let double = weights(&places[..13], 12, 1.0).predictor;
         for (a, b) in single.into_iter().zip(double) {
             assert!((f64::from(a) - b).abs() <= 20.0 * f64::from(f32::EPSILON) * b.abs(), "{a} {b}");
         }
@@ -199,23 +214,25 @@ mod tests {
         let mut places = [1.0, 0.0, -0.3, -1.7, -2.0, -2.1, -2.5, -5.0, -5.5, -6.0, -6.5, -7.5, -7.6, -10.0];
         for end in [1.0, 0.37] {
             for k in 1..=12 {
-                let w = Weights::new(&places[..=k + 1], k, end);
+                let w = weights(&places[..=k + 1], k, end);
                 moments(&w.predictor[..=k], &places, 1, end);
                 moments(&w.corrector[..=k], &places, 0, end);
-                let more = Weights::new(&places[..=k + 1], k + 1, end).corrector;
-                let less = if k > 1 { Weights::new(&places[..k], k - 1, end).corrector } else { [0.0; NODES] };
+                let more = weights(&places[..=k + 1], k + 1, end).corrector;
+                let less = if k > 1 { weights(&places[..k], k - 1, end).corrector } else { [0.0; NODES] };
+                let above = w.change_above();
                 for j in 0..=k + 1 {
                     let size = 50.0 * f64::EPSILON * (w.corrector[j].abs() + more[j].abs() + less[j].abs());
-                    assert!((w.changes[2][j] - (more[j] - w.corrector[j])).abs() <= size, "{k} {j}");
+                    assert!((above[j] - (more[j] - w.corrector[j])).abs() <= size, "{k} {j}");
                     if k > 1 {
-                        assert!((w.changes[1][j] - (w.corrector[j] - less[j])).abs() <= size, "{k} {j}");
+                        assert!((w.change[j] - (w.corrector[j] - less[j])).abs() <= size, "{k} {j}");
                     }
                 }
                 if k > 2 {
-                    let least = Weights::new(&places[..k - 1], k - 2, end).corrector;
+                    let least = weights(&places[..k - 1], k - 2, end).corrector;
+                    let below = w.change_below();
                     for j in 0..k {
                         let size = 50.0 * f64::EPSILON * (least[j].abs() + less[j].abs());
-                        assert!((w.changes[0][j] - (less[j] - least[j])).abs() <= size, "{k} {j}");
+                        assert!((below[j] - (less[j] - least[j])).abs() <= size, "{k} {j}");
                     }
                 }
             }
@@ -228,8 +245,8 @@ mod tests {
         let places: [f64; NODES] = core::array::from_fn(|j| 1.0 - j as f64);
         for k in 1..=12 {
             let (explicit, implicit) = (equal_steps(k, true), equal_steps(k, false));
-            let w = Weights::new(&places[..=k], k, 1.0);
-            let less = Weights::new(&places[..k.max(2)], k.max(2) - 1, 1.0).corrector;
+            let w = weights(&places[..=k], k, 1.0);
+            let less = weights(&places[..k.max(2)], k.max(2) - 1, 1.0).corrector;
             for j in 0..NODES {
                 // As in `moments`; weights of order 12 are sums of numbers up to a hundred times as large.
                 let near = |a: f64, b: f64| (a - b).abs() <= 100.0 * f64::EPSILON * b.abs();

@@ -70,6 +70,7 @@ pub static DOP853: Tableau<12> = Tableau {
         ),
     ],
     error_order: 7,
+    share: 1.0 / 256.0,
     fsal: false,
     dense: Some(&DENSE),
 };

@@ -12,6 +12,7 @@ pub static EULER: Tableau<1> = Tableau {
     b: list("1"),
     error: &[],
     error_order: 0,
+    share: 1.0,
     fsal: false,
     dense: None,
 };
@@ -25,6 +26,7 @@ pub static MIDPOINT: Tableau<2> = Tableau {
     b: list("0 1"),
     error: &[],
     error_order: 0,
+    share: 1.0,
     fsal: false,
     dense: None,
 };
@@ -38,6 +40,7 @@ pub static RK4: Tableau<4> = Tableau {
     b: list("1/6 1/3 1/3 1/6"),
     error: &[],
     error_order: 0,
+    share: 1.0,
     fsal: false,
     dense: None,
 };
@@ -60,6 +63,7 @@ pub static RKF45: Tableau<6> = Tableau {
     b: list("16/135 0 6656/12825 28561/56430 -9/50 2/55"),
     error: &[list("1/360 0 -128/4275 -2197/75240 1/50 2/55")],
     error_order: 4,
+    share: 1.0,
     fsal: false,
     dense: None,
 };
@@ -83,6 +87,7 @@ pub static CASH_KARP: Tableau<6> = Tableau {
     b: list("37/378 0 250/621 125/594 0 512/1771"),
     error: &[list("-277/64512 0 6925/370944 -6925/202752 -277/14336 277/7084")],
     error_order: 4,
+    share: 1.0,
     fsal: false,
     dense: None,
 };
@@ -107,6 +112,7 @@ pub static DORMAND_PRINCE: Tableau<7> = Tableau {
     b: list("35/384 0 500/1113 125/192 -2187/6784 11/84 0"),
     error: &[list("71/57600 0 -71/16695 71/1920 -17253/339200 22/525 -1/40")],
     error_order: 4,
+    share: 1.0,
     fsal: true,
     dense: None,
 };

@@ -42,6 +42,9 @@ pub struct Tableau<const S: usize> {
     pub error: &'static [[Constant; S]],
     /// The estimate behaves as h to this plus one: the order of the lower method. Zero without an estimate.
     pub error_order: u32,
+    /// The part of the tolerance that the estimated error of a step may use up, see
+    /// [`Stepper::share`](super::Stepper::share).
+    pub share: f64,
     /// The last stage is the rate at the new point: the first one of the next step.
     pub fsal: bool,
     /// What gives the points within a step.

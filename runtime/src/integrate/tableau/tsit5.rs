@@ -38,6 +38,7 @@ pub static TSIT5: Tableau<7> = Tableau {
          -0.0151515151515151515151515151515151515",
     )],
     error_order: 4,
+    share: 1.0,
     fsal: true,
     dense: Some(&DENSE),
 };

@@ -75,6 +75,7 @@ pub static VERNER9: Tableau<16> = Tableau {
          0.0305701398308279739772100506792036965 -0.0483423137382395831437672673977287171",
     )],
     error_order: 8,
+    share: 1.0 / 16.0,
     fsal: false,
     dense: Some(&DENSE),
 };
