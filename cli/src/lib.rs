@@ -5,7 +5,10 @@
 
 mod args;
 mod check;
+mod condition;
 mod count;
+mod displacement;
+mod energy;
 mod eval;
 mod explain;
 mod generate;
@@ -15,12 +18,15 @@ mod motion;
 mod output;
 mod picture;
 pub mod plot;
+mod probe;
 mod rivals;
 mod simulate;
 mod source;
 mod stale;
 mod timed;
 mod tour;
+mod trust;
+mod verdict;
 
 use std::io::Write;
 use std::process::ExitCode;

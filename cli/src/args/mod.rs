@@ -323,8 +323,13 @@ floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`
 neutral where it states none; loops are closed from there (from --q, if given) without moving `held` joints. Velocities then
 follow from those of the `held` joints; where none is held, they are the nearest ones that satisfy the constraints.
 
-Without dampers the energy is constant. Its change is an error of the simulation, and is printed relative to the largest
-kinetic energy. A large change shows a bad run, but a small one does not prove a good run: the error of the motion may be larger."
+Without dampers the energy is constant; with dampers it changes by their work. What it changes by otherwise is an error of the
+simulation. It is printed relative to the largest kinetic energy, as a multiple of the tolerance, and beside what errors of the
+tolerance in every step allow; a larger change gets a warning. A small one does not prove a good run: the error of the motion may
+be larger, and --trust measures it. With fixed steps, one step is compared with two of half its size at states of the run.
+
+Exit status 1 also where no digit can be trusted: a tolerance of 1 or more, a start between whose doubles lies a radian or
+metre, steps that do not follow the motion, energy that is lost, and with --trust errors as large as the motion."
 )]
 pub struct SimulateArgs {
     #[command(flatten)]
@@ -354,6 +359,10 @@ pub struct SimulateArgs {
     /// Initial velocities, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub v: Option<Vec<f64>>,
+    /// Run the motion again at a tenth of the tolerance (fixed steps: at a quarter of the step), or in double-double
+    /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
+    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
+    pub trust: Option<Trust>,
     /// Leave out the dampers of the model
     #[arg(long)]
     pub no_damping: bool,
@@ -387,6 +396,15 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
+}
+
+/// The second run of `--trust`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Trust {
+    /// By the same method, at a tenth of the tolerance or a quarter of the step
+    Tenth,
+    /// In double-double numbers, at a tenth of the tolerance
+    Wide,
 }
 
 /// `mbd explain`.

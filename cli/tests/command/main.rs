@@ -5,3 +5,4 @@ mod documented;
 mod eval;
 mod loops;
 mod run;
+mod trust;
