@@ -6,10 +6,10 @@ use multibody::runtime::Interpreter;
 /// Relative error at which not even the first digit of a result is known.
 const NO_DIGIT: f64 = 0.1;
 
-/// Condition of the mass matrix `M` (`n × n`, row by row) in the norm of row sums, after scaling rows and columns so that
-/// the diagonal is one: units and sizes of the coordinates do not matter then, and no scaling of rows and columns has a
-/// condition more than `n` times smaller (van der Sluis, Numer. Math. 14, 1969). Infinite where rounding has left the
-/// matrix indefinite. The index is that of the velocity with the least pivot.
+/// Condition of the mass matrix `M` (`n × n`, row by row) in the norm of row sums, after scaling rows and columns so
+/// that the diagonal is one: units and sizes of the coordinates do not matter then, and no scaling of rows and columns
+/// has a condition more than `n` times smaller (van der Sluis, Numer. Math. 14, 1969). Infinite where rounding has left
+/// the matrix indefinite. The index is that of the velocity with the least pivot.
 fn condition(m: &[f64], n: usize) -> (f64, usize) {
     let root: Vec<f64> = (0..n).map(|i| m[i * n + i].sqrt()).collect();
     let mut l: Vec<f64> = (0..n * n).map(|at| m[at] / (root[at / n] * root[at % n])).collect();
@@ -47,12 +47,12 @@ fn condition(m: &[f64], n: usize) -> (f64, usize) {
     (norm * largest_sum(&inverse), least.1)
 }
 
-/// What the mass matrix leaves of the digits of velocities and accelerations at coordinates `q`: a warning and its help,
-/// where that is none.
+/// What the mass matrix leaves of the digits of velocities and accelerations at coordinates `q`: a warning and its
+/// help, where that is none.
 ///
-/// The numbers of a model are known to a rounding, and so are the entries of `M`: relative to the scaled matrix, an error
-/// of at most `n ε` in the norm of row sums. The solution of `M v = p` then changes by `n ε κ` of its size to first
-/// order, whatever the algorithm (Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 7.1).
+/// The numbers of a model are known to a rounding, and so are the entries of `M`: relative to the scaled matrix, an
+/// error of at most `n ε` in the norm of row sums. The solution of `M v = p` then changes by `n ε κ` of its size to
+/// first order, whatever the algorithm (Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 7.1).
 pub fn of_mass_matrix(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64]) -> Option<(String, String)> {
     let n = plan.dims.nv;
     if n == 0 {
@@ -72,8 +72,8 @@ pub fn of_mass_matrix(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64]
     Some((what, format!("compare the masses and inertias that `{name}` moves with the others, or give it an armature")))
 }
 
-/// The coordinate whose neighbours among the doubles are farthest away: its name, and that distance, rad or m. Components
-/// of quaternions are below one.
+/// The coordinate whose neighbours among the doubles are farthest away: its name, and that distance, rad or m.
+/// Components of quaternions are below one.
 pub fn spacing(plan: &Plan, q: &[f64]) -> Option<(String, f64)> {
     let distances = q.iter().map(|q| q.abs() * f64::EPSILON).enumerate();
     let (at, apart) = distances.max_by(|a, b| a.1.total_cmp(&b.1))?;

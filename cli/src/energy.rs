@@ -34,8 +34,8 @@ const GAUSS: [(f64, f64); 4] = [
 #[derive(Default)]
 pub struct Balance {
     tolerances: Option<Tolerances>,
-    /// The mechanism without its constraints, if it has any: `H` and its derivatives are those of the tree, and the rates
-    /// of the momenta of the constrained mechanism have the forces of the constraints among them.
+    /// The mechanism without its constraints, if it has any: `H` and its derivatives are those of the tree, and the
+    /// rates of the momenta of the constrained mechanism have the forces of the constraints among them.
     tree: Option<Interpreter<f64>>,
     damped: bool,
     /// Damping of every velocity, N m s/rad or N s/m.

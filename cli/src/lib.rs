@@ -4,6 +4,7 @@
 //! programs should use `multibody`.
 
 mod args;
+mod certify;
 mod check;
 mod condition;
 mod count;
@@ -98,6 +99,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Count(a)) => count::run(&a, out),
         Some(Command::Generate(a)) => generate::run(&a, out),
         Some(Command::Eval(a)) => eval::run(&a, out),
+        Some(Command::Certify(a)) => certify::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         Some(Command::Identifiable(a)) => identifiable::run(&a, out),

@@ -9,8 +9,8 @@ use crate::{Real, Scalar};
 /// A sweep that runs on dual numbers computes its own derivative: from `q + ε q̇` and `v + ε v̇` it computes the
 /// momenta `p + ε ṗ`. Dual numbers can be nested: `Dual<Dual<f64>>` carries second derivatives.
 ///
-/// Their order is that of numbers with a positive infinitesimal `ε`: values first, derivatives where values are equal. An
-/// integrator that runs on dual numbers therefore makes the steps that it makes on the values alone, and carries the
+/// Their order is that of numbers with a positive infinitesimal `ε`: values first, derivatives where values are equal.
+/// An integrator that runs on dual numbers therefore makes the steps that it makes on the values alone, and carries the
 /// derivative of its own result along: the tangent flow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Dual<S> {
@@ -124,6 +124,13 @@ mod tests {
         assert_eq!(slope(|x| x.reciprocal_above(c(1.0)), 0.5), 0.0);
         near(slope(|x| x.sin_cos().0, 0.5), crate::trig::sincos_f64(0.5).1);
         near(slope(|x| x.sin_cos().1, 0.5), -crate::trig::sincos_f64(0.5).0);
+    }
+
+    #[test]
+    fn order_is_that_of_infinitesimals() {
+        let (x, more) = (Dual::new(1.0, 0.0), Dual::new(1.0, 1e-9));
+        assert!(x < more && more < Dual::new(1.5, -1e9) && Real::abs(-more) == more);
+        assert!(Real::is_finite(more) && !Real::is_finite(Dual::new(1.0, f64::NAN)));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! `mbd simulate --trust`: the motion once more with smaller errors, the growth of errors, and what is left of the digits.
+//! `mbd simulate --trust`: the motion once more with smaller errors, the growth of errors, and what is left of the
+//! digits.
 
 mod report;
 mod tangent;

@@ -18,7 +18,8 @@ const E_FOLDS: f64 = 3.0;
 
 /// Growth of errors over a run.
 pub struct Growth {
-    /// Slope of the logarithm of errors over the second half, 1/s: the largest Lyapunov exponent as far as the run shows it.
+    /// Slope of the logarithm of errors over the second half, 1/s: the largest Lyapunov exponent as far as the run
+    /// shows it.
     pub rate: f64,
     /// Increase of the logarithm over the second half.
     pub increase: f64,
@@ -27,8 +28,8 @@ pub struct Growth {
 }
 
 impl Growth {
-    /// Whether errors grow exponentially as far as the run shows it: in its second half by more than [`E_FOLDS`]. Regular
-    /// motions have errors that grow with the time or its square, by `k ln 2` in the second half.
+    /// Whether errors grow exponentially as far as the run shows it: in its second half by more than [`E_FOLDS`].
+    /// Regular motions have errors that grow with the time or its square, by `k ln 2` in the second half.
     pub fn exponential(&self) -> bool {
         self.increase > E_FOLDS
     }

@@ -1,5 +1,6 @@
 //! Tests of the command `mbd`, run as a program.
 
+mod certify;
 mod commands;
 mod documented;
 mod eval;

@@ -227,7 +227,8 @@ fn eval_scales_quaternions_and_knows_the_condition() {
         }
         bad(eval(1.00001, layout), &["has length 1.0000", "expected 1"]);
     }
-    // Two sliders on one line: the condition is (1 + c)/(1 - c), c² = 1/(1 + m), about 4/m for a small mass m of the first.
+    // Two sliders on one line: the condition is (1 + c)/(1 - c), c² = 1/(1 + m), about 4/m for a small mass m of the
+    // first.
     let sliders = |m: f64| {
         let slider = "type = \"prismatic\"\naxis = [1, 0, 0]";
         let text = format!(
