@@ -4,8 +4,12 @@
 //! programs should use `multibody`.
 
 mod args;
+mod certify;
 mod check;
+mod condition;
 mod count;
+mod displacement;
+mod energy;
 mod eval;
 mod explain;
 mod generate;
@@ -15,12 +19,15 @@ mod motion;
 mod output;
 mod picture;
 pub mod plot;
+mod probe;
 mod rivals;
 mod simulate;
 mod source;
 mod stale;
 mod timed;
 mod tour;
+mod trust;
+mod verdict;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -92,6 +99,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Count(a)) => count::run(&a, out),
         Some(Command::Generate(a)) => generate::run(&a, out),
         Some(Command::Eval(a)) => eval::run(&a, out),
+        Some(Command::Certify(a)) => certify::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         Some(Command::Identifiable(a)) => identifiable::run(&a, out),

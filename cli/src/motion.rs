@@ -10,8 +10,9 @@ use multibody::codegen::plan::Plan;
 use multibody::runtime::catalogue::{self, Drive, Start};
 use multibody::runtime::constrained::{ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation};
 use multibody::runtime::integrate::{Control, EnergyProjection, Statistics, Step, StepError};
-use multibody::runtime::{Constrained, Interpreter};
+use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
 
+use super::energy::Balance;
 use super::timed::Timed;
 use super::{loops, source, Failure, Outcome};
 
@@ -65,6 +66,8 @@ pub struct Record {
     pub spent: Spent,
     /// Residuals and ranks of loops and couplings.
     pub drift: Drift,
+    /// What the energy may change by.
+    pub balance: Balance,
 }
 
 /// Loops and couplings at the ends of steps.
@@ -144,13 +147,15 @@ impl Observer {
         self.record.p.push(p.to_vec());
     }
 
-    fn end(&mut self, t: f64, q: &[f64], p: &[f64], kept: bool) {
+    /// The end of a step of `h` s.
+    fn end(&mut self, t: f64, h: f64, q: &[f64], p: &[f64], kept: bool) {
         let Observer { interpreter, record, residual, entries, .. } = self;
         if !residual.is_empty() {
             interpreter.constraint_residuals(&q.to_vec(), residual, entries);
             record.drift.left = record.drift.left.max(loops::largest(interpreter.rows(), residual));
         }
         let (kinetic, potential) = self.interpreter.energy(q, p);
+        self.record.balance.step(&mut self.interpreter, h, (q, p), (kinetic, potential));
         let (change, ends) = (kinetic + potential - self.start, &mut self.record.ends);
         (ends.scale, ends.worst) = (ends.scale.max(kinetic), ends.worst.max(change.abs()));
         if kept {
@@ -188,30 +193,66 @@ impl PostStep<Timed> for Keeper {
     }
 }
 
-/// Simulates from given coordinates and velocities, and records the motion.
-pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
+/// The interpreter of a simulation over any scalar, with the default parameters.
+pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
     let params = plan.default_params();
     let gravity = match plan.model.gravity {
         // The default values of these fields in generated code.
         Gravity::Input => [0.0, 0.0, -9.81],
         Gravity::Constant(_) => plan.gravity(&params),
     };
-    let mut interpreter = plan.interpreter(&params);
-    interpreter.gravity = gravity;
-    interpreter.check_rank(&q).map_err(|e| source::rank_failure(&e))?;
-    let mut p = vec![0.0; plan.dims.nv];
-    interpreter.momenta(&q, &v, &mut p);
-    let (mut residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    let bound = !residual.is_empty();
-    if bound {
-        // The nearest velocities in the metric of the mass matrix that satisfy the constraints.
-        let mut v = v.clone();
-        interpreter.project_momenta(0.0, &q, &mut p, &mut v, &mut residual);
+    let params: Vec<S> = params.into_iter().map(S::constant).collect();
+    Interpreter::new(plan.tree(&params), gravity.map(S::constant))
+        .with_names(plan.velocity_names(), plan.constraint_names())
+}
+
+/// Momenta of given velocities; with constraints, of the nearest velocities in the metric of the mass matrix that
+/// satisfy them.
+pub fn momenta<S: Real>(interpreter: &mut Interpreter<S>, q: &Vec<S>, v: &[S]) -> Vec<S> {
+    let (mut p, mut v) = (interpreter.zero_momenta(), v.to_vec());
+    interpreter.momenta(q, &v, &mut p);
+    let mut rows = interpreter.zero_rows();
+    if !rows.is_empty() {
+        interpreter.project_momenta(S::zero(), q, &mut p, &mut v, &mut rows);
     }
+    p
+}
+
+/// The method of the settings at the start of a motion.
+pub fn driver(
+    plan: &Plan,
+    settings: &Settings,
+    system: &mut Timed,
+    start: &Start<'_, Timed>,
+    met: &Rc<RefCell<Drift>>,
+) -> Outcome<Box<dyn Drive<Timed>>> {
+    let keeper =
+        |system: &Timed| Keeper { hold: Projection::new(system, settings.hold, settings.effort()), met: met.clone() };
+    let made = match system.rows().is_empty() {
+        true => catalogue::any(settings.method, system, start),
+        false => {
+            let post_step = keeper(system);
+            catalogue::implicit_with_post_step(settings.method, system, start, post_step).or_else(|| {
+                let post_step = keeper(system);
+                catalogue::explicit_with_post_step(settings.method, system, start, post_step)
+            })
+        }
+    };
+    let made =
+        made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
+    made.map_err(|e| failure(plan, settings, &e))
+}
+
+/// Simulates from given coordinates and velocities, and records the motion.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
+    let mut interpreter = interpreter(plan);
+    interpreter.check_rank(&q).map_err(|e| source::rank_failure(&e))?;
+    let p = momenta(&mut interpreter, &q, &v);
+    let (residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     let (kinetic, potential) = interpreter.energy(&q, &p);
     let mut observer = Observer {
         interpreter: interpreter.clone(),
-        record: Record::default(),
+        record: Record { balance: Balance::new(plan, settings), ..Record::default() },
         start: kinetic + potential,
         residual,
         entries,
@@ -219,25 +260,9 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let mut system = Timed::new(interpreter);
     let start = Start { q: &q, p: &p, step: settings.step, compensated: false };
     let met = Rc::new(RefCell::new(Drift::default()));
-    let made = match bound {
-        false => catalogue::any(settings.method, &mut system, &start),
-        true => {
-            let keeper = |system: &Timed| Keeper {
-                hold: Projection::new(system, settings.hold, settings.effort()),
-                met: met.clone(),
-            };
-            let post_step = keeper(&system);
-            catalogue::implicit_with_post_step(settings.method, &mut system, &start, post_step).or_else(|| {
-                let post_step = keeper(&system);
-                catalogue::explicit_with_post_step(settings.method, &mut system, &start, post_step)
-            })
-        }
-    };
-    let made =
-        made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
-    let mut driver = made.map_err(|e| failure(plan, settings, &e))?;
+    let mut driver = driver(plan, settings, &mut system, &start, &met)?;
     let mut projection = settings.project.then(|| EnergyProjection::new(&mut system, &q, &p, 3));
-    observer.end(0.0, &q, &p, true);
+    observer.end(0.0, 0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
     let clock = Instant::now();
     go(&mut *driver, &mut system, settings, &mut projection, &mut observer).map_err(|e| failure(plan, settings, &e))?;
@@ -280,8 +305,15 @@ fn go(
             observer.row(at(row), &q, &p);
             row += 1;
         }
+        if observer.record.balance.damped() {
+            let Observer { interpreter, record, .. } = &mut *observer;
+            record.balance.dissipate(interpreter, h, |theta| {
+                driver.dense(system, theta, &mut q, &mut p);
+                (q.clone(), p.clone())
+            });
+        }
         driver.state(system, &mut q, &mut p);
-        observer.end(end, &q, &p, kept);
+        observer.end(end, h, &q, &p, kept);
         if row <= rows && at(row) <= end + 1e-9 * h {
             observer.row(at(row), &q, &p);
             row += 1;

@@ -18,7 +18,8 @@ use super::args::SimulateArgs;
 use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
-use super::{loops, picture, source, Failure, Outcome};
+use super::probe::Probe;
+use super::{energy, loops, picture, probe, source, trust, verdict, Failure, Outcome};
 
 /// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at
 /// the end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
@@ -87,6 +88,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         }
         writable(file)?;
     }
+    verdict::start(path, &plan, &q)?;
     let record = simulate(&plan, (q, v), &settings)?;
     let picture = plot::svg(&title(&plan, &settings), &panels(&plan, &record)).map_err(|e| {
         Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
@@ -100,10 +102,19 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if let Some(assembly) = &assembly {
         writeln!(out, "loops: {}", assembly.summary())?;
     }
-    let (worst, scale) = (record.ends.worst(), record.ends.scale);
-    match damped && !args.no_damping {
-        true => writeln!(out, "energy: changes by up to {worst:.1e} of the largest kinetic energy, {scale:.3e} J (the model has dampers; --no-damping leaves them out)")?,
-        false => writeln!(out, "energy error: at most {worst:.1e} of the largest kinetic energy, {scale:.3e} J")?,
+    let energy = energy::judge(&record, &settings);
+    writeln!(out, "{}", energy.line)?;
+    let probe = match settings.step {
+        Step::Fixed(h) => Some(probe::probe(&plan, &settings, &record, h)),
+        Step::Adaptive(_) => None,
+    };
+    match probe {
+        Some(Probe { error, places, .. }) if error.is_finite() => writeln!(
+            out,
+            "step error: at most {error:.1e} rad or m in a step (one step against two of half its size, at {places} states)"
+        )?,
+        Some(_) => writeln!(out, "step error: unknown, a step or its halves fail")?,
+        None => {}
     }
     if assembly.is_some() {
         writeln!(out, "drift: {}", drift(&settings, &record.drift))?;
@@ -117,7 +128,15 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if let Some(file) = &args.picture {
         writeln!(out, "picture: {}", file.display())?;
     }
-    Ok(())
+    let mut trusted = verdict::tell(path, &plan, &settings, &record, (energy, probe));
+    if let Some(how) = args.trust {
+        trusted &= verdict::digits(path, trust::run(&plan, &settings, &record, how, out)?);
+    }
+    if trusted {
+        Ok(())
+    } else {
+        Err(Failure::Shown)
+    }
 }
 
 /// Method, steps and rows of the arguments.
@@ -134,7 +153,18 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             Step::Fixed(args.time / steps)
         }
         None => {
-            let tolerances = Tolerances::new(args.tolerance.unwrap_or(TOLERANCE));
+            let tolerance = args.tolerance.unwrap_or(TOLERANCE);
+            if tolerance >= verdict::MEANINGLESS {
+                let what = format!(
+                    "--tolerance {tolerance:e} means nothing: it allows an error of {tolerance:e} rad or m in every step, and of \
+                     {tolerance:e} times the momenta"
+                );
+                return Err(Failure::new(
+                    what,
+                    format!("give one below {}; the default is {TOLERANCE:e}", verdict::MEANINGLESS),
+                ));
+            }
+            let tolerances = Tolerances::new(tolerance);
             Step::Adaptive(if args.partial { tolerances.coordinates_only() } else { tolerances })
         }
     };
@@ -249,6 +279,12 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
             return Err(Failure::new(
                 format!("--q: {} have length {norm}, expected 1", names[at..at + 4].join(", ")),
                 "give a unit quaternion x, y, z, w",
+            ));
+        }
+        if (norm - 1.0).abs() > verdict::UNIT {
+            let names = names[at..at + 4].join(", ");
+            note(format_args!(
+                "--q: warning: {names} have length {norm}; they are scaled to unit length\n  help: give more digits"
             ));
         }
         q[at..at + 4].iter_mut().for_each(|x| *x /= norm);

@@ -2,13 +2,17 @@
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
-use crate::Scalar;
+use crate::{Real, Scalar};
 
 /// `re + ε du` with `ε² = 0`: a value and its derivative along one direction, exact to rounding.
 ///
 /// A sweep that runs on dual numbers computes its own derivative: from `q + ε q̇` and `v + ε v̇` it computes the
 /// momenta `p + ε ṗ`. Dual numbers can be nested: `Dual<Dual<f64>>` carries second derivatives.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+///
+/// Their order is that of numbers with a positive infinitesimal `ε`: values first, derivatives where values are equal.
+/// An integrator that runs on dual numbers therefore makes the steps that it makes on the values alone, and carries the
+/// derivative of its own result along: the tangent flow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, PartialOrd)]
 pub struct Dual<S> {
     /// Value.
     pub re: S,
@@ -88,6 +92,18 @@ impl<S: Scalar> Scalar for Dual<S> {
     }
 }
 
+impl<S: Real> Real for Dual<S> {
+    fn is_finite(self) -> bool {
+        self.re.is_finite() && self.du.is_finite()
+    }
+    fn to_f64(self) -> f64 {
+        self.re.to_f64()
+    }
+    fn epsilon() -> f64 {
+        S::epsilon()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,6 +124,13 @@ mod tests {
         assert_eq!(slope(|x| x.reciprocal_above(c(1.0)), 0.5), 0.0);
         near(slope(|x| x.sin_cos().0, 0.5), crate::trig::sincos_f64(0.5).1);
         near(slope(|x| x.sin_cos().1, 0.5), -crate::trig::sincos_f64(0.5).0);
+    }
+
+    #[test]
+    fn order_is_that_of_infinitesimals() {
+        let (x, more) = (Dual::new(1.0, 0.0), Dual::new(1.0, 1e-9));
+        assert!(x < more && more < Dual::new(1.5, -1e9) && Real::abs(-more) == more);
+        assert!(Real::is_finite(more) && !Real::is_finite(Dual::new(1.0, f64::NAN)));
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod error;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;
+pub mod interval;
 pub mod kernel;
 #[cfg(feature = "alloc")]
 pub mod layout;

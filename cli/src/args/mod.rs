@@ -36,6 +36,7 @@ const EXAMPLES: &str = "Examples:
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
   mbd simulate models/double_pendulum.toml            ten seconds, as CSV and as a picture
   mbd eval robot.urdf --input states.json             numbers out, to compare with other programs
+  mbd certify robot.urdf --box states.json            guaranteed bounds over a box of states
   mbd explain robot.urdf --after frames               intermediate results of the generator
 
 Findings, notices and progress go to standard error, results to standard output.
@@ -60,6 +61,8 @@ pub enum Command {
     Generate(GenerateArgs),
     /// Evaluate states from a JSON file with the interpreter
     Eval(EvalArgs),
+    /// Bound outputs at a state or over a box of states, rounding errors included
+    Certify(CertifyArgs),
     /// Simulate with the interpreter; write a CSV file and a plot
     Simulate(SimulateArgs),
     /// Show intermediate results of the generator
@@ -308,6 +311,40 @@ pub enum Quantity {
     Multipliers,
 }
 
+/// `mbd certify`.
+#[derive(Args)]
+#[command(after_help = "Box:     {\"q\": [0.1, [-1, 1], ..], \"v\": [..], \"tau\": [..], \"a\": [..]}
+
+Each entry is a number or a pair [low, high]; `v`, `tau` and `a` are zeros where they are left out. Prescribed joints and wrenches
+are at zero, parameters have their defaults. As in `mbd eval`, all numbers of the model are taken exactly (--snap 0).
+
+Where all entries are numbers, every output is computed in doubles and printed with a bound on its error. Otherwise it is bounded
+over the box: by interval arithmetic, by the mean value form, and in parts (--split), of which the union is printed. All bounds
+hold for exact arithmetic with the numbers of the model as they were read. docs/trust.md says what that costs, and where bounds
+are too wide to be of use. An output without a bound is an error, after the others have been printed.")]
+pub struct CertifyArgs {
+    #[command(flatten)]
+    pub model: ModelArgs,
+    /// Box of states, JSON; `-` for standard input
+    #[arg(long = "box", value_name = "FILE")]
+    pub region: PathBuf,
+    /// Outputs, separated by commas: p, qd, pd, qdd, kinetic, potential, M, h, tau, phi, lambda [default: all but phi, lambda]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
+    pub outputs: Vec<Quantity>,
+    /// Number of parts into which the box is divided
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub split: u32,
+    /// Number of random states of the box that are evaluated in double-double numbers and compared with the bounds
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub samples: u32,
+    /// Angles this close to right angles are taken as exact, rad
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
+    pub snap: f64,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// `mbd simulate`.
 #[derive(Args)]
 #[command(
@@ -323,8 +360,13 @@ floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`
 neutral where it states none; loops are closed from there (from --q, if given) without moving `held` joints. Velocities then
 follow from those of the `held` joints; where none is held, they are the nearest ones that satisfy the constraints.
 
-Without dampers the energy is constant. Its change is an error of the simulation, and is printed relative to the largest
-kinetic energy. A large change shows a bad run, but a small one does not prove a good run: the error of the motion may be larger."
+Without dampers the energy is constant; with dampers it changes by their work. What it changes by otherwise is an error of the
+simulation. It is printed relative to the largest kinetic energy, as a multiple of the tolerance, and beside what errors of the
+tolerance in every step allow; a larger change gets a warning. A small one does not prove a good run: the error of the motion may
+be larger, and --trust measures it. With fixed steps, one step is compared with two of half its size at states of the run.
+
+Exit status 1 also where no digit can be trusted: a tolerance of 1 or more, a start between whose doubles lies a radian or
+metre, steps that do not follow the motion, energy that is lost, and with --trust errors as large as the motion."
 )]
 pub struct SimulateArgs {
     #[command(flatten)]
@@ -354,6 +396,10 @@ pub struct SimulateArgs {
     /// Initial velocities, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub v: Option<Vec<f64>>,
+    /// Run the motion again at a tenth of the tolerance (fixed steps: at a quarter of the step), or in double-double
+    /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
+    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
+    pub trust: Option<Trust>,
     /// Leave out the dampers of the model
     #[arg(long)]
     pub no_damping: bool,
@@ -387,6 +433,15 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
+}
+
+/// The second run of `--trust`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Trust {
+    /// By the same method, at a tenth of the tolerance or a quarter of the step
+    Tenth,
+    /// In double-double numbers, at a tenth of the tolerance
+    Wide,
 }
 
 /// `mbd explain`.

@@ -7,11 +7,14 @@ use multibody::runtime::Interpreter;
 use serde_json::{Map, Value};
 
 use super::outer::{Outer, Unit};
+use crate::verdict::UNIT;
 
 /// The contents of the file.
 pub struct Inputs {
     /// Run-time parameters of the model.
     pub params: Vec<f64>,
+    /// What was changed in the states, with its place.
+    pub warnings: Vec<Finding>,
     /// The states.
     pub states: Vec<State>,
 }
@@ -54,8 +57,11 @@ impl State {
 /// A finding: place in the file, what is wrong, what to do.
 pub type Finding = (String, String, String);
 
-/// Allowed difference of the length of a quaternion or a cosine-sine pair from one, for numbers with few decimals.
+/// Allowed difference of the length of a quaternion or a cosine-sine pair from one, for numbers with few decimals: they
+/// are scaled to unit length. Above [`UNIT`], that is reported.
 const UNIT_TOLERANCE: f64 = 1e-6;
+/// Differences of the length from one that are roundings: such numbers are taken as they stand.
+const UNIT_ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 const SHAPE: &str = "write {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..]}, ..]}";
 
@@ -66,10 +72,10 @@ pub fn read(text: &str, plan: &Plan, outer: &Outer) -> Result<Inputs, Vec<Findin
         let what = what.split(" at line ").next().unwrap_or(&what).to_string();
         vec![(format!(":{}:{}", e.line(), e.column()), what, "correct the JSON".to_string())]
     })?;
-    let mut reader = Reader { plan, outer, drives: Outer::drives(plan), findings: Vec::new() };
+    let mut reader = Reader { plan, outer, drives: Outer::drives(plan), findings: Vec::new(), warnings: Vec::new() };
     let inputs = reader.file(&value);
     match (inputs, reader.findings.is_empty()) {
-        (Some(inputs), true) => Ok(inputs),
+        (Some(inputs), true) => Ok(Inputs { warnings: reader.warnings, ..inputs }),
         _ => Err(reader.findings),
     }
 }
@@ -79,6 +85,7 @@ struct Reader<'a> {
     outer: &'a Outer,
     drives: Outer,
     findings: Vec<Finding>,
+    warnings: Vec<Finding>,
 }
 
 /// What a list of numbers stands for.
@@ -114,7 +121,7 @@ impl Reader<'_> {
             return None;
         };
         let states: Vec<Option<State>> = list.iter().enumerate().map(|(k, s)| self.state(k, s)).collect();
-        Some(Inputs { params, states: states.into_iter().collect::<Option<_>>()? })
+        Some(Inputs { params, warnings: Vec::new(), states: states.into_iter().collect::<Option<_>>()? })
     }
 
     fn params(&mut self, value: Option<&Value>) -> Vec<f64> {
@@ -154,19 +161,19 @@ impl Reader<'_> {
             let wanted = Wanted { key, names, required };
             self.numbers(&place, object, &wanted)
         };
-        let q = list("q", &outer.q_names, true);
+        let mut q = list("q", &outer.q_names, true);
         let v = list("v", &outer.v_names, true);
         let a = list("a", &outer.v_names, false);
         let tau = list("tau", &outer.v_names, false);
-        let drive_q = list("drive_q", &drive_q_names, false);
+        let mut drive_q = list("drive_q", &drive_q_names, false);
         let drive_v = list("drive_v", &drive_v_names, false);
         let drive_a = list("drive_a", &drive_v_names, false);
         let gravity = self.gravity(&place, object);
         let wrenches = self.wrenches(&place, object);
-        if let Some(q) = &q {
+        if let Some(q) = &mut q {
             self.units(&format!("{place}.q"), q, outer.units());
         }
-        if let Some(q) = &drive_q {
+        if let Some(q) = &mut drive_q {
             self.units(&format!("{place}.drive_q"), q, self.drives.units());
         }
         if self.findings.len() > before {
@@ -252,14 +259,22 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports quaternions and cosine-sine pairs that do not have unit length, because their results would be
-    /// meaningless.
-    fn units(&mut self, place: &str, q: &[f64], units: Vec<Unit>) {
+    /// Scales quaternions and cosine-sine pairs to unit length. Those that are far from it are findings: their results
+    /// would be meaningless.
+    fn units(&mut self, place: &str, q: &mut [f64], units: Vec<Unit>) {
         for unit in units {
-            let norm = q[unit.at..unit.at + unit.len].iter().fold(0.0_f64, |n, x| n.hypot(*x));
-            if (norm - 1.0).abs() > UNIT_TOLERANCE {
+            let numbers = &mut q[unit.at..unit.at + unit.len];
+            let norm = numbers.iter().fold(0.0_f64, |n, x| n.hypot(*x));
+            let off = (norm - 1.0).abs();
+            if off > UNIT_TOLERANCE {
                 let help = format!("scale {} to unit length", unit.what);
                 self.error(place, format!("{} has length {norm}, expected 1", unit.what), help);
+            } else if off > UNIT_ROUNDING {
+                numbers.iter_mut().for_each(|x| *x /= norm);
+                if off > UNIT {
+                    let what = format!("{} has length {norm}; it is scaled to unit length", unit.what);
+                    self.warnings.push((format!(": {place}"), what, "give more digits".to_string()));
+                }
             }
         }
     }

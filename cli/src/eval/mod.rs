@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
 use super::output::{note, write_file};
-use super::{loops, source, Failure, Outcome};
+use super::{condition, loops, source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;
 
@@ -80,6 +80,9 @@ pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
         }
         Failure::Shown
     })?;
+    for (place, what, help) in &inputs.warnings {
+        note(format_args!("{name}{place}: warning: {what}\n  help: {help}"));
+    }
     let wanted = match args.outputs.is_empty() {
         true => Quantity::value_variants(),
         false => &args.outputs[..],
@@ -116,6 +119,9 @@ fn evaluate(plan: &Plan, outer: &Outer, inputs: &Inputs, wanted: &[Quantity]) ->
         state.apply(&mut interpreter);
         if needs_rank {
             interpreter.check_rank(&state.q).map_err(|e| (k, source::rank_failure(&e)))?;
+            if let Some((what, help)) = condition::of_mass_matrix(plan, &mut interpreter, &state.q) {
+                note(format_args!("states[{k}]: warning: {what}\n  help: {help}"));
+            }
         }
         for open in loops::violated(plan, &mut interpreter, &state.q, &state.v) {
             note(format_args!("states[{k}]: warning: {open}"));

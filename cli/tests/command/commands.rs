@@ -9,10 +9,10 @@ use crate::run::*;
 #[test]
 fn help_teaches() {
     let output = good(run(&["--help"]));
-    for word in ["tour", "check", "count", "generate", "eval", "simulate", "explain", "Exit status"] {
+    for word in ["tour", "check", "count", "generate", "eval", "certify", "simulate", "explain", "Exit status"] {
         assert!(out(&output).contains(word), "{word}");
     }
-    for command in ["check", "count", "generate", "eval", "simulate", "explain"] {
+    for command in ["check", "count", "generate", "eval", "certify", "simulate", "explain"] {
         let output = good(run(&[command, "--help"]));
         assert!(out(&output).contains("--gravity"), "{command}");
     }

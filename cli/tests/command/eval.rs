@@ -3,7 +3,8 @@
 use crate::run::*;
 use serde_json::{json, Value};
 
-fn numbers(v: &Value) -> Vec<f64> {
+/// All numbers of a value, in order.
+pub fn numbers(v: &Value) -> Vec<f64> {
     match v {
         Value::Array(list) => list.iter().flat_map(numbers).collect(),
         v => vec![v.as_f64().expect("a number")],

@@ -1,7 +1,9 @@
 //! Tests of the command `mbd`, run as a program.
 
+mod certify;
 mod commands;
 mod documented;
 mod eval;
 mod loops;
 mod run;
+mod trust;

@@ -7,4 +7,5 @@ mod coverage;
 mod derivatives;
 mod equivalence;
 mod identities;
+mod intervals;
 mod toml_round_trip;

@@ -1,0 +1,73 @@
+//! What a simulation can be trusted for: refusals before it and warnings after it.
+
+use std::path::Path;
+
+use multibody::codegen::plan::Plan;
+use multibody::runtime::integrate::Step;
+
+use super::condition;
+use super::energy::Verdict;
+use super::motion::{interpreter, Record, Settings};
+use super::output::note;
+use super::probe::Probe;
+use super::{Failure, Outcome};
+
+/// Tolerances from here on leave no digit: momenta are then wrong by their own size in every step.
+pub const MEANINGLESS: f64 = 1.0;
+/// Distance of two doubles, rad or m, from which on a coordinate has no digits.
+const APART: f64 = 1.0;
+/// Difference of the length of a quaternion from one above which its scaling is reported.
+pub const UNIT: f64 = 1e-9;
+
+fn warn(path: &Path, what: &str, help: &str) {
+    note(format_args!("{}: warning: {what}\n  help: {help}", path.display()));
+}
+
+/// Looks at the start of a run.
+///
+/// # Errors
+/// Coordinates without digits.
+pub fn start(path: &Path, plan: &Plan, q: &[f64]) -> Outcome {
+    if let Some((name, apart)) = condition::spacing(plan, q).filter(|s| s.1 >= APART) {
+        let what =
+            format!("the start has no digits: doubles near the value of `{name}` are {apart:.1e} rad or m apart");
+        return Err(Failure::new(what, "start nearer to zero: --q, or the model's `start`"));
+    }
+    let mut interpreter = interpreter::<f64>(plan);
+    if let Some((what, help)) = condition::of_mass_matrix(plan, &mut interpreter, q) {
+        warn(path, &format!("at the start, {what}"), &help);
+    }
+    Ok(())
+}
+
+/// Reports what is wrong with a run. Returns whether any digit of it can be trusted.
+pub fn tell(path: &Path, plan: &Plan, settings: &Settings, record: &Record, found: (Verdict, Option<Probe>)) -> bool {
+    let (energy, probe) = found;
+    if let Some((what, help)) = &energy.warning {
+        warn(path, what, help);
+    }
+    let lost = probe.is_some_and(|probe| probe.lost);
+    if lost {
+        let what =
+            "the step is far too large: it does not follow the motion, and two steps of half its size end elsewhere";
+        warn(path, what, "lower --step, or leave it out for steps by the error");
+    }
+    let farthest = record.q.iter().filter_map(|q| condition::spacing(plan, q)).max_by(|a, b| a.1.total_cmp(&b.1));
+    if let (Step::Adaptive(tolerances), Some((name, apart))) = (settings.step, farthest) {
+        if apart > tolerances.rotations {
+            let what =
+                format!("doubles near the values of `{name}` are {apart:.1e} rad or m apart, more than the tolerance");
+            warn(path, &what, "start nearer to zero, or raise --tolerance");
+        }
+    }
+    !(energy.lost || lost)
+}
+
+/// Reports a run whose errors have reached the size of its motion. Returns whether any digit is left.
+pub fn digits(path: &Path, some_left: bool) -> bool {
+    if !some_left {
+        let help = "lower --tolerance or --step; where errors grow exponentially, lower --time";
+        warn(path, "no digit of the motion is left at the end", help);
+    }
+    some_left
+}
