@@ -293,15 +293,15 @@ impl LieJoint {
 
     /// The rotation of a displacement `x` in the chart about the middle of a step, `R = cay(ζ − ξ) cay(ξ) R₀` with half
     /// the step's rotation `ξ` in `half`, rewritten in the chart about its start.
-    pub(super) fn from_middle<S: Scalar>(&self, half: &[S], x: &mut [S]) {
+    pub(super) fn about_start<S: Scalar>(&self, half: &[S], x: &mut [S]) {
         if let Some(at) = self.phi() {
             let half = three(half, at);
             put(x, at, from(sub3(three(x, at), half), scale3(-S::one(), half)));
         }
     }
 
-    /// Inverse of [`LieJoint::from_middle`].
-    pub(super) fn to_middle<S: Scalar>(&self, half: &[S], x: &mut [S]) {
+    /// Inverse of [`LieJoint::about_start`].
+    pub(super) fn about_middle<S: Scalar>(&self, half: &[S], x: &mut [S]) {
         if let Some(at) = self.phi() {
             let half = three(half, at);
             put(x, at, add3(half, from(three(x, at), half)));
@@ -310,7 +310,7 @@ impl LieJoint {
 
     /// The rate `xd` of a rotation, which stands in `start` in the chart about the start and in `middle` in that about
     /// the middle, rewritten from the former to the latter.
-    pub(super) fn rate_to_middle<S: Scalar>(&self, half: &[S], start: &[S], middle: &[S], xd: &mut [S]) {
+    pub(super) fn rate_about_middle<S: Scalar>(&self, half: &[S], start: &[S], middle: &[S], xd: &mut [S]) {
         if let Some(at) = self.phi() {
             let spin = angular(three(start, at), three(xd, at));
             put(xd, at, phi_rate(sub3(three(middle, at), three(half, at)), spin));

@@ -55,8 +55,8 @@ where
         let half = self.half.as_ref();
         self.at.x.as_mut().copy_from_slice(x.as_ref());
         for group in system.lie_joints() {
-            group.to_middle(half, x.as_mut());
-            group.rate_to_middle(half, self.at.x.as_ref(), x.as_ref(), rate.as_mut());
+            group.about_middle(half, x.as_mut());
+            group.rate_about_middle(half, self.at.x.as_ref(), x.as_ref(), rate.as_mut());
         }
     }
 
@@ -76,8 +76,8 @@ where
     pub fn leave(&mut self, system: &Y, stages: &mut [Point<Y>]) {
         let half = self.half.as_ref();
         for group in system.lie_joints() {
-            stages.iter_mut().for_each(|z| group.from_middle(half, z.x.as_mut()));
-            group.from_middle(half, self.end.as_mut());
+            stages.iter_mut().for_each(|z| group.about_start(half, z.x.as_mut()));
+            group.about_start(half, self.end.as_mut());
         }
         self.halve(system);
     }
@@ -93,7 +93,7 @@ where
     pub fn seen_from(&mut self, system: &Y, point: &Point<Y>) -> &Point<Y> {
         self.at.copy_from(point);
         for group in system.lie_joints() {
-            group.to_middle(self.half.as_ref(), self.at.x.as_mut());
+            group.about_middle(self.half.as_ref(), self.at.x.as_mut());
         }
         &self.at
     }
@@ -101,7 +101,7 @@ where
     /// From the chart about the middle to that about the start.
     pub fn to_start(&self, system: &Y, x: &mut Y::Momenta) {
         for group in system.lie_joints() {
-            group.from_middle(self.half.as_ref(), x.as_mut());
+            group.about_start(self.half.as_ref(), x.as_mut());
         }
     }
 
@@ -119,9 +119,9 @@ where
         self.at.p.as_mut().copy_from_slice(end.as_ref());
         for group in system.lie_joints() {
             let (half, zero) = (self.half.as_ref(), self.at.x.as_ref());
-            group.rate_to_middle(half, zero, zero, first.as_mut());
-            group.to_middle(half, self.at.p.as_mut());
-            group.rate_to_middle(half, end.as_ref(), self.at.p.as_ref(), second.as_mut());
+            group.rate_about_middle(half, zero, zero, first.as_mut());
+            group.about_middle(half, self.at.p.as_mut());
+            group.rate_about_middle(half, end.as_ref(), self.at.p.as_ref(), second.as_mut());
         }
     }
 }
