@@ -11,7 +11,7 @@ use mbd_runtime::constrained::{
 };
 use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::system::Real;
-use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, Scalar, System};
+use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
 type Mechanism = Interpreter<f64>;
 type State = (Vec<f64>, Vec<f64>);
