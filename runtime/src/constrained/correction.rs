@@ -7,7 +7,6 @@ use super::rows::{named, worst};
 use super::ConstraintError;
 use crate::integrate::Chart;
 use crate::system::{Constrained, Real};
-#[cfg(feature = "alloc")]
 use crate::Scalar;
 
 /// What is done at the end of every step; see the module's table.

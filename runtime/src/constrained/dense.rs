@@ -5,10 +5,9 @@ use alloc::vec::Vec;
 
 use crate::system::Real;
 
-/// Rows that stand out of the others by less than this part of the largest count as dependent on them: the square root
-/// of the part of a pivot of `Φ M⁻¹ Φᵀ` that kernels leave a row out at.
+/// Rows that stand out of the others by less than this part of the largest count as dependent on them.
 pub(super) fn rank_tolerance<S: Real>() -> S {
-    S::rank_tolerance().sqrt()
+    S::constant(libm::cbrt(S::epsilon()))
 }
 
 fn dot<S: Real>(a: &[S], b: &[S]) -> S {
