@@ -93,9 +93,15 @@ fn lanes_are_vectors() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("assembly");
     std::fs::create_dir_all(&folder).expect("room for the assembly");
     let runtime = Path::new(env!("CARGO_MANIFEST_DIR")).join("../runtime/src/lib.rs");
-    // A stand-in for libm, the only dependency of the runtime. Only integrators use its functions, between steps.
-    let one = ["sqrt", "exp", "exp2", "log", "log2", "cbrt", "ceil"];
-    let one = one.map(|f| format!("pub fn {f}(x: f64) -> f64 {{ x.{}() }}\n", if f == "log" { "ln" } else { f }));
+    // A stand-in for libm, the only dependency of the runtime. Only integrators and intervals use its functions.
+    let one = ["sqrt", "exp", "exp2", "log", "log2", "cbrt", "ceil", "floor", "rint"].map(|f| {
+        let method = match f {
+            "log" => "ln",
+            "rint" => "round_ties_even",
+            _ => f,
+        };
+        format!("pub fn {f}(x: f64) -> f64 {{ x.{method}() }}\n")
+    });
     let stand_in = folder.join("libm.rs");
     std::fs::write(&stand_in, one.concat() + "pub fn pow(x: f64, y: f64) -> f64 { x.powf(y) }\n").expect("the source");
     rustc(&["--crate-name", "libm"], &stand_in, &folder);
