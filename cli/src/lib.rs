@@ -36,6 +36,7 @@ use clap::Parser;
 
 use args::{Arguments, Command};
 
+pub use args::HOLD;
 pub use output::{note, write_file};
 
 /// Reason why a command stopped.

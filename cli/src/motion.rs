@@ -7,9 +7,11 @@ use std::time::{Duration, Instant};
 
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
-use multibody::runtime::catalogue::{self, Drive, Start};
-use multibody::runtime::constrained::{ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation};
-use multibody::runtime::integrate::{Control, EnergyProjection, Statistics, Step, StepError};
+use multibody::runtime::catalogue::{self, BoxedMethod};
+use multibody::runtime::constrained::{
+    ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation, WithPostStep,
+};
+use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
 
 use super::energy::Balance;
@@ -218,29 +220,25 @@ pub fn momenta<S: Real>(interpreter: &mut Interpreter<S>, q: &Vec<S>, v: &[S]) -
     p
 }
 
-/// The method of the settings at the start of a motion.
+/// A solver with a method of the catalogue.
+pub type Driver<'a, Y> = Solver<Y, BoxedMethod<'a, Y>>;
+
+/// The method of the settings at the start of a motion, with the given step.
 pub fn driver(
     plan: &Plan,
     settings: &Settings,
     system: &mut Timed,
-    start: &Start<'_, Timed>,
+    step: Step,
+    (q, p): (&Vec<f64>, &Vec<f64>),
     met: &Rc<RefCell<Drift>>,
-) -> Outcome<Box<dyn Drive<Timed>>> {
-    let keeper =
-        |system: &Timed| Keeper { hold: Projection::new(system, settings.hold, settings.effort()), met: met.clone() };
-    let made = match system.rows().is_empty() {
-        true => catalogue::any(settings.method, system, start),
-        false => {
-            let post_step = keeper(system);
-            catalogue::implicit_with_post_step(settings.method, system, start, post_step).or_else(|| {
-                let post_step = keeper(system);
-                catalogue::explicit_with_post_step(settings.method, system, start, post_step)
-            })
-        }
-    };
-    let made =
-        made.ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
-    made.map_err(|e| failure(plan, settings, &e))
+) -> Outcome<Driver<'static, Timed>> {
+    let mut method = catalogue::any(settings.method, system, false)
+        .ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
+    if !system.rows().is_empty() {
+        let hold = Projection::new(system, settings.hold, settings.effort());
+        method = Box::new(WithPostStep::new(system, method, Keeper { hold, met: met.clone() }));
+    }
+    Solver::new(system, method, step, 0.0, q, p).map_err(|e| failure(plan, settings, &e))
 }
 
 /// Simulates from given coordinates and velocities, and records the motion.
@@ -258,14 +256,13 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         entries,
     };
     let mut system = Timed::new(interpreter);
-    let start = Start { q: &q, p: &p, step: settings.step, compensated: false };
     let met = Rc::new(RefCell::new(Drift::default()));
-    let mut driver = driver(plan, settings, &mut system, &start, &met)?;
+    let mut driver = driver(plan, settings, &mut system, settings.step, (&q, &p), &met)?;
     let mut projection = settings.project.then(|| EnergyProjection::new(&mut system, &q, &p, 3));
     observer.end(0.0, 0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
     let clock = Instant::now();
-    go(&mut *driver, &mut system, settings, &mut projection, &mut observer).map_err(|e| failure(plan, settings, &e))?;
+    go(&mut driver, &mut system, settings, &mut projection, &mut observer).map_err(|e| failure(plan, settings, &e))?;
     let total = clock.elapsed().as_secs_f64();
     let mut record = observer.record;
     record.statistics = driver.statistics();
@@ -278,7 +275,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
 
 /// Makes all steps to the end.
 fn go(
-    driver: &mut dyn Drive<Timed>,
+    driver: &mut Driver<Timed>,
     system: &mut Timed,
     settings: &Settings,
     projection: &mut Option<EnergyProjection<Timed>>,

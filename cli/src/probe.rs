@@ -4,7 +4,6 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use multibody::codegen::plan::Plan;
-use multibody::runtime::catalogue::Start;
 use multibody::runtime::integrate::Step;
 
 use super::displacement::{components, displacement, range};
@@ -39,9 +38,8 @@ pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Probe
     for (q, p) in record.q.iter().zip(&record.p).step_by(stride) {
         found.places += 1;
         let mut end = |parts: f64| -> Option<(Vec<f64>, Vec<f64>)> {
-            let start = Start { q, p, step: Step::Fixed(h / parts), compensated: false };
             let met = Rc::new(RefCell::new(Drift::default()));
-            let mut driver = driver(plan, settings, &mut system, &start, &met).ok()?;
+            let mut driver = driver(plan, settings, &mut system, Step::Fixed(h / parts), (q, p), &met).ok()?;
             driver.run(&mut system, h).ok()?;
             let (mut q, mut p) = (q.clone(), p.clone());
             driver.state(&system, &mut q, &mut p);

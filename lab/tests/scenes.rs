@@ -298,15 +298,15 @@ mod generated {
 /// methods must not fail because of that.
 #[test]
 fn implicit_steps_converge_on_chains() {
-    use multibody::runtime::catalogue::{any, entries, Start};
-    use multibody::runtime::integrate::Step;
+    use multibody::runtime::catalogue::{any, entries};
+    use multibody::runtime::integrate::{Solver, Step};
     for name in ["chain10", "chain10_friction"] {
         let scene = scenes::by_name(name).expect("a scene");
         for entry in entries().filter(|e| e.implicit) {
             let mut system = scene.interpreter::<f64>();
             let (q, p) = scene.start(&mut system);
-            let start = Start { q: &q, p: &p, step: Step::Fixed(5e-4), compensated: false };
-            let mut driver = any(entry.name, &mut system, &start).expect("a method").expect("a start");
+            let method = any(entry.name, &system, false).expect("a method");
+            let mut driver = Solver::new(&mut system, method, Step::Fixed(5e-4), 0.0, &q, &p).expect("a start");
             driver.run(&mut system, 0.02).unwrap_or_else(|e| panic!("{name}, {}: {e}", entry.name));
         }
     }

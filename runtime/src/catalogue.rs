@@ -2,13 +2,11 @@
 
 use alloc::boxed::Box;
 
-use crate::constrained::{PostStep, WithPostStep};
-use crate::integrate::StepDoubling;
 use crate::integrate::{Ab4, Ab6, Abm4, Abm6, Abm8, VariableAdams};
 use crate::integrate::{BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
 use crate::integrate::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
-use crate::integrate::{EnergyProjection, Limits, Solver, Statistics, Step, StepError, Stepper};
-use crate::system::{Differentiable, Energetic, Real, System};
+use crate::integrate::{StepDoubling, Stepper};
+use crate::system::{Differentiable, Real, System};
 
 /// What is known of a method before it is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,142 +22,30 @@ pub struct Entry {
     pub implicit: bool,
 }
 
-/// The functions of a [`Solver`] whose method is chosen at run time.
-pub trait Drive<Y: System> {
-    /// [`Solver::limits`].
-    fn limits(&mut self) -> &mut Limits;
-    /// [`Solver::run`].
-    ///
-    /// # Errors
-    /// [`StepError`].
-    fn run(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError>;
-    /// [`Solver::advance`].
-    ///
-    /// # Errors
-    /// [`StepError`].
-    fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError>;
-    /// [`Solver::time`].
-    fn time(&self) -> Y::Scalar;
-    /// [`Solver::last_step`].
-    fn last_step(&self) -> (Y::Scalar, Y::Scalar);
-    /// [`Solver::state`].
-    fn state(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta);
-    /// [`Solver::dense`].
-    fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta);
-    /// [`Solver::statistics`].
-    fn statistics(&self) -> Statistics;
-    /// [`Solver::project`].
-    fn project(&mut self, system: &mut Y, projection: &mut EnergyProjection<Y>)
-    where
-        Y: Energetic;
-}
+/// A method that is chosen at run time. It runs in a [`Solver`](crate::integrate::Solver) and takes post-steps
+/// ([`WithPostStep`](crate::constrained::WithPostStep)) like any other.
+pub type BoxedMethod<'a, Y> = Box<dyn Stepper<Y> + 'a>;
 
-impl<Y, M> Drive<Y> for Solver<Y, M>
-where
-    Y: System,
-    Y::Scalar: Real,
-    M: Stepper<Y>,
-{
-    fn limits(&mut self) -> &mut Limits {
-        &mut self.limits
-    }
-    fn run(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
-        Solver::run(self, system, t_end)
-    }
-    fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
-        Solver::advance(self, system, t_end)
-    }
-    fn time(&self) -> Y::Scalar {
-        Solver::time(self)
-    }
-    fn last_step(&self) -> (Y::Scalar, Y::Scalar) {
-        Solver::last_step(self)
-    }
-    fn state(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
-        Solver::state(self, system, q, p);
-    }
-    fn dense(&mut self, system: &mut Y, theta: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
-        Solver::dense(self, system, theta, q, p);
-    }
-    fn statistics(&self) -> Statistics {
-        Solver::statistics(self)
-    }
-    fn project(&mut self, system: &mut Y, projection: &mut EnergyProjection<Y>)
-    where
-        Y: Energetic,
-    {
-        Solver::project(self, system, projection);
-    }
-}
-
-/// Where a run starts, and how its steps are chosen.
-#[derive(Debug)]
-pub struct Start<'a, Y: System> {
-    /// Coordinates.
-    pub q: &'a Y::Coordinates,
-    /// Momenta.
-    pub p: &'a Y::Momenta,
-    /// Fixed step, or tolerances.
-    pub step: Step,
-    /// Whether sums are compensated, where the method supports it.
-    pub compensated: bool,
-}
-
-/// The result of asking for a method: `None` if no method has that name.
-pub type Made<'a, Y> = Option<Result<Box<dyn Drive<Y> + 'a>, StepError>>;
-
-fn boxed<'a, Y, M>(system: &mut Y, method: M, start: &Start<'_, Y>) -> Made<'a, Y>
-where
-    Y: System + 'a,
-    Y::Scalar: Real,
-    M: Stepper<Y> + 'a,
-{
-    let t = <Y::Scalar as crate::Scalar>::zero();
-    let solver = Solver::new(system, method, start.step, t, start.q, start.p);
-    Some(solver.map(|s| Box::new(s) as Box<dyn Drive<Y> + 'a>))
-}
-
-/// A table of methods, and the function that makes one of them at time zero.
+/// A table of methods, and the function that makes one of them.
 macro_rules! catalogue {
-    ($(#[$doc:meta])* $list:ident, $make:ident, $with_post_step:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
+    ($(#[$doc:meta])* $list:ident, $make:ident, $bound:ident, $implicit:literal, |$system:ident, $compensated:ident|
      { $($name:literal $title:literal $adaptive:literal $method:expr;)* }) => {
         $(#[$doc])*
         pub static $list: &[Entry] = &[
             $(Entry { name: $name, title: $title, adaptive: $adaptive, implicit: $implicit },)*
         ];
 
-        /// Makes a method by name, at time zero. A method without an error estimate accepts [`Step::Fixed`] only.
-        pub fn $make<'a, Y>(name: &str, $system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
+        /// Makes a method of this table by its name, with compensated sums where it supports them and they are asked
+        /// for. `None` if no method has that name.
+        pub fn $make<'a, Y>(name: &str, $system: &Y, $compensated: bool) -> Option<BoxedMethod<'a, Y>>
         where
             Y: $bound + 'a,
             Y::Scalar: Real,
         {
-            let $compensated = start.compensated;
-            match name {
-                $($name => {
-                    let method = $method;
-                    boxed($system, method, start)
-                })*
-                _ => None,
-            }
-        }
-
-        /// The method of that name with a post-step at the end of every step, see [`constrained`](crate::constrained).
-        pub fn $with_post_step<'a, Y, B>(name: &str, $system: &mut Y, start: &Start<'_, Y>, post_step: B) -> Made<'a, Y>
-        where
-            Y: $bound + 'a,
-            Y::Scalar: Real,
-            B: PostStep<Y> + 'a,
-        {
-            let $compensated = start.compensated;
-            match name {
-                $($name => {
-                    let method = $method;
-                    let method = WithPostStep::new($system, method, post_step);
-                    boxed($system, method, start)
-                })*
-                _ => None,
-            }
+            Some(match name {
+                $($name => Box::new($method),)*
+                _ => return None,
+            })
         }
     };
 }
@@ -177,7 +63,7 @@ macro_rules! sums {
 
 catalogue! {
     /// Methods that need the rates only.
-    EXPLICIT, explicit, explicit_with_post_step, System, false, |system, c| {
+    EXPLICIT, explicit, System, false, |system, c| {
         "euler" "Euler" false sums!(Euler, system, c);
         "semi-implicit-euler" "semi-implicit Euler" false sums!(SemiImplicitEuler, system, c);
         "midpoint" "explicit midpoint, order 2" false sums!(Midpoint, system, c);
@@ -200,7 +86,7 @@ catalogue! {
 
 catalogue! {
     /// Methods that need derivatives of the rates.
-    IMPLICIT, implicit, implicit_with_post_step, Differentiable, true, |system, c| {
+    IMPLICIT, implicit, Differentiable, true, |system, c| {
         "backward-euler" "backward Euler" false sums!(BackwardEuler, system, c);
         "implicit-midpoint" "implicit midpoint, order 2" false sums!(ImplicitMidpoint, system, c);
         "gauss4" "Gauss-Legendre, order 4" false sums!(Gauss4, system, c);
@@ -210,13 +96,13 @@ catalogue! {
     }
 }
 
-/// Makes any method by name, at time zero.
-pub fn any<'a, Y>(name: &str, system: &mut Y, start: &Start<'_, Y>) -> Made<'a, Y>
+/// Makes a method of either table by its name, as [`explicit`] and [`implicit`] do.
+pub fn any<'a, Y>(name: &str, system: &Y, compensated: bool) -> Option<BoxedMethod<'a, Y>>
 where
     Y: Differentiable + 'a,
     Y::Scalar: Real,
 {
-    implicit(name, system, start).or_else(|| explicit(name, system, start))
+    implicit(name, system, compensated).or_else(|| explicit(name, system, compensated))
 }
 
 /// All methods.

@@ -8,8 +8,8 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::runtime::catalogue;
-use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
-use multibody::runtime::integrate::{Step, Tolerances};
+use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation, WithPostStep};
+use multibody::runtime::integrate::{Solver, Step, Stepper, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, Interpreter, System};
 
@@ -157,6 +157,19 @@ fn broken(interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> f64 {
     interpreter.rows().iter().fold(0.0, |m: f64, row| m.max(rate(row).abs()))
 }
 
+/// A method of the catalogue that keeps the loops closed, at time zero and a state.
+fn solver(
+    system: &mut Interpreter<f64>,
+    method: &str,
+    step: Step,
+    (q, p): (&Vec<f64>, &Vec<f64>),
+) -> Solver<Interpreter<f64>, impl Stepper<Interpreter<f64>>> {
+    let method = catalogue::explicit(method, system, false).expect("a method of the catalogue");
+    let hold = Projection::new(system, Stabilisation::default(), Effort::default());
+    let method = WithPostStep::new(system, method, hold);
+    Solver::new(system, method, step, 0.0, q, p).expect("a start")
+}
+
 #[test]
 fn they_keep_their_loops_and_their_energy() {
     for case in &CASES {
@@ -167,12 +180,7 @@ fn they_keep_their_loops_and_their_energy() {
         system.momenta(&q, &v, &mut p);
         system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
         let tolerance = 1e-9;
-        let start =
-            catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(tolerance)), compensated: false };
-        let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
-        let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
-            .expect("it is there")
-            .expect("a start");
+        let mut driver = solver(&mut system, "verner9", Step::Adaptive(Tolerances::new(tolerance)), (&q, &p));
         let energy = |system: &mut Interpreter<f64>, q: &[f64], p: &[f64]| system.energy(q, p);
         let (kinetic, potential) = energy(&mut system, &q, &p);
         let (before, mut scale, mut worst, mut open, mut rate) =
@@ -218,10 +226,7 @@ fn a_parallelogram_passes_its_change_points() {
     system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
     let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = sum(system.energy(&q, &p));
-    let start = catalogue::Start { q: &q.clone(), p: &p.clone(), step: Step::Fixed(0.002), compensated: false };
-    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
-    let mut driver =
-        catalogue::explicit_with_post_step("dop853", &mut system, &start, hold).expect("it is there").expect("a start");
+    let mut driver = solver(&mut system, "dop853", Step::Fixed(0.002), (&q, &p));
     let (mut apart, mut lost, mut passed, mut above) = (0.0_f64, 0.0_f64, 0, true);
     while driver.time() < 2.0 {
         driver.advance(&mut system, 2.0).expect("a step");
@@ -249,16 +254,7 @@ fn a_change_point_takes_no_energy() {
     system.momenta(&q, &v, &mut p);
     let sum = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = sum(system.energy(&q, &p));
-    let start = catalogue::Start {
-        q: &q.clone(),
-        p: &p.clone(),
-        step: Step::Adaptive(Tolerances::new(1e-9)),
-        compensated: false,
-    };
-    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
-    let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
-        .expect("it is there")
-        .expect("a start");
+    let mut driver = solver(&mut system, "verner9", Step::Adaptive(Tolerances::new(1e-9)), (&q, &p));
     let (mut apart, mut lost) = (0.0_f64, 0.0_f64);
     while driver.time() < 4.5 {
         driver.advance(&mut system, 4.5).expect("a step");
@@ -302,11 +298,7 @@ fn the_bicycle_rides_as_published() {
     let (mut p, mut sigma) = (system.zero_momenta(), system.zero_rows());
     system.momenta(&q, &v, &mut p);
     system.project_momenta(0.0, &q, &mut p, &mut v, &mut sigma);
-    let start = catalogue::Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(1e-11)), compensated: false };
-    let hold = Projection::new(&system, Stabilisation::default(), Effort::default());
-    let mut driver = catalogue::explicit_with_post_step("verner9", &mut system, &start, hold)
-        .expect("it is there")
-        .expect("a start");
+    let mut driver = solver(&mut system, "verner9", Step::Adaptive(Tolerances::new(1e-11)), (&q, &p));
     let (mut q, mut p) = (q.clone(), p.clone());
     let h = 0.1;
     let lean = |q: &[f64]| 2.0 * (q[4] * q[5] + q[6] * q[3]);

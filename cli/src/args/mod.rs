@@ -10,7 +10,8 @@ use multibody::codegen::output;
 use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
-use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, snap, vector, HOLD};
+pub use values::HOLD;
+use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, snap, vector};
 
 pub use values::type_name;
 

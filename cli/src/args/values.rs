@@ -44,7 +44,7 @@ pub fn one_of<T: Copy + Send + Sync + 'static>(
         .map(move |given| choices.iter().find(|(_, word, _)| *word == given).expect("a word of the list").0)
 }
 
-/// How loops are kept closed.
+/// How loops are kept closed: by the value of `--hold`, and its help.
 pub const HOLD: [(Stabilisation, &str, &str); 5] = [
     (Stabilisation::None, "none", "Not at all: multipliers accumulate in the momenta, positions drift"),
     (

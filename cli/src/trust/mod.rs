@@ -7,15 +7,15 @@ mod tangent;
 use std::io::Write;
 
 use multibody::codegen::plan::Plan;
-use multibody::runtime::catalogue::Drive;
+use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::integrate::{Radau5, Solver, Step, StepError, Tolerances, Verner9};
 use multibody::runtime::wide::Wide;
-use multibody::runtime::{catalogue, Constrained, Differentiable, Interpreter, Real, Scalar, System};
+use multibody::runtime::{Constrained, Differentiable, Interpreter, Real, Scalar, System};
 
 use super::args::Trust;
 use super::displacement::displacement;
-use super::motion::{interpreter, momenta, simulate, Record, Settings};
+use super::motion::{interpreter, momenta, simulate, Driver, Record, Settings};
 use super::{Failure, Outcome};
 use report::Findings;
 
@@ -140,25 +140,19 @@ fn driver<'a, Y>(
     tolerances: Tolerances,
     settings: &Settings,
     closed: f64,
-) -> Result<Box<dyn Drive<Y> + 'a>, StepError>
+) -> Result<Driver<'a, Y>, StepError>
 where
     Y: Differentiable + Constrained + 'a,
     Y::Scalar: Real,
 {
     let (t, step) = (Y::Scalar::zero(), Step::Adaptive(tolerances));
     let implicit = catalogue::entry(settings.method).is_some_and(|e| e.implicit);
-    let effort = Effort { tolerance: closed, ..Effort::default() };
-    let hold = (!system.rows().is_empty()).then(|| Projection::new(system, settings.hold, effort));
-    Ok(match (implicit, hold) {
-        (false, None) => Box::new(Solver::new(system, Verner9::new(system), step, t, q, p)?),
-        (true, None) => Box::new(Solver::new(system, Radau5::new(system), step, t, q, p)?),
-        (false, Some(hold)) => {
-            let method = WithPostStep::new(system, Verner9::new(system), hold);
-            Box::new(Solver::new(system, method, step, t, q, p)?)
-        }
-        (true, Some(hold)) => {
-            let method = WithPostStep::new(system, Radau5::new(system), hold);
-            Box::new(Solver::new(system, method, step, t, q, p)?)
-        }
-    })
+    let mut method: BoxedMethod<'a, Y> =
+        if implicit { Box::new(Radau5::new(system)) } else { Box::new(Verner9::new(system)) };
+    if !system.rows().is_empty() {
+        let effort = Effort { tolerance: closed, ..Effort::default() };
+        let hold = Projection::new(system, settings.hold, effort);
+        method = Box::new(WithPostStep::new(system, method, hold));
+    }
+    Solver::new(system, method, step, t, q, p)
 }

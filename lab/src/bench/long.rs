@@ -4,8 +4,8 @@
 use std::time::Instant;
 
 use crate::scenes::Scene;
-use multibody::runtime::catalogue::{self, Start};
-use multibody::runtime::integrate::{EnergyProjection, Step};
+use multibody::runtime::catalogue;
+use multibody::runtime::integrate::{EnergyProjection, Solver, Step};
 use multibody::runtime::{Energetic, System};
 use serde::Serialize;
 
@@ -85,8 +85,8 @@ const LOOK: u64 = 16;
 
 fn long(scene: &Scene, system: &mut Erased<f64>, method: &str, step: Step, project: bool, t_end: f64) -> Option<Long> {
     let (mut q, mut p) = scene.start(system);
-    let start = Start { q: &q, p: &p, step, compensated: true };
-    let mut driver = catalogue::any(method, system, &start)?.ok()?;
+    let method = catalogue::any(method, system, true)?;
+    let mut driver = Solver::new(system, method, step, 0.0, &q, &p).ok()?;
     let total = |(kinetic, potential): (f64, f64)| kinetic + potential;
     let before = total(system.energies(&q, &p));
     let mut projection = EnergyProjection::new(system, &q, &p, 3);

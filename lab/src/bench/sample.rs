@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use multibody::runtime::catalogue::{self, Drive, Made, Start};
-use multibody::runtime::integrate::{Statistics, Step, StepError, Tolerances};
+use multibody::runtime::catalogue::{self, BoxedMethod};
+use multibody::runtime::integrate::{Solver, Statistics, Step, StepError, Tolerances};
 use multibody::runtime::{Energetic, Real, Scalar, System};
 use serde::{Deserialize, Serialize};
 
@@ -47,8 +47,20 @@ const SHORTEST: f64 = 0.02;
 /// Number of evaluations after which a run is stopped, because no method needs as many for a useful error.
 pub const MOST: u64 = 20_000_000;
 
-/// Makes a driver for a system.
-pub type Maker<'m, Y> = dyn for<'a, 'b> Fn(&'a mut Y, &'b Start<'b, Y>) -> Made<'static, Y> + 'm;
+/// Where a run starts, and how its steps are chosen.
+pub struct Start<'a, Y: System> {
+    /// Coordinates.
+    pub q: &'a Y::Coordinates,
+    /// Momenta.
+    pub p: &'a Y::Momenta,
+    /// Fixed step, or tolerances.
+    pub step: Step,
+    /// Whether sums are compensated, where the method supports it.
+    pub compensated: bool,
+}
+
+/// Makes a method for a system, with compensated sums or without.
+pub type Maker<'m, Y> = dyn Fn(&Y, bool) -> Option<BoxedMethod<'static, Y>> + 'm;
 
 /// Step of a method at a setting.
 pub fn step(method: &str, setting: f64) -> Step {
@@ -84,11 +96,12 @@ where
     Y::Scalar: Real,
 {
     let clock = Instant::now();
-    let mut driver: Box<dyn Drive<Y>> = match make(system, start)? {
+    let method = make(system, start.compensated)?;
+    let mut driver = match Solver::new(system, method, start.step, Y::Scalar::zero(), start.q, start.p) {
         Ok(driver) => driver,
         Err(e) => return Some(Err(e)),
     };
-    driver.limits().steps = MOST / 4;
+    driver.limits.steps = MOST / 4;
     let failure = driver.run(system, Y::Scalar::constant(t_end)).err();
     let (mut q, mut p) = (start.q.clone(), start.p.clone());
     driver.state(system, &mut q, &mut p);

@@ -1,8 +1,8 @@
 //! Stress runs: every method on every scene.
 
 use crate::scenes::{self, Scene};
-use multibody::runtime::catalogue::{self, Start};
-use multibody::runtime::integrate::Step;
+use multibody::runtime::catalogue;
+use multibody::runtime::integrate::{Solver, Step};
 use multibody::runtime::{Energetic, Interpreter, Real};
 use serde::Serialize;
 
@@ -83,10 +83,9 @@ fn go<S: Real + 'static>(
     let q: Vec<S> = scene.q.iter().map(|x| S::constant(*x)).collect();
     interpreter.check_rank(&q).map_err(|e| e.to_string())?;
     let (q, p) = scene.start(system);
-    let start = Start { q: &q, p: &p, step, compensated: true };
-    let made = catalogue::any(method, system, &start).ok_or("no such method")?;
-    let mut driver = made.map_err(|e| e.to_string())?;
-    driver.limits().steps = STEPS / scene.v.len() as u64;
+    let method = catalogue::any(method, system, true).ok_or("no such method")?;
+    let mut driver = Solver::new(system, method, step, S::zero(), &q, &p).map_err(|e| e.to_string())?;
+    driver.limits.steps = STEPS / scene.v.len() as u64;
     driver.run(system, S::constant(scene.t_end)).map_err(|e| e.to_string())?;
     let (mut q, mut p) = (q.clone(), p.clone());
     driver.state(system, &mut q, &mut p);

@@ -2,12 +2,12 @@
 
 use crate::generated::{visit_differentiable_f64, visit_f32, visit_f64, Visit, VisitDifferentiable};
 use crate::scenes::{Dynamics, Expect, Scene};
-use multibody::runtime::catalogue::{self, Entry, Start};
+use multibody::runtime::catalogue::{self, Entry};
 use multibody::runtime::wide::Wide;
 use multibody::runtime::{AccelerationForm, Differentiable, Energetic, Real};
 
 use super::erased::Erased;
-use super::sample::{end_error, measure, run, step, Maker, Sample};
+use super::sample::{end_error, measure, run, step, Maker, Sample, Start};
 use mbd_cli::note;
 
 /// Variant in which a scene is run.
@@ -106,7 +106,7 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
     let solve = |system: &mut Erased<f64>, method: &str| -> Option<Vec<f64>> {
         let (q, p) = scene.start(system);
         let start = Start { q: &q, p: &p, step: step(method, tight), compensated: true };
-        let make: &Maker<Erased<f64>> = &|s, start| catalogue::explicit(method, s, start);
+        let make: &Maker<Erased<f64>> = &|s, compensated| catalogue::explicit(method, s, compensated);
         let run = run(system, make, &start, scene.t_end)?.ok()?;
         run.failure.is_none().then_some(run.q)
     };
@@ -118,7 +118,7 @@ pub fn reference(scene: &Scene) -> Option<Reference> {
         let end = |tolerance: f64, system: &mut multibody::runtime::Interpreter<Wide>| {
             let start = Start { q: &q, p: &p, step: step("verner9", tolerance), compensated: false };
             let make: &Maker<multibody::runtime::Interpreter<Wide>> =
-                &|s, start| catalogue::explicit("verner9", s, start);
+                &|s, compensated| catalogue::explicit("verner9", s, compensated);
             let run = run(system, make, &start, scene.t_end)?.ok()?;
             run.failure.is_none().then(|| run.q.iter().map(|x| x.to_f64()).collect::<Vec<f64>>())
         };
@@ -224,19 +224,20 @@ fn one(scene: &Scene, reference: &Reference, variant: Variant, entry: &Entry) ->
                 _ => Erased::interpreted(scene),
             };
             let (q, p) = scene.start(&mut system);
-            let make: &Maker<Erased<f64>> = &|s, start| catalogue::any(entry.name, s, start);
+            let make: &Maker<Erased<f64>> = &|s, compensated| catalogue::any(entry.name, s, compensated);
             series(&mut system, make, scene, (&q, &p), reference, with)
         }
         Variant::Acceleration => {
             let mut system = AccelerationForm::new(generated(scene).0);
             let (q, v) = (scene.q.clone(), scene.v.clone());
-            let make: &Maker<AccelerationForm<Erased<f64>>> = &|s, start| catalogue::explicit(entry.name, s, start);
+            let make: &Maker<AccelerationForm<Erased<f64>>> =
+                &|s, compensated| catalogue::explicit(entry.name, s, compensated);
             series(&mut system, make, scene, (&q, &v), reference, with)
         }
         Variant::Single => {
             let Some(mut system) = visit_f32(scene.name, Boxed(scene)) else { return Vec::new() };
             let (q, p) = scene.start(&mut system);
-            let make: &Maker<Erased<f32>> = &|s, start| catalogue::explicit(entry.name, s, start);
+            let make: &Maker<Erased<f32>> = &|s, compensated| catalogue::explicit(entry.name, s, compensated);
             series(&mut system, make, scene, (&q, &p), reference, with)
         }
     }

@@ -7,9 +7,9 @@ use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
-use multibody::runtime::catalogue::{self, Start};
-use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation};
-use multibody::runtime::integrate::{Step, StepError, Tolerances};
+use multibody::runtime::catalogue;
+use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation, WithPostStep};
+use multibody::runtime::integrate::{Solver, Step, StepError, Tolerances};
 use multibody::runtime::{Constrained, Interpreter, System};
 
 use super::mechanisms::Mechanism;
@@ -84,7 +84,7 @@ impl Subject {
         let whole: Vec<&Run> = runs.iter().filter(|run| run.end == End::Whole).collect();
         Judged {
             // An error that is not a number is lost too.
-            lost: whole.iter().filter(|run| !(run.energy <= allowed)).count(),
+            lost: whole.iter().filter(|run| run.energy.is_nan() || run.energy > allowed).count(),
             refused: runs.iter().filter(|run| matches!(run.end, End::Error(_))).count(),
             capped: runs.iter().filter(|run| run.end == End::Steps).count(),
             error: whole.iter().fold(0.0, |most, run| run.energy.max(most)),
@@ -145,10 +145,10 @@ impl Subject {
         let (kinetic, potential) = observer.energy(&q, &p);
         let begun = kinetic + potential;
         let projection = Projection::new(&system, way.hold, Effort::within(way.tolerance));
-        let start = Start { q: &q, p: &p, step: Step::Adaptive(Tolerances::new(way.tolerance)), compensated: false };
-        let made = catalogue::implicit_with_post_step(way.method, &mut system, &start, projection.clone())
-            .or_else(|| catalogue::explicit_with_post_step(way.method, &mut system, &start, projection));
-        let mut solver = made.expect("a method of the catalogue").expect("a start that is closed");
+        let method = catalogue::any(way.method, &system, false).expect("a method of the catalogue");
+        let method = WithPostStep::new(&system, method, projection);
+        let step = Step::Adaptive(Tolerances::new(way.tolerance));
+        let mut solver = Solver::new(&mut system, method, step, 0.0, &q, &p).expect("a start that is closed");
         let mut run = Run { speed, energy: 0.0, steps: 0, end: End::Whole };
         let (mut worst, mut most) = (0.0_f64, kinetic);
         while solver.time() < self.mechanism.time {

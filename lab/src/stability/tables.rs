@@ -4,21 +4,12 @@ use std::fmt::Write as _;
 use std::io::Write;
 
 use multibody::runtime::catalogue;
-use multibody::runtime::constrained::Stabilisation;
 
 use super::change_points::{Judged, Subject, Way};
 use super::mechanisms::{singular, smooth, Mechanism};
 use crate::args::stability::ChangePointArgs;
-use mbd_cli::{note, write_file, Outcome};
+use mbd_cli::{note, write_file, Outcome, HOLD};
 
-/// Stabilisations by the names that `--hold` has for them.
-pub const HOLDS: [(&str, Stabilisation); 5] = [
-    ("none", Stabilisation::None),
-    ("momenta", Stabilisation::Momenta),
-    ("mass", Stabilisation::Mass),
-    ("gradient", Stabilisation::Gradient),
-    ("partition", Stabilisation::Partition),
-];
 /// The default method, which is run at all speeds.
 const DEFAULT: &str = "verner9";
 /// Number of speeds of the mechanism for comparison.
@@ -76,7 +67,7 @@ fn rows(
 ) -> Outcome<usize> {
     let subject = Subject::new(mechanism);
     let mut lost = 0;
-    for (name, hold) in HOLDS.into_iter().filter(|(name, _)| chosen(&args.holds, name)) {
+    for (hold, name, _) in HOLD.into_iter().filter(|(_, name, _)| chosen(&args.holds, name)) {
         note(format_args!("{}: --hold {name}", subject.mechanism.name));
         for method in catalogue::entries().filter(|e| e.adaptive && chosen(&args.methods, e.name)).map(|e| e.name) {
             for &tolerance in &args.tolerances {

@@ -19,8 +19,8 @@ pub(super) struct Basic<S> {
     pub lus: Vec<Lu<S>>,
     /// Number of independent rows of every block in the last solution.
     ranks: Vec<usize>,
-    /// First row of the first block of which that number has changed since.
-    pub changed: Option<usize>,
+    /// The same at the end of the last step.
+    noted: Vec<usize>,
     b: Vec<S>,
     x: Vec<S>,
     work: Vec<S>,
@@ -37,7 +37,7 @@ impl<S: Real> Basic<S> {
             pairs: blocks.list.iter().map(|b| Vec::with_capacity(b.rows.len())).collect(),
             lus: blocks.list.iter().map(|b| Lu::new(b.rows.len())).collect(),
             ranks: vec![0; blocks.list.len()],
-            changed: None,
+            noted: vec![0; blocks.list.len()],
             b: vec![S::zero(); m],
             x: vec![S::zero(); n],
             work: vec![S::zero(); mn],
@@ -64,12 +64,10 @@ impl<S: Real> Basic<S> {
     fn solve_least(&mut self, residual: &[S], dq: &mut [S]) -> usize {
         dq.fill(S::zero());
         let mut rank = 0;
-        self.changed = None;
         for (k, (block, basis)) in self.blocks.list.iter().zip(&mut self.bases).enumerate() {
             let (m, n) = (block.rows.len(), block.columns.len());
-            let own = basis.factor(&block.a, m, n);
-            note(&mut self.changed, &mut self.ranks[k], own, block);
-            rank += own;
+            self.ranks[k] = basis.factor(&block.a, m, n);
+            rank += self.ranks[k];
             for (b, r) in self.b.iter_mut().zip(&block.rows) {
                 *b = -residual[*r];
             }
@@ -122,14 +120,21 @@ impl<S: Real> Basic<S> {
         self.blocks.fill(entries);
         dq.fill(S::zero());
         let rank = self.choose();
-        self.changed = None;
         for k in 0..self.pairs.len() {
-            note(&mut self.changed, &mut self.ranks[k], self.pairs[k].len(), &self.blocks.list[k]);
+            self.ranks[k] = self.pairs[k].len();
             // Pivots were found: the factors exist.
             self.factor(k);
             self.solve(k, residual, dq);
         }
         rank
+    }
+
+    /// Notes the ranks of the last solution at the end of a step. Returns the first row of the first block whose rank
+    /// has changed since the end of the step before.
+    pub fn note(&mut self) -> Option<usize> {
+        let changed = self.ranks.iter().zip(&self.noted).position(|(rank, before)| rank != before);
+        self.noted.copy_from_slice(&self.ranks);
+        self.blocks.list[changed?].rows.first().copied()
     }
 
     /// Takes `Φᵀ Φ_d⁻ᵀ f_d` off forces `f` of a factored block: nothing is left at its dependents.
@@ -169,12 +174,4 @@ impl<S: Real> Basic<S> {
         }
         found
     }
-}
-
-/// Notes the rank of a block, and its first row if it is the first block whose rank differs from what it was.
-fn note<S>(changed: &mut Option<usize>, old: &mut usize, rank: usize, block: &Block<S>) {
-    if *old != rank && changed.is_none() {
-        *changed = block.rows.first().copied();
-    }
-    *old = rank;
 }

@@ -85,7 +85,7 @@ pub(super) struct Corrector<Y: Constrained> {
     effort: Effort,
     /// Largest residual before the last correction.
     pub found: Y::Scalar,
-    /// Number of independent rows then.
+    /// Number of independent rows in its last iteration.
     pub rank: usize,
     /// The last end of a step.
     noted: Option<Noted<Y::Scalar>>,
@@ -151,14 +151,14 @@ where
             // Only the ratio of the signs matters.
             (*older, *old) = if root < zero { (-*old, -root) } else { (*old, root) };
         }
+        #[cfg(feature = "alloc")]
+        if let Some(basic) = &mut self.basic {
+            left = basic.note();
+        }
         let event = match last {
             // Where the rank rises, the position has been noted already.
             Some(last) if last.rank < rank => None,
-            Some(last) if last.rank > rank => {
-                #[cfg(feature = "alloc")]
-                let left = self.basic.as_ref().map_or(left, |basic| basic.changed);
-                Some((left.unwrap_or(0), t, [last.rank, rank]))
-            }
+            Some(last) if last.rank > rank => Some((left.unwrap_or(0), t, [last.rank, rank])),
             _ => found.map(|(row, time)| (row, time, [rank; 2])),
         };
         if let Some((row, time, ranks)) = event {
@@ -195,11 +195,10 @@ where
     ) -> Result<(), ConstraintError> {
         let Effort { iterations, tolerance, .. } = self.effort;
         for k in 0..iterations {
-            let rank = self.solve(room, system, q);
+            self.rank = self.solve(room, system, q);
             let (at, size) = worst(room.residual.as_ref());
             if k == 0 {
                 self.found = size;
-                self.rank = rank;
             }
             if !size.is_finite() {
                 return Err(ConstraintError::NotFinite { index: at });

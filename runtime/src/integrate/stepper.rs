@@ -148,6 +148,97 @@ where
     }
 }
 
+/// A method on the heap: what the [`catalogue`](crate::catalogue) makes. A call goes through a table of functions once
+/// a part of a step, and the rates are called directly.
+#[cfg(feature = "alloc")]
+impl<Y, M> Stepper<Y> for alloc::boxed::Box<M>
+where
+    Y: System,
+    Y::Scalar: Real,
+    M: Stepper<Y> + ?Sized,
+{
+    fn order(&self) -> u32 {
+        (**self).order()
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        (**self).error_order()
+    }
+
+    fn share(&self) -> f64 {
+        (**self).share()
+    }
+
+    fn begin(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        (**self).begin(system, t, q, p)
+    }
+
+    fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
+        (**self).resume(system, t, q, p)
+    }
+
+    fn attempt(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        (**self).attempt(system, t, h, scale)
+    }
+
+    fn advise(&mut self) -> Option<f64> {
+        (**self).advise()
+    }
+
+    fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
+        (**self).parts()
+    }
+
+    fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
+        (**self).start_rate(system, t)
+    }
+
+    fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
+        (**self).end_rate(system, t, h)
+    }
+
+    fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        (**self).accept(system, t, h)
+    }
+
+    fn finish(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
+        (**self).finish(system, t, h)
+    }
+
+    fn corrected(&mut self) {
+        (**self).corrected()
+    }
+
+    fn remembers(&self) -> bool {
+        (**self).remembers()
+    }
+
+    fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
+        (**self).interpolate(system, t, h, theta, out)
+    }
+
+    fn statistics(&self) -> Statistics {
+        (**self).statistics()
+    }
+
+    fn step(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), StepError> {
+        (**self).step(system, t, h, q, p)
+    }
+}
+
 /// Cubic through both ends and their rates, for [`Stepper::interpolate`].
 pub(crate) fn hermite<Y: System>(
     h: Y::Scalar,

@@ -294,15 +294,10 @@ fn every_method_by_its_name() {
     let mut fine = held(&y, Dop853::new(&y), Stabilisation::Mass);
     let reference = march(&mut y, &mut fine, 1000, end, &start);
     for entry in catalogue::entries() {
-        let from = catalogue::Start { q: &start.0, p: &start.1, step: Step::Fixed(1e-3), compensated: false };
-        let hold = |y: &Mechanism| Projection::new(y, Stabilisation::Mass, Effort::default());
-        let post_step = hold(&y);
-        let made = if entry.implicit {
-            catalogue::implicit_with_post_step(entry.name, &mut y, &from, post_step)
-        } else {
-            catalogue::explicit_with_post_step(entry.name, &mut y, &from, post_step)
-        };
-        let mut solver = made.expect(entry.name).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
+        let method = catalogue::any(entry.name, &y, false).expect(entry.name);
+        let method = held(&y, method, Stabilisation::Mass);
+        let made = Solver::new(&mut y, method, Step::Fixed(1e-3), 0.0, &start.0, &start.1);
+        let mut solver = made.unwrap_or_else(|e| panic!("{}: {e}", entry.name));
         let (mut q, mut p) = start.clone();
         solver.run(&mut y, end).unwrap_or_else(|e| panic!("{}: {e}", entry.name));
         solver.state(&y, &mut q, &mut p);

@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use mbd_runtime::catalogue::{self, Entry, Start};
-use mbd_runtime::constrained::{Effort, Projection, Stabilisation};
-use mbd_runtime::integrate::{Statistics, Step, StepError, Tolerances};
+use mbd_runtime::catalogue::{self, Entry};
+use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
+use mbd_runtime::integrate::{Solver, Statistics, Step, StepError, Tolerances};
 use mbd_runtime::{Interpreter, System};
 use mbd_testing::motions::{Motion, MOTIONS};
 
@@ -23,15 +23,12 @@ fn run(
     tolerance: f64,
 ) -> Result<(f64, Statistics), StepError> {
     let mut system = system.clone();
-    let start = Start { q, p, step: Step::Adaptive(Tolerances::new(tolerance)), compensated: false };
-    let made = if motion.constrained {
+    let mut method = catalogue::any(method, &system, false).expect("the catalogue has the method");
+    if motion.constrained {
         let close = Projection::new(&system, Stabilisation::Mass, Effort::default());
-        catalogue::implicit_with_post_step(method, &mut system, &start, close.clone())
-            .or_else(|| catalogue::explicit_with_post_step(method, &mut system, &start, close))
-    } else {
-        catalogue::any(method, &mut system, &start)
-    };
-    let mut solver = made.expect("the catalogue has the method")?;
+        method = Box::new(WithPostStep::new(&system, method, close));
+    }
+    let mut solver = Solver::new(&mut system, method, Step::Adaptive(Tolerances::new(tolerance)), 0.0, q, p)?;
     solver.run(&mut system, END)?;
     let (mut q, mut p) = (system.neutral(), system.zero_momenta());
     solver.state(&system, &mut q, &mut p);
