@@ -99,21 +99,24 @@ where
     fn sums<const M: usize>(&self, weights: [&[Y::Scalar]; M], new: &Point<Y>, mut out: [&mut Point<Y>; M]) {
         let rate = |j: usize| if j == 0 { new } else { self.rate(j - 1) };
         let count = weights.iter().map(|w| w.len()).min().unwrap_or(0);
-        let part = |j: usize, m: usize| weights[m].get(j).copied().unwrap_or(Y::Scalar::zero());
+        let fours = count / 4 * 4;
         out.iter_mut().for_each(|out| out.clear());
-        for j in (0..count).step_by(4) {
-            // Four terms at once need fewer loads and stores. What is beyond the last one counts nothing.
-            let w: [[Y::Scalar; 4]; M] = core::array::from_fn(|m| [0, 1, 2, 3].map(|i| part(j + i, m)));
-            let rates = [0, 1, 2, 3].map(|i| rate((j + i).min(count - 1)).parts());
-            for p in 0..2 {
-                let [a, b, c, d] = rates.map(|rate| rate[p]);
-                for (w, out) in w.iter().zip(&mut out) {
-                    let out = &mut *out.parts_mut()[p];
-                    let (a, b, c, d) = (&a[..out.len()], &b[..out.len()], &c[..out.len()], &d[..out.len()]);
+        for j in (0..fours).step_by(4) {
+            // Four terms at once need fewer loads and stores.
+            let rates = [0, 1, 2, 3].map(|i| rate(j + i).parts());
+            for (w, out) in weights.iter().zip(&mut out) {
+                let w = &w[j..j + 4];
+                for (part, out) in out.parts_mut().into_iter().enumerate() {
+                    let [a, b, c, d] = rates.map(|rate| &rate[part][..out.len()]);
                     for i in 0..out.len() {
                         out[i] = out[i] + ((w[0] * a[i] + w[1] * b[i]) + (w[2] * c[i] + w[3] * d[i]));
                     }
                 }
+            }
+        }
+        for j in fours..count {
+            for (w, out) in weights.iter().zip(&mut out) {
+                out.add(w[j], rate(j));
             }
         }
     }
