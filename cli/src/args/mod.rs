@@ -10,10 +10,9 @@ use multibody::codegen::output;
 use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
 use multibody::runtime::constrained::Stabilisation;
-pub use values::HOLD;
 use values::{camel_case, finite, methods, one_of, outputs, positive, rust_path, snap, vector};
 
-pub use values::type_name;
+pub use values::{type_name, HOLD};
 
 /// Parser of an option whose values the library lists.
 macro_rules! choice {

@@ -361,8 +361,8 @@ where
 pub struct Repartition {
     /// Whether each step starts with `σ = 0` instead of `p_dep = 0`: `p_dep` is then that of `M v`, and constant during
     /// the step. This costs one more solve in each step. Choose it for motions through singular positions: near them the
-    /// multipliers of the gauge `p_dep = 0` grow without bound, and the rows that are left out there take theirs with
-    /// them, a thousandth of the energy at once. Not for methods that use rates of past steps, whose gauge must not change.
+    /// multipliers of the gauge `p_dep = 0` grow without bound, and energy is lost where a row is left out, a thousandth of
+    /// it at once. Not for methods that use rates of past steps, whose gauge must not change.
     pub project_momenta: bool,
 }
 
