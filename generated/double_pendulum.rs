@@ -1321,6 +1321,14 @@ impl ::multibody::runtime::System for DoublePendulum {
     }
 
     #[inline]
+    fn rates_in_lanes<const LANES: usize>(&mut self, _t: &[f64; LANES], q: &[[f64; LANES]], p: &[[f64; LANES]], qd: &mut [[f64; LANES]], pd: &mut [[f64; LANES]]) -> bool {
+        let (Ok(q), Ok(p), Ok(qd), Ok(pd)) = (::core::convert::TryFrom::try_from(q), ::core::convert::TryFrom::try_from(p), ::core::convert::TryFrom::try_from(qd), ::core::convert::TryFrom::try_from(pd)) else { return false };
+        let (q, p, qd, pd): (&[[f64; LANES]; 2], &[[f64; LANES]; 2], &mut [[f64; LANES]; 2], &mut [[f64; LANES]; 2]) = (q, p, qd, pd);
+        ::multibody::runtime::kernel::call_lanes::<Self, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
+        true
+    }
+
+    #[inline]
     fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
         match part {
             ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),

@@ -41,6 +41,10 @@ cd "$work"
 ./pinocchio "$work" reference >reference.jsonl
 ./pinocchio "$work" evaluation >evaluation.jsonl
 { ./pinocchio "$work" "$rounds"; ./mujoco "$work" "$rounds"; drake "$work" "$rounds"; } >rivals.jsonl
+if [ "${MBD:-}" ]; then
+    # heyoka takes the operations that the project's program generates.
+    "$python" "$here/heyoka_run.py" "$MBD" "$rounds" "$work" >>rivals.jsonl
+fi
 "$python" "$here/runaway.py" ${MBD:+"$MBD"} >runaway.jsonl
 # After all is written, so that what disagrees can be looked at.
 "$python" "$here/check.py" "$work" ${MBD:+"$MBD"} >check.txt || { cat check.txt; exit 1; }

@@ -3,7 +3,7 @@
 use alloc::boxed::Box;
 
 use crate::integrate::{Ab4, Ab6, Abm4, Abm6, Abm8, VariableAdams};
-use crate::integrate::{BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
+use crate::integrate::{BackwardEuler, Gauss12FixedPoint, Gauss16, Gauss4, Gauss6, ImplicitMidpoint, Radau5, Rodas5P};
 use crate::integrate::{CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, SemiImplicitEuler, Tsit5, Verner9};
 use crate::integrate::{StepDoubling, Stepper};
 use crate::system::{Differentiable, Real, System};
@@ -81,6 +81,7 @@ catalogue! {
         "abm8" "Adams-Bashforth-Moulton, order 8" false sums!(Abm8, system, c);
         "adams" "Adams-Bashforth-Moulton, variable steps and orders" true sums!(VariableAdams, system, c);
         "gauss12" "Gauss-Legendre, order 12, by fixed-point iteration" false sums!(Gauss12FixedPoint, system, c);
+        "gauss16" "Gauss-Legendre, order 16, all stages at once" true sums!(Gauss16, system, c);
     }
 }
 

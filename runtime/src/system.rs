@@ -96,6 +96,21 @@ pub trait System {
         qd: &mut Self::Coordinates,
         pd: &mut Self::Momenta,
     );
+    /// Rates of several states at once, side by side: `q[k][l]` is coordinate `k` of the state in lane `l`, which is at
+    /// time `t[l]`, s. `q` and `qd` have `nq` rows, `p` and `pd` `nv`. Returns whether it has computed them: generated
+    /// code does, in vector registers and with the bits of [`System::rates_at`]; others evaluate one state after the
+    /// other.
+    #[inline]
+    fn rates_in_lanes<const LANES: usize>(
+        &mut self,
+        _t: &[Self::Scalar; LANES],
+        _q: &[[Self::Scalar; LANES]],
+        _p: &[[Self::Scalar; LANES]],
+        _qd: &mut [[Self::Scalar; LANES]],
+        _pd: &mut [[Self::Scalar; LANES]],
+    ) -> bool {
+        false
+    }
     /// Name of a part, for messages; `None` where it is not known.
     fn part_name(&self, _part: Part) -> Option<&str> {
         None

@@ -4,7 +4,7 @@
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
-use multibody::runtime::integrate::{Rk4, Stepper};
+use multibody::runtime::integrate::{Gauss16, Rk4, Solver, Step, Stepper, Tolerances};
 use multibody::runtime::system::Part;
 use multibody::runtime::{Interpreter, System};
 
@@ -188,4 +188,47 @@ fn inline_descriptions() {
     made::Sled::new().mass_matrix(&[0.0; 3], &mut m);
     assert_eq!(m, [[2.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]]);
     assert_eq!(warned::Warned::NV, 1);
+}
+
+/// The rates of states side by side have the bits of those one by one, and so a method that evaluates its stages at once
+/// gives the bits that the interpreter gives, which has no lanes.
+#[test]
+fn stages_at_once_have_the_same_bits() {
+    fn check<const NQ: usize, const NV: usize, Y>(mut made: Y, (mut interpreter, q): (Interpreter<f64>, Vec<f64>))
+    where
+        Y: System<Scalar = f64, Coordinates = [f64; NQ], Momenta = [f64; NV]>,
+    {
+        let p: [f64; NV] = core::array::from_fn(|k| 0.1 + 0.05 * k as f64);
+        let q: [f64; NQ] = q.try_into().expect("as many coordinates");
+        let (rows_q, rows_p) = (q.map(|x| [0.0, 0.01, 0.02].map(|dx| x + dx)), p.map(|x| [x, x + 0.3, x - 0.7]));
+        let (mut rows_qd, mut rows_pd) = ([[0.0; 3]; NQ], [[0.0; 3]; NV]);
+        assert!(made.rates_in_lanes(&[0.0; 3], &rows_q, &rows_p, &mut rows_qd, &mut rows_pd));
+        assert!(!made.rates_in_lanes(&[0.0; 3], &rows_q[1..], &rows_p, &mut rows_qd, &mut rows_pd), "a row is missing");
+        for lane in 0..3 {
+            let (q, p) = (rows_q.map(|row| row[lane]), rows_p.map(|row| row[lane]));
+            let (mut qd, mut pd) = ([0.0; NQ], [0.0; NV]);
+            made.rates_at(0.0, &q, &p, &mut qd, &mut pd);
+            assert_eq!((qd, pd), (rows_qd.map(|row| row[lane]), rows_pd.map(|row| row[lane])));
+        }
+        let step = Step::Adaptive(Tolerances::new(1e-9));
+        let method = Gauss16::new(&made);
+        let mut solver = Solver::new(&mut made, method, step, 0.0, &q, &p).expect("a start");
+        solver.run(&mut made, 0.3).expect("a motion");
+        let (mut q1, mut p1) = (q, p);
+        solver.state(&made, &mut q1, &mut p1);
+        let method = Gauss16::new(&interpreter);
+        let mut solver = Solver::new(&mut interpreter, method, step, 0.0, &q.to_vec(), &p.to_vec()).expect("a start");
+        solver.run(&mut interpreter, 0.3).expect("a motion");
+        let (mut q2, mut p2) = (q.to_vec(), p.to_vec());
+        solver.state(&interpreter, &mut q2, &mut p2);
+        assert_eq!((&q1[..], &p1[..]), (&q2[..], &p2[..]));
+        assert_ne!(q1, q);
+    }
+    let start = |file, base| {
+        let interpreter = interpreter(file, base);
+        let q = interpreter.neutral();
+        (interpreter, q)
+    };
+    check(made::Ur5::new(), start("models/ur5.urdf", Base::Fixed));
+    check(made::Solo12::new(), start("models/solo12.urdf", Base::Floating));
 }

@@ -77,7 +77,7 @@ pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates:
     lanes::kernels(&mut out, options, &kernels);
     lanes::lanes_type(&mut out, options, &fields, &kernels);
     fields::default(&mut out, "", &options.type_name);
-    traits::traits(&mut out, plan, options);
+    traits::traits(&mut out, plan, options, &kernels);
     if rates {
         lanes::batch_trait(&mut out, plan, options);
     }

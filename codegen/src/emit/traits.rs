@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use mbd_runtime::tree::Source;
 
 use super::fields::neutral;
+use super::head::tuple;
+use super::lanes::Kernel;
 use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
@@ -38,17 +40,15 @@ impl Writer<'_> {
 }
 
 /// All implementations for which the type has the functions; none without the rates.
-pub fn traits(out: &mut String, plan: &Plan, options: &Options) {
+pub fn traits(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
     let t = options.precision.name();
     let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[{t}; {n}]"));
     let mut writer = Writer { out, options, t, q, v };
     let has = |output| options.outputs.contains(&output);
     let of_constraints =
         [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
-    if !has(Output::Rates) {
-        return;
-    }
-    writer.system(plan);
+    let Some(rates) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
+    writer.system(plan, rates);
     if has(Output::Momenta) {
         writer.conjugate();
     }
@@ -67,7 +67,7 @@ pub fn traits(out: &mut String, plan: &Plan, options: &Options) {
 }
 
 impl Writer<'_> {
-    fn system(&mut self, plan: &Plan) {
+    fn system(&mut self, plan: &Plan, rates: &Kernel) {
         let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
         let joints = plan.slots.iter().filter_map(|s| {
             let Some(Source::State { q, v }) = s.at else { return None };
@@ -91,6 +91,7 @@ impl Writer<'_> {
                 &format!("rates_at(&mut self, _t: {t}, q: &{q}, p: &{v}, qd: &mut {q}, pd: &mut {v})"),
                 "Self::rates(self, q, p, qd, pd);",
             ),
+            self.rates_in_lanes(plan, rates),
             method(
                 &format!("part_name(&self, part: {part}) -> Option<&str>"),
                 &format!(
@@ -104,6 +105,34 @@ impl Writer<'_> {
             ),
         ];
         self.implement("System", &items);
+    }
+
+    /// The rates of several states. Rows are arrays in the kernel, so that it checks no index.
+    fn rates_in_lanes(&self, plan: &Plan, rates: &Kernel) -> String {
+        let (rt, t) = (&self.options.runtime, self.t);
+        let states = ["q", "p", "qd", "pd"];
+        let ports = rates.ports.iter().map(|port| match states.contains(&port.name) {
+            true => port.name.to_string(),
+            false => port.argument(),
+        });
+        let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[[{t}; LANES]; {n}]"));
+        let row = format!("[[{t}; LANES]]");
+        let conversions = states.map(|name| format!("::core::convert::TryFrom::try_from({name})"));
+        method(
+            &format!(
+                "rates_in_lanes<const LANES: usize>(&mut self, _t: &[{t}; LANES], q: &{row}, p: &{row}, qd: &mut {row}, \
+                 pd: &mut {row}) -> bool"
+            ),
+            &format!(
+                "let (Ok(q), Ok(p), Ok(qd), Ok(pd)) = ({}) else {{ return false }};
+        let (q, p, qd, pd): (&{q}, &{v}, &mut {q}, &mut {v}) = (q, p, qd, pd);
+        {rt}::kernel::call_lanes::<Self, {}, LANES, {t}, _>({});
+        true",
+                conversions.join(", "),
+                rates.id,
+                tuple(&ports.collect::<Vec<_>>())
+            ),
+        )
     }
 
     fn energetic(&mut self) {

@@ -6,8 +6,16 @@ use multibody::runtime::{
     Accelerated, Conjugate, Differentiable, Energetic, Interpreter, Real, StateDerivatives, System,
 };
 
+/// Lanes of the method that evaluates its stages at once.
+const LANES: usize = 8;
+/// Systems with more velocities than this, in bytes of their arrays, are evaluated one state after the other: their code
+/// for lanes is long, and its compilation too.
+const LARGEST: usize = 160;
+
 /// The functions of a scene's system, on slices.
 trait Calls<S> {
+    /// As [`System::rates_in_lanes`], the rows of `LANES` numbers one after the other.
+    fn rates_in_lanes(&mut self, q: &[S], p: &[S], qd: &mut [S], pd: &mut [S]) -> bool;
     fn rates(&mut self, t: S, q: &[S], p: &[S], qd: &mut [S], pd: &mut [S]);
     fn coordinate_rates(&mut self, q: &[S], v: &[S], qd: &mut [S]);
     fn energy(&mut self, q: &[S], p: &[S]) -> (S, S);
@@ -32,6 +40,16 @@ impl<Y: Dynamics> Held<Y> {
 }
 
 impl<Y: Dynamics> Calls<Y::Scalar> for Held<Y> {
+    fn rates_in_lanes(&mut self, q: &[Y::Scalar], p: &[Y::Scalar], qd: &mut [Y::Scalar], pd: &mut [Y::Scalar]) -> bool {
+        if const { size_of::<Y::Momenta>() > LARGEST } {
+            return false;
+        }
+        let (q, p) = (q.as_chunks::<LANES>().0, p.as_chunks::<LANES>().0);
+        let (qd, pd) = (qd.as_chunks_mut::<LANES>().0, pd.as_chunks_mut::<LANES>().0);
+        // Scenes do not depend on time.
+        self.y.rates_in_lanes(&[Y::Scalar::zero(); LANES], q, p, qd, pd)
+    }
+
     fn rates(&mut self, t: Y::Scalar, q: &[Y::Scalar], p: &[Y::Scalar], qd: &mut [Y::Scalar], pd: &mut [Y::Scalar]) {
         self.take(q, p);
         self.y.rates_at(t, &self.q, &self.p, &mut self.qd, &mut self.pd);
@@ -131,6 +149,19 @@ impl<S: Real + 'static> System for Erased<S> {
 
     fn rates_at(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         self.calls.get_mut().rates(t, q, p, qd, pd);
+    }
+
+    fn rates_in_lanes<const L: usize>(
+        &mut self,
+        _t: &[S; L],
+        q: &[[S; L]],
+        p: &[[S; L]],
+        qd: &mut [[S; L]],
+        pd: &mut [[S; L]],
+    ) -> bool {
+        let calls = self.calls.get_mut();
+        L == LANES
+            && calls.rates_in_lanes(q.as_flattened(), p.as_flattened(), qd.as_flattened_mut(), pd.as_flattened_mut())
     }
 
     fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {

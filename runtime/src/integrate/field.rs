@@ -34,6 +34,13 @@ where
         self.evaluations
     }
 
+    /// Counts evaluations that were made elsewhere.
+    #[cfg(feature = "alloc")]
+    pub(super) fn count(&mut self, evaluations: u64) {
+        self.evaluations += evaluations;
+        self.stored = false;
+    }
+
     /// The chart about the state that displacements start from.
     pub fn chart(&self) -> &Chart<Y> {
         &self.chart

@@ -17,10 +17,11 @@
 //! | [`Gauss6`], [`Radau5`] | 1 | 1 real, 1 complex | `3 n` |
 //! | [`Gauss6FixedPoint`] | 0 | 0 | `1 + 3 n` |
 //! | [`Gauss12FixedPoint`] | 0 | 0 | `1 + 6 n` |
+//! | [`Gauss16`] | 0 | 0 | `1 + 8 n`, and at most 16 for the mobility |
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
 //! These are the numbers of methods made by `with_iterations`. Otherwise `n` is at most 30 (60 by fixed-point
-//! iteration) in a fixed step and 10 (20) in a step under error control. All of it is done twice if the first try
+//! iteration) in a fixed step and 10 (20; [`Gauss16`] 14) in a step under error control. All of it is done twice if the first try
 //! fails, and two evaluations are added where an error is estimated; a step that has used them up ends with
 //! [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
@@ -35,8 +36,12 @@ mod explicit;
 mod field;
 mod fixed;
 mod formulas;
+#[cfg(feature = "alloc")]
+mod gauss16;
 #[cfg(test)]
 mod implicit_tests;
+#[cfg(feature = "alloc")]
+mod in_lanes;
 mod integrator;
 mod jacobian;
 mod lie_joint;
@@ -66,6 +71,8 @@ pub use fixed::FixedIterations;
 pub use formulas::{
     formula, BackwardEuler, Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, Radau5,
 };
+#[cfg(feature = "alloc")]
+pub use gauss16::{Gauss16, ParallelGauss};
 pub use integrator::{Attempt, FromSystem, Integrator, Scheme};
 pub(crate) use middle::{turns, Middle};
 pub use newton::{FixedPoint, Iteration, Newton};

@@ -5,6 +5,7 @@ mod constrained;
 mod free_motion;
 mod microcontroller;
 mod orders;
+mod parallel;
 mod precision;
 mod symmetry;
 mod tolerances;

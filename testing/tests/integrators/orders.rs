@@ -6,7 +6,7 @@
 use mbd_codegen::model::{Gravity, Value};
 use mbd_codegen::search;
 use mbd_runtime::integrate::{
-    Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Dop853, Euler, Gauss12FixedPoint, Gauss4, Gauss6,
+    Ab4, Ab6, Abm4, Abm6, Abm8, BackwardEuler, CashKarp, Dop853, Euler, Gauss12FixedPoint, Gauss16, Gauss4, Gauss6,
     ImplicitMidpoint, Midpoint, Radau5, Rk4, Rkf45, Rodas5P, SemiImplicitEuler, StepDoubling, StepError, Stepper,
     Tsit5, Verner9,
 };
@@ -48,6 +48,7 @@ fn methods<S: Real + 'static>() -> Vec<Row<Interpreter<S>>> {
         row("Gauss 4", 4, 1.0, |i| Box::new(Gauss4::new(i))),
         row("Gauss 6", 6, 2.0, |i| Box::new(Gauss6::new(i))),
         row("Gauss 12", 12, 16.0, |i| Box::new(Gauss12FixedPoint::new(i))),
+        row("Gauss 16", 16, 64.0, |i| Box::new(Gauss16::new(i))),
         row("Radau 5", 5, 1.0, |i| Box::new(Radau5::new(i))),
         // The coefficients of Rodas5P are doubles, so that smaller errors than with this step would be those of
         // coefficients.
@@ -199,7 +200,7 @@ fn high_orders() {
         for row in methods() {
             if row.order >= 5.0 {
                 let h = row.coarse * scene.h;
-                let runs = [1.0, 2.0, 4.0].map(|k| scene.run_wide(&row, (16.0 * h).min(0.0625), h / k));
+                let runs = [1.0, 2.0, 4.0].map(|k| scene.run_wide(&row, (16.0 * h).min(h.max(0.0625)), h / k));
                 check(scene.name, row.name, row.order, runs, &mut wrong);
             }
         }

@@ -1,0 +1,583 @@
+//! Gauss-Legendre collocation of order 16, whose eight stages are lanes of one evaluation.
+//!
+//! The equations of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`, are solved by fixed-point iteration. In an
+//! iteration no stage waits for another: generated code evaluates all eight at once in vector registers
+//! ([`System::rates_in_lanes`]), in little more time than one. An explicit method waits for one evaluation after the
+//! other: where that is what takes the time, on mechanisms of few joints above all, this method needs a third of it.
+//! After P. J. van der Houwen, B. P. Sommeijer, *Parallel iteration of high-order Runge-Kutta methods with stepsize
+//! control*, J. Comput. Appl. Math. 29 (1990).
+//!
+//! The rates at the stages are the values of a polynomial of degree 7, kept as a Legendre series `Σ c_k P_k`. It starts
+//! the iteration of the next step, and the decay of its coefficients tells the error: if they fall by a factor `r` from
+//! one to the next, the quadrature errs by `r¹⁷`, relative to the step. Within a step the displacement is the same
+//! method's over a shorter step, which starts from the polynomial: so dense output is of order 16, too.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::chart::{Chart, Point};
+use super::in_lanes::InLanes;
+use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
+use super::StepError;
+use crate::kernel::{call_lanes, Arithmetic, Kernel};
+use crate::system::{Real, System};
+use crate::Scalar;
+
+/// Stages.
+const STAGES: usize = 8;
+/// Order of the method.
+const ORDER: u32 = 16;
+/// As [`Stepper::share`](super::Stepper::share).
+const SHARE: f64 = 1.0 / 128.0;
+/// Fraction of the allowed error that may remain after the iteration.
+const PART: f64 = 0.1;
+/// Epsilons of the state that may remain where no error is given.
+const FLOOR: f64 = 4.0;
+/// Most iterations of a step, with and without error control, and the number above which the next step is shorter.
+const LIMITS: [u32; 2] = [60, 14];
+const MANY: u32 = 10;
+/// Most evaluations, of all lanes, that the mobility may cost.
+const MOBILITY: usize = 2;
+/// Factor by which Legendre coefficients are expected to fall in the first step.
+const DECAY: f64 = 0.2;
+/// Factor of the step after an iteration that does not converge.
+const SHORTER: f64 = 0.6;
+/// The error that the next step is to have, relative to the allowed one, and the limits of its factor.
+const TARGET: f64 = 0.1;
+const FACTORS: [f64; 2] = [0.3, 2.0];
+/// The largest factor after a rejected attempt, for as many steps.
+const CAUTIOUS: (f64, u32) = (1.05, 4);
+
+/// One number for each stage.
+type Row<S> = [S; STAGES];
+/// By it a row is multiplied from the left: `out_i = Σ_j row_j matrix[j][i]`.
+type Matrix<S> = [Row<S>; STAGES];
+
+/// Gauss-Legendre collocation of order 16 by fixed-point iteration, with error control: all stages at once.
+pub type Gauss16<Y> = Integrator<Y, ParallelGauss<Y>>;
+
+/// The coefficients of the method.
+#[derive(Clone, Debug)]
+struct Formula<S> {
+    /// Nodes, in the step from 0 to 1.
+    c: Row<S>,
+    b: Row<S>,
+    /// Displacements of the stages from their rates.
+    a: Matrix<S>,
+    /// Coefficients of the Legendre series from the rates of the stages.
+    series: Matrix<S>,
+}
+
+/// `P_0` to `P_8` at each of the `x`.
+#[inline(always)]
+fn legendre<S: Real>(x: &Row<S>) -> [Row<S>; STAGES + 1] {
+    let mut p = [[S::one(); STAGES]; STAGES + 1];
+    p[1] = *x;
+    for k in 1..STAGES {
+        let n = S::from_index(k);
+        let [first, second] = [n + n + S::one(), n].map(|weight| weight / (n + S::one()));
+        p[k + 1] = core::array::from_fn(|i| first * x[i] * p[k][i] - second * p[k - 1][i]);
+    }
+    p
+}
+
+/// Integrals of `P_0` to `P_7` from −1 to each of the `x`, by `(2k + 1) ∫ P_k = P_{k+1} − P_{k−1}`.
+#[inline(always)]
+fn integrals<S: Real>(x: &Row<S>) -> Matrix<S> {
+    let p = legendre(x);
+    core::array::from_fn(|k| match k {
+        0 => x.map(|x| x + S::one()),
+        _ => {
+            let weight = S::one() / S::from_index(2 * k + 1);
+            core::array::from_fn(|i| weight * (p[k + 1][i] - p[k - 1][i]))
+        }
+    })
+}
+
+impl<S: Real> Formula<S> {
+    /// Nodes by Newton's method, in the precision of the scalar; everything else follows from them.
+    fn new() -> Self {
+        let (n, half, one) = (S::from_index(STAGES), S::constant(0.5), S::one());
+        // The derivative of `P_8` at `x_i`.
+        let slope =
+            |x: S, i: usize, p: &[Row<S>; STAGES + 1]| n * (x * p[STAGES][i] - p[STAGES - 1][i]) / (x * x - one);
+        let mut x: Row<S> = core::array::from_fn(|i| {
+            let angle = core::f64::consts::PI * (i as f64 + 0.75) / (STAGES as f64 + 0.5);
+            S::constant(-libm::cos(angle))
+        });
+        for _ in 0..8 {
+            let p = legendre(&x);
+            x = core::array::from_fn(|i| x[i] - p[STAGES][i] / slope(x[i], i, &p));
+        }
+        let p = legendre(&x);
+        let b: Row<S> = core::array::from_fn(|i| {
+            let slope = slope(x[i], i, &p);
+            one / ((one - x[i] * x[i]) * slope * slope)
+        });
+        let series: Matrix<S> =
+            core::array::from_fn(|j| core::array::from_fn(|k| S::from_index(2 * k + 1) * b[j] * p[k][j]));
+        let integrals = integrals(&x);
+        let a = series.map(|series| multiply(&series, &integrals).map(|a| half * a));
+        Formula { c: x.map(|x| half * (x + one)), b, a, series }
+    }
+}
+
+#[inline(always)]
+fn multiply<S: Scalar>(row: &Row<S>, matrix: &Matrix<S>) -> Row<S> {
+    // Four sums, so that additions wait less for one another.
+    let mut sums = [[S::zero(); STAGES]; 4];
+    for j in 0..STAGES {
+        let (x, weights, sum) = (row[j], &matrix[j], &mut sums[j % 4]);
+        *sum = core::array::from_fn(|i| sum[i] + x * weights[i]);
+    }
+    core::array::from_fn(|i| (sums[0][i] + sums[1][i]) + (sums[2][i] + sums[3][i]))
+}
+
+/// The root of order 2ⁿ: quicker than a power.
+fn root(x: f64, n: u32) -> f64 {
+    (0..n).fold(x, |x, _| libm::sqrt(x))
+}
+
+/// The sum of a row.
+fn total<S: Scalar>(row: &Row<S>) -> S {
+    let [a, b, c, d, e, f, g, h] = *row;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// One iteration, compiled for the instructions of the processor, as generated code is: from the rates at the stages
+/// their new displacements.
+struct Iterate;
+
+/// What it reads and writes. Coordinates come before momenta.
+struct Iteration<'a, S> {
+    /// `h a`.
+    a: &'a Matrix<S>,
+    /// Rates; those of the coordinates are corrected by what the momenta change.
+    f: &'a mut [Row<S>],
+    z: &'a mut [Row<S>],
+    /// As in [`ParallelGauss`].
+    mobility: &'a [S],
+    weights: &'a [S],
+    /// Changes of the momenta.
+    changes: &'a mut [Row<S>],
+    /// Sums of the squares of all changes in units of `1/weights`, lane by lane.
+    squares: &'a mut Row<S>,
+}
+
+impl<S: Scalar> Kernel<0, STAGES, Iteration<'_, S>> for Iterate {
+    #[inline(always)]
+    fn run<A: Arithmetic>(iteration: Iteration<'_, S>) {
+        let Iteration { a, f, z, mobility, weights, changes, squares } = iteration;
+        let n = changes.len();
+        let ((fx, fp), (zx, zp), (wx, wp)) = (f.split_at_mut(n), z.split_at_mut(n), weights.split_at(n));
+        // Whole rows are read and written, so that the compiler keeps them in vector registers.
+        let mut sum = [S::zero(); STAGES];
+        for (((f, z), weight), change) in fp.iter().zip(zp).zip(wp).zip(changes.iter_mut()) {
+            let new = multiply(f, a);
+            *change = difference(&new, z);
+            sum = add_squares(&sum, change, *weight);
+            *z = new;
+        }
+        for (k, ((f, z), weight)) in fx.iter_mut().zip(zx).zip(wx).enumerate() {
+            let mut rate = *f;
+            for (change, m) in changes.iter().zip(mobility.iter().skip(k * n)) {
+                rate = core::array::from_fn(|i| rate[i] + *m * change[i]);
+            }
+            let new = multiply(&rate, a);
+            sum = add_squares(&sum, &difference(&new, z), *weight);
+            (*f, *z) = (rate, new);
+        }
+        *squares = sum;
+    }
+}
+
+#[inline(always)]
+fn difference<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
+    core::array::from_fn(|i| a[i] - b[i])
+}
+
+#[inline(always)]
+fn add_squares<S: Scalar>(sum: &Row<S>, x: &Row<S>, weight: S) -> Row<S> {
+    core::array::from_fn(|i| {
+        let x = weight * x[i];
+        sum[i] + x * x
+    })
+}
+
+/// Compiled likewise: rows times a matrix, and the sums of the squares of each column in units of `1/weights`.
+struct Multiply;
+
+/// Rows, matrix, weights, products, sums.
+type Product<'a, S> = (&'a [Row<S>], &'a Matrix<S>, &'a [S], &'a mut [Row<S>], &'a mut Row<S>);
+
+impl<S: Scalar> Kernel<0, STAGES, Product<'_, S>> for Multiply {
+    #[inline(always)]
+    fn run<A: Arithmetic>((rows, matrix, weights, out, squares): Product<'_, S>) {
+        let mut sum = [S::zero(); STAGES];
+        for ((row, weight), out) in rows.iter().zip(weights).zip(out) {
+            *out = multiply(row, matrix);
+            sum = add_squares(&sum, out, *weight);
+        }
+        *squares = sum;
+    }
+}
+
+/// Compiled likewise: displacements from the Legendre series of their rates.
+struct Integrate;
+
+/// Series, the arguments `x`, the lower limit of the integral, half the step of the series, displacements.
+type Integral<'a, S> = (&'a [Row<S>], &'a Row<S>, S, S, &'a mut [Row<S>]);
+
+impl<S: Real> Kernel<0, STAGES, Integral<'_, S>> for Integrate {
+    #[inline(always)]
+    fn run<A: Arithmetic>((series, x, from, half, out): Integral<'_, S>) {
+        let mut integrals = integrals(x);
+        // The others vanish at 1 as at −1.
+        integrals[0] = x.map(|x| x - from);
+        for (row, out) in series.iter().zip(out) {
+            *out = multiply(row, &integrals).map(|x| half * x);
+        }
+    }
+}
+
+/// The step whose polynomial is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Known {
+    /// None.
+    Nothing,
+    /// One that ends where the present step starts.
+    Last,
+    /// An attempt from where the present step starts.
+    This,
+}
+
+/// The scheme of [`Gauss16`].
+#[derive(Clone, Debug)]
+pub struct ParallelGauss<Y: System> {
+    formula: Formula<Y::Scalar>,
+    /// Displacements of the stages and their rates: `2 nv` rows.
+    z: Vec<Row<Y::Scalar>>,
+    f: Vec<Row<Y::Scalar>>,
+    /// Legendre coefficients of the rates.
+    series: Vec<Row<Y::Scalar>>,
+    /// Reciprocals of the errors that the iteration may leave; zero where a component is not controlled.
+    weights: Vec<Y::Scalar>,
+    lanes: InLanes<Y, STAGES>,
+    /// The matrix by which rates of coordinates depend on momenta, row by row: the inverse mass matrix. Near the middle
+    /// of the step, and empty where it would cost too many evaluations.
+    mobility: Vec<Y::Scalar>,
+    /// Changes of the momenta in an iteration.
+    changes: Vec<Row<Y::Scalar>>,
+    /// Factor by which Legendre coefficients fall.
+    decay: f64,
+    first: Point<Y>,
+    /// Sizes of the components.
+    size: Point<Y>,
+    /// The step of the series, its size, s, and its displacement.
+    known: Known,
+    past_h: Y::Scalar,
+    past: Point<Y>,
+    /// Factor of the next step, and steps left in which it grows slowly.
+    factor: f64,
+    cautious: u32,
+}
+
+impl<Y: System> FromSystem<Y> for ParallelGauss<Y>
+where
+    Y::Scalar: Real,
+{
+    fn new(system: &Y) -> Self {
+        let first = Point::zero(system);
+        let nv = first.x.as_ref().len();
+        let n = 2 * nv;
+        let rows = || vec![[Y::Scalar::zero(); STAGES]; n];
+        let mobility = if nv <= MOBILITY * (STAGES - 1) { nv * nv } else { 0 };
+        ParallelGauss {
+            formula: Formula::new(),
+            z: rows(),
+            f: rows(),
+            series: rows(),
+            weights: vec![Y::Scalar::zero(); n],
+            lanes: InLanes::new(system),
+            mobility: vec![Y::Scalar::zero(); mobility],
+            changes: vec![[Y::Scalar::zero(); STAGES]; nv],
+            decay: DECAY,
+            first,
+            size: Point::zero(system),
+            past: Point::zero(system),
+            known: Known::Nothing,
+            past_h: Y::Scalar::zero(),
+            factor: 1.0,
+            cautious: 0,
+        }
+    }
+}
+
+/// Whether a step may be replaced by a shorter one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pace {
+    Fixed,
+    Controlled,
+}
+
+/// How an iteration ended.
+struct End {
+    iterations: u32,
+    /// Its last change, relative to what may remain.
+    change: f64,
+    converged: bool,
+}
+
+impl<Y: System> ParallelGauss<Y>
+where
+    Y::Scalar: Real,
+{
+    /// Sets what the iteration may leave.
+    fn weigh(&mut self, step: &Attempt<Y>, system: &Y, h: Y::Scalar, scale: Option<&Point<Y>>) {
+        let remaining = match scale {
+            Some(scale) => scale,
+            None => {
+                step.field.chart().size(system, &mut self.size);
+                for group in system.lie_joints() {
+                    let turned = group.v + group.kind.positions()..group.v + group.kind.sizes().1;
+                    self.size.x.as_mut()[turned].fill(Y::Scalar::one());
+                }
+                for (size, rate) in self.size.parts_mut().into_iter().zip(self.first.parts()) {
+                    let mut most = Y::Scalar::zero();
+                    for (size, rate) in size.iter_mut().zip(rate) {
+                        *size = *size + (h * *rate).abs();
+                        most = if *size > most { *size } else { most };
+                    }
+                    size.fill(most);
+                }
+                &self.size
+            }
+        };
+        let part = if scale.is_some() { PART } else { FLOOR * Y::Scalar::epsilon() };
+        for (weight, remaining) in self.weights.iter_mut().zip(remaining.parts().into_iter().flatten()) {
+            let allowed = Y::Scalar::constant(part) * *remaining;
+            *weight = if allowed > Y::Scalar::zero() { Y::Scalar::one() / allowed } else { Y::Scalar::zero() };
+        }
+    }
+
+    /// Stages of a step of `h` on the known polynomial, or with the rate at the start if there is none.
+    fn predict(&mut self, system: &Y, h: Y::Scalar) {
+        if self.known == Known::Nothing {
+            let c = self.formula.c.map(|c| h * c);
+            for (z, rate) in self.z.iter_mut().zip(self.first.parts().into_iter().flatten()) {
+                *z = c.map(|c| c * *rate);
+            }
+            return;
+        }
+        let (one, two) = (Y::Scalar::one(), Y::Scalar::constant(2.0));
+        let start = if self.known == Known::Last { one } else { -one };
+        let (turns, ratio) = (!system.lie_joints().is_empty(), two * h / self.past_h);
+        let x = self.formula.c.map(|c| start + ratio * c);
+        // Displacements that are not just added are those from the start of the known step, rewritten.
+        let from = if turns { -one } else { start };
+        let half = Y::Scalar::constant(0.5) * self.past_h;
+        call_lanes::<Integrate, 0, STAGES, Y::Scalar, _>((&self.series[..], &x, from, half, &mut self.z[..]));
+        if turns && self.known == Known::Last {
+            let whole = &self.past;
+            self.lanes.change_each(&mut self.z, |z| Chart::relative(system, whole, z));
+        }
+    }
+
+    /// Iterates until the change of the stages says that the displacement is known well enough.
+    fn converge(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, pace: Pace) -> End {
+        let times = self.formula.c.map(|c| t + c * h);
+        let a = self.formula.a.map(|row| row.map(|a| h * a));
+        let n = self.weights.iter().filter(|w| **w > Y::Scalar::zero()).count().max(1);
+        let mean = 1.0 / (STAGES * n) as f64;
+        // Squares of the changes, which spare a root and a quotient in each iteration.
+        let (mut last, mut square) = (f64::INFINITY, f64::NAN);
+        let end = |iterations, square, converged| End { iterations, change: libm::sqrt(square), converged };
+        let limit = if pace == Pace::Controlled { LIMITS[1] } else { LIMITS[0] };
+        for k in 1..=limit {
+            self.lanes.rates(&mut step.field, system, &times, &self.z, &mut self.f);
+            let mut squares = [Y::Scalar::zero(); STAGES];
+            call_lanes::<Iterate, 0, STAGES, Y::Scalar, _>(Iteration {
+                a: &a,
+                f: &mut self.f,
+                z: &mut self.z,
+                mobility: &self.mobility,
+                weights: &self.weights,
+                changes: &mut self.changes,
+                squares: &mut squares,
+            });
+            step.statistics.iterations += 1;
+            square = mean * total(&squares).to_f64();
+            // The last rates are those at the stages before the change, so that their error is what an iteration
+            // leaves of it. Where a small change is not smaller than the one before, it is round-off.
+            let left = if k == 1 { square } else { square * (square / last).min(1.0) };
+            let small = PART * PART * square <= 1.0;
+            if left <= 1.0 || (k > 4 && small && square >= last) {
+                return end(k, square, true);
+            }
+            let hopeless = pace == Pace::Controlled && k > 3 && !small && square > 0.8 * last;
+            if hopeless || !square.is_finite() {
+                return end(k, square, false);
+            }
+            last = square;
+        }
+        end(limit, square, false)
+    }
+
+    /// The displacement at the end of a step, from the rates at its stages.
+    fn displace(&self, h: Y::Scalar, out: &mut Point<Y>) {
+        for (out, f) in out.parts_mut().into_iter().flatten().zip(&self.f) {
+            let sum = f.iter().zip(&self.formula.b).fold(Y::Scalar::zero(), |sum, (f, b)| sum + *b * *f);
+            *out = h * sum;
+        }
+    }
+
+    /// Evaluates the mobility at the predicted middle of a step. Rates are linear in momenta: a lane for each momentum
+    /// that is changed by one, beside one without a change.
+    fn evaluate_mobility(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
+        let n = self.changes.len();
+        let times = [t + Y::Scalar::constant(0.5) * h; STAGES];
+        let of_lanes = STAGES - 1;
+        let mut first = 0;
+        while first < n && !self.mobility.is_empty() {
+            let these = of_lanes.min(n - first);
+            // The rows of the series are free until the iteration has ended.
+            for (row, z) in self.series.iter_mut().zip(&self.z) {
+                *row = [z[STAGES / 2]; STAGES];
+            }
+            for k in 0..these {
+                let row = &mut self.series[n + first + k];
+                row[k + 1] = row[k + 1] + Y::Scalar::one();
+            }
+            self.lanes.rates(&mut step.field, system, &times, &self.series, &mut self.f);
+            for (f, mobility) in self.f.iter().zip(self.mobility.chunks_exact_mut(n)) {
+                for k in 0..these {
+                    mobility[first + k] = f[k + 1] - f[0];
+                }
+            }
+            first += these;
+        }
+    }
+
+    /// The series of the rates, and the error of the step that its decay tells, relative to the allowed one.
+    fn error(&mut self, h: Y::Scalar) -> f64 {
+        let mut squares = [Y::Scalar::zero(); STAGES];
+        let Formula { series, .. } = &self.formula;
+        let product: Product<_> = (&self.f, series, &self.weights, &mut self.series, &mut squares);
+        call_lanes::<Multiply, 0, STAGES, Y::Scalar, _>(product);
+        let squares = squares.map(|x| x.to_f64());
+        let n = self.weights.iter().filter(|w| **w > Y::Scalar::zero()).count().max(1);
+        let large = libm::sqrt(squares[0] + squares[1]);
+        // The last coefficients may be small by chance: those before them tell what is to be expected.
+        let square = self.decay * self.decay;
+        let small = libm::sqrt(squares[STAGES / 2..].iter().fold(0.0, |small: f64, x| x.max(square * small)));
+        // The coefficient that would follow, in relation to the first ones: eight steps of the decay.
+        let decay = root(self.decay * small / large, 3);
+        self.decay = if decay > 0.0 { decay.clamp(0.02, 0.8) } else { DECAY };
+        // To the power of the order and one.
+        let power = (0..4).fold(decay, |power, _| power * power) * decay;
+        PART * h.to_f64() * large / libm::sqrt(n as f64) * power
+    }
+}
+
+impl<Y: System> Scheme<Y> for ParallelGauss<Y>
+where
+    Y::Scalar: Real,
+{
+    fn order(&self) -> u32 {
+        ORDER
+    }
+
+    fn error_order(&self) -> Option<u32> {
+        Some(ORDER)
+    }
+
+    fn share(&self) -> f64 {
+        SHARE
+    }
+
+    fn begin(&mut self) {
+        self.known = Known::Nothing;
+    }
+
+    fn attempt(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        scale: Option<&Point<Y>>,
+    ) -> Result<f64, StepError> {
+        step.start_rate(system, t, &mut self.first);
+        self.weigh(step, system, h, scale);
+        self.lanes.begin(&step.field, system);
+        self.predict(system, h);
+        self.evaluate_mobility(step, system, t, h);
+        let pace = if scale.is_some() { Pace::Controlled } else { Pace::Fixed };
+        let mut end = self.converge(step, system, t, h, pace);
+        if !end.converged && scale.is_none() && self.known != Known::Nothing {
+            self.known = Known::Nothing;
+            self.predict(system, h);
+            end = self.converge(step, system, t, h, pace);
+        }
+        if !end.converged {
+            (self.known, self.cautious) = (Known::Nothing, CAUTIOUS.1);
+            let End { iterations, change, .. } = end;
+            return match scale {
+                Some(_) if change.is_finite() => Ok(libm::pow(SHORTER, -f64::from(ORDER + 1))),
+                Some(_) => Ok(f64::NAN),
+                None => Err(StepError::NoConvergence { time: t.to_f64(), step: h.to_f64(), iterations, change }),
+            };
+        }
+        self.displace(h, &mut step.delta);
+        let error = self.error(h);
+        (self.known, self.past_h) = (Known::This, h);
+        self.past.copy_from(&step.delta);
+        // The error is of order 17: a step too careful by a seventeenth of the decades between them.
+        let factor = root(TARGET / error.max(1e-30), 4);
+        let slow = f64::from(end.iterations.saturating_sub(MANY));
+        self.cautious = if error > 1.0 { CAUTIOUS.1 } else { self.cautious.saturating_sub(1) };
+        let most = match self.cautious {
+            _ if slow > 0.0 => 1.0 - 0.03 * slow,
+            0 => FACTORS[1],
+            _ => CAUTIOUS.0,
+        };
+        self.factor = factor.clamp(FACTORS[0], most);
+        Ok(if scale.is_some() { error } else { 0.0 })
+    }
+
+    fn advise(&mut self) -> Option<f64> {
+        Some(self.factor)
+    }
+
+    fn start(&mut self) -> &mut Point<Y> {
+        &mut self.first
+    }
+
+    fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, _h: Y::Scalar) -> bool {
+        self.known = Known::Last;
+        if step.end_known {
+            step.hand_on(system, &mut self.first, &mut self.size);
+        }
+        step.end_known
+    }
+
+    fn interpolate(
+        &mut self,
+        step: &mut Attempt<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        theta: Y::Scalar,
+        out: &mut Point<Y>,
+    ) {
+        if theta == Y::Scalar::one() {
+            return out.copy_from(&step.delta);
+        }
+        if theta == Y::Scalar::zero() {
+            return out.clear();
+        }
+        self.predict(system, theta * h);
+        self.converge(step, system, t, theta * h, Pace::Fixed);
+        self.displace(theta * h, out);
+    }
+}
