@@ -3,7 +3,7 @@
 use crate::scenes::{Dynamics, Scene};
 use multibody::runtime::system::LieJoint;
 use multibody::runtime::{
-    Accelerated, Conjugate, Differentiable, Energetic, Interpreter, Real, StateDerivatives, System,
+    Accelerated, Conjugate, Differentiable, Energetic, Interpreter, Real, Scalar, StateDerivatives, System,
 };
 
 /// Lanes of the method that evaluates its stages at once.
