@@ -3,9 +3,12 @@
 //! The equations of the stages, `z_i = h Σ_j a_ij f(t + c_j h, z_j)`, are solved by fixed-point iteration. In an
 //! iteration no stage waits for another: generated code evaluates all eight at once in vector registers
 //! ([`System::rates_in_lanes`]), in little more time than one. An explicit method waits for one evaluation after the
-//! other: where that is what takes the time, on mechanisms of few joints above all, this method needs a third of it.
-//! After P. J. van der Houwen, B. P. Sommeijer, *Parallel iteration of high-order Runge-Kutta methods with stepsize
-//! control*, J. Comput. Appl. Math. 29 (1990).
+//! other, and the latency of the operations is most of its time. After P. J. van der Houwen, B. P. Sommeijer, *Parallel
+//! iteration of high-order Runge-Kutta methods with stepsize control*, J. Comput. Appl. Math. 29 (1990).
+//!
+//! Within an iteration the momenta are computed first, and the rates of the coordinates follow their changes by the
+//! mobility, the inverse of the mass matrix near the middle of the step: a Gauss-Seidel iteration in place of Jacobi's. It
+//! ends at the same stages after two thirds of the iterations.
 //!
 //! The rates at the stages are the values of a polynomial of degree 7, kept as a Legendre series `Σ c_k P_k`. It starts
 //! the iteration of the next step, and the decay of its coefficients tells the error: if they fall by a factor `r` from
@@ -31,10 +34,11 @@ const ORDER: u32 = 16;
 const SHARE: f64 = 1.0 / 128.0;
 /// Fraction of the allowed error that may remain after the iteration.
 const PART: f64 = 0.1;
-/// Epsilons of the state that may remain where no error is given.
+/// Epsilons of the state that may remain where no tolerance is given.
 const FLOOR: f64 = 4.0;
-/// Most iterations of a step, with and without error control, and the number above which the next step is shorter.
+/// Most iterations of a step of fixed size, and of one under error control.
 const LIMITS: [u32; 2] = [60, 14];
+/// After more iterations than this the next step is shorter.
 const MANY: u32 = 10;
 /// Most evaluations, of all lanes, that the mobility may cost.
 const MOBILITY: usize = 2;
@@ -45,7 +49,8 @@ const SHORTER: f64 = 0.6;
 /// The error that the next step is to have, relative to the allowed one, and the limits of its factor.
 const TARGET: f64 = 0.1;
 const FACTORS: [f64; 2] = [0.3, 2.0];
-/// The largest factor after a rejected attempt, for as many steps.
+/// The largest factor after a rejected attempt, and the number of steps for which it holds: so attempts are not rejected
+/// again and again where the motion is fast.
 const CAUTIOUS: (f64, u32) = (1.05, 4);
 
 /// One number for each stage.
@@ -532,7 +537,7 @@ where
         let error = self.error(h);
         (self.known, self.past_h) = (Known::This, h);
         self.past.copy_from(&step.delta);
-        // The error is of order 17: a step too careful by a seventeenth of the decades between them.
+        // A root of order 17 would be exact; that of order 16 differs by a few percent.
         let factor = root(TARGET / error.max(1e-30), 4);
         let slow = f64::from(end.iterations.saturating_sub(MANY));
         self.cautious = if error > 1.0 { CAUTIOUS.1 } else { self.cautious.saturating_sub(1) };
