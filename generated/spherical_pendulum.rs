@@ -2286,8 +2286,10 @@ impl ::multibody::runtime::System for SphericalPendulum {
 
     #[inline]
     fn rates_in_lanes<const LANES: usize>(&mut self, _t: &[f64; LANES], q: &[[f64; LANES]], p: &[[f64; LANES]], qd: &mut [[f64; LANES]], pd: &mut [[f64; LANES]]) -> bool {
-        let (Ok(q), Ok(p), Ok(qd), Ok(pd)) = (::core::convert::TryFrom::try_from(q), ::core::convert::TryFrom::try_from(p), ::core::convert::TryFrom::try_from(qd), ::core::convert::TryFrom::try_from(pd)) else { return false };
-        let (q, p, qd, pd): (&[[f64; LANES]; 5], &[[f64; LANES]; 4], &mut [[f64; LANES]; 5], &mut [[f64; LANES]; 4]) = (q, p, qd, pd);
+        let Ok(q) = <&[[f64; LANES]; 5] as ::core::convert::TryFrom<_>>::try_from(q) else { return false };
+        let Ok(p) = <&[[f64; LANES]; 4] as ::core::convert::TryFrom<_>>::try_from(p) else { return false };
+        let Ok(qd) = <&mut [[f64; LANES]; 5] as ::core::convert::TryFrom<_>>::try_from(qd) else { return false };
+        let Ok(pd) = <&mut [[f64; LANES]; 4] as ::core::convert::TryFrom<_>>::try_from(pd) else { return false };
         ::multibody::runtime::kernel::call_lanes::<Self, 0, LANES, f64, _>((q, p, &self.tau, qd, pd,));
         true
     }

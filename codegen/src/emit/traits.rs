@@ -115,20 +115,24 @@ impl Writer<'_> {
             true => port.name.to_string(),
             false => port.argument(),
         });
-        let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[[{t}; LANES]; {n}]"));
         let row = format!("[[{t}; LANES]]");
-        let conversions = states.map(|name| format!("::core::convert::TryFrom::try_from({name})"));
+        let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+        let array = |(name, reference, n): (&str, &str, usize)| {
+            let ty = format!("{reference}[[{t}; LANES]; {n}]");
+            format!(
+                "let Ok({name}) = <{ty} as ::core::convert::TryFrom<_>>::try_from({name}) else {{ return false }};
+        "
+            )
+        };
+        let arrays = [("q", "&", nq), ("p", "&", nv), ("qd", "&mut ", nq), ("pd", "&mut ", nv)].map(array).concat();
         method(
             &format!(
                 "rates_in_lanes<const LANES: usize>(&mut self, _t: &[{t}; LANES], q: &{row}, p: &{row}, qd: &mut {row}, \
                  pd: &mut {row}) -> bool"
             ),
             &format!(
-                "let (Ok(q), Ok(p), Ok(qd), Ok(pd)) = ({}) else {{ return false }};
-        let (q, p, qd, pd): (&{q}, &{v}, &mut {q}, &mut {v}) = (q, p, qd, pd);
-        {rt}::kernel::call_lanes::<Self, {}, LANES, {t}, _>({});
+                "{arrays}{rt}::kernel::call_lanes::<Self, {}, LANES, {t}, _>({});
         true",
-                conversions.join(", "),
                 rates.id,
                 tuple(&ports.collect::<Vec<_>>())
             ),

@@ -18,16 +18,19 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+mod formula;
+mod kernels;
+
 use super::chart::{Chart, Point};
 use super::in_lanes::InLanes;
 use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
 use super::StepError;
-use crate::kernel::{call_lanes, Arithmetic, Kernel};
+use crate::kernel::call_lanes;
 use crate::system::{Real, System};
 use crate::Scalar;
+use formula::{Formula, Row, STAGES};
+use kernels::{total, Integrate, Iterate, Iteration, Multiply, Product};
 
-/// Stages.
-const STAGES: usize = 8;
 /// Order of the method.
 const ORDER: u32 = 16;
 /// As [`Stepper::share`](super::Stepper::share).
@@ -53,197 +56,8 @@ const FACTORS: [f64; 2] = [0.3, 2.0];
 /// again and again where the motion is fast.
 const CAUTIOUS: (f64, u32) = (1.05, 4);
 
-/// One number for each stage.
-type Row<S> = [S; STAGES];
-/// By it a row is multiplied from the left: `out_i = Σ_j row_j matrix[j][i]`.
-type Matrix<S> = [Row<S>; STAGES];
-
 /// Gauss-Legendre collocation of order 16 by fixed-point iteration, with error control: all stages at once.
 pub type Gauss16<Y> = Integrator<Y, ParallelGauss<Y>>;
-
-/// The coefficients of the method.
-#[derive(Clone, Debug)]
-struct Formula<S> {
-    /// Nodes, in the step from 0 to 1.
-    c: Row<S>,
-    b: Row<S>,
-    /// Displacements of the stages from their rates.
-    a: Matrix<S>,
-    /// Coefficients of the Legendre series from the rates of the stages.
-    series: Matrix<S>,
-}
-
-/// `P_0` to `P_8` at each of the `x`.
-#[inline(always)]
-fn legendre<S: Real>(x: &Row<S>) -> [Row<S>; STAGES + 1] {
-    let mut p = [[S::one(); STAGES]; STAGES + 1];
-    p[1] = *x;
-    for k in 1..STAGES {
-        let n = S::from_index(k);
-        let [first, second] = [n + n + S::one(), n].map(|weight| weight / (n + S::one()));
-        p[k + 1] = core::array::from_fn(|i| first * x[i] * p[k][i] - second * p[k - 1][i]);
-    }
-    p
-}
-
-/// Integrals of `P_0` to `P_7` from −1 to each of the `x`, by `(2k + 1) ∫ P_k = P_{k+1} − P_{k−1}`.
-#[inline(always)]
-fn integrals<S: Real>(x: &Row<S>) -> Matrix<S> {
-    let p = legendre(x);
-    core::array::from_fn(|k| match k {
-        0 => x.map(|x| x + S::one()),
-        _ => {
-            let weight = S::one() / S::from_index(2 * k + 1);
-            core::array::from_fn(|i| weight * (p[k + 1][i] - p[k - 1][i]))
-        }
-    })
-}
-
-impl<S: Real> Formula<S> {
-    /// Nodes by Newton's method, in the precision of the scalar; everything else follows from them.
-    fn new() -> Self {
-        let (n, half, one) = (S::from_index(STAGES), S::constant(0.5), S::one());
-        // The derivative of `P_8` at `x_i`.
-        let slope =
-            |x: S, i: usize, p: &[Row<S>; STAGES + 1]| n * (x * p[STAGES][i] - p[STAGES - 1][i]) / (x * x - one);
-        let mut x: Row<S> = core::array::from_fn(|i| {
-            let angle = core::f64::consts::PI * (i as f64 + 0.75) / (STAGES as f64 + 0.5);
-            S::constant(-libm::cos(angle))
-        });
-        for _ in 0..8 {
-            let p = legendre(&x);
-            x = core::array::from_fn(|i| x[i] - p[STAGES][i] / slope(x[i], i, &p));
-        }
-        let p = legendre(&x);
-        let b: Row<S> = core::array::from_fn(|i| {
-            let slope = slope(x[i], i, &p);
-            one / ((one - x[i] * x[i]) * slope * slope)
-        });
-        let series: Matrix<S> =
-            core::array::from_fn(|j| core::array::from_fn(|k| S::from_index(2 * k + 1) * b[j] * p[k][j]));
-        let integrals = integrals(&x);
-        let a = series.map(|series| multiply(&series, &integrals).map(|a| half * a));
-        Formula { c: x.map(|x| half * (x + one)), b, a, series }
-    }
-}
-
-#[inline(always)]
-fn multiply<S: Scalar>(row: &Row<S>, matrix: &Matrix<S>) -> Row<S> {
-    // Four sums, so that additions wait less for one another.
-    let mut sums = [[S::zero(); STAGES]; 4];
-    for j in 0..STAGES {
-        let (x, weights, sum) = (row[j], &matrix[j], &mut sums[j % 4]);
-        *sum = core::array::from_fn(|i| sum[i] + x * weights[i]);
-    }
-    core::array::from_fn(|i| (sums[0][i] + sums[1][i]) + (sums[2][i] + sums[3][i]))
-}
-
-/// The root of order 2ⁿ: quicker than a power.
-fn root(x: f64, n: u32) -> f64 {
-    (0..n).fold(x, |x, _| libm::sqrt(x))
-}
-
-/// The sum of a row.
-fn total<S: Scalar>(row: &Row<S>) -> S {
-    let [a, b, c, d, e, f, g, h] = *row;
-    ((a + b) + (c + d)) + ((e + f) + (g + h))
-}
-
-/// One iteration, compiled for the instructions of the processor, as generated code is: from the rates at the stages
-/// their new displacements.
-struct Iterate;
-
-/// What it reads and writes. Coordinates come before momenta.
-struct Iteration<'a, S> {
-    /// `h a`.
-    a: &'a Matrix<S>,
-    /// Rates; those of the coordinates are corrected by what the momenta change.
-    f: &'a mut [Row<S>],
-    z: &'a mut [Row<S>],
-    /// As in [`ParallelGauss`].
-    mobility: &'a [S],
-    weights: &'a [S],
-    /// Changes of the momenta.
-    changes: &'a mut [Row<S>],
-    /// Sums of the squares of all changes in units of `1/weights`, lane by lane.
-    squares: &'a mut Row<S>,
-}
-
-impl<S: Scalar> Kernel<0, STAGES, Iteration<'_, S>> for Iterate {
-    #[inline(always)]
-    fn run<A: Arithmetic>(iteration: Iteration<'_, S>) {
-        let Iteration { a, f, z, mobility, weights, changes, squares } = iteration;
-        let n = changes.len();
-        let ((fx, fp), (zx, zp), (wx, wp)) = (f.split_at_mut(n), z.split_at_mut(n), weights.split_at(n));
-        // Whole rows are read and written, so that the compiler keeps them in vector registers.
-        let mut sum = [S::zero(); STAGES];
-        for (((f, z), weight), change) in fp.iter().zip(zp).zip(wp).zip(changes.iter_mut()) {
-            let new = multiply(f, a);
-            *change = difference(&new, z);
-            sum = add_squares(&sum, change, *weight);
-            *z = new;
-        }
-        for (k, ((f, z), weight)) in fx.iter_mut().zip(zx).zip(wx).enumerate() {
-            let mut rate = *f;
-            for (change, m) in changes.iter().zip(mobility.iter().skip(k * n)) {
-                rate = core::array::from_fn(|i| rate[i] + *m * change[i]);
-            }
-            let new = multiply(&rate, a);
-            sum = add_squares(&sum, &difference(&new, z), *weight);
-            (*f, *z) = (rate, new);
-        }
-        *squares = sum;
-    }
-}
-
-#[inline(always)]
-fn difference<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
-    core::array::from_fn(|i| a[i] - b[i])
-}
-
-#[inline(always)]
-fn add_squares<S: Scalar>(sum: &Row<S>, x: &Row<S>, weight: S) -> Row<S> {
-    core::array::from_fn(|i| {
-        let x = weight * x[i];
-        sum[i] + x * x
-    })
-}
-
-/// Compiled likewise: rows times a matrix, and the sums of the squares of each column in units of `1/weights`.
-struct Multiply;
-
-/// Rows, matrix, weights, products, sums.
-type Product<'a, S> = (&'a [Row<S>], &'a Matrix<S>, &'a [S], &'a mut [Row<S>], &'a mut Row<S>);
-
-impl<S: Scalar> Kernel<0, STAGES, Product<'_, S>> for Multiply {
-    #[inline(always)]
-    fn run<A: Arithmetic>((rows, matrix, weights, out, squares): Product<'_, S>) {
-        let mut sum = [S::zero(); STAGES];
-        for ((row, weight), out) in rows.iter().zip(weights).zip(out) {
-            *out = multiply(row, matrix);
-            sum = add_squares(&sum, out, *weight);
-        }
-        *squares = sum;
-    }
-}
-
-/// Compiled likewise: displacements from the Legendre series of their rates.
-struct Integrate;
-
-/// Series, the arguments `x`, the lower limit of the integral, half the step of the series, displacements.
-type Integral<'a, S> = (&'a [Row<S>], &'a Row<S>, S, S, &'a mut [Row<S>]);
-
-impl<S: Real> Kernel<0, STAGES, Integral<'_, S>> for Integrate {
-    #[inline(always)]
-    fn run<A: Arithmetic>((series, x, from, half, out): Integral<'_, S>) {
-        let mut integrals = integrals(x);
-        // The others vanish at 1 as at −1.
-        integrals[0] = x.map(|x| x - from);
-        for (row, out) in series.iter().zip(out) {
-            *out = multiply(row, &integrals).map(|x| half * x);
-        }
-    }
-}
 
 /// The step whose polynomial is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -585,4 +399,9 @@ where
         self.converge(step, system, t, theta * h, Pace::Fixed);
         self.displace(theta * h, out);
     }
+}
+
+/// The root of order 2ⁿ: quicker than a power.
+fn root(x: f64, n: u32) -> f64 {
+    (0..n).fold(x, |x, _| libm::sqrt(x))
 }
