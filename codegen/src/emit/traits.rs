@@ -118,6 +118,10 @@ impl Writer<'_> {
         let row = format!("[[{t}; LANES]]");
         let (nq, nv) = (plan.dims.nq, plan.dims.nv);
         let array = |(name, reference, n): (&str, &str, usize)| {
+            // Rates need not depend on all of the state.
+            if rates.ports.iter().all(|port| port.name != name) {
+                return format!("let _ = {name};\n        ");
+            }
             let ty = format!("{reference}[[{t}; LANES]; {n}]");
             format!(
                 "let Ok({name}) = <{ty} as ::core::convert::TryFrom<_>>::try_from({name}) else {{ return false }};
