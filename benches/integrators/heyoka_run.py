@@ -25,7 +25,7 @@ BUDGET = 4.0  # s for one setting
 
 
 def generated(mbd, model, snap):
-    """Operations of the rates, as pairs of a name and an expression, and the model's sizes."""
+    """The text of the function that computes the rates, and the number of velocities."""
     source = ROOT / "target" / "heyoka.rs"
     source.parent.mkdir(exist_ok=True)
     subprocess.run([mbd, "generate", str(model), "--outputs", "rates", "--arithmetic", "exact", "--no-efforts", "--rolled",
@@ -46,17 +46,16 @@ def equations(mbd, model, snap):
         text = re.sub(r"\bA::fma_f64", "fma", text).replace("[l]", "")
         return eval(text, {"fma": lambda a, b, c: a * b + c}, names)  # noqa: S307: text of the project's own generator
 
-    # Local arrays: angles and what is given, in the order of their assignments.
-    names |= {"angles": {}, "given": {}, "results": {}, "sines": {}, "cosines": {}}
+    # The function's local arrays.
+    names |= {"given": {}, "sines": {}, "cosines": {}}
     for line in body.splitlines():
         if found := re.search(r"given\[(\d+)\]\[l\] = (\w+)\.get\((\d+), l\)", line):
             names["given"][int(found[1])] = {"p": p, "q": q}[found[2]][int(found[3])]
         elif found := re.fullmatch(r"\s*let (\w+) = q\.get\((\d+), l\);", line):
             names[found[1]] = q[int(found[2])]
         elif found := re.fullmatch(r"\s*angles\[(\d+)\]\[l\] = (.*);", line):
-            angle = value(found[2])
-            k = int(found[1])
-            names["angles"][k], names["sines"][k], names["cosines"][k] = angle, hy.sin(angle), hy.cos(angle)
+            k, angle = int(found[1]), value(found[2])
+            names["sines"][k], names["cosines"][k] = hy.sin(angle), hy.cos(angle)
         elif found := re.fullmatch(r"\s*results\[(\d+)\]\[l\] = (.*);", line):
             rates[int(found[1])] = hy.expression(0.0) + value(found[2])
         elif found := re.fullmatch(r"\s*let (\w+) = ([^;]*);", line):
@@ -91,9 +90,9 @@ def race(scene, variant, system, start, end, rounds, angles):
         begin, times, steps = time.thread_time(), [], 0
         while len(times) < rounds and (not times or time.thread_time() - begin < BUDGET):
             integrator.state[:], integrator.time = start, 0.0
-            at = time.perf_counter()
+            at = time.thread_time()
             steps = integrator.propagate_until(end)[3]
-            times.append(time.perf_counter() - at)
+            times.append(time.thread_time() - at)
         print(json.dumps({
             "tool": "heyoka", "version": version("heyoka"), "scene": scene, "variant": variant, "method": "taylor",
             "setting": f"tol={tolerance:.1e} order={integrator.order}", "cpu_s": min(times), "steps": steps,

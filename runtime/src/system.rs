@@ -204,6 +204,11 @@ impl LieJoint {
         LieJoint { kind, q, v, momenta: true }
     }
 
+    /// Indices into `v` of its rotations.
+    pub const fn rotations(&self) -> core::ops::Range<usize> {
+        self.v + self.kind.positions()..self.v + self.kind.sizes().1
+    }
+
     /// Index into `q` of the first component of its quaternion.
     pub const fn quaternion(&self) -> Option<usize> {
         match self.kind {

@@ -113,17 +113,25 @@ fn columns(plan: &Plan, options: &Options) -> (String, &'static str, usize) {
     (list, given, if efforts { nv } else { 0 })
 }
 
+/// The call of a kernel for `lanes` states from a function of the type itself. The arrays in `local` are variables of
+/// this function with rows of lanes; everything else is the same for all states.
+pub fn call(options: &Options, kernel: &Kernel, lanes: &str, local: &[&str]) -> String {
+    let (rt, t) = (&options.runtime, options.precision.name());
+    let ports = kernel.ports.iter().map(|port| match local.contains(&port.name) {
+        true => port.name.to_string(),
+        false => port.argument(),
+    });
+    let ports = tuple(&ports.collect::<Vec<_>>());
+    format!("{rt}::kernel::call_lanes::<Self, {}, {lanes}, {t}, _>({ports});", kernel.id)
+}
+
 /// Rates of any number of states.
 pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
     let (rt, t, width) = (&options.runtime, options.precision.name(), width(options));
     let Some(kernel) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
     let (arguments, given, _) = columns(plan, options);
-    // The columns have the names of the kernel's arrays; everything else is the same for all states.
-    let ports = kernel.ports.iter().map(|p| match p.name {
-        "q" | "p" | "tau" | "qd" | "pd" => p.name.to_string(),
-        _ => p.argument(),
-    });
-    let ports = tuple(&ports.collect::<Vec<_>>());
+    // The columns have the names of the kernel's arrays.
+    let call = call(options, kernel, &width.to_string(), &["q", "p", "tau", "qd", "pd"]);
     let of_tau = if given == "tau" { "Joint forces are a column each; the" } else { "The" };
     let _ = writeln!(
         out,
@@ -135,10 +143,10 @@ pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel
     /// Columns of different lengths; nothing is written then.
     pub fn rates_batch(&self, {arguments}) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
         {rt}::batch::run::<{t}, {width}, {}, {}, _>(q, p, {given}, qd, pd, |q, p, tau, qd, pd| {{
-            {rt}::kernel::call_lanes::<Self, {}, {width}, {t}, _>({ports});
+            {call}
         }})
     }}",
-        plan.dims.nq, plan.dims.nv, kernel.id
+        plan.dims.nq, plan.dims.nv
     );
 }
 

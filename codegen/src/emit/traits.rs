@@ -5,8 +5,7 @@ use std::fmt::Write as _;
 use mbd_runtime::tree::Source;
 
 use super::fields::neutral;
-use super::head::tuple;
-use super::lanes::Kernel;
+use super::lanes::{self, Kernel};
 use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
@@ -109,12 +108,7 @@ impl Writer<'_> {
 
     /// The rates of several states. Rows are arrays in the kernel, so that it checks no index.
     fn rates_in_lanes(&self, plan: &Plan, rates: &Kernel) -> String {
-        let (rt, t) = (&self.options.runtime, self.t);
-        let states = ["q", "p", "qd", "pd"];
-        let ports = rates.ports.iter().map(|port| match states.contains(&port.name) {
-            true => port.name.to_string(),
-            false => port.argument(),
-        });
+        let t = self.t;
         let row = format!("[[{t}; LANES]]");
         let (nq, nv) = (plan.dims.nq, plan.dims.nv);
         let array = |(name, reference, n): (&str, &str, usize)| {
@@ -129,17 +123,13 @@ impl Writer<'_> {
             )
         };
         let arrays = [("q", "&", nq), ("p", "&", nv), ("qd", "&mut ", nq), ("pd", "&mut ", nv)].map(array).concat();
+        let call = lanes::call(self.options, rates, "LANES", &["q", "p", "qd", "pd"]);
         method(
             &format!(
                 "rates_in_lanes<const LANES: usize>(&mut self, _t: &[{t}; LANES], q: &{row}, p: &{row}, qd: &mut {row}, \
                  pd: &mut {row}) -> bool"
             ),
-            &format!(
-                "{arrays}{rt}::kernel::call_lanes::<Self, {}, LANES, {t}, _>({});
-        true",
-                rates.id,
-                tuple(&ports.collect::<Vec<_>>())
-            ),
+            &format!("{arrays}{call}\n        true"),
         )
     }
 

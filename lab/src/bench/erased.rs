@@ -8,8 +8,8 @@ use multibody::runtime::{
 
 /// Lanes of the method that evaluates its stages at once.
 const LANES: usize = 8;
-/// Systems with more velocities than this, in bytes of their arrays, are evaluated one state after the other: their code
-/// for lanes is long, and its compilation too.
+/// Bytes of an array of velocities. Larger systems are evaluated one state after the other, because their code for lanes
+/// takes long to compile.
 const LARGEST: usize = 160;
 
 /// The functions of a scene's system, on slices.

@@ -244,7 +244,7 @@ where
         }
         for group in system.lie_joints() {
             let x = self.weight.x.as_mut();
-            x[group.v + group.kind.positions()..group.v + group.kind.sizes().1].fill(Y::Scalar::one());
+            x[group.rotations()].fill(Y::Scalar::one());
         }
         let (floor, part) = match scale {
             None => (FLOOR * Y::Scalar::epsilon(), None),

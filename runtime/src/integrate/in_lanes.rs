@@ -116,9 +116,8 @@ where
             read(z, l, &mut self.point);
             let (q, p) = &mut self.state;
             field.chart().state(system, &self.point, q, p);
-            for (row, x) in self.q.iter_mut().chain(&mut self.p).zip(q.as_ref().iter().chain(p.as_ref())) {
-                row[l] = *x;
-            }
+            set_lane(&mut self.q, l, q.as_ref());
+            set_lane(&mut self.p, l, p.as_ref());
         }
     }
 
@@ -153,6 +152,12 @@ fn copy_lane<S: Copy, const L: usize>(rows: &[[S; L]], lane: usize, out: &mut [S
     }
 }
 
+fn set_lane<S: Copy, const L: usize>(rows: &mut [[S; L]], lane: usize, values: &[S]) {
+    for (row, x) in rows.iter_mut().zip(values) {
+        row[lane] = *x;
+    }
+}
+
 /// Reads the displacement of one lane.
 fn read<Y: System, const L: usize>(rows: &[[Y::Scalar; L]], lane: usize, out: &mut Point<Y>) {
     let (x, p) = rows.split_at(rows.len() / 2);
@@ -162,7 +167,7 @@ fn read<Y: System, const L: usize>(rows: &[[Y::Scalar; L]], lane: usize, out: &m
 
 /// Writes the displacement of one lane.
 fn write<Y: System, const L: usize>(point: &Point<Y>, rows: &mut [[Y::Scalar; L]], lane: usize) {
-    for (row, x) in rows.iter_mut().zip(point.x.as_ref().iter().chain(point.p.as_ref())) {
-        row[lane] = *x;
-    }
+    let (x, p) = rows.split_at_mut(rows.len() / 2);
+    set_lane(x, lane, point.x.as_ref());
+    set_lane(p, lane, point.p.as_ref());
 }

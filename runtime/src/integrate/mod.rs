@@ -21,8 +21,8 @@
 //! | [`Rodas5P`], always | 1 | 1 real | 7; 9 if the system depends on time |
 //!
 //! These are the numbers of methods made by `with_iterations`. Otherwise `n` is at most 30 (60 by fixed-point
-//! iteration) in a fixed step and 10 (20; [`Gauss16`] 14) in a step under error control. All of it is done twice if the first try
-//! fails, and two evaluations are added where an error is estimated; a step that has used them up ends with
+//! iteration) in a fixed step and 10 (20; [`Gauss16`] 14) in a step under error control. All of it is done twice if the
+//! first try fails, and two evaluations are added where an error is estimated; a step that has used them up ends with
 //! [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
 mod adams;

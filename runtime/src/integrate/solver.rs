@@ -369,9 +369,7 @@ where
             *scale = allowed(tolerances.coordinates, size.to_f64(), most_x);
         }
         for group in system.lie_joints() {
-            for k in group.kind.positions()..group.kind.sizes().1 {
-                self.scale.x.as_mut()[group.v + k] = part(tolerances.rotations, 1.0);
-            }
+            self.scale.x.as_mut()[group.rotations()].fill(part(tolerances.rotations, 1.0));
         }
         let full = tolerances.control == Control::Full;
         for (scale, size) in self.scale.p.as_mut().iter_mut().zip(self.size.p.as_ref()) {

@@ -28,7 +28,7 @@ use super::StepError;
 use crate::kernel::call_lanes;
 use crate::system::{Real, System};
 use crate::Scalar;
-use formula::{Formula, Row, STAGES};
+use formula::{root, Formula, Row, STAGES};
 use kernels::{total, Integrate, Iterate, Iteration, Multiply, Product};
 
 /// Order of the method.
@@ -56,7 +56,8 @@ const FACTORS: [f64; 2] = [0.3, 2.0];
 /// again and again where the motion is fast.
 const CAUTIOUS: (f64, u32) = (1.05, 4);
 
-/// Gauss-Legendre collocation of order 16 by fixed-point iteration, with error control: all stages at once.
+/// Gauss-Legendre collocation of order 16 by fixed-point iteration, with error control: all stages at once (van der
+/// Houwen and Sommeijer 1990). Its memory is allocated when it is made.
 pub type Gauss16<Y> = Integrator<Y, ParallelGauss<Y>>;
 
 /// The step whose polynomial is known.
@@ -79,8 +80,10 @@ pub struct ParallelGauss<Y: System> {
     f: Vec<Row<Y::Scalar>>,
     /// Legendre coefficients of the rates.
     series: Vec<Row<Y::Scalar>>,
-    /// Reciprocals of the errors that the iteration may leave; zero where a component is not controlled.
+    /// Reciprocals of the errors that the iteration may leave; zero where a component is not controlled. The number of
+    /// the others.
     weights: Vec<Y::Scalar>,
+    controlled: usize,
     lanes: InLanes<Y, STAGES>,
     /// The matrix by which rates of coordinates depend on momenta, row by row: the inverse mass matrix. Near the middle
     /// of the step, and empty where it would cost too many evaluations.
@@ -117,6 +120,7 @@ where
             f: rows(),
             series: rows(),
             weights: vec![Y::Scalar::zero(); n],
+            controlled: 1,
             lanes: InLanes::new(system),
             mobility: vec![Y::Scalar::zero(); mobility],
             changes: vec![[Y::Scalar::zero(); STAGES]; nv],
@@ -158,8 +162,7 @@ where
             None => {
                 step.field.chart().size(system, &mut self.size);
                 for group in system.lie_joints() {
-                    let turned = group.v + group.kind.positions()..group.v + group.kind.sizes().1;
-                    self.size.x.as_mut()[turned].fill(Y::Scalar::one());
+                    self.size.x.as_mut()[group.rotations()].fill(Y::Scalar::one());
                 }
                 for (size, rate) in self.size.parts_mut().into_iter().zip(self.first.parts()) {
                     let mut most = Y::Scalar::zero();
@@ -177,6 +180,7 @@ where
             let allowed = Y::Scalar::constant(part) * *remaining;
             *weight = if allowed > Y::Scalar::zero() { Y::Scalar::one() / allowed } else { Y::Scalar::zero() };
         }
+        self.controlled = self.weights.iter().filter(|w| **w > Y::Scalar::zero()).count().max(1);
     }
 
     /// Stages of a step of `h` on the known polynomial, or with the rate at the start if there is none.
@@ -206,8 +210,7 @@ where
     fn converge(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, pace: Pace) -> End {
         let times = self.formula.c.map(|c| t + c * h);
         let a = self.formula.a.map(|row| row.map(|a| h * a));
-        let n = self.weights.iter().filter(|w| **w > Y::Scalar::zero()).count().max(1);
-        let mean = 1.0 / (STAGES * n) as f64;
+        let mean = 1.0 / (STAGES * self.controlled) as f64;
         // Squares of the changes, which spare a root and a quotient in each iteration.
         let (mut last, mut square) = (f64::INFINITY, f64::NAN);
         let end = |iterations, square, converged| End { iterations, change: libm::sqrt(square), converged };
@@ -284,7 +287,6 @@ where
         let product: Product<_> = (&self.f, series, &self.weights, &mut self.series, &mut squares);
         call_lanes::<Multiply, 0, STAGES, Y::Scalar, _>(product);
         let squares = squares.map(|x| x.to_f64());
-        let n = self.weights.iter().filter(|w| **w > Y::Scalar::zero()).count().max(1);
         let large = libm::sqrt(squares[0] + squares[1]);
         // The last coefficients may be small by chance: those before them tell what is to be expected.
         let square = self.decay * self.decay;
@@ -294,7 +296,7 @@ where
         self.decay = if decay > 0.0 { decay.clamp(0.02, 0.8) } else { DECAY };
         // To the power of the order and one.
         let power = (0..4).fold(decay, |power, _| power * power) * decay;
-        PART * h.to_f64() * large / libm::sqrt(n as f64) * power
+        PART * h.to_f64() * large / libm::sqrt(self.controlled as f64) * power
     }
 }
 
@@ -399,9 +401,4 @@ where
         self.converge(step, system, t, theta * h, Pace::Fixed);
         self.displace(theta * h, out);
     }
-}
-
-/// The root of order 2ⁿ: quicker than a power.
-fn root(x: f64, n: u32) -> f64 {
-    (0..n).fold(x, |x, _| libm::sqrt(x))
 }
