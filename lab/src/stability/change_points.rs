@@ -14,8 +14,8 @@ use multibody::runtime::{Constrained, Interpreter, System};
 
 use super::mechanisms::Mechanism;
 
-/// A run is given up after so many steps.
-const MOST_STEPS: u64 = 40_000;
+/// A run is given up after so many evaluations of the rates.
+const MOST_EVALUATIONS: u64 = 640_000;
 
 /// A mechanism that has been read.
 pub struct Subject {
@@ -43,8 +43,8 @@ pub enum End {
     Whole,
     /// It stopped with an error.
     Error(StepError),
-    /// It took more steps than are allowed here.
-    Steps,
+    /// It took more evaluations than are allowed here.
+    GivenUp,
 }
 
 /// One run.
@@ -56,6 +56,8 @@ pub struct Run {
     pub energy: f64,
     /// Steps.
     pub steps: u64,
+    /// Singular positions that were met or passed, as far as the stabilisation sees them.
+    pub positions: u32,
     /// How it ended.
     pub end: End,
 }
@@ -73,6 +75,8 @@ pub struct Judged {
     pub error: f64,
     /// Mean number of steps of those.
     pub steps: u64,
+    /// Number of singular positions that all runs met or passed.
+    pub positions: u32,
 }
 
 impl Subject {
@@ -86,9 +90,10 @@ impl Subject {
             // An error that is not a number is lost too.
             lost: whole.iter().filter(|run| run.energy.is_nan() || run.energy > allowed).count(),
             refused: runs.iter().filter(|run| matches!(run.end, End::Error(_))).count(),
-            capped: runs.iter().filter(|run| run.end == End::Steps).count(),
+            capped: runs.iter().filter(|run| run.end == End::GivenUp).count(),
             error: whole.iter().fold(0.0, |most, run| run.energy.max(most)),
             steps: whole.iter().map(|run| run.steps).sum::<u64>() / whole.len().max(1) as u64,
+            positions: runs.iter().map(|run| run.positions).sum(),
         }
     }
 
@@ -149,7 +154,7 @@ impl Subject {
         let method = WithPostStep::new(&system, method, projection);
         let step = Step::Adaptive(Tolerances::new(way.tolerance));
         let mut solver = Solver::new(&mut system, method, step, 0.0, &q, &p).expect("a start that is closed");
-        let mut run = Run { speed, energy: 0.0, steps: 0, end: End::Whole };
+        let mut run = Run { speed, energy: 0.0, steps: 0, positions: 0, end: End::Whole };
         let (mut worst, mut most) = (0.0_f64, kinetic);
         while solver.time() < self.mechanism.time {
             if let Err(error) = solver.advance(&mut system, self.mechanism.time) {
@@ -157,8 +162,8 @@ impl Subject {
                 break;
             }
             run.steps += 1;
-            if run.steps > MOST_STEPS {
-                run.end = End::Steps;
+            if solver.statistics().evaluations > MOST_EVALUATIONS {
+                run.end = End::GivenUp;
                 break;
             }
             solver.state(&system, &mut q, &mut p);
@@ -166,6 +171,7 @@ impl Subject {
             (worst, most) = (worst.max((kinetic + potential - begun).abs()), most.max(kinetic));
         }
         run.energy = worst / most;
+        run.positions = solver.method().post_step.singular_positions().0;
         run
     }
 }

@@ -34,18 +34,18 @@ pub fn singular() -> Vec<Mechanism> {
         crank("unequal_masses", "The same with a rocker of 0.9 kg and a coupler of 0.1 kg.", unequal_masses()),
         crank("skew_axes", "The same with closing frames turned by 0.6 rad: no row vanishes, two become dependent.", skew_axes()),
         crank("two_parallelograms", "Two parallelograms: the rocker of the first is the crank of the second.", parallelograms(2)),
-        crank("singular_leg", "The shipped Strandbeest leg with an upper rod at which its first loop has a change point.", singular_leg()),
+        crank("singular_leg", "A Strandbeest leg whose lower loop has a change point: lower rod 0.631 m, link and foot 0.45 m, the pin of the link turned back by 20°.", singular_leg()),
         Mechanism {
             name: "stewart",
-            title: "The shipped Stewart platform, twisted about its vertical axis by 1 to 10 rad/s.",
-            text: include_str!("../../../models/mechanisms/stewart.toml").to_string(),
+            title: "The shipped Stewart platform without springs and gravity, twisted by 2 to 10 rad/s through the pose at 90°, in which locked legs would not hold it.",
+            text: free_stewart(),
             driver: 5,
-            speeds: [1.0, 10.0],
+            speeds: [2.0, 10.0],
             time: 1.0,
         },
         Mechanism {
             name: "four_rods",
-            title: "A plate on four equal rods, twisted by 0.5 to 5 rad/s: where it is not twisted the rods are parallel, and one row is redundant.",
+            title: "A plate on four equal rods at the corners of a rectangle, twisted by 0.5 to 5 rad/s: one of the four rows follows from the others.",
             text: four_rods(),
             driver: 5,
             speeds: [0.5, 5.0],
@@ -104,15 +104,33 @@ fn parallelograms(n: usize) -> String {
     text.finish()
 }
 
-/// The Strandbeest leg whose upper rod is as long as shoulder, distance of the fixed pins, less the crank: the upper
-/// loop has a change point where all four lie in one line.
+/// The Strandbeest leg whose lower rod is as long as rocker and distance of the fixed pins, less the crank: the lower
+/// loop has a change point where all four lie in one line. With the shipped lengths, the other loops keep the crank from
+/// getting there.
 fn singular_leg() -> String {
     let leg = include_str!("../../../models/mechanisms/strandbeest_leg.toml");
-    let length = 0.415 + 0.38_f64.hypot(0.078) - 0.15;
-    replaced(leg, "xyz = [0.5, 0, 0]", 0, &format!("xyz = [{length:?}, 0, 0]"))
+    let lower = 0.393 + 0.38_f64.hypot(0.078) - 0.15;
+    let (sin, cos) = (-20.0_f64).to_radians().sin_cos();
+    let [x, z] = [0.0260988 * cos - 0.40015 * sin, 0.0260988 * sin + 0.40015 * cos];
+    let changes = [
+        ("xyz = [0.619, 0, 0]", format!("xyz = [{lower:?}, 0, 0]")),
+        ("xyz = [0.394, 0, 0]", "xyz = [0.45, 0, 0]".to_string()),
+        ("xyz = [0.367, 0, 0]", "xyz = [0.45, 0, 0]".to_string()),
+        ("xyz = [0.0260988, 0, 0.40015]", format!("xyz = [{x:?}, 0, {z:?}]")),
+    ];
+    changes.iter().fold(leg.to_string(), |text, (old, new)| replaced(&text, old, 0, new))
 }
 
-/// A plate on four equal rods, which are parallel when it is not twisted: the rods then allow one motion more.
+/// The Stewart platform without what turns it back before its singular pose.
+fn free_stewart() -> String {
+    let platform = include_str!("../../../models/mechanisms/stewart.toml");
+    let kept = platform.lines().filter(|line| !line.starts_with("stiffness") && !line.starts_with("rest"));
+    let text: Vec<&str> = kept.collect();
+    replaced(&text.join("\n"), "gravity = [0, 0, -9.81]", 0, "gravity = [0, 0, 0]")
+}
+
+/// A plate on four equal rods at the corners of a rectangle. It stays level, and the lengths of three rods give that of
+/// the fourth.
 fn four_rods() -> String {
     let mut text = String::from(
         "name = \"four_rods\"\ngravity = [0, 0, -9.81]\n\n[[body]]\nname = \"plate\"\nmass = 2\ninertia = [0.03, 0.05, 0.07]\n\n\

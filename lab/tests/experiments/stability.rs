@@ -17,11 +17,15 @@ fn smooth_error(smooth: &Subject, way: Way) -> f64 {
 fn closed_loops_keep_their_energy_at_change_points() {
     let way = Way { method: METHOD, tolerance: 1e-9, hold: Stabilisation::Mass };
     let reference = smooth_error(&Subject::new(smooth()), way);
-    for mechanism in singular().into_iter().filter(|m| m.name != "stewart") {
+    for mechanism in singular() {
         let subject = Subject::new(mechanism);
         let judged = subject.judged(way, &subject.speeds(4), reference);
         let name = subject.mechanism.name;
-        assert_eq!((judged.lost, judged.refused, judged.capped), (0, 0, 0), "{name}: {judged:?}");
+        assert_eq!((judged.lost, judged.capped), (0, 0), "{name}: {judged:?}");
+        // The leg's energy errs by 1e-8 where its row is left out, and the run says so.
+        assert!(judged.refused == 0 || name == "singular_leg", "{name}: {judged:?}");
+        let passes = !matches!(name, "stewart" | "four_rods");
+        assert_eq!(judged.positions > 0, passes, "{name}: {judged:?}");
         // A bound on the work: the steps fell to 1e-15 s at these positions before rows were left out near them.
         assert!(judged.steps < 3000, "{name}: {judged:?}");
     }
@@ -51,5 +55,18 @@ fn the_speeds_that_lost_energy() {
         let run = subject.run(Way { method: METHOD, tolerance, hold: Stabilisation::Mass }, speed);
         assert_eq!(run.end, End::Whole);
         assert!(run.energy < tolerance, "{run:?}");
+    }
+}
+
+/// Multipliers that `adams` kept in its momenta became motion where their row counted as redundant: at these speeds the
+/// energy erred by 3.6e-6 and 1.6e-5 without an error.
+#[test]
+fn adams_keeps_no_multipliers_past_change_points() {
+    for (name, speed, tolerance, most) in [("fourbar_equal", 8.75, 1e-11, 1e-11), ("unequal_masses", 8.75, 1e-9, 1e-8)]
+    {
+        let subject = Subject::new(singular().into_iter().find(|m| m.name == name).expect("it is built in"));
+        let run = subject.run(Way { method: "adams", tolerance, hold: Stabilisation::Mass }, speed);
+        assert_eq!(run.end, End::Whole, "{name}");
+        assert!(run.energy < most, "{name}: {run:?}");
     }
 }

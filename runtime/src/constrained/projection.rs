@@ -12,7 +12,8 @@ use crate::Scalar;
 /// projected first. Then positions are corrected with the momenta unchanged, which changes the energy least.
 ///
 /// Methods that remember rates of past steps keep their multipliers `σ`: they are removed from the momenta, and added
-/// again at the corrected positions.
+/// again at the corrected positions. Near a singular position such a method is restarted without them, because a
+/// multiplier of a row that vanishes there would become motion.
 ///
 /// The policy `P` says how much work is done: [`ToTolerance`] iterates until the residuals are small, [`FixedWork`]
 /// always does the same, for processors with a fixed time budget. [`Stabilisation::Momenta`], [`Stabilisation::Mass`]
@@ -55,6 +56,9 @@ impl<Y: Constrained> Room<Y> {
 
 /// The work of a [`Projection`].
 pub trait Policy<Y: Constrained> {
+    /// Whether [`Policy::restart`] does anything.
+    const RESTARTS: bool = false;
+
     /// Projects the state `(q, p)` at time `t` (s). `remembers` as in [`PostStep::close`].
     ///
     /// # Errors
@@ -68,6 +72,21 @@ pub trait Policy<Y: Constrained> {
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
+
+    /// Frees the momenta of their multipliers, if it is time; as [`PostStep::restart`].
+    ///
+    /// # Errors
+    /// [`ConstraintError`].
+    fn restart(
+        &mut self,
+        _room: &mut Room<Y>,
+        _system: &mut Y,
+        _t: Y::Scalar,
+        _q: &Y::Coordinates,
+        _p: &mut Y::Momenta,
+    ) -> Result<bool, ConstraintError> {
+        Ok(false)
+    }
 }
 
 /// Exactly `N` iterations with [`Stabilisation::Mass`], whatever the residuals are: nothing is compared with a
@@ -116,6 +135,49 @@ pub struct ToTolerance<Y: Constrained> {
     q: Y::Coordinates,
     p: Y::Momenta,
     sigma: Y::Rows,
+    /// Whether the last end of a step has given multipliers back.
+    gave_back: bool,
+    nearness: Nearness<Y::Rows, Y::Scalar>,
+}
+
+/// How near a singular position is, and when the momenta have last been freed of their multipliers for it.
+#[derive(Clone, Debug)]
+struct Nearness<R, S> {
+    /// Largest pivot that each row has had.
+    largest: R,
+    rank: usize,
+    /// The least part of its largest pivot that a row had when the momenta were freed; 1 far from singular positions.
+    freed: S,
+}
+
+impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
+    /// Multipliers `σ` of a row with pivot `d` are the part `√d σ` of the momenta. That part is motion as soon as the
+    /// row counts as redundant, at whatever pivot that happens; so it is removed at every hundredth of the pivot again.
+    const STEP: f64 = 0.01;
+
+    /// Whether the momenta must be freed at these pivots.
+    fn asks(&mut self, pivots: &[S]) -> bool {
+        let zero = S::zero();
+        let rank = pivots.iter().filter(|pivot| **pivot != zero).count();
+        let mut least = S::one();
+        for (pivot, largest) in pivots.iter().zip(self.largest.as_mut()) {
+            if *pivot > *largest {
+                *largest = *pivot;
+            }
+            if *pivot != zero && *pivot < least * *largest {
+                least = *pivot / *largest;
+            }
+        }
+        let step = S::constant(Self::STEP);
+        let asks = (rank != self.rank && self.rank > 0) || least < step * self.freed;
+        self.rank = rank;
+        if asks {
+            self.freed = least;
+        } else if least > step {
+            self.freed = S::one();
+        }
+        asks
+    }
 }
 
 /// What corrections would take from the kinetic energy, at the ends of the last two steps.
@@ -165,6 +227,8 @@ where
             q: system.neutral(),
             p: system.zero_momenta(),
             sigma: system.zero_rows(),
+            gave_back: false,
+            nearness: Nearness { largest: system.zero_rows(), rank: 0, freed: Y::Scalar::one() },
         };
         Projection { room: Room::new(system), policy }
     }
@@ -247,6 +311,8 @@ where
     Y: Constrained,
     Y::Scalar: Real,
 {
+    const RESTARTS: bool = true;
+
     fn close(
         &mut self,
         room: &mut Room<Y>,
@@ -283,10 +349,34 @@ where
         if closes || judged {
             self.corrector.note(system, t, &room.pivots);
         }
-        if frees && remembers {
+        self.gave_back = frees && remembers;
+        if self.gave_back {
             room.give_back(system, q, p);
         }
         Ok(())
+    }
+
+    fn restart(
+        &mut self,
+        room: &mut Room<Y>,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<bool, ConstraintError> {
+        if !self.gave_back {
+            return Ok(false);
+        }
+        if !matches!(self.corrector.stabilisation, Stabilisation::Mass) {
+            // The others compute no pivots.
+            system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
+        }
+        if !self.nearness.asks(room.pivots.as_ref()) {
+            return Ok(false);
+        }
+        system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);
+        finite(p.as_ref())?;
+        Ok(true)
     }
 }
 
@@ -305,6 +395,8 @@ where
     Y::Scalar: Real,
     P: Policy<Y>,
 {
+    const RESTARTS: bool = P::RESTARTS;
+
     #[inline]
     fn close(
         &mut self,
@@ -315,5 +407,15 @@ where
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
         self.policy.close(&mut self.room, system, t, remembers, q, p)
+    }
+    #[inline]
+    fn restart(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<bool, ConstraintError> {
+        self.policy.restart(&mut self.room, system, t, q, p)
     }
 }

@@ -314,11 +314,10 @@ where
             };
             self.weigh(system, &tolerances, tried);
             let step = if last { all } else { Y::Scalar::constant(tried) };
-            let error = match self.method.attempt(system, self.t, step, Some(&self.scale)) {
-                Ok(error) => error,
-                // An implicit method may succeed with a smaller step.
-                Err(e) if 0.25 * tried < least => return Err(e),
-                Err(_) => f64::NAN,
+            let (error, refused) = match self.method.attempt(system, self.t, step, Some(&self.scale)) {
+                Ok(error) => (error, None),
+                // A smaller step may succeed: of an implicit method, or with loops that open less.
+                Err(e) => (f64::NAN, Some(e)),
             };
             if error <= 1.0 && self.check().is_ok() {
                 let factor = self.method.advise().unwrap_or_else(|| {
@@ -337,6 +336,9 @@ where
             let factor = if error.is_finite() { SAFETY * libm::pow(error, -exponent) } else { SHRINK };
             h = tried * factor.clamp(SHRINK, SAFETY);
             if h < least {
+                if let Some(refused) = refused {
+                    return Err(refused);
+                }
                 let start = self.method.start_rate(system, self.t);
                 let time = self.t.to_f64();
                 return Err(match start.not_finite() {

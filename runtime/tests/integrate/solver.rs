@@ -1,6 +1,7 @@
 //! The solver: tolerances, exact ends of runs, limits, kinds of failures, order of dense output.
 
 use super::systems::*;
+use mbd_runtime::constrained::{ConstraintError, PostStep, WithPostStep};
 use mbd_runtime::integrate::tableau;
 use mbd_runtime::integrate::{
     CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, Solver, Statistics, Step, StepError, Stepper, Tolerance, Tolerances,
@@ -237,6 +238,36 @@ fn limits_are_kept() {
         solver.limits.max_step = h;
         let ended = run(&mut solver, &mut y, 1.0);
         assert!(matches!(ended, Err(StepError::StepTooSmall { .. })) || h.is_nan(), "{h}: {ended:?}");
+    }
+}
+
+/// Refuses every end of a step.
+struct Refuses;
+
+impl<Y: System> PostStep<Y> for Refuses {
+    fn close(
+        &mut self,
+        _: &mut Y,
+        _: Y::Scalar,
+        _: bool,
+        _: &mut Y::Coordinates,
+        _: &mut Y::Momenta,
+    ) -> Result<(), ConstraintError> {
+        Err(ConstraintError::NotFinite { index: 7 })
+    }
+}
+
+#[test]
+fn a_refused_end_keeps_its_reason() {
+    // Wherever the steps become too small, the reason is that of the last attempt.
+    for k in 0..100 {
+        let least = 0.1 * 0.8_f64.powi(k);
+        let mut y = pendulum::<f64>();
+        let method = WithPostStep::new(&y, Tsit5::new(&y), Refuses);
+        let mut solver = adaptive(&mut y, method, 1e-6, (&[2.0], &[0.0]));
+        solver.limits.min_step = least;
+        let error = ConstraintError::NotFinite { index: 7 };
+        assert_eq!(run(&mut solver, &mut y, 1.0), Err(StepError::Constraint { time: 0.0, error }), "{least}");
     }
 }
 
