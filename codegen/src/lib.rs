@@ -2,13 +2,15 @@
 
 mod check;
 mod choice;
-mod code;
+pub mod code;
 pub mod diag;
 mod emit;
 mod error;
 pub mod generate;
 pub mod identifiable;
 mod import;
+#[cfg(feature = "jit")]
+pub mod jit;
 pub mod model;
 mod names;
 pub mod options;

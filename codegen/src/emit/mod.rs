@@ -1,6 +1,5 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
-mod angles;
 mod constants;
 mod fields;
 mod head;

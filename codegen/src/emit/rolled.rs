@@ -4,13 +4,13 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::angles::pairs;
 use super::head::{locate, Head};
 use super::names::{heading, identifier, Names};
 use super::numbers::{minus, signed};
 use crate::options::Precision;
 use crate::plan::Plan;
 use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
+use crate::symbolic::angles::pairs;
 use crate::symbolic::{Op, ProgramResult};
 
 /// Largest size of the rows of eight lanes on the stack, bytes. If they are larger, lanes are computed one after the

@@ -8,10 +8,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use super::angles::{nodes, Angles, Pairs};
 use super::head::{locate, Head};
 use super::names::{heading, identifier, Names};
 use crate::plan::Plan;
+use crate::symbolic::angles::{nodes, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
 /// A program with names for its values and places for its results.

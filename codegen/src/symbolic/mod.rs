@@ -4,6 +4,7 @@
 //! `1 · x`, `0 · x`, signs, `x − x`, folding of constants, order of commutative operands, sharing of equal operations.
 //! A program therefore gives the same bits as the sweep on numbers, up to the sign of zero.
 
+pub mod angles;
 mod cost;
 mod evaluate;
 mod expr;

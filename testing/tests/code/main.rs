@@ -6,6 +6,7 @@ mod constrained;
 mod counts;
 mod eliminations;
 mod emitted;
+mod machine_code;
 mod rewriting;
 mod rolled;
 mod wide;

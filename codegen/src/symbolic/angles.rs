@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::symbolic::{Op, Operand, Program, ProgramResult};
+use super::{Op, Operand, Program, ProgramResult};
 
 /// Angles with the nodes of their sines and cosines.
 pub type Pairs = BTreeMap<u32, [Option<u32>; 2]>;

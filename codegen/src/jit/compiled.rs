@@ -1,0 +1,242 @@
+//! A mechanism whose functions are machine code made at run time.
+
+use std::sync::{Arc, OnceLock};
+
+use mbd_runtime::Interpreter;
+
+use super::lower::INPUTS;
+use super::memory::{MachineCode, Number};
+use super::CompileError;
+use crate::code::{compile, Code};
+use crate::model::{Gravity, Model};
+use crate::options::Options;
+use crate::output::{Output, OutputProgram, Sizes, Spec, COORDINATE_RATES};
+use crate::plan::Plan;
+use crate::rolled::rolled;
+use crate::search;
+use crate::trace::{chosen_frames, coordinate_rates, sizes};
+
+/// Largest number of operations of a program that is compiled; those of a loop's body count once. Compiling one takes
+/// some 25 µs.
+const MOST_OPERATIONS: usize = 30_000;
+
+/// Mechanisms with more bodies than this are not unrolled: they would have more operations than that.
+const MOST_BODIES: usize = MOST_OPERATIONS / 50;
+
+/// A mechanism whose functions are machine code, compiled when they are first called.
+///
+/// It implements the traits of generated types, so that all integrators and constraint methods take it. Outputs whose
+/// programs are too large to compile ([`CompileError::TooLarge`]) are computed by the interpreter. Clones share the
+/// code; each has its own inputs and working memory.
+///
+/// The inputs beside the state (joint forces, prescribed motions, wrenches, gravity where it is an input) are those of
+/// [`Compiled::inputs`].
+#[derive(Clone, Debug)]
+pub struct Compiled<S: Number = f64> {
+    shared: Arc<Shared<S>>,
+    pub(super) interpreter: Interpreter<S>,
+    params: Vec<S>,
+    scratch: Vec<S>,
+    /// Arguments and results that have to be copied.
+    pub(super) copies: Vec<S>,
+}
+
+/// What all clones have in common.
+#[derive(Debug)]
+struct Shared<S> {
+    plan: Plan,
+    options: Options,
+    sizes: Sizes,
+    /// One for each of [`Output::ALL`].
+    outputs: Vec<OnceLock<Result<MachineCode<S>, CompileError>>>,
+    coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
+}
+
+impl<S: Number> Shared<S> {
+    /// Compiles a program.
+    fn machine_code(&self, program: &OutputProgram<Code>) -> Result<MachineCode<S>, CompileError> {
+        let results = program.spec.results.iter().map(|array| array.len(&self.sizes)).collect();
+        MachineCode::new(program, results, self.options.arithmetic)
+    }
+
+    /// The code of an output, made when it is first asked for.
+    fn output(&self, output: Output) -> Result<&MachineCode<S>, &CompileError> {
+        let at = Output::ALL.iter().position(|o| *o == output).expect("all outputs are in the list");
+        let make = || {
+            let (plan, options, most) = (&self.plan, &self.options, MOST_OPERATIONS);
+            if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
+                return Err(CompileError::TooLarge { output, operations: None, most });
+            }
+            let program = compile(plan, output, options)?;
+            let operations = match &program.program {
+                Code::Straight(straight) => straight.steps.len(),
+                Code::Rolled(rolled) => rolled.blocks.iter().map(|block| block.program.steps.len()).sum(),
+            };
+            match operations > most {
+                true => Err(CompileError::TooLarge { output, operations: Some(operations), most }),
+                false => self.machine_code(&program),
+            }
+        };
+        self.outputs[at].get_or_init(make).as_ref()
+    }
+
+    fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {
+        let make = || self.machine_code(&coordinate_rates(&self.plan, &self.options).map(Code::Straight));
+        self.coordinate_rates.get_or_init(make).as_ref()
+    }
+}
+
+impl<S: Number> Compiled<S> {
+    /// A mechanism with parameters at their defaults and other inputs zero. Of the options, those count that change the
+    /// programs: arithmetic, frames, choice of the structure. All outputs that the model has are available.
+    ///
+    /// # Errors
+    /// An unknown frame name in the options.
+    pub fn new(model: &Model, options: &Options) -> Result<Self, CompileError> {
+        let options = options.of_model(!model.constraints.is_empty());
+        Compiled::from_plan(search::plan(model, options.plan), options)
+    }
+
+    /// The same with the eliminations of a plan; [`Options::plan`] only says where code is rolled.
+    ///
+    /// # Errors
+    /// As of [`Compiled::new`].
+    pub fn from_plan(plan: Plan, options: Options) -> Result<Self, CompileError> {
+        // Joint forces that are zero cost next to nothing, and a user may want to set them.
+        let options = Options { precision: S::PRECISION, efforts: true, ..options };
+        let frames = chosen_frames(&plan, &options)?.len();
+        let sizes = sizes(&plan, &options, frames);
+        let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
+        let interpreter = interpreter(&plan, &params);
+        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
+        let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new() };
+        Ok(Compiled { shared: Arc::new(shared), interpreter, params, scratch: Vec::new(), copies: Vec::new() })
+    }
+
+    /// The plan of which the code is made.
+    pub fn plan(&self) -> &Plan {
+        &self.shared.plan
+    }
+
+    /// Lengths of all arrays.
+    pub fn sizes(&self) -> &Sizes {
+        &self.shared.sizes
+    }
+
+    /// The inputs beside the state: `tau`, `drive_q`, `drive_v`, `drive_a`, `wrenches`, `gravity`. They must keep their
+    /// lengths. Gravity is read only where the model says that it is an input.
+    pub fn inputs(&mut self) -> &mut Interpreter<S> {
+        &mut self.interpreter
+    }
+
+    /// The parameters, in the order of the model.
+    pub fn parameters(&self) -> &[S] {
+        &self.params
+    }
+
+    /// Sets the parameters; the code stays as it is.
+    ///
+    /// # Panics
+    /// If there is another number of them than the model has.
+    pub fn set_parameters(&mut self, params: &[S]) {
+        self.params.copy_from_slice(params);
+        let old = &self.interpreter;
+        let mut new = interpreter(&self.shared.plan, params);
+        new.tau.clone_from(&old.tau);
+        new.drive_q.clone_from(&old.drive_q);
+        new.drive_v.clone_from(&old.drive_v);
+        new.drive_a.clone_from(&old.drive_a);
+        new.wrenches.clone_from(&old.wrenches);
+        if self.shared.plan.model.gravity == Gravity::Input {
+            new.gravity = old.gravity;
+        }
+        self.interpreter = new;
+    }
+
+    /// Compiles an output now, in place of at its first call.
+    ///
+    /// # Errors
+    /// [`CompileError`]; where it is `TooLarge`, the functions of the traits use the interpreter.
+    pub fn prepare(&self, output: Output) -> Result<(), CompileError> {
+        self.shared.output(output).map(|_| ()).map_err(CompileError::clone)
+    }
+
+    /// Computes an output: its arguments and results are those of the generated function ([`Output::spec`]), as flat
+    /// slices.
+    ///
+    /// # Errors
+    /// [`CompileError`], where there is no code for the output or the arrays are not its own; nothing is written then.
+    pub fn evaluate(
+        &mut self,
+        output: Output,
+        arguments: &[&[S]],
+        results: &mut [&mut [S]],
+    ) -> Result<(), CompileError> {
+        let code = self.shared.output(output).map_err(CompileError::clone)?;
+        check(output.spec(), &self.shared.sizes, arguments, results)
+            .map_err(|words| CompileError::Arrays { output, words })?;
+        let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
+        run(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, &mut self.scratch);
+        Ok(())
+    }
+
+    /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for
+    /// it.
+    #[inline]
+    pub(super) fn run(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
+        let Ok(code) = self.shared.output(output) else { return false };
+        run(code, arguments, &self.interpreter, &self.params, results, &mut self.scratch);
+        true
+    }
+
+    /// `q̇ = N(q) v`.
+    pub(super) fn coordinate_rates_into(&self, q: &[S], v: &[S], qd: &mut [S]) -> bool {
+        let Ok(code) = self.shared.coordinate_rates() else { return false };
+        let mut scratch = Vec::new();
+        run(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], &mut scratch);
+        true
+    }
+}
+
+/// An interpreter of a plan, with numbers of any type.
+fn interpreter<S: Number>(plan: &Plan, params: &[S]) -> Interpreter<S> {
+    let doubles: Vec<f64> = params.iter().map(|x| x.to_f64()).collect();
+    let gravity = plan.gravity(&doubles).map(S::constant);
+    Interpreter::new(plan.tree(params), gravity).with_names(plan.velocity_names(), plan.constraint_names())
+}
+
+/// Calls machine code with the inputs of an interpreter.
+#[inline]
+fn run<S: Number>(
+    code: &MachineCode<S>,
+    [a, b, c]: [&[S]; 3],
+    inputs: &Interpreter<S>,
+    params: &[S],
+    results: &mut [&mut [S]],
+    scratch: &mut Vec<S>,
+) {
+    if scratch.len() < code.scratch() {
+        scratch.resize(code.scratch(), S::zero());
+    }
+    // In the order of the table of fields.
+    let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
+    let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
+    let given: [&[S]; INPUTS] = [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, gravity];
+    code.call(&given, results, scratch);
+}
+
+/// Compares the lengths of arguments and results with those of an output.
+fn check<S>(spec: &Spec, sizes: &Sizes, arguments: &[&[S]], results: &[&mut [S]]) -> Result<(), String> {
+    let lengths = |arrays: &[crate::output::Array]| arrays.iter().map(|a| a.len(sizes)).collect::<Vec<_>>();
+    let given = [arguments.iter().map(|a| a.len()).collect(), results.iter().map(|r| r.len()).collect::<Vec<_>>()];
+    for (name, given, expected) in
+        [("arguments", &given[0], lengths(spec.inputs)), ("results", &given[1], lengths(spec.results))]
+    {
+        if *given != expected {
+            return Err(format!("its {name} have the lengths {expected:?}, and {given:?} were given"));
+        }
+    }
+    Ok(())
+}
+
+const _: () = assert!(COORDINATE_RATES.results.len() == 1);

@@ -1,0 +1,224 @@
+//! Machine code in memory, and its calls.
+//!
+//! The only `unsafe` code of the generator is in this file. It is sound for these reasons:
+//! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
+//!   array of which the code was made. The code reads and writes at constant places inside these arrays, in tables that
+//!   the function owns, and in working memory whose length is compared too.
+//! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
+//!   meet those of others.
+//! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
+//!   threads may call it.
+//! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
+#![allow(unsafe_code)]
+
+use cranelift::codegen::ir::{types, Function, Type, UserFuncName};
+use cranelift::codegen::Context;
+use cranelift::jit::{JITBuilder, JITModule};
+use cranelift::module::{default_libcall_names, Linkage, Module};
+use cranelift::prelude::*;
+
+use super::lower::{input_places, lower, Scratch, Shape, INPUTS};
+use super::CompileError;
+use crate::code::Code;
+use crate::options::{Arithmetic, Precision};
+use crate::output::OutputProgram;
+use mbd_runtime::kernel::{level, Level};
+use mbd_runtime::system::Real;
+use mbd_runtime::trig;
+
+/// The most result arrays that a function has.
+const RESULTS: usize = 6;
+
+/// Computes sines and cosines of `n` angles.
+type Sines<S> = unsafe extern "C" fn(*const S, usize, *mut S, *mut S);
+
+/// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory.
+type Entry<S> = unsafe extern "C" fn(*const *const S, *const *mut S, *mut S);
+
+/// A number type that machine code can compute with: `f64` or `f32`.
+pub trait Number: Real + Default + Send + Sync + 'static + sealed::Sealed {
+    /// The option that stands for it.
+    const PRECISION: Precision;
+}
+
+mod sealed {
+    use super::*;
+
+    pub trait Sealed: Sized {
+        const FLOAT: Type;
+        /// With plain products and sums, and with the best arithmetic of the processor.
+        const SINES: [Sines<Self>; 2];
+    }
+}
+
+macro_rules! number {
+    ($float:ident, $precision:ident, $type:ident, $lanes:path, $slice:path) => {
+        impl Number for $float {
+            const PRECISION: Precision = Precision::$precision;
+        }
+
+        impl sealed::Sealed for $float {
+            const FLOAT: Type = types::$type;
+            const SINES: [Sines<$float>; 2] = {
+                unsafe extern "C" fn plain(angles: *const $float, n: usize, sin: *mut $float, cos: *mut $float) {
+                    // SAFETY: the code calls with three parts of its working memory that do not overlap.
+                    let (angles, sin, cos) = unsafe { parts(angles, n, sin, cos) };
+                    for ((angles, sin), cos) in angles.chunks(4).zip(sin.chunks_mut(4)).zip(cos.chunks_mut(4)) {
+                        let mut four = [0.0; 4];
+                        four[..angles.len()].copy_from_slice(angles);
+                        let (s, c) = $lanes(four);
+                        sin.copy_from_slice(&s[..angles.len()]);
+                        cos.copy_from_slice(&c[..angles.len()]);
+                    }
+                }
+                unsafe extern "C" fn best(angles: *const $float, n: usize, sin: *mut $float, cos: *mut $float) {
+                    // SAFETY: as above.
+                    let (angles, sin, cos) = unsafe { parts(angles, n, sin, cos) };
+                    $slice(angles, sin, cos);
+                }
+                [plain, best]
+            };
+        }
+    };
+}
+
+/// The slices behind the addresses.
+///
+/// # Safety
+/// Each address is that of `n` numbers, and they do not overlap.
+unsafe fn parts<'a, S>(x: *const S, n: usize, sin: *mut S, cos: *mut S) -> (&'a [S], &'a mut [S], &'a mut [S]) {
+    use std::slice::{from_raw_parts, from_raw_parts_mut};
+    // SAFETY: as the caller promises.
+    unsafe { (from_raw_parts(x, n), from_raw_parts_mut(sin, n), from_raw_parts_mut(cos, n)) }
+}
+
+number!(f64, F64, F64, trig::sincos_lanes_f64, trig::sincos_slice_f64);
+number!(f32, F32, F32, trig::sincos_lanes_f32, trig::sincos_slice_f32);
+
+/// The machine code of one output.
+pub struct MachineCode<S> {
+    /// Owns the code; `None` only while it is dropped.
+    module: Option<JITModule>,
+    entry: Entry<S>,
+    /// Place in the table of inputs and length of every input array.
+    inputs: Vec<(usize, usize)>,
+    /// Lengths of the result arrays.
+    results: Vec<usize>,
+    /// Length of the working memory.
+    scratch: usize,
+    /// Tables of rolled code, at addresses that are part of the code.
+    _tables: Vec<Box<[S]>>,
+}
+
+// SAFETY: the module and the tables are not touched before they are dropped, and the code has no state of its own.
+unsafe impl<S> Send for MachineCode<S> {}
+// SAFETY: the same.
+unsafe impl<S> Sync for MachineCode<S> {}
+
+impl<S: Number> MachineCode<S> {
+    /// Compiles a program whose results fill arrays of the lengths `results`.
+    ///
+    /// # Errors
+    /// [`CompileError::Machine`] with Cranelift's words.
+    pub fn new(
+        program: &OutputProgram<Code>,
+        results: Vec<usize>,
+        arithmetic: Arithmetic,
+    ) -> Result<Self, CompileError> {
+        let fast = arithmetic == Arithmetic::Fast;
+        let mut flags = settings::builder();
+        for (name, value) in [("opt_level", "speed"), ("enable_verifier", "false"), ("is_pic", "false")] {
+            flags.set(name, value).map_err(CompileError::machine)?;
+        }
+        let isa = cranelift::native::builder().map_err(CompileError::machine)?;
+        let isa = isa.finish(settings::Flags::new(flags)).map_err(CompileError::machine)?;
+        let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
+        let (address, call) = (module.target_config().pointer_type(), module.target_config().default_call_conv);
+        let signature = |parameters: usize| {
+            let mut signature = Signature::new(call);
+            signature.params = vec![AbiParam::new(address); parameters];
+            signature
+        };
+        let tables: Vec<Box<[S]>> = match &program.program {
+            Code::Straight(_) => Vec::new(),
+            Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(numbers).collect(),
+        };
+        let scratch = Scratch::new(&program.program);
+        let shape = Shape {
+            float: S::FLOAT,
+            address,
+            fused: fast && level() > Level::Plain,
+            inputs: &program.inputs,
+            results: &results,
+            tables: &tables.iter().map(|table| table.as_ptr() as usize).collect::<Vec<_>>(),
+            sines: (signature(4), S::SINES[usize::from(fast)] as usize),
+        };
+        let id = module.declare_function(program.spec.name, Linkage::Local, &signature(3));
+        let id = id.map_err(CompileError::machine)?;
+        let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature(3));
+        lower(&mut function, &program.program, &scratch, &shape);
+        let mut context = Context::for_function(function);
+        module.define_function(id, &mut context).map_err(CompileError::machine)?;
+        module.finalize_definitions().map_err(CompileError::machine)?;
+        let code = module.get_finalized_function(id);
+        // SAFETY: the function was made with this signature, for the calling convention of the host.
+        let entry = unsafe { std::mem::transmute::<*const u8, Entry<S>>(code) };
+        let lengths = program.inputs.iter().map(|array| array.len());
+        let inputs = input_places(&program.inputs).into_iter().zip(lengths).collect();
+        Ok(MachineCode { module: Some(module), entry, inputs, results, scratch: scratch.len, _tables: tables })
+    }
+
+    /// Length of the working memory that a call needs.
+    pub fn scratch(&self) -> usize {
+        self.scratch
+    }
+
+    /// Whether gravity, the last of the fields, is an input.
+    #[inline]
+    pub fn reads_gravity(&self) -> bool {
+        self.inputs.last().is_some_and(|(_, len)| *len > 0)
+    }
+
+    /// Runs the code. `inputs` are the arguments, then the fields.
+    ///
+    /// # Panics
+    /// If a slice has another length than its array, or the working memory is too short.
+    #[inline]
+    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) {
+        assert!(scratch.len() >= self.scratch, "the working memory is too short");
+        for (place, len) in &self.inputs {
+            assert_eq!(inputs[*place].len(), *len, "input array {place} has another length");
+        }
+        assert_eq!(results.len(), self.results.len(), "there is another number of results");
+        let mut written = [std::ptr::null_mut(); RESULTS];
+        for ((to, result), len) in written.iter_mut().zip(results.iter_mut()).zip(&self.results) {
+            assert_eq!(result.len(), *len, "a result array has another length");
+            *to = result.as_mut_ptr();
+        }
+        let read = inputs.map(|input| input.as_ptr());
+        // SAFETY: see the head of this file.
+        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
+    }
+}
+
+fn numbers<S: Number>(table: Vec<f64>) -> Box<[S]> {
+    table.into_iter().map(S::constant).collect()
+}
+
+impl<S> Drop for MachineCode<S> {
+    fn drop(&mut self) {
+        if let Some(module) = self.module.take() {
+            // SAFETY: nobody can call the code any more, because the function is being dropped.
+            unsafe { module.free_memory() };
+        }
+    }
+}
+
+impl<S> std::fmt::Debug for MachineCode<S> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("MachineCode")
+            .field("inputs", &self.inputs)
+            .field("results", &self.results)
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,32 @@
+//! Machine code at run time, for models that are known at run time only (feature `jit`).
+//!
+//! The programs are those of generated Rust. Cranelift makes machine code of them in milliseconds, without a compiler on
+//! the machine. With [`Arithmetic::Exact`](crate::options::Arithmetic::Exact) the code gives the bits of the
+//! interpreter, up to the sign of zero.
+//!
+//! ```
+//! use mbd_codegen::jit::Compiled;
+//! use mbd_codegen::options::Options;
+//! use mbd_codegen::read::{self, ImportOptions};
+//! use mbd_runtime::system::{Conjugate, Energetic, System};
+//!
+//! let text = include_str!("../../../models/double_pendulum.toml");
+//! let model = read::model("double_pendulum.toml", text, &ImportOptions::default())?.model;
+//! let mut pendulum = Compiled::<f64>::new(&model, &Options::default())?;
+//! let (mut q, mut p) = (pendulum.neutral(), pendulum.zero_momenta());
+//! q[0] = 0.5;
+//! pendulum.conjugate_momenta(&q, &vec![1.0, 0.0], &mut p);
+//! let (kinetic, potential) = pendulum.energies(&q, &p);
+//! assert!(kinetic > 0.0 && potential != 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod compiled;
+mod error;
+mod lower;
+mod memory;
+mod traits;
+
+pub use compiled::Compiled;
+pub use error::CompileError;
+pub use memory::Number;

@@ -1,0 +1,273 @@
+//! Machine code made at run time against the programs that it was made of, and against the interpreter.
+//!
+//! In exact arithmetic all give the same bits, except for the signs of zeros: straight-line and rolled code, trees and
+//! loops, both precisions.
+
+use mbd_codegen::code::{compile, Code};
+use mbd_codegen::jit::{CompileError, Compiled, Number};
+use mbd_codegen::model::{Gravity, Model};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::{search, Arithmetic, Options, Output, RolledCode};
+use mbd_runtime::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, System};
+use mbd_testing::chains::{general, planar};
+use mbd_testing::closed::{random_loops, LoopKnobs};
+use mbd_testing::random::{random_model, Distribution};
+use mbd_testing::state::{random_state, State};
+use mbd_testing::toml::to_toml;
+
+fn options(elimination: EliminationStrategy, rolled: RolledCode, arithmetic: Arithmetic) -> Options {
+    let plan = PlanOptions { elimination, rolled, ..PlanOptions::default() };
+    Options { arithmetic, plan, ..Options::default() }
+}
+
+/// Machine code of a plan with the inputs of a state.
+fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compiled<S> {
+    let all = |list: &[f64]| list.iter().map(|x| S::constant(*x)).collect::<Vec<S>>();
+    let mut compiled = Compiled::from_plan(plan.clone(), options.clone()).expect("options");
+    compiled.set_parameters(&all(&s.params));
+    let inputs = compiled.inputs();
+    inputs.tau = all(&s.tau);
+    [inputs.drive_q, inputs.drive_v, inputs.drive_a] = [0, 1, 2].map(|k| all(&s.drive[k]));
+    inputs.wrenches = s.wrenches.iter().map(|w| w.map(S::constant)).collect();
+    if plan.model.gravity == Gravity::Input {
+        inputs.gravity = s.gravity.map(S::constant);
+    }
+    compiled
+}
+
+/// Whether two numbers are the same but for the signs of zeros.
+fn same<S: Number>(a: S, b: S) -> bool {
+    a == b || (a.to_f64().is_nan() && b.to_f64().is_nan())
+}
+
+/// Every output of a plan by machine code and by its program, operation by operation, with or without `derivatives`. Returns the number of outputs and
+/// of those that are rolled.
+fn compare<S: Number>(whose: &str, plan: &Plan, options: &Options, s: &State, derivatives: bool) -> [usize; 2] {
+    let options = Options { precision: S::PRECISION, ..options.clone() };
+    let mut machine = compiled::<S>(plan, &options, s);
+    let (p, a) = (s.v.iter().map(|x| 0.7 * x - 0.1).collect::<Vec<_>>(), vec![0.3; s.v.len()]);
+    let mut counts = [0; 2];
+    for output in Output::available(!plan.constraints.is_empty()) {
+        // Derivatives are as large as all other outputs together.
+        if output.name().contains("derivatives") && !derivatives {
+            continue;
+        }
+        let program = compile(plan, output, &options).unwrap_or_else(|e| panic!("{whose}: {e}"));
+        let given: Vec<S> = s.inputs_of(&program.inputs, &p, &a).into_iter().map(S::constant).collect();
+        let expected = match &program.program {
+            Code::Straight(straight) => straight.evaluate(&given, |a, b, c| a * b + c),
+            Code::Rolled(rolled) => rolled.evaluate(&given, |a, b, c| a * b + c),
+        };
+        let arguments: Vec<&[S]> = {
+            let mut rest = &given[..];
+            let lengths = program.inputs.iter().filter(|array| !array.field).map(|array| array.len());
+            lengths.map(|len| rest.split_off(..len).expect("inputs start with the arguments")).collect()
+        };
+        // Memory that was used before must not matter.
+        let lengths = program.spec.results.iter().map(|array| array.len(machine.sizes()));
+        let mut found: Vec<Vec<S>> = lengths.map(|len| vec![S::constant(f64::NAN); len]).collect();
+        let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+        match machine.evaluate(output, &arguments, &mut results) {
+            Err(CompileError::TooLarge { .. }) => continue,
+            result => result.unwrap_or_else(|e| panic!("{whose}: {output:?}: {e}")),
+        }
+        let found = found.concat();
+        assert_eq!(found.len(), expected.len(), "{whose}: {output:?}");
+        for (k, (a, b)) in found.iter().zip(&expected).enumerate() {
+            let text = || to_toml(&plan.model);
+            assert!(same(*a, *b), "{whose}: {output:?}[{k}]: {a:?}, by the program {b:?}\n{}", text());
+        }
+        counts[0] += 1;
+        counts[1] += usize::from(matches!(program.program, Code::Rolled(_)));
+    }
+    counts
+}
+
+#[test]
+fn trees() {
+    for seed in 0..40 {
+        let model = random_model(seed, &Distribution::everything(seed, 6));
+        let elimination =
+            [EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest][seed as usize % 3];
+        let options = options(elimination, RolledCode::Never, Arithmetic::Exact);
+        let plan = search::plan(&model, options.plan);
+        let s = random_state(&plan, seed);
+        compare::<f64>(&format!("seed {seed}"), &plan, &options, &s, seed % 8 == 0);
+        if seed % 4 == 1 {
+            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &s, seed == 1);
+        }
+    }
+}
+
+#[test]
+fn loops() {
+    for seed in 0..20 {
+        let system = random_loops(seed, &LoopKnobs::everything(seed, 5));
+        let options = options(EliminationStrategy::Single, RolledCode::Never, Arithmetic::Exact);
+        let plan = search::plan(&system.model, options.plan);
+        compare::<f64>(&format!("seed {seed}"), &plan, &options, &system.state, seed % 8 == 0);
+        if seed % 4 == 1 {
+            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &system.state, false);
+        }
+    }
+}
+
+#[test]
+fn rolled_code() {
+    let mut rolled = 0;
+    for seed in 0..12 {
+        let n = 6 + seed as usize % 7;
+        let model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
+        let options = options(EliminationStrategy::Single, RolledCode::Always, Arithmetic::Exact);
+        let plan = search::plan(&model, options.plan);
+        let s = random_state(&plan, seed);
+        rolled += compare::<f64>(&format!("seed {seed}"), &plan, &options, &s, false)[1];
+        if seed % 4 == 1 {
+            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &s, false);
+        }
+    }
+    assert!(rolled > 60, "{rolled} outputs are rolled");
+}
+
+/// The functions of the traits by machine code in exact arithmetic and by the interpreter.
+fn compare_traits(whose: &str, plan: &Plan, s: &State) {
+    let options = options(EliminationStrategy::Fastest, RolledCode::Auto, Arithmetic::Exact);
+    let (mut c, mut i) = (compiled::<f64>(plan, &options, s), s.interpreter(plan));
+    let check = |what: &str, found: &[f64], expected: &[f64]| {
+        mbd_testing::assert_same_bits(whose, what, &plan.model, found, expected);
+    };
+    let state = || (i_zero(plan.dims.nq), i_zero(plan.dims.nv), i_zero(plan.dims.nv));
+    let (q, (mut p, mut p2)) = (&s.q, (i_zero(plan.dims.nv), i_zero(plan.dims.nv)));
+    c.conjugate_momenta(q, &s.v, &mut p);
+    i.conjugate_momenta(q, &s.v, &mut p2);
+    check("momenta", &p, &p2);
+    let ((mut qd, mut pd, mut a), (mut qd2, mut pd2, mut a2)) = (state(), state());
+    c.rates_at(0.0, q, &p, &mut qd, &mut pd);
+    i.rates_at(0.0, q, &p, &mut qd2, &mut pd2);
+    check("rates", &[&qd[..], &pd].concat(), &[&qd2[..], &pd2].concat());
+    c.coordinate_rates(q, &s.v, &mut qd);
+    i.coordinate_rates(q, &s.v, &mut qd2);
+    check("coordinate rates", &qd, &qd2);
+    c.generalized_accelerations(q, &s.v, &mut a);
+    i.generalized_accelerations(q, &s.v, &mut a2);
+    check("accelerations", &a, &a2);
+    let (e, e2) = (c.energies(q, &p), i.energies(q, &p));
+    check("energy", &[e.0, e.1], &[e2.0, e2.1]);
+    let (mut d, mut d2) = (c.zero_derivatives(), i.zero_derivatives());
+    c.rate_derivatives(0.0, q, &p, &mut d);
+    i.rate_derivatives(0.0, q, &p, &mut d2);
+    for (to, from) in d.blocks_mut().into_iter().flatten().zip(d2.blocks_mut().into_iter().flatten()) {
+        check("derivatives", &to.concat(), &from.concat());
+    }
+    if plan.constraints.is_empty() {
+        return;
+    }
+    let ([mut r, mut r2], [mut g, mut g2]) = ([c.zero_rows(), i.zero_rows()], [c.zero_entries(), i.zero_entries()]);
+    c.constraint_residuals(q, &mut r, &mut g);
+    i.constraint_residuals(q, &mut r2, &mut g2);
+    check("residuals", &[&r[..], &g].concat(), &[&r2[..], &g2].concat());
+    c.project_momenta(0.0, q, &mut p, &mut a, &mut r);
+    i.project_momenta(0.0, q, &mut p2, &mut a2, &mut r2);
+    check("projection", &[&p[..], &a, &r].concat(), &[&p2[..], &a2, &r2].concat());
+    let (mut x, mut x2) = (c.zero_rows(), i.zero_rows());
+    c.position_correction(q, &mut r, &mut a, &mut x);
+    i.position_correction(q, &mut r2, &mut a2, &mut x2);
+    check("correction", &[&r[..], &a, &x].concat(), &[&r2[..], &a2, &x2].concat());
+    c.multipliers(0.0, q, &s.v, &mut r);
+    i.multipliers(0.0, q, &s.v, &mut r2);
+    check("multipliers", &r, &r2);
+}
+
+fn i_zero(n: usize) -> Vec<f64> {
+    vec![0.0; n]
+}
+
+#[test]
+fn traits_have_the_bits_of_the_interpreter() {
+    for seed in 0..6 {
+        let model = random_model(seed, &Distribution { bodies: (2, 6), ..Distribution::default() });
+        let plan = search::plan(&model, PlanOptions::default());
+        compare_traits(&format!("seed {seed}"), &plan, &random_state(&plan, seed));
+        let system = random_loops(seed, &LoopKnobs::plain());
+        let plan = search::plan(&system.model, PlanOptions::default());
+        compare_traits(&format!("loops, seed {seed}"), &plan, &system.state);
+    }
+}
+
+/// Rewritten and fused operations round differently. The tolerance, relative to the largest result, allows for a few
+/// hundred roundings and for their growth by the condition of the inertia, which is below 1e3 here.
+#[test]
+fn fast_code_is_as_accurate() {
+    for seed in 0..30 {
+        let model = random_model(seed, &Distribution { bodies: (2, 9), ..Distribution::default() });
+        let fast = options(EliminationStrategy::Fastest, RolledCode::Auto, Arithmetic::Fast);
+        let plan = search::plan(&model, fast.plan);
+        let s = random_state(&plan, seed);
+        let (mut c, mut i): (Compiled, Interpreter<f64>) = (compiled(&plan, &fast, &s), s.interpreter(&plan));
+        let (mut a, mut a2) = (i_zero(s.v.len()), i_zero(s.v.len()));
+        c.generalized_accelerations(&s.q, &s.v, &mut a);
+        i.generalized_accelerations(&s.q, &s.v, &mut a2);
+        let size = a2.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        let off = a.iter().zip(&a2).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(off <= 1e-11 * size, "seed {seed}: {off:e} of {size:e}\n{}", to_toml(&model));
+    }
+}
+
+/// `n` bodies side by side, without a run of links that code could be rolled over.
+fn comb(n: usize) -> Model {
+    let mut model = random_model(3, &Distribution { bodies: (n, n), ..Distribution::default() });
+    model.joints.iter_mut().for_each(|joint| joint.parent = None);
+    model
+}
+
+#[test]
+fn large_mechanisms_are_interpreted() {
+    let options = options(EliminationStrategy::Single, RolledCode::Auto, Arithmetic::Exact);
+    let model = comb(1400);
+    let mut c = Compiled::<f64>::new(&model, &options).expect("options");
+    let error = c.prepare(Output::Rates).expect_err("so many bodies");
+    assert!(matches!(error, CompileError::TooLarge { output: Output::Rates, .. }), "{error:?}");
+    let mut i = c.plan().interpreter(&c.plan().default_params());
+    let (q, p) = (c.neutral(), vec![0.1; c.plan().dims.nv]);
+    let [mut qd, mut pd, mut qd2, mut pd2] = [0; 4].map(|_| i_zero(p.len()));
+    (qd, qd2) = (vec![0.0; q.len()], {
+        qd2.resize(q.len(), qd[0]);
+        qd2
+    });
+    c.rates_at(0.0, &q, &p, &mut qd, &mut pd);
+    i.rates_at(0.0, &q, &p, &mut qd2, &mut pd2);
+    assert_eq!((qd, pd), (qd2, pd2));
+}
+
+#[test]
+fn wrong_arrays_are_refused() {
+    let model = random_model(1, &Distribution { bodies: (3, 3), ..Distribution::default() });
+    let mut c = Compiled::<f64>::new(&model, &Options::default()).expect("options");
+    let (q, mut m) = (c.neutral(), vec![0.0; 2]);
+    let error = c.evaluate(Output::MassMatrix, &[&q], &mut [&mut m]).expect_err("too short");
+    let nv = c.plan().dims.nv;
+    assert_eq!(
+        error.to_string(),
+        format!("`mass_matrix`: its results have the lengths [{}], and [2] were given", nv * nv)
+    );
+    let error = c.evaluate(Output::Multipliers, &[&q, &q], &mut [&mut m]).expect_err("no constraints");
+    assert!(error.to_string().contains("loops or couplings"), "{error}");
+}
+
+#[test]
+fn threads_share_the_code() {
+    let model = random_model(5, &Distribution { bodies: (6, 6), ..Distribution::default() });
+    let c = Compiled::<f64>::new(&model, &Options::default()).expect("options");
+    let (q, p) = (c.neutral(), c.zero_momenta());
+    let rates = |mut c: Compiled<f64>| {
+        let (mut qd, mut pd) = (c.neutral(), c.zero_momenta());
+        (0..100).for_each(|_| c.rates_at(0.0, &q, &p, &mut qd, &mut pd));
+        (qd, pd)
+    };
+    std::thread::scope(|scope| {
+        let all: Vec<_> = (0..4).map(|_| c.clone()).map(|c| scope.spawn(|| rates(c))).collect();
+        let all: Vec<_> = all.into_iter().map(|thread| thread.join().expect("no thread panics")).collect();
+        assert!(all.windows(2).all(|pair| pair[0] == pair[1]));
+    });
+}
