@@ -5,15 +5,17 @@
 //! within its tolerance, one step changes the balance by at most `Σ |∂H/∂yᵢ| eᵢ`, and the sum of these bounds is what
 //! the tolerance allows. A larger change proves that errors of steps are larger than estimated.
 
+use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::{Model, Value};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search;
 use multibody::runtime::integrate::{Step, Tolerances};
 use multibody::runtime::system::LieGroup;
-use multibody::runtime::{Interpreter, System};
+use multibody::runtime::{Conjugate, System};
 
-use super::motion::{interpreter, Record, Settings};
+use super::motion::{mechanism, Record, Settings};
+use super::Outcome;
 
 /// Roundings of a step, as an error relative to the size of a component.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
@@ -36,7 +38,7 @@ pub struct Balance {
     tolerances: Option<Tolerances>,
     /// The mechanism without its constraints, if it has any: `H` and its derivatives are those of the tree, and the
     /// rates of the momenta of the constrained mechanism have the forces of the constraints among them.
-    tree: Option<Interpreter<f64>>,
+    tree: Option<Compiled>,
     damped: bool,
     /// Damping of every velocity, N m s/rad or N s/m.
     damping: Vec<f64>,
@@ -62,7 +64,7 @@ pub struct Balance {
 
 impl Balance {
     /// The balance of a run that has not begun.
-    pub fn new(plan: &Plan, settings: &Settings) -> Balance {
+    pub fn new(plan: &Plan, settings: &Settings) -> Outcome<Balance> {
         let damped = plan.model.joints.iter().any(|j| j.damping.iter().any(|d| *d != Value::ZERO));
         let parameters = plan.tree(&plan.default_params()).dynamic_parameters();
         // Behind the inertias there are the dampings and the dry frictions of all velocities.
@@ -75,9 +77,16 @@ impl Balance {
             let model = Model { constraints: Vec::new(), ..plan.model.clone() };
             // Coordinates are in the same order. No search: it is evaluated once a step.
             let options = PlanOptions { elimination: EliminationStrategy::Single, ..PlanOptions::default() };
-            interpreter(&search::plan(&model, options))
+            mechanism(&search::plan(&model, options), settings.interpreted)
         });
-        Balance { tolerances, tree, damped, damping: parameters[end - 2 * nv..end - nv].to_vec(), ..Balance::default() }
+        let tree = tree.transpose()?;
+        Ok(Balance {
+            tolerances,
+            tree,
+            damped,
+            damping: parameters[end - 2 * nv..end - nv].to_vec(),
+            ..Balance::default()
+        })
     }
 
     /// Whether dampers take energy.
@@ -86,17 +95,12 @@ impl Balance {
     }
 
     /// Adds the work of the dampers in a step of `h` s, from the states of its dense output.
-    pub fn dissipate(
-        &mut self,
-        interpreter: &mut Interpreter<f64>,
-        h: f64,
-        mut dense: impl FnMut(f64) -> (Vec<f64>, Vec<f64>),
-    ) {
-        let mut v = interpreter.zero_momenta();
+    pub fn dissipate(&mut self, mechanism: &mut Compiled, h: f64, mut dense: impl FnMut(f64) -> (Vec<f64>, Vec<f64>)) {
+        let mut v = mechanism.zero_momenta();
         let mut half = |from: f64| -> f64 {
             let powers = GAUSS.iter().map(|(node, weight)| {
                 let (q, p) = dense(from + 0.5 * node);
-                interpreter.velocities(&q, &p, &mut v);
+                mechanism.velocities(&q, &p, &mut v);
                 -weight * v.iter().zip(&self.damping).map(|(v, d)| d * v * v).sum::<f64>()
             });
             0.5 * h * powers.sum::<f64>()
@@ -105,7 +109,7 @@ impl Balance {
         // The balance at the middle of the step shows the error of the dense output there. The power follows the
         // kinetic energy, so that the work is uncertain by that error times the part of the energy it takes.
         let (q, p) = dense(0.5);
-        let (kinetic, potential) = interpreter.energy(&q, &p);
+        let (kinetic, potential) = mechanism.energy(&q, &p);
         let middle = (self.defect(kinetic + potential, self.work + first) - self.defect).abs();
         let part = ((first + second).abs() / kinetic.max(f64::MIN_POSITIVE)).min(1.0);
         self.work += first + second;
@@ -120,7 +124,7 @@ impl Balance {
     /// Adds a step of `h` s that ends at a state with given kinetic and potential energy.
     pub fn step(
         &mut self,
-        interpreter: &mut Interpreter<f64>,
+        mechanism: &mut Compiled,
         h: f64,
         (q, p): (&[f64], &[f64]),
         (kinetic, potential): (f64, f64),
@@ -136,11 +140,11 @@ impl Balance {
         if let Some(tolerances) = self.tolerances {
             let mut tree = self.tree.take();
             let allowed = match &mut tree {
-                None => self.one(&tolerances, interpreter, h, q, p),
+                None => self.one(&tolerances, mechanism, h, q, p),
                 Some(tree) => {
                     let (mut v, mut p) = (p.to_vec(), p.to_vec());
-                    interpreter.velocities(q, &p.clone(), &mut v);
-                    tree.momenta(q, &v, &mut p);
+                    mechanism.velocities(q, &p.clone(), &mut v);
+                    tree.conjugate_momenta(&q.to_vec(), &v, &mut p);
                     self.one(&tolerances, tree, h, q, &p)
                 }
             };
@@ -152,10 +156,11 @@ impl Balance {
 
     /// What the tolerances allow in one step of `h` s at a state, J: `Σ |∂H/∂yᵢ| eᵢ`, at most
     /// `√n (Σ (∂H/∂yᵢ sᵢ)²)^½` for errors whose root mean square relative to the scales `sᵢ` is one.
-    fn one(&self, tolerances: &Tolerances, interpreter: &mut Interpreter<f64>, h: f64, q: &[f64], p: &[f64]) -> f64 {
+    fn one(&self, tolerances: &Tolerances, mechanism: &mut Compiled, h: f64, q: &[f64], p: &[f64]) -> f64 {
         let nv = p.len();
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; q.len()], vec![0.0; nv]);
-        interpreter.rates(q, p, &mut v, &mut qd, &mut pd);
+        mechanism.velocities(q, p, &mut v);
+        mechanism.rates_at(0.0, &q.to_vec(), &p.to_vec(), &mut qd, &mut pd);
         // ∂H/∂q is the rate of the momenta without the dampers' part.
         let mut by_q: Vec<f64> = (0..nv).map(|k| pd[k].abs() + self.damping[k] * v[k].abs()).collect();
         let (mut by_p, mut size) = (v.iter().map(|v| v.abs()).collect::<Vec<_>>(), p.to_vec());
@@ -163,7 +168,7 @@ impl Balance {
         let largest_angle = q.iter().fold(1.0_f64, |m, q| m.max(q.abs()));
         // Parts of Lie joints are compared by their length, which is the same in all axes.
         let norm = |x: &[f64]| x.iter().fold(0.0_f64, |n, x| n.hypot(*x));
-        for group in interpreter.lie_joints() {
+        for group in mechanism.lie_joints() {
             let n = group.kind.sizes().1;
             let (linear, angular) = match group.kind {
                 LieGroup::SO3 => (0, 3),

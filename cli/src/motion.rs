@@ -1,12 +1,14 @@
-//! A simulation with the interpreter, and the record of its motion.
+//! A simulation with machine code made for it, or with the interpreter, and the record of its motion.
 
 use std::cell::RefCell;
 use std::io::{IsTerminal, Write as _};
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
+use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::Gravity;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::{Arithmetic, Options, Output};
 use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{
     ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation, WithPostStep,
@@ -32,6 +34,8 @@ pub struct Settings<'a> {
     pub project: bool,
     /// How loops are kept closed.
     pub hold: Stabilisation,
+    /// Whether the interpreter computes everything.
+    pub interpreted: bool,
 }
 
 impl Settings<'_> {
@@ -101,6 +105,8 @@ pub struct Ends {
 pub struct Spent {
     /// Total.
     pub total: f64,
+    /// Making machine code of the rates, before the run; `None` where the interpreter computes them.
+    pub compiled: Option<f64>,
     /// Evaluations of the rates in steps.
     pub rates: f64,
     /// Derivatives of the rates.
@@ -131,7 +137,7 @@ impl Ends {
 
 /// Observer of the states of a simulation.
 struct Observer {
-    interpreter: Interpreter<f64>,
+    mechanism: Compiled,
     record: Record,
     start: f64,
     residual: Vec<f64>,
@@ -141,8 +147,8 @@ struct Observer {
 impl Observer {
     fn row(&mut self, t: f64, q: &[f64], p: &[f64]) {
         let mut v = vec![0.0; p.len()];
-        self.interpreter.velocities(q, p, &mut v);
-        self.record.energy.push(self.interpreter.energy(q, p));
+        self.mechanism.velocities(q, p, &mut v);
+        self.record.energy.push(self.mechanism.energy(q, p));
         self.record.t.push(t);
         self.record.v.push(v);
         self.record.q.push(q.to_vec());
@@ -151,13 +157,13 @@ impl Observer {
 
     /// The end of a step of `h` s.
     fn end(&mut self, t: f64, h: f64, q: &[f64], p: &[f64], kept: bool) {
-        let Observer { interpreter, record, residual, entries, .. } = self;
+        let Observer { mechanism, record, residual, entries, .. } = self;
         if !residual.is_empty() {
-            interpreter.constraint_residuals(&q.to_vec(), residual, entries);
-            record.drift.left = record.drift.left.max(loops::largest(interpreter.rows(), residual));
+            mechanism.constraint_residuals(&q.to_vec(), residual, entries);
+            record.drift.left = record.drift.left.max(loops::largest(mechanism.rows(), residual));
         }
-        let (kinetic, potential) = self.interpreter.energy(q, p);
-        self.record.balance.step(&mut self.interpreter, h, (q, p), (kinetic, potential));
+        let (kinetic, potential) = self.mechanism.energy(q, p);
+        self.record.balance.step(&mut self.mechanism, h, (q, p), (kinetic, potential));
         let (change, ends) = (kinetic + potential - self.start, &mut self.record.ends);
         (ends.scale, ends.worst) = (ends.scale.max(kinetic), ends.worst.max(change.abs()));
         if kept {
@@ -195,7 +201,7 @@ impl PostStep<Timed> for Keeper {
     }
 }
 
-/// The interpreter of a simulation over any scalar, with the default parameters.
+/// An interpreter over any scalar, with the default parameters.
 pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
     let params = plan.default_params();
     let gravity = match plan.model.gravity {
@@ -206,6 +212,16 @@ pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
     let params: Vec<S> = params.into_iter().map(S::constant).collect();
     Interpreter::new(plan.tree(&params), gravity.map(S::constant))
         .with_names(plan.velocity_names(), plan.constraint_names())
+}
+
+/// Machine code of a plan with the default parameters, in exact arithmetic, which gives the bits of the interpreter; with
+/// `interpreted` the interpreter itself.
+pub fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Compiled> {
+    let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
+    let mut mechanism = Compiled::from_plan(plan.clone(), options)
+        .map_err(|e| Failure::new(e.to_string(), "simulate with --interpreted"))?;
+    mechanism.inputs().gravity = interpreter::<f64>(plan).gravity;
+    Ok(if interpreted { mechanism.interpreted() } else { mechanism })
 }
 
 /// Momenta of given velocities; with constraints, of the nearest velocities in the metric of the mass matrix that
@@ -248,14 +264,18 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let p = momenta(&mut interpreter, &q, &v);
     let (residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     let (kinetic, potential) = interpreter.energy(&q, &p);
+    let mechanism = mechanism(plan, settings.interpreted)?;
+    let clock = Instant::now();
+    let compiled = !settings.interpreted && mechanism.prepare(Output::Rates).is_ok();
+    let compiled = compiled.then(|| clock.elapsed().as_secs_f64());
     let mut observer = Observer {
-        interpreter: interpreter.clone(),
-        record: Record { balance: Balance::new(plan, settings), ..Record::default() },
+        mechanism: mechanism.clone(),
+        record: Record { balance: Balance::new(plan, settings)?, ..Record::default() },
         start: kinetic + potential,
         residual,
         entries,
     };
-    let mut system = Timed::new(interpreter);
+    let mut system = Timed::new(mechanism);
     let met = Rc::new(RefCell::new(Drift::default()));
     let mut driver = driver(plan, settings, &mut system, settings.step, (&q, &p), &met)?;
     let mut projection = settings.project.then(|| EnergyProjection::new(&mut system, &q, &p, 3));
@@ -269,7 +289,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     [record.spent.rates, record.spent.derivatives, record.spent.constraints, record.spent.clock] = system.seconds();
     let met = met.borrow();
     (record.drift.found, record.drift.singular) = (met.found, met.singular.clone());
-    record.spent.total = total;
+    (record.spent.total, record.spent.compiled) = (total, compiled);
     Ok(record)
 }
 
@@ -303,8 +323,8 @@ fn go(
             row += 1;
         }
         if observer.record.balance.damped() {
-            let Observer { interpreter, record, .. } = &mut *observer;
-            record.balance.dissipate(interpreter, h, |theta| {
+            let Observer { mechanism, record, .. } = &mut *observer;
+            record.balance.dissipate(mechanism, h, |theta| {
                 driver.dense(system, theta, &mut q, &mut p);
                 (q.clone(), p.clone())
             });

@@ -7,8 +7,9 @@ use multibody::codegen::plan::Plan;
 use multibody::runtime::integrate::Step;
 
 use super::displacement::{components, displacement, range};
-use super::motion::{driver, interpreter, Drift, Record, Settings};
+use super::motion::{driver, mechanism, Drift, Record, Settings};
 use super::timed::Timed;
+use super::Outcome;
 
 /// Number of states at which steps are compared.
 const PLACES: usize = 8;
@@ -29,8 +30,8 @@ pub struct Probe {
 }
 
 /// Compares steps of `h` s with halved ones at states of the record.
-pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Probe {
-    let mut system = Timed::new(interpreter(plan));
+pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Outcome<Probe> {
+    let mut system = Timed::new(mechanism(plan, settings.interpreted)?);
     let components = components(plan);
     let range = range(&components, &record.q);
     let stride = record.q.len().div_ceil(PLACES);
@@ -46,7 +47,7 @@ pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Probe
             Some((q, p))
         };
         let (Some(one), Some(two)) = (end(1.0), end(2.0)) else {
-            return Probe { error: f64::INFINITY, lost: true, ..found };
+            return Ok(Probe { error: f64::INFINITY, lost: true, ..found });
         };
         let x = displacement(&system, (&one.0, &one.1), (&two.0, &two.1));
         for (x, component) in x.iter().zip(&components) {
@@ -55,5 +56,5 @@ pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Probe
             found.lost |= x.is_nan() || x.abs() > far;
         }
     }
-    found
+    Ok(found)
 }

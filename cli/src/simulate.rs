@@ -1,4 +1,4 @@
-//! `mbd simulate`: free motion through the interpreter, as a table and a plot.
+//! `mbd simulate`: free motion as a table and a plot.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -105,7 +105,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let energy = energy::judge(&record, &settings);
     writeln!(out, "{}", energy.line)?;
     let probe = match settings.step {
-        Step::Fixed(h) => Some(probe::probe(&plan, &settings, &record, h)),
+        Step::Fixed(h) => Some(probe::probe(&plan, &settings, &record, h)?),
         Step::Adaptive(_) => None,
     };
     match probe {
@@ -175,7 +175,15 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             "raise --every or lower --rows",
         ));
     }
-    Ok(Settings { method, step, time: args.time, every, project: args.project, hold: args.hold })
+    Ok(Settings {
+        method,
+        step,
+        time: args.time,
+        every,
+        project: args.project,
+        hold: args.hold,
+        interpreted: args.interpreted,
+    })
 }
 
 /// The title of the plot, which is also the first line of the report.
@@ -238,7 +246,7 @@ fn singular(plan: &Plan, drift: &Drift) -> Option<String> {
 
 /// Report of the computing times.
 fn spent(time: f64, spent: &Spent) -> String {
-    let Spent { total, rates, derivatives, constraints, output, clock } = *spent;
+    let Spent { total, compiled, rates, derivatives, constraints, output, clock } = *spent;
     let share = |x: f64| format!("{:.0} %", 100.0 * (x / total).clamp(0.0, 1.0));
     let method = (total - rates - derivatives - constraints - output - clock).max(0.0);
     let derivatives = match derivatives > 0.0 {
@@ -249,8 +257,12 @@ fn spent(time: f64, spent: &Spent) -> String {
         true => format!(", loops {}", share(constraints)),
         false => String::new(),
     };
+    let by = match compiled {
+        Some(seconds) => format!("machine code, made in {:.0} ms", 1e3 * seconds),
+        None => "interpreter".to_string(),
+    };
     format!(
-        "{total:.3} s, {:.0} times faster than time itself; rates {} (interpreter){derivatives}{constraints}, the method's own sums {}, \
+        "{total:.3} s, {:.0} times faster than time itself; rates {} ({by}){derivatives}{constraints}, the method's own sums {}, \
          energies and rows {}",
         time / total,
         share(rates),

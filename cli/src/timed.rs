@@ -2,8 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use multibody::codegen::jit::Compiled;
 use multibody::runtime::system::{LieJoint, Row};
-use multibody::runtime::{Constrained, Differentiable, Energetic, Interpreter, StateDerivatives, System};
+use multibody::runtime::{Constrained, Differentiable, Energetic, StateDerivatives, System};
 
 /// Total time of calls of one kind.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,9 +23,9 @@ impl Clocked {
     }
 }
 
-/// The interpreter, with the times of its rates and their derivatives.
+/// A compiled mechanism, with the times of its rates and their derivatives.
 pub struct Timed {
-    inner: Interpreter<f64>,
+    inner: Compiled,
     /// Whether calls are for dense output rather than for steps.
     pub output: bool,
     /// Time of reading the clock once, s.
@@ -37,8 +38,8 @@ pub struct Timed {
 }
 
 impl Timed {
-    /// Wraps an interpreter.
-    pub fn new(inner: Interpreter<f64>) -> Self {
+    /// Wraps a mechanism.
+    pub fn new(inner: Compiled) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
         Timed {

@@ -153,7 +153,15 @@ fn compare(states: &[State], generated: &mut Ur5, interpreter: &mut Interpreter<
 /// The interpreter's simulation of the same motion as the generated code's.
 fn settings() -> Settings<'static> {
     let step = Step::Fixed(TIME / STEPS as f64);
-    Settings { method: "rk4", step, time: TIME, every: TIME / 1000.0, project: false, hold: Stabilisation::default() }
+    Settings {
+        method: "rk4",
+        step,
+        time: TIME,
+        every: TIME / 1000.0,
+        project: false,
+        hold: Stabilisation::default(),
+        interpreted: false,
+    }
 }
 
 /// Simulates with the generated code and with the interpreter.

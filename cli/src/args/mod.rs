@@ -63,7 +63,7 @@ pub enum Command {
     Eval(EvalArgs),
     /// Bound outputs at a state or over a box of states, rounding errors included
     Certify(CertifyArgs),
-    /// Simulate with the interpreter; write a CSV file and a plot
+    /// Simulate; write a CSV file and a plot
     Simulate(SimulateArgs),
     /// Show intermediate results of the generator
     Explain(ExplainArgs),
@@ -387,6 +387,10 @@ pub struct SimulateArgs {
     /// the motion hardly changes
     #[arg(long)]
     pub project: bool,
+    /// Compute everything with the interpreter: the same numbers as the machine code that is otherwise made of the model,
+    /// many times slower
+    #[arg(long)]
+    pub interpreted: bool,
     /// Fixed step, s; shortened if the time is not a multiple of it
     #[arg(long, value_name = "S", value_parser = positive)]
     pub step: Option<f64>,

@@ -171,6 +171,32 @@ fn simulates() {
     assert_eq!((rows.len(), rows[1000][0]), (1001, 10.0));
 }
 
+/// Machine code made at run time and the interpreter write the same table, loops, dampers, dense rows and all.
+#[test]
+fn simulates_the_same_interpreted() {
+    let folder = folder("simulate_interpreted");
+    let run = |model: &str, more: &[&str]| {
+        let model = format!("{ROOT}/models/{model}");
+        let arguments =
+            [&["simulate", &model, "--time", "0.3", "--rows", "17", "--csv", "a.csv", "--svg", "a.svg"], more];
+        let output = good(run_in(&folder, &arguments.concat()));
+        (read(&folder, "a.csv"), out(&output).to_string())
+    };
+    let arguments: [(&str, &[&str]); 5] = [
+        ("ur5.urdf", &[]),
+        ("solo12.urdf", &["--base", "floating", "--method", "radau5"]),
+        ("mechanisms/fourbar.toml", &["--method", "adams"]),
+        ("mechanisms/strandbeest_leg.toml", &["--step", "0.001"]),
+        ("chain100.toml", &["--method", "dop853"]),
+    ];
+    for (model, more) in arguments {
+        let (compiled, interpreted) = (run(model, more), run(model, &[more, &["--interpreted"]].concat()));
+        assert_eq!(compiled.0, interpreted.0, "{model}");
+        assert!(compiled.1.contains("(machine code, made in "), "{}", compiled.1);
+        assert!(interpreted.1.contains("(interpreter)"), "{}", interpreted.1);
+    }
+}
+
 #[test]
 fn simulates_on_the_energy_of_the_start() {
     let folder = folder("simulate_project");

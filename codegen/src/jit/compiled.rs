@@ -35,6 +35,8 @@ const MOST_BODIES: usize = MOST_OPERATIONS / 50;
 pub struct Compiled<S: Number = f64> {
     shared: Arc<Shared<S>>,
     pub(super) interpreter: Interpreter<S>,
+    /// Whether the interpreter computes everything.
+    interpreted: bool,
     params: Vec<S>,
     scratch: Vec<S>,
     /// Arguments and results that have to be copied.
@@ -110,7 +112,14 @@ impl<S: Number> Compiled<S> {
         let interpreter = interpreter(&plan, &params);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
         let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new() };
-        Ok(Compiled { shared: Arc::new(shared), interpreter, params, scratch: Vec::new(), copies: Vec::new() })
+        let (shared, scratch, copies) = (Arc::new(shared), Vec::new(), Vec::new());
+        Ok(Compiled { shared, interpreter, interpreted: false, params, scratch, copies })
+    }
+
+    /// The same mechanism computed by the interpreter alone, for comparison. In exact arithmetic it gives the same bits.
+    #[must_use]
+    pub fn interpreted(self) -> Self {
+        Compiled { interpreted: true, ..self }
     }
 
     /// The plan of which the code is made.
@@ -180,10 +189,35 @@ impl<S: Number> Compiled<S> {
         Ok(())
     }
 
+    /// Velocities from momenta, `(q, p) → v`.
+    ///
+    /// # Panics
+    /// If a slice has another length than the mechanism has coordinates or velocities.
+    pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
+        if !self.run(Output::Velocities, [q, p, &[]], &mut [v]) {
+            self.interpreter.velocities(q, p, v);
+        }
+    }
+
+    /// Kinetic and potential energy, `(q, p) → (kinetic, potential)`, J.
+    ///
+    /// # Panics
+    /// As [`Compiled::velocities`].
+    pub fn energy(&mut self, q: &[S], p: &[S]) -> (S, S) {
+        let mut energy = [S::zero(); 2];
+        match self.run(Output::Energy, [q, p, &[]], &mut [&mut energy]) {
+            true => (energy[0], energy[1]),
+            false => self.interpreter.energy(q, p),
+        }
+    }
+
     /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for
     /// it.
     #[inline]
     pub(super) fn run(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
+        if self.interpreted {
+            return false;
+        }
         let Ok(code) = self.shared.output(output) else { return false };
         run(code, arguments, &self.interpreter, &self.params, results, &mut self.scratch);
         true
@@ -191,6 +225,9 @@ impl<S: Number> Compiled<S> {
 
     /// `q̇ = N(q) v`.
     pub(super) fn coordinate_rates_into(&self, q: &[S], v: &[S], qd: &mut [S]) -> bool {
+        if self.interpreted {
+            return false;
+        }
         let Ok(code) = self.shared.coordinate_rates() else { return false };
         let mut scratch = Vec::new();
         run(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], &mut scratch);

@@ -45,11 +45,7 @@ impl<S: Number> System for Compiled<S> {
 
 impl<S: Number> Energetic for Compiled<S> {
     fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
-        let mut energy = [S::zero(); 2];
-        match self.run(Output::Energy, [q, p, &[]], &mut [&mut energy]) {
-            true => (energy[0], energy[1]),
-            false => self.interpreter.energies(q, p),
-        }
+        self.energy(q, p)
     }
 }
 
