@@ -6,6 +6,8 @@ mod arm_control;
 mod batch;
 #[path = "../examples/closed_loop.rs"]
 mod closed_loop;
+#[path = "../examples/known_at_run_time.rs"]
+mod known_at_run_time;
 #[path = "../examples/lqr.rs"]
 mod lqr;
 #[path = "../examples/pendulum.rs"]
@@ -36,4 +38,9 @@ fn many_arms_fall_at_once() -> Outcome {
 #[test]
 fn a_linkage_stays_closed() -> Outcome {
     closed_loop::main()
+}
+
+#[test]
+fn a_robot_is_compiled_at_run_time() -> Outcome {
+    known_at_run_time::main()
 }

@@ -36,6 +36,29 @@ pub fn model(file: &str, text: &str, options: &ImportOptions) -> Result<Reading,
     }
 }
 
+impl Model {
+    /// Reads and checks a description: [`model`] of a file, with the import options at their defaults. Warnings and
+    /// notices are not returned.
+    ///
+    /// # Errors
+    /// All findings at once where one of them is an error; a file that cannot be read is one.
+    pub fn load(path: impl AsRef<Path>) -> Result<Model, Diagnostics> {
+        let name = path.as_ref().display().to_string();
+        match std::fs::read_to_string(&path) {
+            Ok(text) => model(&name, &text, &ImportOptions::default()).map(|reading| reading.model),
+            Err(error) => {
+                let mut findings = Findings::new(&name, "");
+                findings.error(
+                    Span::FILE,
+                    format!("cannot read the file: {error}"),
+                    "check its name and its access rights",
+                );
+                Err(findings.finish())
+            }
+        }
+    }
+}
+
 /// The same for tools that show findings either way: a model exactly where no finding is an error, and all findings.
 pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
     let mut findings = Findings::new(file, text);

@@ -13,7 +13,7 @@
 //! compiler vectorises this loop. If the processor has AVX-512 and the compiler is 1.89 or later, lanes that fill its
 //! registers use it.
 //!
-//! The only `unsafe` code of the project is at the end of this file. It calls functions that are compiled for more than
+//! The only `unsafe` code of the runtime is at the end of this file. It calls functions that are compiled for more than
 //! the baseline of the target. This is sound because every call first asks [`level`] which instructions the processor
 //! has.
 

@@ -10,7 +10,7 @@ use super::CompileError;
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::options::Options;
-use crate::output::{Output, OutputProgram, Sizes, Spec, COORDINATE_RATES};
+use crate::output::{Output, OutputProgram, Sizes, Spec};
 use crate::plan::Plan;
 use crate::rolled::rolled;
 use crate::search;
@@ -235,6 +235,16 @@ impl<S: Number> Compiled<S> {
     }
 }
 
+impl Model {
+    /// Machine code of the model: [`Compiled::new`] in double precision.
+    ///
+    /// # Errors
+    /// As of [`Compiled::new`].
+    pub fn compile(&self, options: &Options) -> Result<Compiled, CompileError> {
+        Compiled::new(self, options)
+    }
+}
+
 /// An interpreter of a plan, with numbers of any type.
 fn interpreter<S: Number>(plan: &Plan, params: &[S]) -> Interpreter<S> {
     let doubles: Vec<f64> = params.iter().map(|x| x.to_f64()).collect();
@@ -275,5 +285,3 @@ fn check<S>(spec: &Spec, sizes: &Sizes, arguments: &[&[S]], results: &[&mut [S]]
     }
     Ok(())
 }
-
-const _: () = assert!(COORDINATE_RATES.results.len() == 1);
