@@ -20,6 +20,9 @@ use crate::trace::{chosen_frames, coordinate_rates, sizes};
 /// some 25 µs.
 const MOST_OPERATIONS: usize = 30_000;
 
+/// Length of the working memory of coordinate rates that is not allocated.
+const FEW: usize = 96;
+
 /// Mechanisms with more bodies than this are not unrolled: they would have more operations than that.
 const MOST_BODIES: usize = MOST_OPERATIONS / 50;
 
@@ -116,7 +119,8 @@ impl<S: Number> Compiled<S> {
         Ok(Compiled { shared, interpreter, interpreted: false, params, scratch, copies })
     }
 
-    /// The same mechanism computed by the interpreter alone, for comparison. In exact arithmetic it gives the same bits.
+    /// The same mechanism, whose traits are computed by the interpreter alone, for comparison. In exact arithmetic it
+    /// gives the same bits. [`Compiled::evaluate`] still runs machine code.
     #[must_use]
     pub fn interpreted(self) -> Self {
         Compiled { interpreted: true, ..self }
@@ -185,7 +189,8 @@ impl<S: Number> Compiled<S> {
         check(output.spec(), &self.shared.sizes, arguments, results)
             .map_err(|words| CompileError::Arrays { output, words })?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
-        run(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, &mut self.scratch);
+        let scratch = long_enough(&mut self.scratch, code);
+        run(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, scratch);
         Ok(())
     }
 
@@ -219,7 +224,8 @@ impl<S: Number> Compiled<S> {
             return false;
         }
         let Ok(code) = self.shared.output(output) else { return false };
-        run(code, arguments, &self.interpreter, &self.params, results, &mut self.scratch);
+        let scratch = long_enough(&mut self.scratch, code);
+        run(code, arguments, &self.interpreter, &self.params, results, scratch);
         true
     }
 
@@ -229,8 +235,10 @@ impl<S: Number> Compiled<S> {
             return false;
         }
         let Ok(code) = self.shared.coordinate_rates() else { return false };
-        let mut scratch = Vec::new();
-        run(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], &mut scratch);
+        // These programs have few angles, or none, so that nothing is allocated.
+        let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
+        let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
+        run(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], scratch);
         true
     }
 }
@@ -252,6 +260,15 @@ fn interpreter<S: Number>(plan: &Plan, params: &[S]) -> Interpreter<S> {
     Interpreter::new(plan.tree(params), gravity).with_names(plan.velocity_names(), plan.constraint_names())
 }
 
+/// Working memory that is long enough for a function.
+#[inline]
+fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) -> &'a mut [S] {
+    if scratch.len() < code.scratch() {
+        scratch.resize(code.scratch(), S::zero());
+    }
+    scratch
+}
+
 /// Calls machine code with the inputs of an interpreter.
 #[inline]
 fn run<S: Number>(
@@ -260,11 +277,8 @@ fn run<S: Number>(
     inputs: &Interpreter<S>,
     params: &[S],
     results: &mut [&mut [S]],
-    scratch: &mut Vec<S>,
+    scratch: &mut [S],
 ) {
-    if scratch.len() < code.scratch() {
-        scratch.resize(code.scratch(), S::zero());
-    }
     // In the order of the table of fields.
     let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
     let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };

@@ -21,7 +21,7 @@ pub const ARGUMENTS: usize = 3;
 /// Number of input arrays of every function.
 pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
 
-/// What a body is lowered with.
+/// What the body of a function depends on besides its program.
 pub struct Shape<'a> {
     /// The floating-point type.
     pub float: Type,
@@ -153,7 +153,7 @@ struct Turn<'a> {
     carried: &'a [Value],
 }
 
-/// Values of the nodes of a program, and the sines and cosines that are known already.
+/// Values of the nodes of a program, and the sines and cosines by their angles, as far as they are known.
 struct Values {
     of: Vec<Option<Value>>,
     pairs: BTreeMap<u32, [Value; 2]>,
@@ -272,7 +272,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The operations of a program in order, those of `skip` left out. A result is given to `put` as soon as it is
+    /// The operations of a program in order, only those that are `wanted`. A result is given to `put` as soon as it is
     /// known.
     fn steps(
         &mut self,
@@ -506,9 +506,9 @@ impl<'a> Lowering<'a> {
         self.turns(turns, false, Vec::new(), |s, k, carried| {
             let turn = Some(Turn { k, run, carried });
             let mut values = Values::new(&block.program);
-            let functions = |id: u32| angles.values().flatten().flatten().all(|node| *node != id);
+            let others = |id: u32| angles.values().flatten().flatten().all(|node| *node != id);
             let input = |s: &mut Self, k: usize| s.place(program, block.inputs[k], turn);
-            s.steps(&block.program, &mut values, functions, input, |s, k, value| {
+            s.steps(&block.program, &mut values, others, input, |s, k, value| {
                 s.give(program, block.outputs[k], turn, value);
             });
             for (n, angle) in angles.keys().enumerate() {
