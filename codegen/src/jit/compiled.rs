@@ -66,7 +66,6 @@ impl<S: Number> Shared<S> {
 
     /// The code of an output, made when it is first asked for.
     fn output(&self, output: Output) -> Result<&MachineCode<S>, &CompileError> {
-        let at = Output::ALL.iter().position(|o| *o == output).expect("all outputs are in the list");
         let make = || {
             let (plan, options, most) = (&self.plan, &self.options, MOST_OPERATIONS);
             if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
@@ -82,7 +81,8 @@ impl<S: Number> Shared<S> {
                 false => self.machine_code(&program),
             }
         };
-        self.outputs[at].get_or_init(make).as_ref()
+        // The list has the order of the enumeration.
+        self.outputs[output as usize].get_or_init(make).as_ref()
     }
 
     fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {

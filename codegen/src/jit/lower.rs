@@ -18,6 +18,9 @@ use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, Program, ProgramResul
 /// Largest number of arguments of a function; the fields follow them in the table of inputs.
 pub const ARGUMENTS: usize = 3;
 
+/// Sines and cosines are computed of so many angles at once; memory for them is a multiple of it.
+pub const BLOCK: usize = 4;
+
 /// Number of input arrays of every function.
 pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
 
@@ -52,8 +55,8 @@ pub fn input_places(inputs: &[InputArray]) -> Vec<usize> {
 /// Working memory of a function: its parts by the number of their first entry.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    /// Number of angles whose sines and cosines are computed together. The angles come first, then their sines, then
-    /// their cosines.
+    /// Number of angles whose sines and cosines are computed together, in whole blocks. The angles come first, then
+    /// their sines, then their cosines.
     angles: usize,
     /// Values kept between the blocks of rolled code.
     kept: usize,
@@ -68,7 +71,7 @@ impl Scratch {
     pub fn new(code: &Code) -> Scratch {
         match code {
             Code::Straight(program) => {
-                let angles = Angles::new(program).early.len().max(1);
+                let angles = Angles::new(program).early.len().max(1).next_multiple_of(BLOCK);
                 Scratch { angles, len: 3 * angles, ..Scratch::default() }
             }
             Code::Rolled(program) => {
@@ -76,7 +79,7 @@ impl Scratch {
                     let turns = block.repeat.as_ref().filter(|r| r.way.is_none());
                     turns.map_or(1, |r| program.loops[r.run].table.len() * pairs(&block.program).len())
                 };
-                let angles = program.blocks.iter().map(together).max().unwrap_or(0).max(1);
+                let angles = program.blocks.iter().map(together).max().unwrap_or(0).max(1).next_multiple_of(BLOCK);
                 let kept = 3 * angles;
                 let mut len = kept + program.kept;
                 let rows = program.loops.iter().map(|run| {
@@ -204,11 +207,12 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// Calls the function for sines and cosines for the first `n` angles of the working memory.
+    /// Calls the function for sines and cosines for the first `n` angles of the working memory, and the rest of the last
+    /// block.
     fn call_sines(&mut self, n: usize) {
         let parts = [0, 1, 2].map(|part| self.size * (part * self.scratch.angles) as i64);
         let [angles, sines, cosines] = parts.map(|offset| self.b.ins().iadd_imm(self.memory, offset));
-        let count = self.b.ins().iconst(self.target.address, n as i64);
+        let count = self.b.ins().iconst(self.target.address, n.next_multiple_of(BLOCK) as i64);
         let callee = self.b.ins().iconst(self.target.address, self.target.sines.1 as i64);
         self.b.ins().call_indirect(self.sines, callee, &[angles, count, sines, cosines]);
     }

@@ -17,7 +17,7 @@ use cranelift::jit::{JITBuilder, JITModule};
 use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
-use super::lower::{input_places, lower, Scratch, Shape, INPUTS};
+use super::lower::{input_places, lower, Scratch, Shape, BLOCK, INPUTS};
 use super::CompileError;
 use crate::code::Code;
 use crate::options::{Arithmetic, Precision};
@@ -29,7 +29,7 @@ use mbd_runtime::trig;
 /// The most result arrays that a function has.
 const RESULTS: usize = 6;
 
-/// Computes sines and cosines of `n` angles.
+/// Computes sines and cosines of `n` angles, a multiple of [`BLOCK`].
 type Sines<S> = unsafe extern "C" fn(*const S, usize, *mut S, *mut S);
 
 /// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory.
@@ -63,12 +63,9 @@ macro_rules! number {
                 unsafe extern "C" fn plain(angles: *const $float, n: usize, sin: *mut $float, cos: *mut $float) {
                     // SAFETY: the code calls with three parts of its working memory that do not overlap.
                     let (angles, sin, cos) = unsafe { parts(angles, n, sin, cos) };
-                    for ((angles, sin), cos) in angles.chunks(4).zip(sin.chunks_mut(4)).zip(cos.chunks_mut(4)) {
-                        let mut four = [0.0; 4];
-                        four[..angles.len()].copy_from_slice(angles);
-                        let (s, c) = $lanes(four);
-                        sin.copy_from_slice(&s[..angles.len()]);
-                        cos.copy_from_slice(&c[..angles.len()]);
+                    let (sin, cos) = (sin.as_chunks_mut().0, cos.as_chunks_mut().0);
+                    for ((angles, sin), cos) in angles.as_chunks::<BLOCK>().0.iter().zip(sin).zip(cos) {
+                        (*sin, *cos) = $lanes(*angles);
                     }
                 }
                 unsafe extern "C" fn best(angles: *const $float, n: usize, sin: *mut $float, cos: *mut $float) {
@@ -100,10 +97,10 @@ pub struct MachineCode<S> {
     /// Owns the code; `None` only while it is dropped.
     module: Option<JITModule>,
     entry: Entry<S>,
-    /// Place in the table of inputs and length of every input array.
-    inputs: Vec<(usize, usize)>,
-    /// Lengths of the result arrays.
-    results: Vec<usize>,
+    /// Lengths of the input arrays.
+    inputs: [usize; INPUTS],
+    /// Number and lengths of the result arrays; those that it does not have are empty.
+    results: (usize, [usize; RESULTS]),
     /// Length of the working memory.
     scratch: usize,
     /// Tables of rolled code, at addresses that are part of the code.
@@ -163,8 +160,13 @@ impl<S: Number> MachineCode<S> {
         let code = module.get_finalized_function(id);
         // SAFETY: the function was made with this signature, for the calling convention of the host.
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<S>>(code) };
-        let lengths = program.inputs.iter().map(|array| array.len());
-        let inputs = input_places(&program.inputs).into_iter().zip(lengths).collect();
+        let mut inputs = [0; INPUTS];
+        for (array, place) in program.inputs.iter().zip(input_places(&program.inputs)) {
+            inputs[place] = array.len();
+        }
+        let mut lengths = [0; RESULTS];
+        lengths[..results.len()].copy_from_slice(&results);
+        let results = (results.len(), lengths);
         Ok(MachineCode { module: Some(module), entry, inputs, results, scratch: scratch.len, _tables: tables })
     }
 
@@ -176,7 +178,7 @@ impl<S: Number> MachineCode<S> {
     /// Whether gravity, the last of the fields, is an input.
     #[inline]
     pub fn reads_gravity(&self) -> bool {
-        self.inputs.last().is_some_and(|(_, len)| *len > 0)
+        self.inputs[INPUTS - 1] > 0
     }
 
     /// Runs the code. `inputs` are the arguments, then the fields.
@@ -186,13 +188,14 @@ impl<S: Number> MachineCode<S> {
     #[inline]
     pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
-        for (place, len) in &self.inputs {
-            assert_eq!(inputs[*place].len(), *len, "input array {place} has another length");
-        }
-        assert_eq!(results.len(), self.results.len(), "there is another number of results");
+        // Differences are collected without a branch.
+        let other = inputs.iter().zip(&self.inputs).fold(0, |all, (input, len)| all | (input.len() ^ len));
+        assert!(other == 0, "the inputs have the lengths {:?}, expected {:?}", inputs.map(<[S]>::len), self.inputs);
+        let (count, lengths) = &self.results;
+        assert!(results.len() == *count, "there are {} results, expected {count}", results.len());
         let mut written = [std::ptr::null_mut(); RESULTS];
-        for ((to, result), len) in written.iter_mut().zip(results.iter_mut()).zip(&self.results) {
-            assert_eq!(result.len(), *len, "a result array has another length");
+        for ((to, result), len) in written.iter_mut().zip(results.iter_mut()).zip(lengths) {
+            assert!(result.len() == *len, "a result has {} entries, expected {len}", result.len());
             *to = result.as_mut_ptr();
         }
         let read = inputs.map(|input| input.as_ptr());
