@@ -159,8 +159,7 @@ impl Balance {
     fn one(&self, tolerances: &Tolerances, mechanism: &mut Compiled, h: f64, q: &[f64], p: &[f64]) -> f64 {
         let nv = p.len();
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; q.len()], vec![0.0; nv]);
-        mechanism.velocities(q, p, &mut v);
-        mechanism.rates_at(0.0, &q.to_vec(), &p.to_vec(), &mut qd, &mut pd);
+        mechanism.rates(q, p, &mut v, &mut qd, &mut pd);
         // ∂H/∂q is the rate of the momenta without the dampers' part.
         let mut by_q: Vec<f64> = (0..nv).map(|k| pd[k].abs() + self.damping[k] * v[k].abs()).collect();
         let (mut by_p, mut size) = (v.iter().map(|v| v.abs()).collect::<Vec<_>>(), p.to_vec());

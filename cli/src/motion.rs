@@ -201,16 +201,19 @@ impl PostStep<Timed> for Keeper {
     }
 }
 
-/// An interpreter over any scalar, with the default parameters.
-pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
-    let params = plan.default_params();
-    let gravity = match plan.model.gravity {
+/// Gravity in ground axes with the default parameters, m/s².
+fn gravity(plan: &Plan) -> [f64; 3] {
+    match plan.model.gravity {
         // The default values of these fields in generated code.
         Gravity::Input => [0.0, 0.0, -9.81],
-        Gravity::Constant(_) => plan.gravity(&params),
-    };
-    let params: Vec<S> = params.into_iter().map(S::constant).collect();
-    Interpreter::new(plan.tree(&params), gravity.map(S::constant))
+        Gravity::Constant(_) => plan.gravity(&plan.default_params()),
+    }
+}
+
+/// An interpreter over any scalar, with the default parameters.
+pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
+    let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
+    Interpreter::new(plan.tree(&params), gravity(plan).map(S::constant))
         .with_names(plan.velocity_names(), plan.constraint_names())
 }
 
@@ -220,7 +223,7 @@ pub fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Compiled> {
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
     let mut mechanism = Compiled::from_plan(plan.clone(), options)
         .map_err(|e| Failure::new(e.to_string(), "simulate with --interpreted"))?;
-    mechanism.inputs().gravity = interpreter::<f64>(plan).gravity;
+    mechanism.inputs().gravity = gravity(plan);
     Ok(if interpreted { mechanism.interpreted() } else { mechanism })
 }
 
@@ -259,12 +262,12 @@ pub fn driver(
 
 /// Simulates from given coordinates and velocities, and records the motion.
 pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Record> {
-    let mut interpreter = interpreter(plan);
+    let mut mechanism = mechanism(plan, settings.interpreted)?;
+    let interpreter = mechanism.inputs();
     interpreter.check_rank(&q).map_err(|e| source::rank_failure(&e))?;
-    let p = momenta(&mut interpreter, &q, &v);
+    let p = momenta(interpreter, &q, &v);
     let (residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     let (kinetic, potential) = interpreter.energy(&q, &p);
-    let mechanism = mechanism(plan, settings.interpreted)?;
     let clock = Instant::now();
     let compiled = !settings.interpreted && mechanism.prepare(Output::Rates).is_ok();
     let compiled = compiled.then(|| clock.elapsed().as_secs_f64());

@@ -160,7 +160,7 @@ fn settings() -> Settings<'static> {
         every: TIME / 1000.0,
         project: false,
         hold: Stabilisation::default(),
-        interpreted: false,
+        interpreted: true,
     }
 }
 

@@ -194,6 +194,18 @@ impl<S: Number> Compiled<S> {
         Ok(())
     }
 
+    /// Velocities and rates of the state, `(q, p) → (v, q̇, ṗ)`.
+    ///
+    /// # Panics
+    /// As [`Compiled::velocities`].
+    pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
+        if self.run(Output::Rates, [q, p, &[]], &mut [qd, pd]) {
+            self.velocities(q, p, v);
+        } else {
+            self.interpreter.rates(q, p, v, qd, pd);
+        }
+    }
+
     /// Velocities from momenta, `(q, p) → v`.
     ///
     /// # Panics

@@ -408,6 +408,7 @@ where
     ) -> Result<(), ConstraintError> {
         self.policy.close(&mut self.room, system, t, remembers, q, p)
     }
+
     #[inline]
     fn restart(
         &mut self,
