@@ -190,7 +190,7 @@ impl<S: Number> Compiled<S> {
             .map_err(|words| CompileError::Arrays { output, words })?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
-        run(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, scratch);
+        call(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, scratch);
         Ok(())
     }
 
@@ -237,7 +237,7 @@ impl<S: Number> Compiled<S> {
         }
         let Ok(code) = self.shared.output(output) else { return false };
         let scratch = long_enough(&mut self.scratch, code);
-        run(code, arguments, &self.interpreter, &self.params, results, scratch);
+        call(code, arguments, &self.interpreter, &self.params, results, scratch);
         true
     }
 
@@ -250,7 +250,7 @@ impl<S: Number> Compiled<S> {
         // These programs have few angles, or none, so that nothing is allocated.
         let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
         let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
-        run(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], scratch);
+        call(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], scratch);
         true
     }
 }
@@ -283,7 +283,7 @@ fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) ->
 
 /// Calls machine code with the inputs of an interpreter.
 #[inline]
-fn run<S: Number>(
+fn call<S: Number>(
     code: &MachineCode<S>,
     [a, b, c]: [&[S]; 3],
     inputs: &Interpreter<S>,

@@ -25,6 +25,7 @@ mod compiled;
 mod error;
 mod lower;
 mod memory;
+mod rolled;
 mod traits;
 
 pub use compiled::Compiled;

@@ -36,6 +36,7 @@ mod coordinate_partition;
 mod correction;
 #[cfg(feature = "alloc")]
 mod dense;
+mod nearness;
 mod open_and_closed;
 mod post_step;
 mod projection;

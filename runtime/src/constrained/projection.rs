@@ -1,6 +1,7 @@
 //! Projection of states onto the constraints at the ends of steps.
 
 use super::correction::{Corrector, Effort, SingularPosition, Stabilisation};
+use super::nearness::Nearness;
 use super::post_step::PostStep;
 use super::rows::{add_forces, named, worst};
 use super::ConstraintError;
@@ -140,46 +141,6 @@ pub struct ToTolerance<Y: Constrained> {
     nearness: Nearness<Y::Rows, Y::Scalar>,
 }
 
-/// How near a singular position is, and when the momenta have last been freed of their multipliers for it.
-#[derive(Clone, Debug)]
-struct Nearness<R, S> {
-    /// Largest pivot that each row has had.
-    largest: R,
-    rank: usize,
-    /// The least part of its largest pivot that a row had when the momenta were freed; 1 far from singular positions.
-    freed: S,
-}
-
-impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
-    /// Multipliers `σ` of a row with pivot `d` are the part `√d σ` of the momenta. That part is motion as soon as the
-    /// row counts as redundant, at whatever pivot that happens; so it is removed at every hundredth of the pivot again.
-    const STEP: f64 = 0.01;
-
-    /// Whether the momenta must be freed at these pivots.
-    fn asks(&mut self, pivots: &[S]) -> bool {
-        let zero = S::zero();
-        let rank = pivots.iter().filter(|pivot| **pivot != zero).count();
-        let mut least = S::one();
-        for (pivot, largest) in pivots.iter().zip(self.largest.as_mut()) {
-            if *pivot > *largest {
-                *largest = *pivot;
-            }
-            if *pivot != zero && *pivot < least * *largest {
-                least = *pivot / *largest;
-            }
-        }
-        let step = S::constant(Self::STEP);
-        let asks = (rank != self.rank && self.rank > 0) || least < step * self.freed;
-        self.rank = rank;
-        if asks {
-            self.freed = least;
-        } else if least > step {
-            self.freed = S::one();
-        }
-        asks
-    }
-}
-
 /// What corrections would take from the kinetic energy, at the ends of the last two steps.
 #[derive(Clone, Copy, Debug)]
 struct Ledger<S> {
@@ -228,7 +189,7 @@ where
             p: system.zero_momenta(),
             sigma: system.zero_rows(),
             gave_back: false,
-            nearness: Nearness { largest: system.zero_rows(), rank: 0, freed: Y::Scalar::one() },
+            nearness: Nearness::new(system.zero_rows()),
         };
         Projection { room: Room::new(system), policy }
     }

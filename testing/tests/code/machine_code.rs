@@ -5,7 +5,7 @@
 
 use mbd_codegen::code::{compile, Code};
 use mbd_codegen::jit::{CompileError, Compiled, Number};
-use mbd_codegen::model::{Gravity, Model};
+use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, RolledCode};
@@ -23,16 +23,10 @@ fn options(elimination: EliminationStrategy, rolled: RolledCode, arithmetic: Ari
 
 /// Machine code of a plan with the inputs of a state.
 fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compiled<S> {
-    let all = |list: &[f64]| list.iter().map(|x| S::constant(*x)).collect::<Vec<S>>();
     let mut compiled = Compiled::from_plan(plan.clone(), options.clone()).expect("options");
-    compiled.set_parameters(&all(&s.params));
-    let inputs = compiled.inputs();
-    inputs.tau = all(&s.tau);
-    [inputs.drive_q, inputs.drive_v, inputs.drive_a] = [0, 1, 2].map(|k| all(&s.drive[k]));
-    inputs.wrenches = s.wrenches.iter().map(|w| w.map(S::constant)).collect();
-    if plan.model.gravity == Gravity::Input {
-        inputs.gravity = s.gravity.map(S::constant);
-    }
+    *compiled.inputs() = s.interpreter_of(plan, |x, _| S::constant(x));
+    // Keeps the other inputs.
+    compiled.set_parameters(&s.params.iter().map(|x| S::constant(*x)).collect::<Vec<S>>());
     compiled
 }
 
@@ -41,8 +35,8 @@ fn same<S: Number>(a: S, b: S) -> bool {
     a == b || (a.to_f64().is_nan() && b.to_f64().is_nan())
 }
 
-/// Every output of a plan by machine code and by its program, operation by operation, with or without `derivatives`. Returns the number of outputs and
-/// of those that are rolled.
+/// Every output of a plan, derivatives only if asked for, by machine code and by its program, operation by operation.
+/// Returns the number of outputs and of those that are rolled.
 fn compare<S: Number>(whose: &str, plan: &Plan, options: &Options, s: &State, derivatives: bool) -> [usize; 2] {
     let options = Options { precision: S::PRECISION, ..options.clone() };
     let mut machine = compiled::<S>(plan, &options, s);
@@ -137,8 +131,8 @@ fn compare_traits(whose: &str, plan: &Plan, s: &State) {
     let check = |what: &str, found: &[f64], expected: &[f64]| {
         mbd_testing::assert_same_bits(whose, what, &plan.model, found, expected);
     };
-    let state = || (i_zero(plan.dims.nq), i_zero(plan.dims.nv), i_zero(plan.dims.nv));
-    let (q, (mut p, mut p2)) = (&s.q, (i_zero(plan.dims.nv), i_zero(plan.dims.nv)));
+    let state = || (zeros(plan.dims.nq), zeros(plan.dims.nv), zeros(plan.dims.nv));
+    let (q, (mut p, mut p2)) = (&s.q, (zeros(plan.dims.nv), zeros(plan.dims.nv)));
     c.conjugate_momenta(q, &s.v, &mut p);
     i.conjugate_momenta(q, &s.v, &mut p2);
     check("momenta", &p, &p2);
@@ -179,7 +173,7 @@ fn compare_traits(whose: &str, plan: &Plan, s: &State) {
     check("multipliers", &r, &r2);
 }
 
-fn i_zero(n: usize) -> Vec<f64> {
+fn zeros(n: usize) -> Vec<f64> {
     vec![0.0; n]
 }
 
@@ -205,7 +199,7 @@ fn fast_code_is_as_accurate() {
         let plan = search::plan(&model, fast.plan);
         let s = random_state(&plan, seed);
         let (mut c, mut i): (Compiled, Interpreter<f64>) = (compiled(&plan, &fast, &s), s.interpreter(&plan));
-        let (mut a, mut a2) = (i_zero(s.v.len()), i_zero(s.v.len()));
+        let (mut a, mut a2) = (zeros(s.v.len()), zeros(s.v.len()));
         c.generalized_accelerations(&s.q, &s.v, &mut a);
         i.generalized_accelerations(&s.q, &s.v, &mut a2);
         let size = a2.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
@@ -230,7 +224,7 @@ fn large_mechanisms_are_interpreted() {
     assert!(matches!(error, CompileError::TooLarge { output: Output::Rates, .. }), "{error:?}");
     let mut i = c.plan().interpreter(&c.plan().default_params());
     let (q, p) = (c.neutral(), vec![0.1; c.plan().dims.nv]);
-    let [mut qd, mut pd, mut qd2, mut pd2] = [0; 4].map(|_| i_zero(p.len()));
+    let [mut qd, mut pd, mut qd2, mut pd2] = [0; 4].map(|_| zeros(p.len()));
     (qd, qd2) = (vec![0.0; q.len()], {
         qd2.resize(q.len(), qd[0]);
         qd2

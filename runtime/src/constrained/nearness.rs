@@ -1,0 +1,48 @@
+//! When a method that remembers must be freed of its multipliers.
+
+use crate::system::Real;
+
+/// How near a singular position is, and when the momenta have last been freed of their multipliers for it.
+#[derive(Clone, Debug)]
+pub(super) struct Nearness<R, S> {
+    /// Largest pivot that each row has had.
+    largest: R,
+    rank: usize,
+    /// The least part of its largest pivot that a row had when the momenta were freed; 1 far from singular positions.
+    freed: S,
+}
+
+impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
+    /// Multipliers `σ` of a row with pivot `d` are the part `√d σ` of the momenta. That part is motion as soon as the
+    /// row counts as redundant, at whatever pivot that happens; so it is removed at every hundredth of the pivot again.
+    const STEP: f64 = 0.01;
+
+    /// Far from singular positions; `zero` has an entry of zero for each row.
+    pub fn new(zero: R) -> Self {
+        Nearness { largest: zero, rank: 0, freed: S::one() }
+    }
+
+    /// Whether the momenta must be freed at these pivots.
+    pub fn asks(&mut self, pivots: &[S]) -> bool {
+        let zero = S::zero();
+        let rank = pivots.iter().filter(|pivot| **pivot != zero).count();
+        let mut least = S::one();
+        for (pivot, largest) in pivots.iter().zip(self.largest.as_mut()) {
+            if *pivot > *largest {
+                *largest = *pivot;
+            }
+            if *pivot != zero && *pivot < least * *largest {
+                least = *pivot / *largest;
+            }
+        }
+        let step = S::constant(Self::STEP);
+        let asks = (rank != self.rank && self.rank > 0) || least < step * self.freed;
+        self.rank = rank;
+        if asks {
+            self.freed = least;
+        } else if least > step {
+            self.freed = S::one();
+        }
+        asks
+    }
+}
