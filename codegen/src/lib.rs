@@ -11,6 +11,8 @@ pub mod identifiable;
 mod import;
 #[cfg(feature = "jit")]
 pub mod jit;
+#[cfg(feature = "jit")]
+mod lower;
 pub mod model;
 mod names;
 pub mod options;

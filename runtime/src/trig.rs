@@ -28,7 +28,17 @@
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
 #![allow(clippy::excessive_precision, clippy::approx_constant)]
 
+mod number;
+
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
+use number::In;
+pub use number::Number;
+
+/// Largest angle of the main path in double precision, rad.
+pub const LIMIT_F64: f64 = 1.0e6;
+
+/// Largest angle of the main path in single precision, rad.
+pub const LIMIT_F32: f32 = 1600.0;
 
 /// Whether angles are computed in blocks. Without vector instructions, the unused lanes of a block would cost as much
 /// as the others.
@@ -61,18 +71,19 @@ fn chunk64(at: u32) -> u64 {
 macro_rules! sincos {
     (
         float $float:ident, bits $uint:ident, wide $wide:ident, chunk $chunk:ident, mantissa $mant:literal;
-        limit $limit:literal;
+        limit $limit:expr;
         two_over_pi $inv:literal, magic $magic:literal;
         pi_half $p1:literal, $p2:literal, $p3:literal, $p4:literal, integer $pi_int:literal;
         fused $f1:literal, $f2:literal, $f3:literal;
         fma $fma:ident, width $width:literal;
-        sin($zs:ident, $fs:ident) $s1:literal, $sin_tail:expr;
-        cos($zc:ident, $fc:ident) $cos_tail:expr;
+        sin($zs:ident, $fs:ident, $cs:ident) $s1:literal, $sin_tail:expr;
+        cos($zc:ident, $fc:ident, $cc:ident) $cos_tail:expr;
         $(#[$doc:meta])* scalar $name:ident;
         $(#[$lanes_doc:meta])* lanes $lanes:ident;
         $(#[$slice_doc:meta])* slice $slice:ident, $kernel_type:ident;
         $(#[$pair_doc:meta])* pair $pair:ident;
         $(#[$pairs_doc:meta])* pairs $pairs:ident;
+        $(#[$path_doc:meta])* path $path:ident;
         parts $fast:ident, $kernel:ident, $slow:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
     ) => {
         $(#[$doc])*
@@ -195,59 +206,97 @@ macro_rules! sincos {
             (x.to_bits() & ($uint::MAX >> 1)) > <$float>::to_bits($limit)
         }
 
+        impl<A: Arithmetic> Number<$float> for In<A, $float> {
+            type Quadrant = $uint;
+
+            const FUSED: bool = A::FUSED;
+
+            #[inline(always)]
+            fn constant(self, x: $float) -> Self {
+                In::new(x)
+            }
+
+            #[inline(always)]
+            fn fma(self, b: Self, c: Self) -> Self {
+                In::new(A::$fma(self.number, b.number, c.number))
+            }
+
+            #[inline(always)]
+            fn quadrant(shifted: Self, _: Self) -> $uint {
+                shifted.number.to_bits()
+            }
+
+            #[inline(always)]
+            fn turned(quadrant: $uint, sin: Self, cos: Self) -> (Self, Self) {
+                let odd = quadrant & 1 != 0;
+                let (s, c) = (if odd { cos } else { sin }, if odd { sin } else { cos });
+                // Bit 1 of the quadrant is the sign of the sine; the sign of the cosine is the same bit of the next
+                // quadrant.
+                let to_sign = |bits: $uint| (bits & 2) << ($uint::BITS - 2);
+                (
+                    In::new(<$float>::from_bits(s.number.to_bits() ^ to_sign(quadrant))),
+                    In::new(<$float>::from_bits(c.number.to_bits() ^ to_sign(quadrant.wrapping_add(1)))),
+                )
+            }
+        }
+
         /// The main path. Beyond its range the result is meaningless, but there is no panic.
         #[inline(always)]
         fn $fast<A: Arithmetic>(x: $float) -> ($float, $float) {
-            let shifted = A::$fma(x, $inv, $magic);
-            let n = shifted - $magic;
-            if A::FUSED {
+            let (sin, cos) = $path(In::<A, $float>::new(x));
+            (sin.number, cos.number)
+        }
+
+        $(#[$path_doc])*
+        #[inline(always)]
+        pub fn $path<N: Number<$float>>(x: N) -> (N, N) {
+            let constant = |c: $float| x.constant(c);
+            let magic = constant($magic);
+            let shifted = x.fma(constant($inv), magic);
+            let n = shifted - magic;
+            let quadrant = N::quadrant(shifted, n);
+            if N::FUSED {
                 // This is exact; see the module's documentation.
-                let a = A::$fma(-n, $f1, x);
+                let a = (-n).fma(constant($f1), x);
                 // The product is exact, and so is the remainder, for the reason given below.
-                let w = n * $f2;
+                let w = n * constant($f2);
                 let b = a - w;
                 let lost = (a - b) - w;
-                return $kernel::<A>(b, A::$fma(-n, $f3, lost), shifted.to_bits());
+                return $kernel(b, (-n).fma(constant($f3), lost), quadrant);
             }
             // The product is exact; so is the difference, by Sterbenz's lemma.
-            let a = x - n * $p1;
+            let a = x - n * constant($p1);
             // The products are exact. `a` and `b` are multiples of the last place of `w` and `v`, so that both
             // remainders are exact.
-            let w = n * $p2;
+            let w = n * constant($p2);
             let b = a - w;
             let lost_b = (a - b) - w;
-            let v = n * $p3;
+            let v = n * constant($p3);
             let c = b - v;
             let lost_c = (b - c) - v;
-            $kernel::<A>(c, (lost_b + lost_c) - n * $p4, shifted.to_bits())
+            $kernel(c, (lost_b + lost_c) - n * constant($p4), quadrant)
         }
 
         /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4. `y1` is at most some ulps of
         /// `y0`, except where both are tiny.
         #[inline(always)]
-        fn $kernel<A: Arithmetic>(y0: $float, y1: $float, quadrant: $uint) -> ($float, $float) {
+        fn $kernel<N: Number<$float>>(y0: N, y1: N, quadrant: N::Quadrant) -> (N, N) {
+            let constant = |c: $float| y0.constant(c);
             let z = y0 * y0;
+            let half = constant(0.5) * z;
             let sin = {
-                let ($zs, $fs) = (z, A::$fma);
+                let ($zs, $fs, $cs) = (z, N::fma, constant);
                 // The correction is subtracted, so that the sine of -0 is -0.
-                let bend = A::$fma(0.5 * z, y1, -y1);
-                y0 - A::$fma(-(z * y0), A::$fma(z, $sin_tail, $s1), bend)
+                let bend = half.fma(y1, -y1);
+                y0 - (-(z * y0)).fma(z.fma($sin_tail, $cs($s1)), bend)
             };
             let cos = {
-                let ($zc, $fc) = (z, A::$fma);
-                let half = 0.5 * z;
-                let w = 1.0 - half;
-                w + (((1.0 - w) - half) + A::$fma(z, $cos_tail, -(y0 * y1)))
+                let ($zc, $fc, $cc) = (z, N::fma, constant);
+                let one = $cc(1.0);
+                let w = one - half;
+                w + (((one - w) - half) + z.fma($cos_tail, -(y0 * y1)))
             };
-            let odd = quadrant & 1 != 0;
-            let (s, c) = (if odd { cos } else { sin }, if odd { sin } else { cos });
-            // Bit 1 of the quadrant is the sign of the sine; the sign of the cosine is the same bit of the next
-            // quadrant.
-            let to_sign = |bits: $uint| (bits & 2) << ($uint::BITS - 2);
-            (
-                <$float>::from_bits(s.to_bits() ^ to_sign(quadrant)),
-                <$float>::from_bits(c.to_bits() ^ to_sign(quadrant.wrapping_add(1))),
-            )
+            N::turned(quadrant, sin, cos)
         }
 
         /// Payne–Hanek reduction for `x` beyond the main path; NaN for infinities and NaN.
@@ -291,26 +340,26 @@ macro_rules! sincos {
             let quadrant = quadrant.wrapping_add($uint::from(negative));
             // The angle's sign, then that of x: the sine is odd, the cosine even.
             let (y0, y1) = if negative { (-y0, -y1) } else { (y0, y1) };
-            let (sin, cos) = $kernel::<Plain>(y0, y1, quadrant);
-            (if x < 0.0 { -sin } else { sin }, cos)
+            let (sin, cos) = $kernel(In::<Plain, $float>::new(y0), In::new(y1), quadrant);
+            (if x < 0.0 { -sin.number } else { sin.number }, cos.number)
         }
     };
 }
 
 sincos! {
     float f64, bits u64, wide u128, chunk chunk64, mantissa 52;
-    limit 1.0e6;
+    limit LIMIT_F64;
     two_over_pi 0.6366197723675814, magic 6755399441055744.0;
     pi_half 1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32,
         integer 0xc90fdaa22168c235;
     fused 1.5707963267948966, 6.12323399538461e-17, 3.5215598651832e-27;
     fma fma_f64, width 8;
-    sin(z, fma) -1.66666666666666324348e-01,
-        fma(z * (z * z), fma(z, 1.58969099521155010221e-10, -2.50507602534068634195e-08),
-            fma(z, fma(z, 2.75573137070700676789e-06, -1.98412698298579493134e-04), 8.33333333332248946124e-03));
-    cos(z, fma) fma((z * z) * (z * z),
-            fma(z, fma(z, -1.13596475577881948265e-11, 2.08757232129817482790e-09), -2.75573143513906633035e-07),
-            z * fma(z, fma(z, 2.48015872894767294178e-05, -1.38888888888741095749e-03), 4.16666666666666019037e-02));
+    sin(z, fma, c) -1.66666666666666324348e-01,
+        fma(z * (z * z), fma(z, c(1.58969099521155010221e-10), c(-2.50507602534068634195e-08)),
+            fma(z, fma(z, c(2.75573137070700676789e-06), c(-1.98412698298579493134e-04)), c(8.33333333332248946124e-03)));
+    cos(z, fma, c) fma((z * z) * (z * z),
+            fma(z, fma(z, c(-1.13596475577881948265e-11), c(2.08757232129817482790e-09)), c(-2.75573143513906633035e-07)),
+            z * fma(z, fma(z, c(2.48015872894767294178e-05), c(-1.38888888888741095749e-03)), c(4.16666666666666019037e-02)));
     /// `(sin x, cos x)`, `x` in radians, each within one unit in the last place for every finite `x`; NaN otherwise.
     scalar sincos_f64;
     /// [`sincos_f64`] of each lane, with the same bits.
@@ -322,18 +371,20 @@ sincos! {
     pair pair_f64;
     /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
     pairs pairs_f64;
+    /// The main path on numbers of any kind, for |x| up to [`LIMIT_F64`]: the sine and cosine of `x`, rad.
+    path path_f64;
     parts fast_f64, kernel_f64, slow_f64, large_f64, repair_f64, block_f64, flat_f64
 }
 
 sincos! {
     float f32, bits u32, wide u64, chunk chunk32, mantissa 23;
-    limit 1600.0;
+    limit LIMIT_F32;
     two_over_pi 0.63661975, magic 12582912.0;
     pi_half 1.5706787, 0.000117614865, 9.91804e-10, 2.8960740e-13, integer 0xc90fdaa2;
     fused 1.57079637, -4.37139533e-8, 2.56334407e-12;
     fma fma_f32, width 16;
-    sin(z, fma) -0.16666655, fma(z, -0.00019521112, 0.008332202);
-    cos(z, fma) z * fma(z, fma(z, 2.4432287e-05, -0.0013887309), 0.041666646);
+    sin(z, fma, c) -0.16666655, fma(z, c(-0.00019521112), c(0.008332202));
+    cos(z, fma, c) z * fma(z, fma(z, c(2.4432287e-05), c(-0.0013887309)), c(0.041666646));
     /// `(sin x, cos x)`, `x` in radians, each within one unit in the last place for every finite `x`; NaN otherwise.
     /// No double-precision operation is used.
     scalar sincos_f32;
@@ -346,6 +397,8 @@ sincos! {
     pair pair_f32;
     /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
     pairs pairs_f32;
+    /// The main path on numbers of any kind, for |x| up to [`LIMIT_F32`]: the sine and cosine of `x`, rad.
+    path path_f32;
     parts fast_f32, kernel_f32, slow_f32, large_f32, repair_f32, block_f32, flat_f32
 }
 

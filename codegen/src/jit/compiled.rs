@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use mbd_runtime::Interpreter;
 
-use super::lower::INPUTS;
+use super::instructions::INPUTS;
 use super::memory::{MachineCode, Number};
 use super::CompileError;
 use crate::code::{compile, Code};

@@ -11,15 +11,16 @@
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
 #![allow(unsafe_code)]
 
-use cranelift::codegen::ir::{types, Function, Type, UserFuncName};
+use cranelift::codegen::ir::{Function, UserFuncName};
 use cranelift::codegen::Context;
 use cranelift::jit::{JITBuilder, JITModule};
 use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
-use super::lower::{input_places, lower, Scratch, Shape, BLOCK, INPUTS};
+use super::instructions::{input_places, write, Shape, BLOCK, INPUTS};
 use super::CompileError;
 use crate::code::Code;
+use crate::lower::Memory;
 use crate::options::{Arithmetic, Precision};
 use crate::output::OutputProgram;
 use mbd_runtime::kernel::{level, Level};
@@ -45,20 +46,18 @@ mod sealed {
     use super::*;
 
     pub trait Sealed: Sized {
-        const FLOAT: Type;
         /// With plain products and sums, and with the best arithmetic of the processor.
         const SINES: [Sines<Self>; 2];
     }
 }
 
 macro_rules! number {
-    ($float:ident, $precision:ident, $type:ident, $lanes:path, $slice:path) => {
+    ($float:ident, $precision:ident, $lanes:path, $slice:path) => {
         impl Number for $float {
             const PRECISION: Precision = Precision::$precision;
         }
 
         impl sealed::Sealed for $float {
-            const FLOAT: Type = types::$type;
             const SINES: [Sines<$float>; 2] = {
                 unsafe extern "C" fn plain(angles: *const $float, n: usize, sin: *mut $float, cos: *mut $float) {
                     // SAFETY: the code calls with three parts of its working memory that do not overlap.
@@ -89,8 +88,8 @@ unsafe fn parts<'a, S>(x: *const S, n: usize, sin: *mut S, cos: *mut S) -> (&'a 
     unsafe { (from_raw_parts(x, n), from_raw_parts_mut(sin, n), from_raw_parts_mut(cos, n)) }
 }
 
-number!(f64, F64, F64, trig::sincos_lanes_f64, trig::sincos_slice_f64);
-number!(f32, F32, F32, trig::sincos_lanes_f32, trig::sincos_slice_f32);
+number!(f64, F64, trig::sincos_lanes_f64, trig::sincos_slice_f64);
+number!(f32, F32, trig::sincos_lanes_f32, trig::sincos_slice_f32);
 
 /// The machine code of one output.
 pub struct MachineCode<S> {
@@ -140,20 +139,20 @@ impl<S: Number> MachineCode<S> {
             Code::Straight(_) => Vec::new(),
             Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(numbers).collect(),
         };
-        let scratch = Scratch::new(&program.program);
+        let memory = Memory::new(&program.program, BLOCK);
         let shape = Shape {
-            float: S::FLOAT,
+            precision: S::PRECISION,
             address,
             fused: fast && level() > Level::Plain,
-            inputs: &program.inputs,
             results: &results,
+            memory: &memory,
             tables: &tables.iter().map(|table| table.as_ptr() as usize).collect::<Vec<_>>(),
             sines: (signature(4), S::SINES[usize::from(fast)] as usize),
         };
         let id = module.declare_function(program.spec.name, Linkage::Local, &signature(3));
         let id = id.map_err(CompileError::machine)?;
         let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature(3));
-        lower(&mut function, &program.program, &scratch, &shape);
+        write(&mut function, program, &shape);
         let mut context = Context::for_function(function);
         module.define_function(id, &mut context).map_err(CompileError::machine)?;
         module.finalize_definitions().map_err(CompileError::machine)?;
@@ -167,7 +166,7 @@ impl<S: Number> MachineCode<S> {
         let mut lengths = [0; RESULTS];
         lengths[..results.len()].copy_from_slice(&results);
         let results = (results.len(), lengths);
-        Ok(MachineCode { module: Some(module), entry, inputs, results, scratch: scratch.len, _tables: tables })
+        Ok(MachineCode { module: Some(module), entry, inputs, results, scratch: memory.len(), _tables: tables })
     }
 
     /// Length of the working memory that a call needs.

@@ -23,9 +23,8 @@
 
 mod compiled;
 mod error;
-mod lower;
+mod instructions;
 mod memory;
-mod rolled;
 mod traits;
 
 pub use compiled::Compiled;

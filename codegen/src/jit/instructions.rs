@@ -1,0 +1,332 @@
+//! Single instructions in Cranelift's intermediate language.
+//!
+//! A compiled function takes three addresses: a table with the addresses of the input arrays (three arguments, then
+//! [`FIELDS`]), a table with those of the result arrays, and working memory.
+
+use cranelift::codegen::ir::{BlockArg, Function, MemFlags, SigRef, Signature, StackSlotData, StackSlotKind, Type};
+use cranelift::prelude::*;
+
+use crate::code::Code;
+use crate::lower::{self, main_path, Array, Instructions, Memory, Operation, Place};
+use crate::options::Precision;
+use crate::output::{InputArray, OutputProgram, FIELDS};
+use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64};
+
+/// Largest number of arguments of a function; the fields follow them in the table of inputs.
+pub const ARGUMENTS: usize = 3;
+
+/// The function for sines and cosines computes a multiple of so many angles.
+pub const BLOCK: usize = 4;
+
+/// Number of input arrays of every function.
+pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
+
+/// What the body of a function depends on besides its program.
+pub struct Shape<'a> {
+    /// The number type.
+    pub precision: Precision,
+    /// The type of an address.
+    pub address: Type,
+    /// Whether products and sums are one instruction.
+    pub fused: bool,
+    /// Lengths of the result arrays.
+    pub results: &'a [usize],
+    /// Working memory.
+    pub memory: &'a Memory,
+    /// Addresses of the tables of rolled code.
+    pub tables: &'a [usize],
+    /// Signature and address of the function that computes sines and cosines.
+    pub sines: (Signature, usize),
+}
+
+/// Place of each input array in the table of inputs.
+pub fn input_places(inputs: &[InputArray]) -> Vec<usize> {
+    let mut arguments = 0..ARGUMENTS;
+    let place = |array: &InputArray| match array.field {
+        true => FIELDS.iter().position(|field| field.array.name == array.name).map(|k| ARGUMENTS + k),
+        false => arguments.next(),
+    };
+    inputs.iter().map(place).map(|place| place.expect("every input is an argument or a field")).collect()
+}
+
+/// Writes the body of a function.
+pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Shape) {
+    let mut context = FunctionBuilderContext::new();
+    let mut b = FunctionBuilder::new(function, &mut context);
+    let entry = b.create_block();
+    b.append_block_params_for_function_params(entry);
+    b.switch_to_block(entry);
+    let [inputs, results, memory] = b.block_params(entry) else { unreachable!("a function has three parameters") };
+    let (inputs, results, memory) = (*inputs, *results, *memory);
+    let pointer = i32::try_from(shape.address.bytes()).expect("addresses are small");
+    let constant = MemFlags::trusted().with_readonly();
+    let mut addresses = |table: Value, place: usize| {
+        let at = i32::try_from(place).expect("arrays are few") * pointer;
+        b.ins().load(shape.address, constant, table, at)
+    };
+    let inputs = input_places(&program.inputs).into_iter().map(|place| addresses(inputs, place)).collect();
+    let outputs = (0..shape.results.len()).map(|place| addresses(results, place)).collect();
+    let sines = b.import_signature(shape.sines.0.clone());
+    let number = match shape.precision {
+        Precision::F64 => types::F64,
+        Precision::F32 => types::F32,
+    };
+    let mut writer = Writer { b, shape, number, inputs, outputs, memory, sines };
+    lower::lower(&mut writer, program, shape.results);
+    writer.b.ins().return_(&[]);
+    writer.b.seal_all_blocks();
+    writer.b.finalize();
+}
+
+/// A body that is being written.
+struct Writer<'a> {
+    b: FunctionBuilder<'a>,
+    shape: &'a Shape<'a>,
+    /// Type of the numbers, or of vectors of them while sines are written.
+    number: Type,
+    /// Addresses of the input arrays.
+    inputs: Vec<Value>,
+    /// Addresses of the result arrays.
+    outputs: Vec<Value>,
+    /// Address of the working memory.
+    memory: Value,
+    /// Signature of the function for sines and cosines.
+    sines: SigRef,
+}
+
+/// A loop that is being written.
+pub struct Loop {
+    header: Block,
+    exit: Block,
+    turn: Value,
+    /// The last turn, and the step from turn to turn.
+    last: i64,
+    step: i64,
+}
+
+impl Writer<'_> {
+    /// Bytes of a number.
+    fn size(&self) -> i64 {
+        i64::from(self.number.lane_type().bytes())
+    }
+
+    /// Address and offset of an entry. An offset that is too large for an instruction is added to the address.
+    fn address(&mut self, place: Place<Value>) -> (Value, i32) {
+        let size = self.size();
+        let (address, first) = match place.array {
+            Array::Input(k) => (self.inputs[k], 0),
+            Array::Result(k) => (self.outputs[k], 0),
+            Array::Table(run) => (self.b.ins().iconst(self.shape.address, self.shape.tables[run] as i64), 0),
+            array => (self.memory, self.shape.memory.start(array)),
+        };
+        let address = match place.turn {
+            None => address,
+            Some((turn, stride)) => {
+                let by = self.b.ins().imul_imm(turn, size * stride as i64);
+                self.b.ins().iadd(address, by)
+            }
+        };
+        let offset = size * (first + place.at) as i64;
+        match i32::try_from(offset) {
+            Ok(offset) => (address, offset),
+            Err(_) => (self.b.ins().iadd_imm(address, offset), 0),
+        }
+    }
+
+    /// Calls the function for sines and cosines of `n` angles, or those that fill the last block.
+    fn call_sines(&mut self, [angles, sines, cosines]: [Value; 3], n: usize) {
+        let count = self.b.ins().iconst(self.shape.address, n.next_multiple_of(BLOCK) as i64);
+        let callee = self.b.ins().iconst(self.shape.address, self.shape.sines.1 as i64);
+        self.b.ins().call_indirect(self.sines, callee, &[angles, count, sines, cosines]);
+    }
+
+    /// Exchanges sine and cosine in odd quadrants and gives them the quadrant's signs, by their bits.
+    fn turned(&mut self, quadrant: Value, [sin, cos]: [Value; 2]) -> [Value; 2] {
+        let bits = self.number.as_int();
+        let top = i64::from(bits.lane_bits()) - 1;
+        // `bitcast` between vectors has to be told the order of bytes.
+        let flags = MemFlags::new().with_endianness(cranelift::codegen::ir::Endianness::Little);
+        let [quadrant, sin, cos] = [quadrant, sin, cos].map(|x| self.b.ins().bitcast(bits, flags, x));
+        let one = self.b.ins().iconst(bits.lane_type(), 1);
+        let one = if bits.is_vector() { self.b.ins().splat(bits, one) } else { one };
+        let odd = self.b.ins().band(quadrant, one);
+        // All bits are set in odd quadrants.
+        let odd = self.b.ins().ineg(odd);
+        let pair = [(cos, sin), (sin, cos)].map(|(a, b)| self.b.ins().bitselect(odd, a, b));
+        let next = self.b.ins().iadd(quadrant, one);
+        let mut signed = pair;
+        for (x, quadrant) in signed.iter_mut().zip([quadrant, next]) {
+            // Bit 1 becomes the sign.
+            let half = self.b.ins().ushr_imm(quadrant, 1);
+            let sign = self.b.ins().ishl_imm(half, top);
+            let bits = self.b.ins().bxor(*x, sign);
+            *x = self.b.ins().bitcast(self.number, flags, bits);
+        }
+        signed
+    }
+
+    /// Sines and cosines of numbers by the main path, as many together as a vector has lanes, and whether all are
+    /// within its range.
+    fn by_main_path(&mut self, angles: &[Value]) -> (Vec<[Value; 2]>, Option<Value>) {
+        let number = self.number;
+        let lanes = (16 / number.bytes()) as usize;
+        let (mut pairs, mut within): (Vec<[Value; 2]>, Option<Value>) = (Vec::new(), None);
+        let vector = number.by(lanes as u32).expect("there are vectors of 16 bytes");
+        for angles in angles.chunks(lanes) {
+            let mut angle = angles[0];
+            if angles.len() > 1 {
+                self.number = vector;
+                angle = self.b.ins().splat(vector, angle);
+                for (lane, x) in angles.iter().enumerate().skip(1) {
+                    angle = self.b.ins().insertlane(angle, *x, lane as u8);
+                }
+            }
+            let limit = self.constant(match self.shape.precision {
+                Precision::F64 => LIMIT_F64,
+                Precision::F32 => f64::from(LIMIT_F32),
+            });
+            let size = self.b.ins().fabs(angle);
+            // NaN is not within the range.
+            let fits = self.b.ins().fcmp(FloatCC::LessThanOrEqual, size, limit);
+            let fits = if angles.len() > 1 { self.b.ins().vall_true(fits) } else { fits };
+            within = Some(within.map_or(fits, |within| self.b.ins().band(within, fits)));
+            let pair = main_path(self, angle, self.shape.precision, self.shape.fused, |s, [shifted, _], pair| {
+                s.turned(shifted, pair)
+            });
+            self.number = number;
+            match angles.len() {
+                1 => pairs.push(pair),
+                n => pairs.extend((0..n).map(|lane| pair.map(|x| self.b.ins().extractlane(x, lane as u8)))),
+            }
+        }
+        (pairs, within)
+    }
+
+    /// Sines and cosines of numbers by the function that takes any angle.
+    fn by_function(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
+        let bytes = self.number.bytes() * BLOCK as u32;
+        let slots = [0; 3].map(|_| {
+            let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, bytes, 4);
+            self.b.create_sized_stack_slot(slot)
+        });
+        let addresses = slots.map(|slot| self.b.ins().stack_addr(self.shape.address, slot, 0));
+        let mut pairs = Vec::new();
+        for angles in angles.chunks(BLOCK) {
+            let offset = |lane: usize| (lane * bytes as usize / BLOCK) as i32;
+            for lane in 0..BLOCK {
+                let angle = angles.get(lane).unwrap_or(&angles[0]);
+                self.b.ins().stack_store(*angle, slots[0], offset(lane));
+            }
+            self.call_sines(addresses, angles.len());
+            let part = |s: &mut Self, lane, part: usize| s.b.ins().stack_load(s.number, slots[part], offset(lane));
+            pairs.extend((0..angles.len()).map(|lane| [1, 2].map(|which| part(self, lane, which))));
+        }
+        pairs
+    }
+}
+
+impl Instructions for Writer<'_> {
+    type Value = Value;
+    type Turn = Value;
+    type Loop = Loop;
+
+    fn constant(&mut self, x: f64) -> Value {
+        let constant = match self.shape.precision {
+            Precision::F32 => self.b.ins().f32const(x as f32),
+            Precision::F64 => self.b.ins().f64const(x),
+        };
+        match self.number.is_vector() {
+            true => self.b.ins().splat(self.number, constant),
+            false => constant,
+        }
+    }
+
+    fn load(&mut self, place: Place<Value>) -> Value {
+        let flags = match place.array {
+            Array::Input(_) | Array::Table(_) => MemFlags::trusted().with_readonly(),
+            _ => MemFlags::trusted(),
+        };
+        let (address, offset) = self.address(place);
+        self.b.ins().load(self.number, flags, address, offset)
+    }
+
+    fn store(&mut self, place: Place<Value>, value: Value) {
+        let (address, offset) = self.address(place);
+        self.b.ins().store(MemFlags::trusted(), value, address, offset);
+    }
+
+    fn operation(&mut self, operation: Operation<Value>) -> Value {
+        match operation {
+            Operation::Add(a, b) => self.b.ins().fadd(a, b),
+            Operation::Sub(a, b) => self.b.ins().fsub(a, b),
+            Operation::Mul(a, b) => self.b.ins().fmul(a, b),
+            Operation::Div(a, b) => self.b.ins().fdiv(a, b),
+            Operation::Fma(a, b, c) if self.shape.fused => self.b.ins().fma(a, b, c),
+            Operation::Fma(a, b, c) => {
+                let product = self.b.ins().fmul(a, b);
+                self.b.ins().fadd(product, c)
+            }
+            Operation::Negate(a) => self.b.ins().fneg(a),
+            Operation::ReciprocalAbove { value, floor } => {
+                let (one, zero) = (self.constant(1.0), self.constant(0.0));
+                let reciprocal = self.b.ins().fdiv(one, value);
+                let below = self.b.ins().fcmp(FloatCC::LessThanOrEqual, value, floor);
+                self.b.ins().select(below, zero, reciprocal)
+            }
+            Operation::Sqrt(a) => self.b.ins().sqrt(a),
+        }
+    }
+
+    fn sines(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
+        let (pairs, within) = self.by_main_path(angles);
+        let Some(within) = within else { return pairs };
+        let (far, next) = (self.b.create_block(), self.b.create_block());
+        self.b.set_cold_block(far);
+        let arguments = |pairs: Vec<[Value; 2]>| pairs.into_iter().flatten().map(BlockArg::Value).collect::<Vec<_>>();
+        for _ in pairs.iter().flatten() {
+            self.b.append_block_param(next, self.number);
+        }
+        self.b.ins().brif(within, next, &arguments(pairs), far, &[]);
+        self.b.switch_to_block(far);
+        let pairs = self.by_function(angles);
+        self.b.ins().jump(next, &arguments(pairs));
+        self.b.switch_to_block(next);
+        self.b.block_params(next).as_chunks().0.to_vec()
+    }
+
+    fn sines_of_array(&mut self, n: usize) {
+        let arrays = [Array::Angles, Array::Sines, Array::Cosines].map(|array| {
+            let offset = self.size() * self.shape.memory.start(array) as i64;
+            self.b.ins().iadd_imm(self.memory, offset)
+        });
+        self.call_sines(arrays, n);
+    }
+
+    fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Value>) -> (Loop, Value, Vec<Value>) {
+        let (header, exit) = (self.b.create_block(), self.b.create_block());
+        self.b.append_block_param(header, self.shape.address);
+        for _ in &start {
+            self.b.append_block_param(header, self.number);
+            self.b.append_block_param(exit, self.number);
+        }
+        let end = turns as i64 - 1;
+        let (first, last, step) = if backward { (end, 0, -1) } else { (0, end, 1) };
+        let first = self.b.ins().iconst(self.shape.address, first);
+        let arguments: Vec<BlockArg> = [first].into_iter().chain(start).map(BlockArg::Value).collect();
+        self.b.ins().jump(header, &arguments);
+        self.b.switch_to_block(header);
+        let parameters = self.b.block_params(header);
+        let (turn, carried) = (parameters[0], parameters[1..].to_vec());
+        (Loop { header, exit, turn, last, step }, turn, carried)
+    }
+
+    fn close_loop(&mut self, open: Loop, next: Vec<Value>) -> Vec<Value> {
+        let done = self.b.ins().icmp_imm(IntCC::Equal, open.turn, open.last);
+        let turn = self.b.ins().iadd_imm(open.turn, open.step);
+        let ends: Vec<BlockArg> = next.into_iter().map(BlockArg::Value).collect();
+        let again: Vec<BlockArg> = [BlockArg::Value(turn)].into_iter().chain(ends.iter().copied()).collect();
+        self.b.ins().brif(done, open.exit, &ends, open.header, &again);
+        self.b.switch_to_block(open.exit);
+        self.b.block_params(open.exit).to_vec()
+    }
+}

@@ -1,0 +1,54 @@
+//! Working memory of a function.
+
+use super::Array;
+use crate::code::Code;
+use crate::rolled::Block;
+use crate::symbolic::angles::pairs;
+
+/// Working memory of a function: lengths of its arrays, which follow one another.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// Number of angles whose sines and cosines are computed together in a loop's turns.
+    pub angles: usize,
+    /// Numbers kept between the blocks of rolled code.
+    pub kept: usize,
+    /// Numbers in all rows of each run.
+    pub rows: Vec<usize>,
+}
+
+impl Memory {
+    /// The memory that some code needs; `angles` come in blocks of a length.
+    pub fn new(code: &Code, block: usize) -> Memory {
+        let Code::Rolled(program) = code else { return Memory::default() };
+        let together = |block: &Block| {
+            let turns = block.repeat.as_ref().filter(|repeat| repeat.way.is_none());
+            turns.map_or(0, |repeat| program.loops[repeat.run].table.len() * pairs(&block.program).len())
+        };
+        let angles = program.blocks.iter().map(together).max().unwrap_or(0).next_multiple_of(block);
+        let rows = program.loops.iter().map(|run| run.table.len() * run.row).collect();
+        Memory { angles, kept: program.kept, rows }
+    }
+
+    /// Number of entries before an array.
+    ///
+    /// # Panics
+    /// If the array is no part of the working memory.
+    pub fn start(&self, array: Array) -> usize {
+        let kept = 3 * self.angles;
+        match array {
+            Array::Angles => 0,
+            Array::Sines => self.angles,
+            Array::Cosines => 2 * self.angles,
+            Array::Kept => kept,
+            Array::Rows(run) => kept + self.kept + self.rows[..run].iter().sum::<usize>(),
+            Array::Input(_) | Array::Result(_) | Array::Table(_) => {
+                unreachable!("inputs, results and tables are not in the working memory")
+            }
+        }
+    }
+
+    /// Number of all entries.
+    pub fn len(&self) -> usize {
+        self.start(Array::Rows(self.rows.len()))
+    }
+}

@@ -1,0 +1,157 @@
+//! Programs as single instructions, for every target that has one state, loads and stores: machine code at run time, C,
+//! WebAssembly.
+//!
+//! [`lower`] walks through a program and tells a target, by its [`Instructions`], one instruction after the other. A
+//! target knows how an instruction is written and where its arrays are, and nothing of programs. (Rust is written by
+//! `emit`, which has one text for one state and many.)
+
+mod memory;
+mod rolled;
+mod sines;
+mod straight;
+
+use crate::code::Code;
+use crate::output::OutputProgram;
+use crate::symbolic::Label;
+
+pub use memory::Memory;
+pub use sines::main_path;
+use straight::Lowering;
+
+/// An array that a function reads or writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Array {
+    /// Input array of this number, in the order of [`OutputProgram::inputs`].
+    Input(usize),
+    /// Result array of this number, in the order of the output's specification.
+    Result(usize),
+    /// Numbers that rolled code keeps between its blocks.
+    Kept,
+    /// Angles of all turns of a run.
+    Angles,
+    /// Their sines.
+    Sines,
+    /// Their cosines.
+    Cosines,
+    /// Rows of the run of this number, one for each turn.
+    Rows(usize),
+    /// Constants of the run of this number, one row for each turn.
+    Table(usize),
+}
+
+/// An entry of an array.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<T> {
+    /// The array.
+    pub array: Array,
+    /// Its entry, in a loop that of turn 0.
+    pub at: usize,
+    /// In a loop the number of the turn, and by how many entries the place moves from turn to turn.
+    pub turn: Option<(T, usize)>,
+}
+
+/// An operation on numbers.
+#[derive(Clone, Debug)]
+pub enum Operation<V> {
+    /// `a + b`
+    Add(V, V),
+    /// `a − b`
+    Sub(V, V),
+    /// `a · b`
+    Mul(V, V),
+    /// `a / b`
+    Div(V, V),
+    /// `a · b + c`, rounded once where the target has an instruction for it.
+    Fma(V, V, V),
+    /// `−a`
+    Negate(V),
+    /// `1 / value`, or 0 where the value is not above the floor; NaN is above.
+    ReciprocalAbove {
+        /// The value.
+        value: V,
+        /// The floor.
+        floor: V,
+    },
+    /// `√a`
+    Sqrt(V),
+}
+
+impl<V> Operation<V> {
+    /// The same with other operands.
+    pub fn map<W>(self, mut f: impl FnMut(V) -> W) -> Operation<W> {
+        match self {
+            Operation::Add(a, b) => Operation::Add(f(a), f(b)),
+            Operation::Sub(a, b) => Operation::Sub(f(a), f(b)),
+            Operation::Mul(a, b) => Operation::Mul(f(a), f(b)),
+            Operation::Div(a, b) => Operation::Div(f(a), f(b)),
+            Operation::Fma(a, b, c) => Operation::Fma(f(a), f(b), f(c)),
+            Operation::Negate(a) => Operation::Negate(f(a)),
+            Operation::ReciprocalAbove { value, floor } => {
+                Operation::ReciprocalAbove { value: f(value), floor: f(floor) }
+            }
+            Operation::Sqrt(a) => Operation::Sqrt(f(a)),
+        }
+    }
+}
+
+/// Instructions of a target language, which are written one after the other.
+pub trait Instructions {
+    /// A number that an instruction gave.
+    type Value: Clone;
+    /// The number of a loop's turn.
+    type Turn: Copy;
+    /// A loop that is being written.
+    type Loop;
+
+    /// A constant.
+    fn constant(&mut self, x: f64) -> Self::Value;
+
+    /// Reads an entry of an array.
+    fn load(&mut self, place: Place<Self::Turn>) -> Self::Value;
+
+    /// Writes an entry of an array.
+    fn store(&mut self, place: Place<Self::Turn>, value: Self::Value);
+
+    /// Computes an operation.
+    fn operation(&mut self, operation: Operation<Self::Value>) -> Self::Value;
+
+    /// Sines and cosines of some angles, whose values the instructions before gave.
+    fn sines(&mut self, angles: &[Self::Value]) -> Vec<[Self::Value; 2]>;
+
+    /// The same for the first `n` entries of [`Array::Angles`], into [`Array::Sines`] and [`Array::Cosines`].
+    fn sines_of_array(&mut self, n: usize);
+
+    /// Begins a loop of `turns` turns, from the last to the first if `backward`. Returns the number of the turn and the
+    /// values that are carried from turn to turn, which are `start` in the first one.
+    fn open_loop(
+        &mut self,
+        turns: usize,
+        backward: bool,
+        start: Vec<Self::Value>,
+    ) -> (Self::Loop, Self::Turn, Vec<Self::Value>);
+
+    /// Ends the loop that was begun last. `next` is carried to the next turn; the values after the last one are
+    /// returned.
+    fn close_loop(&mut self, open: Self::Loop, next: Vec<Self::Value>) -> Vec<Self::Value>;
+
+    /// Is told each value before it is used: it is that of node `id` of a block's program (straight-line code is block
+    /// 0). A target that has names gives it one.
+    fn named(&mut self, _block: usize, _id: u32, _label: Label, value: Self::Value) -> Self::Value {
+        value
+    }
+}
+
+/// Tells a target the body of a function, whose results fill arrays of the lengths `results`.
+pub fn lower<I: Instructions>(target: &mut I, program: &OutputProgram<Code>, results: &[usize]) {
+    let entries = |lengths: Vec<usize>, array: fn(usize) -> Array| {
+        let of = move |(k, len)| (0..len).map(move |at| (array(k), at));
+        lengths.into_iter().enumerate().flat_map(of).collect::<Vec<_>>()
+    };
+    let inputs = entries(program.inputs.iter().map(|array| array.len()).collect(), Array::Input);
+    let results = entries(results.to_vec(), Array::Result);
+    let mut lowering = Lowering { target, inputs, results };
+    match &program.program {
+        Code::Straight(program) => lowering.straight(program),
+        Code::Rolled(program) => lowering.rolled(program),
+    }
+}

@@ -1,0 +1,148 @@
+//! Rolled code: loops over the turns of a run, whose rows are in the working memory.
+
+use std::collections::BTreeMap;
+
+use super::straight::{Lowering, Values};
+use super::{Array, Instructions, Place};
+use crate::rolled::{Place as Source, Repeat, RolledProgram, Start, SweepDirection, Target};
+use crate::symbolic::angles::pairs;
+use crate::symbolic::ProgramResult;
+
+/// One turn of a loop.
+struct Turn<'a, I: Instructions> {
+    /// Its number.
+    k: I::Turn,
+    run: usize,
+    /// Values carried from the turn before.
+    carried: &'a [I::Value],
+}
+
+impl<I: Instructions> Lowering<'_, I> {
+    pub fn rolled(&mut self, program: &RolledProgram) {
+        for (number, block) in program.blocks.iter().enumerate() {
+            match &block.repeat {
+                None => {
+                    self.block(program, number, None);
+                }
+                Some(repeat) if repeat.way.is_none() => self.all_sines(program, number, repeat),
+                Some(repeat) => self.repeated(program, number, repeat),
+            }
+        }
+    }
+
+    /// An input of a block.
+    fn source(&mut self, program: &RolledProgram, source: Source, turn: Option<&Turn<I>>) -> I::Value {
+        let moved = |(array, at), stride, turn: &Turn<I>| Place { array, at, turn: Some((turn.k, stride)) };
+        let place = match (source, turn) {
+            (Source::Given(k), _) => {
+                let (array, at) = self.inputs[k];
+                Place { array, at, turn: None }
+            }
+            (Source::Kept(at), _) => Place { array: Array::Kept, at, turn: None },
+            (Source::GivenOfTurn { first, stride }, Some(turn)) => moved(self.inputs[first], stride, turn),
+            (Source::Column(column), Some(turn)) => {
+                let columns = program.loops[turn.run].table.first().map_or(0, Vec::len);
+                moved((Array::Table(turn.run), column), columns, turn)
+            }
+            (Source::Row(row), Some(turn)) => moved((Array::Rows(turn.run), row), program.loops[turn.run].row, turn),
+            (Source::Carried(k), Some(turn)) => return turn.carried[k].clone(),
+            (source, None) => unreachable!("{source:?} outside of a loop"),
+        };
+        self.target.load(place)
+    }
+
+    /// Gives a value to an output of a block; those that are carried to the next turn are the caller's.
+    fn give(&mut self, program: &RolledProgram, target: Target, turn: Option<&Turn<I>>, value: I::Value) {
+        let moved = |(array, at), stride, turn: &Turn<I>| Place { array, at, turn: Some((turn.k, stride)) };
+        let place = match (target, turn) {
+            (Target::Result(k), _) => {
+                let (array, at) = self.results[k];
+                Place { array, at, turn: None }
+            }
+            (Target::Kept(at), _) => Place { array: Array::Kept, at, turn: None },
+            (Target::ResultOfTurn { first, stride }, Some(turn)) => moved(self.results[first], stride, turn),
+            (Target::Row(row), Some(turn)) => moved((Array::Rows(turn.run), row), program.loops[turn.run].row, turn),
+            (Target::Carried(_), Some(_)) => return,
+            (target, None) => unreachable!("{target:?} outside of a loop"),
+        };
+        self.target.store(place, value);
+    }
+
+    /// The body of a block. Returns what is carried to the next turn.
+    fn block(&mut self, program: &RolledProgram, number: usize, turn: Option<&Turn<I>>) -> BTreeMap<usize, I::Value> {
+        let block = &program.blocks[number];
+        let mut values = Values::new(number, &block.program);
+        let mut carried = BTreeMap::new();
+        let input = |s: &mut Self, k: usize| s.source(program, block.inputs[k], turn);
+        let mut put = |s: &mut Self, k: usize, value: I::Value| {
+            if let Target::Carried(slot) = block.outputs[k] {
+                carried.insert(slot, value.clone());
+            }
+            s.give(program, block.outputs[k], turn, value);
+        };
+        self.steps(&block.program, &mut values, |_| true, input, &mut put);
+        self.constants(&block.program, put);
+        carried
+    }
+
+    fn repeated(&mut self, program: &RolledProgram, number: usize, repeat: &Repeat) {
+        let mut start = Vec::new();
+        for (value, _) in &repeat.carried {
+            start.push(match *value {
+                Start::Const(x) => self.target.constant(x),
+                Start::Kept(slot, minus) => {
+                    let value = self.source(program, Source::Kept(slot), None);
+                    self.signed(value, minus)
+                }
+                Start::Given(k, minus) => {
+                    let value = self.source(program, Source::Given(k), None);
+                    self.signed(value, minus)
+                }
+            });
+        }
+        let (turns, backward) = (program.loops[repeat.run].table.len(), repeat.way == Some(SweepDirection::TipToBase));
+        let (open, k, carried) = self.target.open_loop(turns, backward, start);
+        let next = self.block(program, number, Some(&Turn { k, run: repeat.run, carried: &carried }));
+        let next = carried.iter().enumerate().map(|(slot, old)| next.get(&slot).unwrap_or(old).clone()).collect();
+        let ends = self.target.close_loop(open, next);
+        for ((_, end), value) in repeat.carried.iter().zip(ends) {
+            if let Some(at) = *end {
+                self.target.store(Place { array: Array::Kept, at, turn: None }, value);
+            }
+        }
+    }
+
+    /// Sines and cosines of all turns together.
+    fn all_sines(&mut self, program: &RolledProgram, number: usize, repeat: &Repeat) {
+        let block = &program.blocks[number];
+        let (run, turns) = (repeat.run, program.loops[repeat.run].table.len());
+        let angles = pairs(&block.program);
+        let (open, k, _) = self.target.open_loop(turns, false, Vec::new());
+        let turn = Turn { k, run, carried: &[] };
+        let mut values = Values::new(number, &block.program);
+        let others = |id: u32| angles.values().flatten().flatten().all(|node| *node != id);
+        let input = |s: &mut Self, k: usize| s.source(program, block.inputs[k], Some(&turn));
+        self.steps(&block.program, &mut values, others, input, |s, k, value| {
+            s.give(program, block.outputs[k], Some(&turn), value);
+        });
+        for (n, angle) in angles.keys().enumerate() {
+            let place = Place { array: Array::Angles, at: n * turns, turn: Some((k, 1)) };
+            self.target.store(place, values.get(*angle));
+        }
+        self.target.close_loop(open, Vec::new());
+        self.target.sines_of_array(turns * angles.len());
+        let (open, k, _) = self.target.open_loop(turns, false, Vec::new());
+        let turn = Turn { k, run, carried: &[] };
+        for (result, target) in block.program.outputs.iter().zip(&block.outputs) {
+            let ProgramResult::Node(id, minus) = result else { continue };
+            for (n, pair) in angles.values().enumerate() {
+                let Some(part) = pair.iter().position(|node| *node == Some(*id)) else { continue };
+                let array = [Array::Sines, Array::Cosines][part];
+                let value = self.target.load(Place { array, at: n * turns, turn: Some((k, 1)) });
+                let value = self.signed(value, *minus);
+                self.give(program, *target, Some(&turn), value);
+            }
+        }
+        self.target.close_loop(open, Vec::new());
+    }
+}

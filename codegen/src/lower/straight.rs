@@ -1,0 +1,147 @@
+//! Straight-line code: first the sines and cosines of all angles together, then one instruction for each operation.
+
+use std::collections::BTreeMap;
+
+use super::{Array, Instructions, Operation, Place};
+use crate::symbolic::angles::Angles;
+use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, Program, ProgramResult};
+
+/// A body that is being told.
+pub(super) struct Lowering<'a, I: Instructions> {
+    pub target: &'a mut I,
+    /// Array and entry of each of the function's inputs.
+    pub inputs: Vec<(Array, usize)>,
+    /// Array and entry of each result.
+    pub results: Vec<(Array, usize)>,
+}
+
+/// Values of the nodes of a block's program, and the sines and cosines by their angles, as far as they are known.
+pub(super) struct Values<V> {
+    block: usize,
+    of: Vec<Option<V>>,
+    pub pairs: BTreeMap<u32, [V; 2]>,
+}
+
+impl<V: Clone> Values<V> {
+    pub fn new(block: usize, program: &Program) -> Values<V> {
+        Values { block, of: vec![None; program.width()], pairs: BTreeMap::new() }
+    }
+
+    pub fn get(&self, id: u32) -> V {
+        self.of[id as usize].clone().expect("operands come before the operations that use them")
+    }
+}
+
+impl<I: Instructions> Lowering<'_, I> {
+    pub fn signed(&mut self, x: I::Value, minus: bool) -> I::Value {
+        if minus {
+            self.target.operation(Operation::Negate(x))
+        } else {
+            x
+        }
+    }
+
+    /// The value of an operation other than inputs, sines and cosines.
+    fn operation(&mut self, op: &Op, values: &Values<I::Value>) -> I::Value {
+        let mut operand = |o: Operand| match o {
+            Operand::Const(bits) => self.target.constant(f64::from_bits(bits)),
+            Operand::Node(id) => values.get(id),
+        };
+        let operation = match *op {
+            Op::Add(a, b) => Operation::Add(operand(a), operand(b)),
+            Op::Sub(a, b) => Operation::Sub(operand(a), operand(b)),
+            Op::Mul(a, b) => Operation::Mul(operand(a), operand(b)),
+            Op::Div(a, b) => Operation::Div(operand(a), operand(b)),
+            Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
+                let (a, b, c) = (operand(a), operand(b), operand(c));
+                Operation::Fma(self.signed(a, minus_product), b, self.signed(c, minus_addend))
+            }
+            Op::ReciprocalAbove(FlooredReciprocal { value, floor, minus_value, minus_floor }) => {
+                let (value, floor) = (operand(value), operand(floor));
+                Operation::ReciprocalAbove {
+                    value: self.signed(value, minus_value),
+                    floor: self.signed(floor, minus_floor),
+                }
+            }
+            Op::Sqrt(a) => Operation::Sqrt(values.get(a)),
+            Op::Input(_) | Op::Sin(_) | Op::Cos(_) => unreachable!("these are no operations on numbers"),
+        };
+        self.target.operation(operation)
+    }
+
+    /// The operations of a program in order, only those that are `wanted`. A result is given to `put` as soon as it is
+    /// known.
+    pub fn steps(
+        &mut self,
+        program: &Program,
+        values: &mut Values<I::Value>,
+        wanted: impl Fn(u32) -> bool,
+        mut input: impl FnMut(&mut Self, usize) -> I::Value,
+        mut put: impl FnMut(&mut Self, usize, I::Value),
+    ) {
+        let mut results: BTreeMap<u32, Vec<(usize, bool)>> = BTreeMap::new();
+        for (k, result) in program.outputs.iter().enumerate() {
+            if let ProgramResult::Node(id, minus) = result {
+                results.entry(*id).or_default().push((k, *minus));
+            }
+        }
+        for (id, op, label) in &program.steps {
+            if !wanted(*id) {
+                continue;
+            }
+            if values.of[*id as usize].is_none() {
+                let value = match op {
+                    Op::Input(k) => input(self, *k as usize),
+                    Op::Sin(a) | Op::Cos(a) => {
+                        if !values.pairs.contains_key(a) {
+                            let pair = self.target.sines(&[values.get(*a)]);
+                            values.pairs.extend([*a].into_iter().zip(pair));
+                        }
+                        let [sin, cos] = values.pairs[a].clone();
+                        if matches!(op, Op::Sin(_)) {
+                            sin
+                        } else {
+                            cos
+                        }
+                    }
+                    op => self.operation(op, values),
+                };
+                values.of[*id as usize] = Some(self.target.named(values.block, *id, *label, value));
+            }
+            for (k, minus) in results.remove(id).unwrap_or_default() {
+                let value = self.signed(values.get(*id), minus);
+                put(self, k, value);
+            }
+        }
+    }
+
+    /// The constant results of a program.
+    pub fn constants(&mut self, program: &Program, mut put: impl FnMut(&mut Self, usize, I::Value)) {
+        for (k, result) in program.outputs.iter().enumerate() {
+            if let ProgramResult::Const(x) = result {
+                let value = self.target.constant(*x);
+                put(self, k, value);
+            }
+        }
+    }
+
+    pub fn straight(&mut self, program: &Program) {
+        let angles = Angles::new(program);
+        let mut values = Values::new(0, program);
+        let input = |s: &mut Self, k: usize| {
+            let (array, at) = s.inputs[k];
+            s.target.load(Place { array, at, turn: None })
+        };
+        let put = |s: &mut Self, k: usize, value| {
+            let (array, at) = s.results[k];
+            s.target.store(Place { array, at, turn: None }, value);
+        };
+        if !angles.early.is_empty() {
+            self.steps(program, &mut values, |id| angles.before.contains(&id), input, |_, _, _| {});
+            let early: Vec<I::Value> = angles.early.keys().map(|angle| values.get(*angle)).collect();
+            values.pairs.extend(angles.early.into_keys().zip(self.target.sines(&early)));
+        }
+        self.steps(program, &mut values, |_| true, input, put);
+        self.constants(program, put);
+    }
+}
