@@ -11,8 +11,8 @@ pub use crate::output::{InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::Counts;
-pub use crate::trace::{chosen_frames, trace};
-use crate::trace::{coordinate_rates, sizes};
+use crate::trace::coordinate_rates;
+pub use crate::trace::{chosen_frames, sizes, trace};
 
 /// Generated code and information about it.
 #[derive(Clone, Debug)]

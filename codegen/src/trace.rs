@@ -16,7 +16,8 @@ use crate::plan::Plan;
 use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
 use directional::Directional;
 use inputs::gravity_of;
-pub(crate) use inputs::{sizes, SymbolicInputs};
+pub use inputs::sizes;
+pub(crate) use inputs::SymbolicInputs;
 
 /// Frames of the options, as indices into the plan's.
 ///

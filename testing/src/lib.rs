@@ -3,6 +3,7 @@
 pub mod batch;
 pub mod chains;
 pub mod closed;
+pub mod conformance;
 pub mod eliminations;
 pub mod kkt;
 pub mod motions;

@@ -88,7 +88,7 @@ pub(super) fn gravity_of<S: Scalar>(plan: &Plan, params: &[S], given: impl FnOnc
 }
 
 /// Lengths of all arrays of a generated type.
-pub(crate) fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
+pub fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
     let dims = plan.dims;
     Sizes {
         nq: dims.nq,

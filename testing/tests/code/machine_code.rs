@@ -3,15 +3,14 @@
 //! In exact arithmetic all give the same bits, except for the signs of zeros: straight-line and rolled code, trees and
 //! loops, both precisions.
 
-use mbd_codegen::code::{compile, Code};
 use mbd_codegen::jit::{CompileError, Compiled, Number};
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, System};
-use mbd_testing::chains::{general, planar};
 use mbd_testing::closed::{random_loops, LoopKnobs};
+use mbd_testing::conformance::{chain, closed, far, tree, Case};
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
@@ -30,97 +29,60 @@ fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compiled<S>
     compiled
 }
 
-/// Whether two numbers are the same but for the signs of zeros.
-fn same<S: Number>(a: S, b: S) -> bool {
-    a == b || (a.to_f64().is_nan() && b.to_f64().is_nan())
+/// Every output of a case by machine code and by its program. Returns the number of outputs that are rolled.
+fn compare<S: Number>(case: &Case) -> usize {
+    let mut machine = compiled::<S>(&case.plan, &case.options, &case.state);
+    let mut rolled = 0;
+    for run in case.runs() {
+        let given: Vec<Vec<S>> =
+            run.arrays().into_iter().map(|array| array.iter().map(|x| S::constant(*x)).collect()).collect();
+        let arguments = given.iter().zip(&run.inputs).filter(|(_, array)| !array.field);
+        let arguments: Vec<&[S]> = arguments.map(|(given, _)| &given[..]).collect();
+        // Memory that was used before must not matter.
+        let mut found: Vec<Vec<S>> = run.lengths.iter().map(|len| vec![S::constant(f64::NAN); *len]).collect();
+        let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+        match machine.evaluate(run.output, &arguments, &mut results) {
+            Err(CompileError::TooLarge { .. }) => continue,
+            result => result.unwrap_or_else(|e| panic!("{}: {:?}: {e}", case.name, run.output)),
+        }
+        let found: Vec<f64> = found.concat().into_iter().map(|x| x.to_f64()).collect();
+        run.check(&format!("{}\n{}", case.name, to_toml(&case.plan.model)), &found);
+        rolled += usize::from(run.rolled);
+    }
+    rolled
 }
 
-/// Every output of a plan, derivatives only if asked for, by machine code and by its program, operation by operation.
-/// Returns the number of outputs and of those that are rolled.
-fn compare<S: Number>(whose: &str, plan: &Plan, options: &Options, s: &State, derivatives: bool) -> [usize; 2] {
-    let options = Options { precision: S::PRECISION, ..options.clone() };
-    let mut machine = compiled::<S>(plan, &options, s);
-    let (p, a) = (s.v.iter().map(|x| 0.7 * x - 0.1).collect::<Vec<_>>(), vec![0.3; s.v.len()]);
-    let mut counts = [0; 2];
-    for output in Output::available(!plan.constraints.is_empty()) {
-        // Derivatives are as large as all other outputs together.
-        if output.name().contains("derivatives") && !derivatives {
-            continue;
-        }
-        let program = compile(plan, output, &options).unwrap_or_else(|e| panic!("{whose}: {e}"));
-        let given: Vec<S> = s.inputs_of(&program.inputs, &p, &a).into_iter().map(S::constant).collect();
-        let expected = match &program.program {
-            Code::Straight(straight) => straight.evaluate(&given, |a, b, c| a * b + c),
-            Code::Rolled(rolled) => rolled.evaluate(&given, |a, b, c| a * b + c),
-        };
-        let arguments: Vec<&[S]> = {
-            let mut rest = &given[..];
-            let lengths = program.inputs.iter().filter(|array| !array.field).map(|array| array.len());
-            lengths.map(|len| rest.split_off(..len).expect("inputs start with the arguments")).collect()
-        };
-        // Memory that was used before must not matter.
-        let lengths = program.spec.results.iter().map(|array| array.len(machine.sizes()));
-        let mut found: Vec<Vec<S>> = lengths.map(|len| vec![S::constant(f64::NAN); len]).collect();
-        let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
-        match machine.evaluate(output, &arguments, &mut results) {
-            Err(CompileError::TooLarge { .. }) => continue,
-            result => result.unwrap_or_else(|e| panic!("{whose}: {output:?}: {e}")),
-        }
-        let found = found.concat();
-        assert_eq!(found.len(), expected.len(), "{whose}: {output:?}");
-        for (k, (a, b)) in found.iter().zip(&expected).enumerate() {
-            let text = || to_toml(&plan.model);
-            assert!(same(*a, *b), "{whose}: {output:?}[{k}]: {a:?}, by the program {b:?}\n{}", text());
-        }
-        counts[0] += 1;
-        counts[1] += usize::from(matches!(program.program, Code::Rolled(_)));
+/// Compares a case, at every fourth seed also in single precision and at every eighth with the derivatives and with
+/// large angles.
+fn compare_all(case: Case, seed: u64) -> usize {
+    let rolled = compare::<f64>(&Case { derivatives: seed % 8 == 0, ..case.clone() });
+    if seed % 4 == 1 {
+        compare::<f32>(&case.clone().single());
     }
-    counts
+    if seed % 8 == 2 {
+        compare::<f64>(&far(case.clone()));
+        compare::<f32>(&far(case).single());
+    }
+    rolled
 }
 
 #[test]
 fn trees() {
-    for seed in 0..40 {
-        let model = random_model(seed, &Distribution::everything(seed, 6));
-        let elimination =
-            [EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest][seed as usize % 3];
-        let options = options(elimination, RolledCode::Never, Arithmetic::Exact);
-        let plan = search::plan(&model, options.plan);
-        let s = random_state(&plan, seed);
-        compare::<f64>(&format!("seed {seed}"), &plan, &options, &s, seed % 8 == 0);
-        if seed % 4 == 1 {
-            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &s, seed == 1);
-        }
-    }
+    (0..40).for_each(|seed| {
+        compare_all(tree(seed), seed);
+    });
 }
 
 #[test]
 fn loops() {
-    for seed in 0..20 {
-        let system = random_loops(seed, &LoopKnobs::everything(seed, 5));
-        let options = options(EliminationStrategy::Single, RolledCode::Never, Arithmetic::Exact);
-        let plan = search::plan(&system.model, options.plan);
-        compare::<f64>(&format!("seed {seed}"), &plan, &options, &system.state, seed % 8 == 0);
-        if seed % 4 == 1 {
-            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &system.state, false);
-        }
-    }
+    (0..20).for_each(|seed| {
+        compare_all(closed(seed), seed);
+    });
 }
 
 #[test]
 fn rolled_code() {
-    let mut rolled = 0;
-    for seed in 0..12 {
-        let n = 6 + seed as usize % 7;
-        let model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
-        let options = options(EliminationStrategy::Single, RolledCode::Always, Arithmetic::Exact);
-        let plan = search::plan(&model, options.plan);
-        let s = random_state(&plan, seed);
-        rolled += compare::<f64>(&format!("seed {seed}"), &plan, &options, &s, false)[1];
-        if seed % 4 == 1 {
-            compare::<f32>(&format!("seed {seed}, f32"), &plan, &options, &s, false);
-        }
-    }
+    let rolled: usize = (0..12).map(|seed| compare_all(chain(seed), seed)).sum();
     assert!(rolled > 60, "{rolled} outputs are rolled");
 }
 

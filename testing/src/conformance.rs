@@ -1,0 +1,158 @@
+//! The cases of the conformance suite, which every evaluator of programs runs: machine code at run time, C,
+//! WebAssembly. In exact arithmetic all give the bits of the program run operation by operation, which other tests hold
+//! to the interpreter.
+
+use mbd_codegen::code::{compile, Code};
+use mbd_codegen::generate::{chosen_frames, sizes, InputArray};
+use mbd_codegen::options::{EliminationStrategy, PlanOptions};
+use mbd_codegen::plan::Plan;
+use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
+use mbd_runtime::system::Real;
+
+use crate::chains::{general, planar};
+use crate::closed::{random_loops, LoopKnobs};
+use crate::random::{random_model, Distribution};
+use crate::state::{random_state, State};
+
+/// A mechanism in a state, and options in exact arithmetic.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// What messages call it; also a valid identifier.
+    pub name: String,
+    /// The mechanism.
+    pub plan: Plan,
+    /// Options, whose outputs do not count.
+    pub options: Options,
+    /// State and inputs.
+    pub state: State,
+    /// Whether derivatives are compared too, which are as large as all other outputs together.
+    pub derivatives: bool,
+}
+
+/// An output of a case, with its inputs and the results that every evaluator must give.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The output.
+    pub output: Output,
+    /// Its input arrays: arguments, then fields.
+    pub inputs: Vec<InputArray>,
+    /// Their entries, one array after the other.
+    pub given: Vec<f64>,
+    /// Lengths of the results.
+    pub lengths: Vec<usize>,
+    /// Entries of the results, one array after the other. Those of single precision are widened.
+    pub expected: Vec<f64>,
+    /// Whether the program has loops.
+    pub rolled: bool,
+}
+
+impl Run {
+    /// The entries of every input array.
+    pub fn arrays(&self) -> Vec<&[f64]> {
+        let mut rest = &self.given[..];
+        self.inputs.iter().map(|array| rest.split_off(..array.len()).expect("as many entries as inputs")).collect()
+    }
+
+    /// Asserts that an evaluator gave the bits expected; signs of zeros and of NaN do not count.
+    ///
+    /// # Panics
+    /// It gave others.
+    pub fn check(&self, whose: &str, found: &[f64]) {
+        assert_eq!(found.len(), self.expected.len(), "{whose}: {:?}", self.output);
+        for (k, (a, b)) in found.iter().zip(&self.expected).enumerate() {
+            let same = a == b || (a.is_nan() && b.is_nan());
+            assert!(same, "{whose}: {:?}[{k}] is {a:e}, by the program {b:e}", self.output);
+        }
+    }
+}
+
+impl Case {
+    fn new(name: String, plan: Plan, options: Options, state: State) -> Case {
+        Case { name, plan, options, state, derivatives: false }
+    }
+
+    /// The same in single precision.
+    #[must_use]
+    pub fn single(self) -> Case {
+        let options = Options { precision: Precision::F32, ..self.options };
+        Case { name: format!("{}_f32", self.name), options, derivatives: false, ..self }
+    }
+
+    /// Its outputs with what they must give.
+    ///
+    /// # Panics
+    /// If the generator refuses an output.
+    pub fn runs(&self) -> Vec<Run> {
+        match self.options.precision {
+            Precision::F64 => self.runs_in::<f64>(),
+            Precision::F32 => self.runs_in::<f32>(),
+        }
+    }
+
+    fn runs_in<S: Real>(&self) -> Vec<Run> {
+        let available = Output::available(!self.plan.constraints.is_empty());
+        let wanted = available.filter(|output| self.derivatives || !output.name().contains("derivatives"));
+        let (p, a) = (self.state.v.iter().map(|x| 0.7 * x - 0.1).collect::<Vec<_>>(), vec![0.3; self.state.v.len()]);
+        let run = |output| {
+            let program = compile(&self.plan, output, &self.options).unwrap_or_else(|e| panic!("{}: {e}", self.name));
+            let given: Vec<S> = self.state.inputs_of(&program.inputs, &p, &a).into_iter().map(S::constant).collect();
+            let expected = match &program.program {
+                Code::Straight(straight) => straight.evaluate(&given, |a, b, c| a * b + c),
+                Code::Rolled(rolled) => rolled.evaluate(&given, |a, b, c| a * b + c),
+            };
+            let frames = chosen_frames(&self.plan, &self.options).expect("all frames").len();
+            let sizes = sizes(&self.plan, &self.options, frames);
+            Run {
+                output,
+                lengths: program.spec.results.iter().map(|array| array.len(&sizes)).collect(),
+                given: given.iter().map(|x| x.to_f64()).collect(),
+                expected: expected.iter().map(|x| x.to_f64()).collect(),
+                rolled: matches!(program.program, Code::Rolled(_)),
+                inputs: program.inputs,
+            }
+        };
+        wanted.map(run).collect()
+    }
+}
+
+fn options(elimination: EliminationStrategy, rolled: RolledCode) -> Options {
+    let plan = PlanOptions { elimination, rolled, ..PlanOptions::default() };
+    Options { arithmetic: Arithmetic::Exact, plan, ..Options::default() }
+}
+
+/// A random tree of up to six bodies with everything that models can have.
+pub fn tree(seed: u64) -> Case {
+    let model = random_model(seed, &Distribution::everything(seed, 6));
+    let strategies = [EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest];
+    let options = options(strategies[(seed % 3) as usize], RolledCode::Never);
+    let plan = search::plan(&model, options.plan);
+    let state = random_state(&plan, seed);
+    Case::new(format!("tree{seed}"), plan, options, state)
+}
+
+/// A random mechanism with loops.
+pub fn closed(seed: u64) -> Case {
+    let system = random_loops(seed, &LoopKnobs::everything(seed, 5));
+    let options = options(EliminationStrategy::Single, RolledCode::Never);
+    let plan = search::plan(&system.model, options.plan);
+    Case::new(format!("closed{seed}"), plan, options, system.state)
+}
+
+/// A random chain, whose programs are rolled wherever links repeat.
+pub fn chain(seed: u64) -> Case {
+    let n = 6 + (seed % 7) as usize;
+    let model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
+    let options = options(EliminationStrategy::Single, RolledCode::Always);
+    let plan = search::plan(&model, options.plan);
+    let state = random_state(&plan, seed);
+    Case::new(format!("chain{seed}"), plan, options, state)
+}
+
+/// A case at positions beyond the range in which sines have a short way: large ones, infinite ones, NaN.
+pub fn far(mut case: Case) -> Case {
+    let far = [3e6, -7.5e11, 1e300, f64::INFINITY, f64::NAN];
+    for (k, x) in case.state.q.iter_mut().enumerate() {
+        *x *= far[k % if k % 3 == 0 { 3 } else { 5 }];
+    }
+    Case { name: format!("{}_far", case.name), ..case }
+}
