@@ -82,6 +82,15 @@ impl Default for PlanOptions {
     }
 }
 
+impl PlanOptions {
+    /// No search at all: the joints are eliminated one at a time. The code is ready in a fraction of the time, and takes
+    /// more operations where several joints could be eliminated together.
+    pub fn quick() -> PlanOptions {
+        let elimination = EliminationStrategy::Single;
+        PlanOptions { elimination, accelerations: false, mass_matrix: false, ..PlanOptions::default() }
+    }
+}
+
 /// Options of the generated code.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {

@@ -141,7 +141,7 @@ pub fn closed(seed: u64) -> Case {
 /// A random chain, whose programs are rolled wherever links repeat.
 pub fn chain(seed: u64) -> Case {
     let n = 6 + (seed % 7) as usize;
-    let model = if seed % 2 == 0 { general(seed, n) } else { planar(seed, n) };
+    let model = if seed.is_multiple_of(2) { general(seed, n) } else { planar(seed, n) };
     let options = options(EliminationStrategy::Single, RolledCode::Always);
     let plan = search::plan(&model, options.plan);
     let state = random_state(&plan, seed);

@@ -1,0 +1,130 @@
+//! Times of machine code made at run time and of generated Rust, `rates` of one state, in one process.
+//!
+//!     cargo run --release --manifest-path benches/machine_code/Cargo.toml
+//!
+//! Both run in turns on the same random states, one after the other and as a chain in which every state waits for the
+//! rates of the one before. The least of many rounds counts.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use mbd_codegen::jit::Compiled;
+use mbd_codegen::read::{self, Base, ImportOptions};
+use mbd_codegen::{Arithmetic, Options, Output};
+use mbd_runtime::System;
+
+const STATES: usize = 64;
+const ROUNDS: usize = 400;
+
+/// Random numbers between −1 and 1.
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// Nanoseconds for one state of each system, `chained` or not.
+fn time<S: System>(system: &mut S, states: &[(S::Coordinates, S::Momenta)], chained: bool) -> f64
+where
+    S::Coordinates: AsMut<[f64]>,
+    S::Momenta: AsMut<[f64]>,
+{
+    let (mut qd, mut pd) = (system.neutral(), system.zero_momenta());
+    let (mut q, mut p) = states[0].clone();
+    let from = Instant::now();
+    for state in states {
+        if chained {
+            // Rates are used, but change next to nothing.
+            for (q, qd) in q.as_mut().iter_mut().zip(qd.as_mut()) {
+                *q += 1e-300 * *qd;
+            }
+            for (p, pd) in p.as_mut().iter_mut().zip(pd.as_mut()) {
+                *p += 1e-300 * *pd;
+            }
+            system.rates_at(zero::<S>(), &q, &p, &mut qd, &mut pd);
+        } else {
+            system.rates_at(zero::<S>(), black_box(&state.0), black_box(&state.1), &mut qd, &mut pd);
+            black_box((&mut qd, &mut pd));
+        }
+    }
+    black_box((&mut qd, &mut pd));
+    from.elapsed().as_secs_f64() * 1e9 / states.len() as f64
+}
+
+fn zero<S: System>() -> S::Scalar {
+    mbd_runtime::Scalar::zero()
+}
+
+/// Random states near the neutral one.
+fn states<S: System>(system: &S) -> Vec<(S::Coordinates, S::Momenta)>
+where
+    S::Coordinates: AsMut<[f64]>,
+    S::Momenta: AsMut<[f64]>,
+{
+    let mut seed = 1;
+    let state = |_| {
+        let (mut q, mut p) = (system.neutral(), system.zero_momenta());
+        q.as_mut().iter_mut().for_each(|x| *x += random(&mut seed));
+        p.as_mut().iter_mut().for_each(|x| *x = random(&mut seed));
+        (q, p)
+    };
+    (0..STATES).map(state).collect()
+}
+
+/// Least times of both systems in many rounds, in turns.
+fn pair<A: System, B: System>(a: &mut A, b: &mut B, chained: bool) -> [f64; 2]
+where
+    A::Coordinates: AsMut<[f64]>,
+    A::Momenta: AsMut<[f64]>,
+    B::Coordinates: AsMut<[f64]>,
+    B::Momenta: AsMut<[f64]>,
+{
+    let (of_a, of_b) = (states(a), states(b));
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..ROUNDS {
+        least[0] = least[0].min(time(a, &of_a, chained));
+        least[1] = least[1].min(time(b, &of_b, chained));
+    }
+    least
+}
+
+fn compiled(path: &str, floating: bool, arithmetic: Arithmetic) -> Compiled {
+    let text = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
+    let base = if floating { Base::Floating } else { Base::Fixed };
+    let model = read::model(path, &text, &ImportOptions { base, gravity: None }).expect("checked by the build").model;
+    let compiled = Compiled::new(&model, &Options { arithmetic, ..Options::default() }).expect("options");
+    compiled.prepare(Output::Rates).expect("machine code");
+    compiled
+}
+
+macro_rules! models {
+    ($($name:ident, $path:literal, $floating:literal;)*) => {
+        $(mod $name {
+            include!(concat!(env!("OUT_DIR"), "/", stringify!($name), "_exact.rs"));
+            include!(concat!(env!("OUT_DIR"), "/", stringify!($name), "_fast.rs"));
+        })*
+
+        fn main() {
+            println!("| model | arithmetic | independent: machine code | Rust | ratio | chained: machine code | Rust | ratio |");
+            println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
+            $(
+                row(stringify!($name), "exact", &mut compiled($path, $floating, Arithmetic::Exact), &mut $name::Exact::new());
+                row(stringify!($name), "fast", &mut compiled($path, $floating, Arithmetic::Fast), &mut $name::Fast::new());
+            )*
+        }
+    };
+}
+
+fn row<B: System>(name: &str, arithmetic: &str, machine: &mut Compiled, rust: &mut B)
+where
+    B::Coordinates: AsMut<[f64]>,
+    B::Momenta: AsMut<[f64]>,
+{
+    print!("| {name} | {arithmetic} |");
+    for chained in [false, true] {
+        let [m, r] = pair(machine, rust, chained);
+        print!(" {m:.0} ns | {r:.0} ns | {:.2} |", m / r);
+    }
+    println!();
+}
+
+include!(concat!(env!("OUT_DIR"), "/models.rs"));
