@@ -8,6 +8,7 @@ use mbd_codegen::{generate, Arithmetic, Options, Output};
 include!("src/models.rs");
 
 fn main() {
+    println!("cargo:rerun-if-changed=src/models.rs");
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
     let mut list = String::from("models! {\n");
     for (name, file, floating) in MODELS {

@@ -28,6 +28,18 @@ impl Code {
         }
     }
 
+    /// Bits of the constants that operations have.
+    pub fn constants(&self) -> BTreeSet<u64> {
+        let of = |program: &Program| -> Vec<u64> {
+            let operands = program.steps.iter().flat_map(|(_, op, _)| op.operands());
+            operands.filter_map(|o| if let Operand::Const(bits) = o { Some(bits) } else { None }).collect()
+        };
+        match self {
+            Code::Straight(program) => of(program).into_iter().collect(),
+            Code::Rolled(program) => program.blocks.iter().flat_map(|block| of(&block.program)).collect(),
+        }
+    }
+
     /// Indices of the inputs that are read.
     pub fn used_inputs(&self) -> BTreeSet<usize> {
         match self {

@@ -1,13 +1,15 @@
 //! Single instructions in Cranelift's intermediate language.
 //!
 //! A compiled function takes three addresses: a table with the addresses of the input arrays (three arguments, then
-//! [`FIELDS`]), a table with those of the result arrays, and working memory.
+//! [`FIELDS`], then the function's constants), a table with those of the result arrays, and working memory.
+
+use std::collections::BTreeMap;
 
 use cranelift::codegen::ir::{BlockArg, Function, MemFlags, SigRef, Signature, StackSlotData, StackSlotKind, Type};
 use cranelift::prelude::*;
 
 use crate::code::Code;
-use crate::lower::{self, main_path, Array, Instructions, Memory, Operation, Place};
+use crate::lower::{self, main_path, Array, Instructions, Memory, Operation, Place, Spills};
 use crate::options::Precision;
 use crate::output::{InputArray, OutputProgram, FIELDS};
 use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64};
@@ -17,6 +19,10 @@ pub const ARGUMENTS: usize = 3;
 
 /// The function for sines and cosines computes a multiple of so many angles.
 pub const BLOCK: usize = 4;
+
+/// Sines and cosines of more angles are computed by the function: their instructions would take more of the cache than
+/// the call takes time.
+const MOST_INLINE: usize = 16;
 
 /// Number of input arrays of every function.
 pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
@@ -33,8 +39,12 @@ pub struct Shape<'a> {
     pub results: &'a [usize],
     /// Working memory.
     pub memory: &'a Memory,
+    /// Values that leave the registers.
+    pub spills: &'a Spills,
     /// Addresses of the tables of rolled code.
     pub tables: &'a [usize],
+    /// Places of constants, by their bits, in their table.
+    pub constants: &'a BTreeMap<u64, usize>,
     /// Signature and address of the function that computes sines and cosines.
     pub sines: (Signature, usize),
 }
@@ -57,22 +67,23 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
     b.append_block_params_for_function_params(entry);
     b.switch_to_block(entry);
     let [inputs, results, memory] = b.block_params(entry) else { unreachable!("a function has three parameters") };
-    let (inputs, results, memory) = (*inputs, *results, *memory);
+    let (inputs_table, results, memory) = (*inputs, *results, *memory);
     let pointer = i32::try_from(shape.address.bytes()).expect("addresses are small");
     let constant = MemFlags::trusted().with_readonly();
     let mut addresses = |table: Value, place: usize| {
         let at = i32::try_from(place).expect("arrays are few") * pointer;
         b.ins().load(shape.address, constant, table, at)
     };
-    let inputs = input_places(&program.inputs).into_iter().map(|place| addresses(inputs, place)).collect();
+    let inputs = input_places(&program.inputs).into_iter().map(|place| addresses(inputs_table, place)).collect();
+    let table = addresses(inputs_table, INPUTS);
     let outputs = (0..shape.results.len()).map(|place| addresses(results, place)).collect();
     let sines = b.import_signature(shape.sines.0.clone());
     let number = match shape.precision {
         Precision::F64 => types::F64,
         Precision::F32 => types::F32,
     };
-    let mut writer = Writer { b, shape, number, inputs, outputs, memory, sines };
-    lower::lower(&mut writer, program, shape.results);
+    let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, sines };
+    lower::lower(&mut writer, program, shape.results, shape.spills);
     writer.b.ins().return_(&[]);
     writer.b.seal_all_blocks();
     writer.b.finalize();
@@ -90,6 +101,8 @@ struct Writer<'a> {
     outputs: Vec<Value>,
     /// Address of the working memory.
     memory: Value,
+    /// Address of the table of constants.
+    constants: Value,
     /// Signature of the function for sines and cosines.
     sines: SigRef,
 }
@@ -231,23 +244,29 @@ impl Instructions for Writer<'_> {
     type Loop = Loop;
 
     fn constant(&mut self, x: f64) -> Value {
-        let constant = match self.shape.precision {
+        // An operand in memory takes less code than a number in a register.
+        if let (false, Some(at)) = (self.number.is_vector(), self.shape.constants.get(&x.to_bits())) {
+            let offset = i32::try_from(self.size() * *at as i64).expect("constants are few");
+            return self.b.ins().load(self.number, MemFlags::trusted(), self.constants, offset);
+        }
+        if self.number.is_vector() {
+            let lanes = match self.shape.precision {
+                Precision::F32 => [(x as f32).to_le_bytes(); 4].concat(),
+                Precision::F64 => [x.to_le_bytes(); 2].concat(),
+            };
+            let lanes = self.b.func.dfg.constants.insert(lanes.into());
+            return self.b.ins().vconst(self.number, lanes);
+        }
+        match self.shape.precision {
             Precision::F32 => self.b.ins().f32const(x as f32),
             Precision::F64 => self.b.ins().f64const(x),
-        };
-        match self.number.is_vector() {
-            true => self.b.ins().splat(self.number, constant),
-            false => constant,
         }
     }
 
     fn load(&mut self, place: Place<Value>) -> Value {
-        let flags = match place.array {
-            Array::Input(_) | Array::Table(_) => MemFlags::trusted().with_readonly(),
-            _ => MemFlags::trusted(),
-        };
+        // Not `readonly`: such loads would be merged, and their values kept in registers that others need.
         let (address, offset) = self.address(place);
-        self.b.ins().load(self.number, flags, address, offset)
+        self.b.ins().load(self.number, MemFlags::trusted(), address, offset)
     }
 
     fn store(&mut self, place: Place<Value>, value: Value) {
@@ -278,6 +297,9 @@ impl Instructions for Writer<'_> {
     }
 
     fn sines(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
+        if angles.len() > MOST_INLINE {
+            return self.by_function(angles);
+        }
         let (pairs, within) = self.by_main_path(angles);
         let Some(within) = within else { return pairs };
         let (far, next) = (self.b.create_block(), self.b.create_block());

@@ -11,6 +11,8 @@
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
 #![allow(unsafe_code)]
 
+use std::collections::BTreeMap;
+
 use cranelift::codegen::ir::{Function, UserFuncName};
 use cranelift::codegen::Context;
 use cranelift::jit::{JITBuilder, JITModule};
@@ -20,7 +22,7 @@ use cranelift::prelude::*;
 use super::instructions::{input_places, write, Shape, BLOCK, INPUTS};
 use super::CompileError;
 use crate::code::Code;
-use crate::lower::Memory;
+use crate::lower::{Memory, Spills};
 use crate::options::{Arithmetic, Precision};
 use crate::output::OutputProgram;
 use mbd_runtime::kernel::{level, Level};
@@ -29,6 +31,10 @@ use mbd_runtime::trig;
 
 /// The most result arrays that a function has.
 const RESULTS: usize = 6;
+
+/// Values of straight-line code that are in registers at a time. The processors have 16 or 32 for numbers, of which an
+/// instruction needs one or two more.
+const REGISTERS: usize = 13;
 
 /// Computes sines and cosines of `n` angles, a multiple of [`BLOCK`].
 type Sines<S> = unsafe extern "C" fn(*const S, usize, *mut S, *mut S);
@@ -102,6 +108,8 @@ pub struct MachineCode<S> {
     results: (usize, [usize; RESULTS]),
     /// Length of the working memory.
     scratch: usize,
+    /// Constants that the code reads.
+    constants: Box<[S]>,
     /// Tables of rolled code, at addresses that are part of the code.
     _tables: Vec<Box<[S]>>,
 }
@@ -123,7 +131,9 @@ impl<S: Number> MachineCode<S> {
     ) -> Result<Self, CompileError> {
         let fast = arithmetic == Arithmetic::Fast;
         let mut flags = settings::builder();
-        for (name, value) in [("opt_level", "speed"), ("enable_verifier", "false"), ("is_pic", "false")] {
+        // Straight-line code is optimised already, and its order decides what stays in registers.
+        let optimisation = if matches!(program.program, Code::Straight(_)) { "none" } else { "speed" };
+        for (name, value) in [("opt_level", optimisation), ("enable_verifier", "false"), ("is_pic", "false")] {
             flags.set(name, value).map_err(CompileError::machine)?;
         }
         let isa = cranelift::native::builder().map_err(CompileError::machine)?;
@@ -139,13 +149,18 @@ impl<S: Number> MachineCode<S> {
             Code::Straight(_) => Vec::new(),
             Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(numbers).collect(),
         };
-        let memory = Memory::new(&program.program, BLOCK);
+        let constants: BTreeMap<u64, usize> =
+            program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
+        let spills = Spills::of(&program.program, REGISTERS);
+        let memory = Memory::new(&program.program, &spills, BLOCK);
         let shape = Shape {
             precision: S::PRECISION,
             address,
             fused: fast && level() > Level::Plain,
             results: &results,
             memory: &memory,
+            spills: &spills,
+            constants: &constants,
             tables: &tables.iter().map(|table| table.as_ptr() as usize).collect::<Vec<_>>(),
             sines: (signature(4), S::SINES[usize::from(fast)] as usize),
         };
@@ -166,7 +181,15 @@ impl<S: Number> MachineCode<S> {
         let mut lengths = [0; RESULTS];
         lengths[..results.len()].copy_from_slice(&results);
         let results = (results.len(), lengths);
-        Ok(MachineCode { module: Some(module), entry, inputs, results, scratch: memory.len(), _tables: tables })
+        Ok(MachineCode {
+            module: Some(module),
+            entry,
+            inputs,
+            results,
+            scratch: memory.len(),
+            constants: numbers(constants.into_keys().map(f64::from_bits).collect()),
+            _tables: tables,
+        })
     }
 
     /// Length of the working memory that a call needs.
@@ -197,7 +220,10 @@ impl<S: Number> MachineCode<S> {
             assert!(result.len() == *len, "a result has {} entries, expected {len}", result.len());
             *to = result.as_mut_ptr();
         }
-        let read = inputs.map(|input| input.as_ptr());
+        let mut read = [self.constants.as_ptr(); INPUTS + 1];
+        for (to, input) in read.iter_mut().zip(inputs) {
+            *to = input.as_ptr();
+        }
         // SAFETY: see the head of this file.
         unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
     }

@@ -1,6 +1,6 @@
 //! Working memory of a function.
 
-use super::Array;
+use super::{Array, Spills};
 use crate::code::Code;
 use crate::rolled::Block;
 use crate::symbolic::angles::pairs;
@@ -10,6 +10,8 @@ use crate::symbolic::angles::pairs;
 pub struct Memory {
     /// Number of angles whose sines and cosines are computed together in a loop's turns.
     pub angles: usize,
+    /// Values of straight-line code that leave the registers.
+    pub spilled: usize,
     /// Numbers kept between the blocks of rolled code.
     pub kept: usize,
     /// Numbers in all rows of each run.
@@ -18,15 +20,15 @@ pub struct Memory {
 
 impl Memory {
     /// The memory that some code needs; `angles` come in blocks of a length.
-    pub fn new(code: &Code, block: usize) -> Memory {
-        let Code::Rolled(program) = code else { return Memory::default() };
+    pub fn new(code: &Code, spills: &Spills, block: usize) -> Memory {
+        let Code::Rolled(program) = code else { return Memory { spilled: spills.places, ..Memory::default() } };
         let together = |block: &Block| {
             let turns = block.repeat.as_ref().filter(|repeat| repeat.way.is_none());
             turns.map_or(0, |repeat| program.loops[repeat.run].table.len() * pairs(&block.program).len())
         };
         let angles = program.blocks.iter().map(together).max().unwrap_or(0).next_multiple_of(block);
         let rows = program.loops.iter().map(|run| run.table.len() * run.row).collect();
-        Memory { angles, kept: program.kept, rows }
+        Memory { angles, spilled: 0, kept: program.kept, rows }
     }
 
     /// Number of entries before an array.
@@ -34,11 +36,13 @@ impl Memory {
     /// # Panics
     /// If the array is no part of the working memory.
     pub fn start(&self, array: Array) -> usize {
-        let kept = 3 * self.angles;
+        let spilled = 3 * self.angles;
+        let kept = spilled + self.spilled;
         match array {
             Array::Angles => 0,
             Array::Sines => self.angles,
             Array::Cosines => 2 * self.angles,
+            Array::Spilled => spilled,
             Array::Kept => kept,
             Array::Rows(run) => kept + self.kept + self.rows[..run].iter().sum::<usize>(),
             Array::Input(_) | Array::Result(_) | Array::Table(_) => {

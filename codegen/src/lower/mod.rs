@@ -6,6 +6,7 @@
 //! `emit`, which has one text for one state and many.)
 
 mod memory;
+mod registers;
 mod rolled;
 mod sines;
 mod straight;
@@ -15,6 +16,7 @@ use crate::output::OutputProgram;
 use crate::symbolic::Label;
 
 pub use memory::Memory;
+pub use registers::Spills;
 pub use sines::main_path;
 use straight::Lowering;
 
@@ -25,6 +27,8 @@ pub enum Array {
     Input(usize),
     /// Result array of this number, in the order of the output's specification.
     Result(usize),
+    /// Values of straight-line code that leave the registers.
+    Spilled,
     /// Numbers that rolled code keeps between its blocks.
     Kept,
     /// Angles of all turns of a run.
@@ -141,15 +145,16 @@ pub trait Instructions {
     }
 }
 
-/// Tells a target the body of a function, whose results fill arrays of the lengths `results`.
-pub fn lower<I: Instructions>(target: &mut I, program: &OutputProgram<Code>, results: &[usize]) {
+/// Tells a target the body of a function, whose results fill arrays of the lengths `results`. Targets whose compiler
+/// decides by itself what stays in registers have no `spills`.
+pub fn lower<I: Instructions>(target: &mut I, program: &OutputProgram<Code>, results: &[usize], spills: &Spills) {
     let entries = |lengths: Vec<usize>, array: fn(usize) -> Array| {
         let of = move |(k, len)| (0..len).map(move |at| (array(k), at));
         lengths.into_iter().enumerate().flat_map(of).collect::<Vec<_>>()
     };
     let inputs = entries(program.inputs.iter().map(|array| array.len()).collect(), Array::Input);
     let results = entries(results.to_vec(), Array::Result);
-    let mut lowering = Lowering { target, inputs, results };
+    let mut lowering = Lowering { target, inputs, results, spills };
     match &program.program {
         Code::Straight(program) => lowering.straight(program),
         Code::Rolled(program) => lowering.rolled(program),

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use super::{Array, Instructions, Operation, Place};
+use super::{Array, Instructions, Operation, Place, Spills};
 use crate::symbolic::angles::Angles;
-use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, Program, ProgramResult};
+use crate::symbolic::{FlooredReciprocal, Fma, Label, Op, Operand, Program, ProgramResult};
 
 /// A body that is being told.
 pub(super) struct Lowering<'a, I: Instructions> {
@@ -13,6 +13,8 @@ pub(super) struct Lowering<'a, I: Instructions> {
     pub inputs: Vec<(Array, usize)>,
     /// Array and entry of each result.
     pub results: Vec<(Array, usize)>,
+    /// Values of straight-line code that leave the registers.
+    pub spills: &'a Spills,
 }
 
 /// Values of the nodes of a block's program, and the sines and cosines by their angles, as far as they are known.
@@ -42,17 +44,31 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     /// The value of an operation other than inputs, sines and cosines.
-    fn operation(&mut self, op: &Op, values: &Values<I::Value>) -> I::Value {
+    fn operation(&mut self, id: u32, op: &Op, values: &Values<I::Value>) -> I::Value {
+        // Some processors write the result where the first operand was, and read the last one from memory.
+        let gone = |o: Operand| matches!(o, Operand::Node(k) if self.spills.last.contains(&(id, k)));
+        let loaded = |o: Operand| match o {
+            Operand::Const(_) => true,
+            Operand::Node(k) => gone(o) && self.spills.loaded.get(&id).is_some_and(|all| all.contains(&k)),
+        };
+        let last = |a: Operand, b: Operand| if loaded(a) && !loaded(b) { (b, a) } else { (a, b) };
         let mut operand = |o: Operand| match o {
             Operand::Const(bits) => self.target.constant(f64::from_bits(bits)),
             Operand::Node(id) => values.get(id),
         };
         let operation = match *op {
-            Op::Add(a, b) => Operation::Add(operand(a), operand(b)),
+            Op::Add(a, b) => {
+                let (a, b) = last(a, b);
+                Operation::Add(operand(a), operand(b))
+            }
             Op::Sub(a, b) => Operation::Sub(operand(a), operand(b)),
-            Op::Mul(a, b) => Operation::Mul(operand(a), operand(b)),
+            Op::Mul(a, b) => {
+                let (a, b) = last(a, b);
+                Operation::Mul(operand(a), operand(b))
+            }
             Op::Div(a, b) => Operation::Div(operand(a), operand(b)),
             Op::Fma(Fma { a, b, c, minus_product, minus_addend }) => {
+                let (a, b) = if gone(b) && !gone(a) { (b, a) } else { last(a, b) };
                 let (a, b, c) = (operand(a), operand(b), operand(c));
                 Operation::Fma(self.signed(a, minus_product), b, self.signed(c, minus_addend))
             }
@@ -85,11 +101,27 @@ impl<I: Instructions> Lowering<'_, I> {
                 results.entry(*id).or_default().push((k, *minus));
             }
         }
+        // Loops have no spills.
+        let inputs: BTreeMap<u32, u32> = match self.spills.loaded.is_empty() {
+            true => BTreeMap::new(),
+            false => program
+                .steps
+                .iter()
+                .filter_map(|(id, op, _)| if let Op::Input(k) = op { Some((*id, *k)) } else { None })
+                .collect(),
+        };
         for (id, op, label) in &program.steps {
             if !wanted(*id) {
                 continue;
             }
             if values.of[*id as usize].is_none() {
+                for value in self.spills.loaded.get(id).into_iter().flatten() {
+                    let again = match inputs.get(value) {
+                        Some(k) => input(self, *k as usize),
+                        None => self.target.load(self.spilled(*value)),
+                    };
+                    values.of[*value as usize] = Some(again);
+                }
                 let value = match op {
                     Op::Input(k) => input(self, *k as usize),
                     Op::Sin(a) | Op::Cos(a) => {
@@ -104,15 +136,29 @@ impl<I: Instructions> Lowering<'_, I> {
                             cos
                         }
                     }
-                    op => self.operation(op, values),
+                    op => self.operation(*id, op, values),
                 };
-                values.of[*id as usize] = Some(self.target.named(values.block, *id, *label, value));
+                self.define(values, *id, *label, value);
             }
             for (k, minus) in results.remove(id).unwrap_or_default() {
                 let value = self.signed(values.get(*id), minus);
                 put(self, k, value);
             }
         }
+    }
+
+    /// Place of a value that leaves the registers.
+    fn spilled(&self, value: u32) -> Place<I::Turn> {
+        Place { array: Array::Spilled, at: self.spills.stored[&value], turn: None }
+    }
+
+    /// Sets the value of a node, and stores it if it leaves the registers.
+    fn define(&mut self, values: &mut Values<I::Value>, id: u32, label: Label, value: I::Value) {
+        let value = self.target.named(values.block, id, label, value);
+        if self.spills.stored.contains_key(&id) {
+            self.target.store(self.spilled(id), value.clone());
+        }
+        values.of[id as usize] = Some(value);
     }
 
     /// The constant results of a program.
@@ -139,7 +185,14 @@ impl<I: Instructions> Lowering<'_, I> {
         if !angles.early.is_empty() {
             self.steps(program, &mut values, |id| angles.before.contains(&id), input, |_, _, _| {});
             let early: Vec<I::Value> = angles.early.keys().map(|angle| values.get(*angle)).collect();
-            values.pairs.extend(angles.early.into_keys().zip(self.target.sines(&early)));
+            values.pairs.extend(angles.early.keys().copied().zip(self.target.sines(&early)));
+            for (id, op, label) in &program.steps {
+                let (Op::Sin(a) | Op::Cos(a)) = op else { continue };
+                if let Some([sin, cos]) = values.pairs.get(a).cloned() {
+                    let value = if matches!(op, Op::Sin(_)) { sin } else { cos };
+                    self.define(&mut values, *id, *label, value);
+                }
+            }
         }
         self.steps(program, &mut values, |_| true, input, put);
         self.constants(program, put);
