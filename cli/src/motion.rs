@@ -202,19 +202,18 @@ impl PostStep<Timed> for Keeper {
 }
 
 /// Gravity in ground axes with the default parameters, m/s².
-fn gravity(plan: &Plan) -> [f64; 3] {
-    match plan.model.gravity {
-        // The default values of these fields in generated code.
-        Gravity::Input => [0.0, 0.0, -9.81],
-        Gravity::Constant(_) => plan.gravity(&plan.default_params()),
+/// Gives gravity that is an input the default value of the field in generated code.
+fn set_gravity<S: Scalar>(plan: &Plan, interpreter: &mut Interpreter<S>) {
+    if plan.model.gravity == Gravity::Input {
+        interpreter.gravity = [0.0, 0.0, -9.81].map(S::constant);
     }
 }
 
 /// An interpreter over any scalar, with the default parameters.
 pub fn interpreter<S: Scalar>(plan: &Plan) -> Interpreter<S> {
-    let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
-    Interpreter::new(plan.tree(&params), gravity(plan).map(S::constant))
-        .with_names(plan.velocity_names(), plan.constraint_names())
+    let mut interpreter = plan.default_interpreter();
+    set_gravity(plan, &mut interpreter);
+    interpreter
 }
 
 /// Machine code of a plan with the default parameters, in exact arithmetic, which gives the bits of the interpreter; with
@@ -223,7 +222,7 @@ pub fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Compiled> {
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
     let mut mechanism = Compiled::from_plan(plan.clone(), options)
         .map_err(|e| Failure::new(e.to_string(), "simulate with --interpreted"))?;
-    mechanism.inputs().gravity = gravity(plan);
+    set_gravity(plan, mechanism.inputs());
     Ok(if interpreted { mechanism.interpreted() } else { mechanism })
 }
 

@@ -62,7 +62,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let assembly = match model.constraints.is_empty() {
         true => None,
         false => {
-            let mut interpreter = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+            let mut interpreter = plan.default_interpreter();
             let assembly = loops::assemble(path, &plan, &mut interpreter, &q)?;
             loops::tell(path, &plan, &assembly);
             q.clone_from(&assembly.q);
@@ -284,7 +284,7 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let names = plan.coordinate_names();
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
     let v = list("v", &args.v, plan.velocity_names(), vec![0.1; plan.dims.nv])?;
-    let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+    let interpreter: Interpreter<f64> = plan.default_interpreter();
     for at in interpreter.quaternions() {
         let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));
         if (norm - 1.0).abs() > 1e-3 {
@@ -306,7 +306,7 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
 
 /// The default start; `mbd simulate --help` states it.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
-    let interpreter: Interpreter<f64> = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+    let interpreter: Interpreter<f64> = plan.default_interpreter();
     if !plan.model.constraints.is_empty() || !plan.model.starts.is_empty() {
         return plan.start();
     }

@@ -15,7 +15,6 @@ use crate::output::{Availability, Output, OutputProgram, Sizes, Spec, COORDINATE
 use crate::plan::Plan;
 use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
 use directional::Directional;
-use inputs::gravity_of;
 pub use inputs::sizes;
 pub(crate) use inputs::SymbolicInputs;
 
@@ -200,7 +199,7 @@ impl<'g> Run<'_, 'g> {
             .map(|k| {
                 let one = |j: usize| if j == k { Expr::one() } else { Expr::zero() };
                 let varied: Vec<Dual<Expr>> = params.iter().enumerate().map(|(j, x)| Dual::new(*x, one(j))).collect();
-                let gravity = gravity_of(self.plan, &varied, || inputs.gravity.map(|x| Dual::new(x, Expr::zero())));
+                let gravity = self.plan.gravity_or(&varied, || inputs.gravity.map(|x| Dual::new(x, Expr::zero())));
                 let tree = self.plan.tree(&varied).regrouped();
                 let mut column = ParameterDerivatives::new(&tree);
                 column.compute(&Sweeps { tree: &tree, trace }, gravity, q, &inputs, &d);

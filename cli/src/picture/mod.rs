@@ -51,7 +51,7 @@ pub fn drawing(plan: &Plan, args: &SimulateArgs) -> Outcome<Drawing> {
 /// The picture.
 pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
     let shapes = Shapes::new(plan);
-    let mut interpreter = Interpreter::new(plan.tree(&plan.default_params()), [0.0; 3]);
+    let mut interpreter: Interpreter<f64> = plan.default_interpreter();
     let mut frames = |row: usize| -> Frames {
         let mut out = vec![FrameState::ground(); plan.frames.len()];
         interpreter.frames(&record.q[row], &record.v[row], &mut out);

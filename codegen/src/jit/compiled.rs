@@ -112,7 +112,7 @@ impl<S: Number> Compiled<S> {
         let frames = chosen_frames(&plan, &options)?.len();
         let sizes = sizes(&plan, &options, frames);
         let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
-        let interpreter = interpreter(&plan, &params);
+        let interpreter = plan.interpreter(&params);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
         let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new() };
         let (shared, scratch, copies) = (Arc::new(shared), Vec::new(), Vec::new());
@@ -154,7 +154,7 @@ impl<S: Number> Compiled<S> {
     pub fn set_parameters(&mut self, params: &[S]) {
         self.params.copy_from_slice(params);
         let old = &self.interpreter;
-        let mut new = interpreter(&self.shared.plan, params);
+        let mut new = self.shared.plan.interpreter(params);
         new.tau.clone_from(&old.tau);
         new.drive_q.clone_from(&old.drive_q);
         new.drive_v.clone_from(&old.drive_v);
@@ -263,13 +263,6 @@ impl Model {
     pub fn compile(&self, options: &Options) -> Result<Compiled, CompileError> {
         Compiled::new(self, options)
     }
-}
-
-/// An interpreter of a plan, with numbers of any type.
-fn interpreter<S: Number>(plan: &Plan, params: &[S]) -> Interpreter<S> {
-    let doubles: Vec<f64> = params.iter().map(|x| x.to_f64()).collect();
-    let gravity = plan.gravity(&doubles).map(S::constant);
-    Interpreter::new(plan.tree(params), gravity).with_names(plan.velocity_names(), plan.constraint_names())
 }
 
 /// Working memory that is long enough for a function.

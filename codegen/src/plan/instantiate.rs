@@ -62,16 +62,26 @@ pub(super) fn body_inertia<S: Scalar>(
 
 impl Plan {
     /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
-    pub fn interpreter(&self, params: &[f64]) -> Interpreter<f64> {
+    pub fn interpreter<S: Scalar>(&self, params: &[S]) -> Interpreter<S> {
         Interpreter::new(self.tree(params), self.gravity(params))
             .with_names(self.velocity_names(), self.constraint_names())
     }
 
+    /// The interpreter with the parameters at their defaults.
+    pub fn default_interpreter<S: Scalar>(&self) -> Interpreter<S> {
+        self.interpreter(&self.default_params().into_iter().map(S::constant).collect::<Vec<S>>())
+    }
+
     /// Gravity of the model at given parameters; zero where it is an input, to be set with every call.
-    pub fn gravity(&self, params: &[f64]) -> [f64; 3] {
+    pub fn gravity<S: Scalar>(&self, params: &[S]) -> [S; 3] {
+        self.gravity_or(params, || [S::zero(); 3])
+    }
+
+    /// Gravity of the model at given parameters; what is given where it is an input.
+    pub(crate) fn gravity_or<S: Scalar>(&self, params: &[S], given: impl FnOnce() -> [S; 3]) -> [S; 3] {
         match self.model.gravity {
             Gravity::Constant(g) => g.map(|v| value(v, params)),
-            Gravity::Input => [0.0; 3],
+            Gravity::Input => given(),
         }
     }
 

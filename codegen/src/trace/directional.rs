@@ -6,7 +6,7 @@ use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use super::inputs::{gravity_of, SymbolicInputs};
+use super::inputs::SymbolicInputs;
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
 
@@ -55,7 +55,7 @@ impl<'g> Directional<'_, 'g> {
         let (given, zero) = (self.given, Dual::zero());
         let mut tree = self.plan.tree(params).regrouped();
         tree.tolerance = Dual::new(self.tolerance, Expr::zero());
-        let gravity = gravity_of(self.plan, params, || given.gravity.map(|x| Dual::new(x, Expr::zero())));
+        let gravity = self.plan.gravity_or(params, || given.gravity.map(|x| Dual::new(x, Expr::zero())));
         let [drive_q, drive_v, drive_a] = given.drive.each_ref().map(|x| fixed(x));
         let wrenches: Vec<[Dual<Expr>; 6]> =
             given.wrenches.iter().map(|w| w.map(|x| Dual::new(x, Expr::zero()))).collect();

@@ -1,9 +1,8 @@
 //! The inputs of generated functions as symbols.
 
 use mbd_runtime::sweep::Inputs;
-use mbd_runtime::Scalar;
 
-use crate::model::{Gravity, Value};
+use crate::model::Gravity;
 use crate::options::Options;
 use crate::output::{Array, InputArray, Sizes, Spec, FIELDS};
 use crate::plan::Plan;
@@ -59,7 +58,7 @@ impl<'g> SymbolicInputs<'g> {
         let [tau, drive_q, drive_v, drive_a, wrenches, params, gravity] =
             FIELDS.map(|field| symbols.array(&field.array, true, sizes));
         let wrenches = wrenches.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
-        let gravity = gravity_of(plan, &params, || std::array::from_fn(|k| gravity[k]));
+        let gravity = plan.gravity_or(&params, || std::array::from_fn(|k| gravity[k]));
         let drive = [drive_q, drive_v, drive_a];
         SymbolicInputs { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
     }
@@ -73,17 +72,6 @@ impl<'g> SymbolicInputs<'g> {
     pub fn inputs(&self) -> Inputs<'_, Expr<'g>> {
         let [drive_q, drive_v, drive_a] = &self.drive;
         Inputs { tau: &self.tau, drive_q, drive_v, drive_a, wrenches: &self.wrenches, gravity: self.gravity }
-    }
-}
-
-/// Gravity in ground axes, where it is an input as `given`.
-pub(super) fn gravity_of<S: Scalar>(plan: &Plan, params: &[S], given: impl FnOnce() -> [S; 3]) -> [S; 3] {
-    match plan.model.gravity {
-        Gravity::Constant(g) => g.map(|v| match v {
-            Value::Const(x) => S::constant(x),
-            Value::Param(k) => params[k],
-        }),
-        Gravity::Input => given(),
     }
 }
 

@@ -23,9 +23,7 @@ pub fn read(text: &str) -> Outcome<Mechanism> {
     let read = read::model("model.toml", text, &ImportOptions::default());
     let model = read.map_err(|findings| Failure::new(findings.to_string(), built_in))?.model;
     let plan = search::plan(&model, PlanOptions::default());
-    let params = plan.default_params();
-    let gravity = plan.gravity(&params);
-    let system = Interpreter::new(plan.tree(&params), gravity);
+    let system = plan.default_interpreter();
     let q = start(&model, &plan);
     Ok(Mechanism { system, q })
 }

@@ -16,10 +16,7 @@ impl Scene {
     /// The interpreter of its model, in any number type.
     pub fn interpreter<S: Scalar + Debug>(&self) -> Interpreter<S> {
         let plan = search::plan(&self.model, PlanOptions::default());
-        let params = plan.default_params();
-        let gravity = plan.gravity(&params).map(S::constant);
-        let params: Vec<S> = params.into_iter().map(S::constant).collect();
-        Interpreter::new(plan.tree(&params), gravity)
+        plan.default_interpreter()
     }
 
     /// Coordinates and momenta of a scene at its start.

@@ -104,7 +104,7 @@ impl Subject {
         let plan = search::plan(&model, PlanOptions::default());
         let mut start = plan.start();
         let held = plan.held();
-        let closed = close(&mut interpreter(&plan), &mut start, &Closing::holding(&held));
+        let closed = close(&mut plan.default_interpreter(), &mut start, &Closing::holding(&held));
         closed.unwrap_or_else(|e| panic!("{}: {e}", mechanism.name));
         Subject { mechanism, plan, start }
     }
@@ -174,10 +174,4 @@ impl Subject {
         run.positions = solver.method().post_step.singular_positions().0;
         run
     }
-}
-
-fn interpreter(plan: &Plan) -> Interpreter<f64> {
-    let params = plan.default_params();
-    let gravity = plan.gravity(&params);
-    Interpreter::new(plan.tree(&params), gravity)
 }
