@@ -13,6 +13,7 @@ use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
 use super::structure::{PlanFrame, PlanNode, PoseStep, Slot};
 use crate::model::{JointMotion, Model, Value};
+use crate::rounded_once::{atan2, hypot};
 
 /// Nodes with their frames chosen.
 pub struct Framed {
@@ -127,11 +128,11 @@ fn tip(way: &Screws, kind: Kind<Value>, centre: Option<Vec3<f64>>) -> (Turn, f64
     let (c, s) = way.turn;
     let undo = (c, -s);
     let turn = match centre {
-        Some([x, y, _]) if kind == Kind::Revolute && x.hypot(y) > 0.0 => {
+        Some([x, y, _]) if kind == Kind::Revolute && hypot(x, y) > 0.0 => {
             let ahead = unit(x, y);
             // Against the parent's axes: already zero there?
             let y = c * y + s * x;
-            let aligned = y.abs() <= ROUND_OFF * x.hypot(y);
+            let aligned = y.abs() <= ROUND_OFF * hypot(x, y);
             if aligned {
                 undo
             } else {
@@ -145,7 +146,7 @@ fn tip(way: &Screws, kind: Kind<Value>, centre: Option<Vec3<f64>>) -> (Turn, f64
 
 /// A direction across the axis. Both signs are possible; the one closer to the present frame is chosen.
 fn unit(x: f64, y: f64) -> Turn {
-    let n = x.hypot(y);
+    let n = hypot(x, y);
     let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
     let (x, y) = (snap(x), snap(y));
     if x < 0.0 || (x == 0.0 && y < 0.0) {
@@ -162,12 +163,12 @@ fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn,
     let Some((point, axis)) = line else { return ((1.0, 0.0), 0.0) };
     let size = point.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let Some([ux, uy, uz]) = axis else {
-        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        let off = hypot(point[0], point[1]) > ROUND_OFF * size;
         return (if off { unit(point[0], point[1]) } else { undo.0 }, point[2]);
     };
-    let sine = ux.hypot(uy);
+    let sine = hypot(ux, uy);
     if sine < ROUND_OFF {
-        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        let off = hypot(point[0], point[1]) > ROUND_OFF * size;
         return (if off { unit(point[0], point[1]) } else { undo.0 }, undo.1);
     }
     let along = point[0] * ux + point[1] * uy + point[2] * uz;
@@ -192,7 +193,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
     let (phase, quarter, slide) = match element.kind.nv() {
         1 => {
             let (c0, s0) = way.turn;
-            let angle = (s0 * c + c0 * s).atan2(c0 * c - s0 * s);
+            let angle = atan2(s0 * c + c0 * s, c0 * c - s0 * s);
             let quarters = (angle / std::f64::consts::FRAC_PI_2).round();
             let rest = angle - quarters * std::f64::consts::FRAC_PI_2;
             let slide = way.slide + h;

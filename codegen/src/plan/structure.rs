@@ -4,6 +4,7 @@ use mbd_runtime::spatial::{Axis, Mat3};
 use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes, INERTIAL_PARAMETERS};
 
 use crate::model::{JointSpec, LoopKind, Model, Param, Value};
+use crate::rounded_once::hypot;
 
 /// One elementary transform of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,7 +223,7 @@ impl Plan {
             }
             if let Some(first) = kind.spec().quaternion() {
                 let turn = &mut q[at + first..at + first + 4];
-                match turn.iter().fold(0.0_f64, |n, x| n.hypot(*x)) {
+                match turn.iter().fold(0.0_f64, |n, x| hypot(n, *x)) {
                     0.0 => turn[3] = 1.0,
                     norm => turn.iter_mut().for_each(|x| *x /= norm),
                 }
