@@ -6,7 +6,6 @@ use std::path::Path;
 
 use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::options::PlanOptions;
-use multibody::codegen::search;
 use multibody::runtime::tree::Source;
 
 use super::args::CheckArgs;
@@ -47,7 +46,7 @@ fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
 }
 
 fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
-    let plan = search::plan(model, PlanOptions::default());
+    let plan = source::planned(model, PlanOptions::default()).plan;
     source::tell_notices(path, &plan.notices);
     let params = plan.default_params();
     let closed = match model.constraints.is_empty() {

@@ -3,6 +3,9 @@
 use multibody::codegen::plan::Plan;
 use multibody::runtime::Interpreter;
 
+/// Velocities of the largest mass matrix whose condition is computed: the time grows with the cube of their number.
+const LARGEST: usize = 1000;
+
 /// Relative error at which not even the first digit of a result is known.
 const NO_DIGIT: f64 = 0.1;
 
@@ -48,14 +51,14 @@ fn condition(m: &[f64], n: usize) -> (f64, usize) {
 }
 
 /// What the mass matrix leaves of the digits of velocities and accelerations at coordinates `q`: a warning and its
-/// help, where that is none.
+/// help, where that is none. Large matrices are not looked at.
 ///
 /// The numbers of a model are known to a rounding, and so are the entries of `M`: relative to the scaled matrix, an
 /// error of at most `n ε` in the norm of row sums. The solution of `M v = p` then changes by `n ε κ` of its size to
 /// first order, whatever the algorithm (Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 7.1).
 pub fn of_mass_matrix(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64]) -> Option<(String, String)> {
     let n = plan.dims.nv;
-    if n == 0 {
+    if n == 0 || n > LARGEST {
         return None;
     }
     let mut m = vec![0.0; n * n];

@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::args::CountArgs;
 use super::generate;
+use super::output::mentioned;
 use super::rivals::{chain_of_pins, RIVALS};
 use super::{source, Outcome};
 
@@ -81,12 +82,12 @@ struct Part {
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let Chosen { plan, candidates: tried } = source::chosen(&args.model, args.code.plan_options())?;
     let options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
-    let counts = all(&plan, &options)?;
+    let counts = mentioned("counting the operations of every output", || all(&plan, &options))?;
     let parts = match options.outputs.first() {
-        Some(&group) => parts(&plan, &options, group)?,
+        Some(&group) => mentioned("counting what parts of the scene cost", || parts(&plan, &options, group))?,
         None => Vec::new(),
     };
-    let speeds = speeds(&plan, &options)?;
+    let speeds = mentioned("estimating the speed of every output", || speeds(&plan, &options))?;
     if args.json {
         return as_json(&plan, &counts, &speeds, &parts, out);
     }

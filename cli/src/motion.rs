@@ -17,6 +17,7 @@ use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistic
 use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
 
 use super::energy::Balance;
+use super::output::mentioned;
 use super::timed::Timed;
 use super::{loops, source, Failure, Outcome};
 
@@ -268,7 +269,8 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let (residual, entries) = (interpreter.zero_rows(), interpreter.zero_entries());
     let (kinetic, potential) = interpreter.energy(&q, &p);
     let clock = Instant::now();
-    let compiled = !settings.interpreted && mechanism.prepare(Output::Rates).is_ok();
+    let compiled =
+        !settings.interpreted && mentioned("making machine code", || mechanism.prepare(Output::Rates)).is_ok();
     let compiled = compiled.then(|| clock.elapsed().as_secs_f64());
     let mut observer = Observer {
         mechanism: mechanism.clone(),

@@ -1,14 +1,35 @@
 //! Writing: notes to standard error, and files that are written completely or not at all.
 
-use std::fmt::Arguments;
+use std::fmt::{Arguments, Display};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use super::{Failure, Outcome};
 
 /// Writes one note to standard error. A failure to write it is ignored.
 pub fn note(text: Arguments) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Time after which work that goes on is mentioned.
+const LONG: Duration = Duration::from_secs(2);
+
+/// Does some work, and says on standard error what it is if it takes longer than two seconds.
+pub fn mentioned<R>(what: impl Display + Sync, work: impl FnOnce() -> R) -> R {
+    std::thread::scope(|scope| {
+        let (done, wait) = mpsc::channel::<()>();
+        let what = &what;
+        scope.spawn(move || {
+            if wait.recv_timeout(LONG) == Err(RecvTimeoutError::Timeout) {
+                note(format_args!("{what} ..."));
+            }
+        });
+        let result = work();
+        drop(done);
+        result
+    })
 }
 
 /// Writes a file through a temporary file in the same directory, so that it is either complete or unchanged.

@@ -7,7 +7,6 @@ use std::path::PathBuf;
 use multibody::codegen::model::{Coordinate, Unit, Value};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::search;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{SingularPosition, Stabilisation};
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
@@ -40,7 +39,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
     }
-    let plan = search::plan(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() });
+    let plan = source::planned(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() }).plan;
     source::tell_notices(path, &plan.notices);
     if plan.dims.drive_v > 0 {
         note(format_args!("{}: notice: prescribed joints are held at zero", path.display()));

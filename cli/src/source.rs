@@ -12,7 +12,7 @@ use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
 
 use super::args::ModelArgs;
-use super::output::note;
+use super::output::{mentioned, note};
 use super::{Failure, Outcome};
 
 /// Largest size of a file, bytes. No description of a mechanism is as long, but a device file may be endless.
@@ -55,7 +55,8 @@ fn similar(path: &Path) -> String {
 /// Reads and checks a model. All findings go to standard error.
 pub fn model(path: &Path, options: &ImportOptions) -> Outcome<Model> {
     let text = read(path)?;
-    let (model, findings) = load(&path.to_string_lossy(), &text, options);
+    let reading = format!("reading and checking {}", path.display());
+    let (model, findings) = mentioned(reading, || load(&path.to_string_lossy(), &text, options));
     if !findings.0.is_empty() {
         note(format_args!("{findings}"));
     }
@@ -82,9 +83,14 @@ pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
 
 /// The plan of a model and what was tried on the way to it, with its notices told.
 pub fn chosen(args: &ModelArgs, options: PlanOptions) -> Outcome<Chosen> {
-    let chosen = search::best(Plan::new(&model_of(args)?, options.snap), options);
+    let chosen = planned(&model_of(args)?, options);
     tell_notices(&args.model, &chosen.plan.notices);
     Ok(chosen)
+}
+
+/// The plan of a model and what was tried on the way to it.
+pub fn planned(model: &Model, options: PlanOptions) -> Chosen {
+    mentioned("choosing the elimination", || search::best(Plan::new(model, options.snap), options))
 }
 
 /// Plans a model and reports the notices.

@@ -20,6 +20,7 @@ pub mod output;
 pub mod plan;
 pub mod read;
 pub mod rolled;
+mod rounded_once;
 mod sample;
 pub mod search;
 pub mod symbolic;

@@ -6,6 +6,7 @@ mod bench;
 mod experiments;
 #[cfg(feature = "generated")]
 pub mod generated;
+mod interpreter;
 pub mod scenes;
 pub mod stability;
 
@@ -27,6 +28,7 @@ fn run(command: Command, out: &mut dyn Write) -> Outcome {
     match command {
         Command::Experiments(a) => experiments::run(&a, out),
         Command::Stability(a) => stability::run(&a, out),
+        Command::Interpreter(a) => interpreter::run(&a, out),
         #[cfg(feature = "generated")]
         Command::Bench(a) => bench::run(&a, out),
         #[cfg(not(feature = "generated"))]

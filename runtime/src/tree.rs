@@ -6,6 +6,7 @@
 
 mod elimination;
 mod map;
+mod unrolled;
 
 use alloc::vec::Vec;
 
@@ -13,6 +14,7 @@ use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
 pub use elimination::Elimination;
+pub(crate) use unrolled::{for_component, for_freedom};
 
 /// The motion of a node's joint, in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +88,7 @@ pub enum Freedom<S> {
 
 impl<S: Scalar> Freedom<S> {
     /// `E · F`.
+    #[inline]
     pub fn dot(&self, f: &Force<S>) -> S {
         match self {
             Freedom::Unit(k) => f.get(*k),

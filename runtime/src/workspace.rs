@@ -68,28 +68,35 @@ impl<S: Scalar> JointSteps<S> {
     }
 
     /// Replaces the transforms; there are at most four.
-    pub fn set(&mut self, steps: &[ElementaryTransform<S>]) {
+    #[inline(always)]
+    pub fn set<const N: usize>(&mut self, steps: [ElementaryTransform<S>; N]) {
         self.set_with(0, steps);
     }
 
     /// The same, where the first `placing` transforms represent the constant placement.
-    pub fn set_with(&mut self, placing: usize, steps: &[ElementaryTransform<S>]) {
-        self.placing = placing;
-        self.len = steps.len().min(4);
-        self.steps[..self.len].copy_from_slice(&steps[..self.len]);
+    #[inline(always)]
+    pub fn set_with<const N: usize>(&mut self, placing: usize, steps: [ElementaryTransform<S>; N]) {
+        const { assert!(N <= 4, "a joint has at most four steps") };
+        (self.placing, self.len) = (placing, N);
+        for (to, step) in self.steps.iter_mut().zip(steps) {
+            *to = step;
+        }
     }
 
     /// The transforms, from parent to child.
+    #[inline]
     pub fn get(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.len]
     }
 
     /// The transforms of the constant placement.
+    #[inline]
     pub fn placing(&self) -> &[ElementaryTransform<S>] {
         &self.steps[..self.placing.min(self.len)]
     }
 
     /// The transforms of the joint's motion.
+    #[inline]
     pub fn own(&self) -> &[ElementaryTransform<S>] {
         &self.steps[self.placing.min(self.len)..self.len]
     }

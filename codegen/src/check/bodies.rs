@@ -155,7 +155,7 @@ pub(super) fn sizes(raw: &RawModel, bodies: &[Body], joints: &[Joint], numbers: 
         // The ball with this mass and moment: r² = 5/2 I/m. No body of that mass and largest moment is less dense in
         // its ball than this.
         let ball = (2.5 * large / mass).sqrt();
-        let density = mass / (4.0 / 3.0 * std::f64::consts::PI * ball.powi(3));
+        let density = mass / (4.0 / 3.0 * std::f64::consts::PI * (ball * ball * ball));
         if density > 1e6 {
             let message = format!(
                 "body {} has {} kg within {} m: {} times the density of lead",

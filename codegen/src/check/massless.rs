@@ -1,5 +1,7 @@
 //! Freedoms that nothing resists: they make the mass matrix singular.
 
+use mbd_runtime::Scalar;
+
 use super::symmetric::full;
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
@@ -194,7 +196,7 @@ fn resistance(i: &Inertia, columns: &[([f64; 3], [f64; 3])], armature: &[f64]) -
 
 fn matrix(rotation: &Rotation, model: &Model) -> Mat3 {
     let about = |axis: [f64; 3], angle: f64| {
-        let (s, c) = angle.sin_cos();
+        let (s, c) = Scalar::sin_cos(angle);
         let [x, y, z] = axis;
         let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
         let one = |i: usize, j: usize| f64::from(u8::from(i == j));

@@ -36,8 +36,8 @@ fn rotate(a: &mut [[f64; 3]; 3], p: usize, q: usize) {
         return;
     }
     let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-    let t = theta.signum() / (theta.abs() + theta.hypot(1.0));
-    let c = 1.0 / t.hypot(1.0);
+    let t = theta.signum() / (theta.abs() + libm::hypot(theta, 1.0));
+    let c = 1.0 / libm::hypot(t, 1.0);
     let s = t * c;
     for k in 0..3 {
         let (x, y) = (a[k][p], a[k][q]);
@@ -73,7 +73,7 @@ mod tests {
             (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
         };
         for _ in 0..1000 {
-            let s = [0; 6].map(|_| next() * 10f64.powf(6.0 * next()));
+            let s = [0; 6].map(|_| next() * libm::pow(10.0, 6.0 * next()));
             let scale = s.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
             let l = eigenvalues(s).unwrap();
             let m = full(s);

@@ -1,5 +1,7 @@
 //! Builds the plan of a model.
 
+use std::collections::HashMap;
+
 use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
 use super::structure::{Plan, PlanFrame, Slot};
@@ -40,8 +42,10 @@ impl Plan {
 
 /// Frame index and axes of each wrench.
 fn wrenches(model: &Model, frames: &[PlanFrame]) -> Vec<(usize, WrenchAxes)> {
+    // Of several frames with one name, the first one counts.
+    let places: HashMap<&str, usize> = frames.iter().enumerate().rev().map(|(k, f)| (f.name.as_str(), k)).collect();
     let of = |w: &model::Wrench| {
-        let frame = frames.iter().position(|f| f.name == model.bodies[w.body].name);
+        let frame = places.get(model.bodies[w.body].name.as_str()).copied();
         let axes = match w.axes {
             model::WrenchAxes::Body => WrenchAxes::Frame,
             model::WrenchAxes::World => WrenchAxes::Ground,

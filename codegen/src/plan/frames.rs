@@ -13,6 +13,7 @@ use super::placement::constant;
 use super::rigid::{all_steps, screws, Rigid, Screws, ROUND_OFF};
 use super::structure::{PlanFrame, PlanNode, PoseStep, Slot};
 use crate::model::{JointMotion, Model, Value};
+use crate::rounded_once::{atan2, hypot};
 
 /// Nodes with their frames chosen.
 pub struct Framed {
@@ -28,7 +29,8 @@ pub struct Framed {
 
 /// Chooses frames and expresses every body in them.
 pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Option<[Carried; 2]>]) -> Framed {
-    let weights = weights(elements);
+    let primary = primary_children(elements);
+    let bodies = bodies_of_elements(elements);
     let mut nodes: Vec<PlanNode> = Vec::new();
     // Element frame in the node frame.
     let mut inside: Vec<Rigid> = Vec::new();
@@ -38,15 +40,11 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
         pose.extend(&element.pose);
         pose.push(PoseStep::Rotate(align.rot));
         let way = factored(&pose);
-        let primary = (0..elements.list.len()).filter(|&c| elements.list[c].parent == Some(k)).max_by(|&a, &b| {
-            // Among equals the first one.
-            weights[a].cmp(&weights[b]).then(b.cmp(&a))
-        });
-        let line = primary.and_then(|c| line_of(elements, c, &align));
+        let line = primary[k].and_then(|c| line_of(elements, c, &align));
         let turns = element.kind.nv() == 1;
-        let ((c, s), h) = match (turns, primary) {
+        let ((c, s), h) = match (turns, primary[k]) {
             (false, _) => ((1.0, 0.0), 0.0),
-            (true, None) => tip(&way, element.kind, centre(model, elements, k, &align)),
+            (true, None) => tip(&way, element.kind, centre(model, elements, &bodies[k], &align)),
             (true, Some(_)) => freedom(&way, line),
         };
         inside.push(Rigid::screw_z(c, s, h).inverse().then(&align.inverse()));
@@ -60,15 +58,30 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
     Framed { nodes, frames, joint_nodes, mounts }
 }
 
-/// Number of elements in every subtree.
-fn weights(elements: &Elements) -> Vec<usize> {
+/// The child of every element that has the largest subtree, the first one among equals.
+fn primary_children(elements: &Elements) -> Vec<Option<usize>> {
     let mut weights = vec![1; elements.list.len()];
+    let mut primary: Vec<Option<usize>> = vec![None; elements.list.len()];
     for k in (0..weights.len()).rev() {
         if let Some(p) = elements.list[k].parent {
             weights[p] += weights[k];
+            if primary[p].is_none_or(|other| weights[k] >= weights[other]) {
+                primary[p] = Some(k);
+            }
         }
     }
-    weights
+    primary
+}
+
+/// The bodies that every element carries.
+fn bodies_of_elements(elements: &Elements) -> Vec<Vec<usize>> {
+    let mut bodies = vec![Vec::new(); elements.list.len()];
+    for (b, (element, _)) in elements.bodies.iter().enumerate() {
+        if let Some(k) = element {
+            bodies[*k].push(b);
+        }
+    }
+    bodies
 }
 
 /// Transform to the axis of an element: constants are factored into screws, parameters are left unchanged.
@@ -106,10 +119,11 @@ fn line_of(elements: &Elements, c: usize, align: &Rigid) -> Option<(Vec3<f64>, O
 
 type Turn = (f64, f64);
 
-/// First moment of the bodies of an element in its aligned frame, if it is constant.
-fn centre(model: &Model, elements: &Elements, k: usize, align: &Rigid) -> Option<Vec3<f64>> {
+/// First moment of some bodies of an element in its aligned frame, if it is constant.
+fn centre(model: &Model, elements: &Elements, bodies: &[usize], align: &Rigid) -> Option<Vec3<f64>> {
     let mut sum = [0.0; 3];
-    for (b, body) in model.bodies.iter().enumerate().filter(|(b, _)| elements.bodies[*b].0 == Some(k)) {
+    for &b in bodies {
+        let body = &model.bodies[b];
         let pose = align.inverse().then(&constant(&elements.bodies[b].1)?);
         let (mass, com) = (body.mass.constant()?, [body.com[0], body.com[1], body.com[2]]);
         let com = [com[0].constant()?, com[1].constant()?, com[2].constant()?];
@@ -127,11 +141,11 @@ fn tip(way: &Screws, kind: Kind<Value>, centre: Option<Vec3<f64>>) -> (Turn, f64
     let (c, s) = way.turn;
     let undo = (c, -s);
     let turn = match centre {
-        Some([x, y, _]) if kind == Kind::Revolute && x.hypot(y) > 0.0 => {
+        Some([x, y, _]) if kind == Kind::Revolute && hypot(x, y) > 0.0 => {
             let ahead = unit(x, y);
             // Against the parent's axes: already zero there?
             let y = c * y + s * x;
-            let aligned = y.abs() <= ROUND_OFF * x.hypot(y);
+            let aligned = y.abs() <= ROUND_OFF * hypot(x, y);
             if aligned {
                 undo
             } else {
@@ -145,7 +159,7 @@ fn tip(way: &Screws, kind: Kind<Value>, centre: Option<Vec3<f64>>) -> (Turn, f64
 
 /// A direction across the axis. Both signs are possible; the one closer to the present frame is chosen.
 fn unit(x: f64, y: f64) -> Turn {
-    let n = x.hypot(y);
+    let n = hypot(x, y);
     let snap = |x: f64| if (x / n).abs() < ROUND_OFF { 0.0 } else { x / n };
     let (x, y) = (snap(x), snap(y));
     if x < 0.0 || (x == 0.0 && y < 0.0) {
@@ -162,12 +176,12 @@ fn freedom(way: &Screws, line: Option<(Vec3<f64>, Option<Vec3<f64>>)>) -> (Turn,
     let Some((point, axis)) = line else { return ((1.0, 0.0), 0.0) };
     let size = point.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let Some([ux, uy, uz]) = axis else {
-        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        let off = hypot(point[0], point[1]) > ROUND_OFF * size;
         return (if off { unit(point[0], point[1]) } else { undo.0 }, point[2]);
     };
-    let sine = ux.hypot(uy);
+    let sine = hypot(ux, uy);
     if sine < ROUND_OFF {
-        let off = point[0].hypot(point[1]) > ROUND_OFF * size;
+        let off = hypot(point[0], point[1]) > ROUND_OFF * size;
         return (if off { unit(point[0], point[1]) } else { undo.0 }, undo.1);
     }
     let along = point[0] * ux + point[1] * uy + point[2] * uz;
@@ -192,7 +206,7 @@ fn node(model: &Model, elements: &Elements, slots: &[Slot], k: usize, way: Screw
     let (phase, quarter, slide) = match element.kind.nv() {
         1 => {
             let (c0, s0) = way.turn;
-            let angle = (s0 * c + c0 * s).atan2(c0 * c - s0 * s);
+            let angle = atan2(s0 * c + c0 * s, c0 * c - s0 * s);
             let quarters = (angle / std::f64::consts::FRAC_PI_2).round();
             let rest = angle - quarters * std::f64::consts::FRAC_PI_2;
             let slide = way.slide + h;
@@ -236,8 +250,7 @@ fn source(model: &Model, slots: &[Slot], joint: usize, first: usize) -> (Source,
         follow.insert(0, (ratio, offset));
         at = leader;
     }
-    let slot = slots.iter().find(|s| s.joint == at).and_then(|s| s.at);
-    let source = match slot {
+    let source = match Slot::of_joint(slots, at).and_then(|s| s.at) {
         Some(Source::State { q, v }) => Source::State { q: q + first, v: v + first },
         Some(Source::Drive { q, v }) => Source::Drive { q: q + first, v: v + first },
         None => unreachable!("a checked model's mimic chains end at a joint with coordinates"),
@@ -308,7 +321,9 @@ fn carried_frame(name: &str, (node, pose): &Carried, inside: &[Rigid]) -> PlanFr
 fn named_frames(model: &Model, elements: &Elements, inside: &[Rigid], joint_nodes: &[usize]) -> Vec<PlanFrame> {
     let frame = |name: &str, carried: &Carried| carried_frame(name, carried, inside);
     let children: Vec<usize> = joint_nodes.iter().map(|&k| model.joints[elements.list[k].joint.0].child).collect();
-    let others = (0..model.bodies.len()).filter(|b| !children.contains(b));
+    let mut carried = vec![false; model.bodies.len()];
+    children.iter().for_each(|&b| carried[b] = true);
+    let others = (0..model.bodies.len()).filter(|b| !carried[*b]);
     let bodies = children.iter().copied().chain(others).map(|b| frame(&model.bodies[b].name, &elements.bodies[b]));
     let named = model.frames.iter().zip(&elements.frames).map(|(f, carried)| frame(&f.name, carried));
     bodies.chain(named).collect()

@@ -5,6 +5,7 @@ use mbd_runtime::spatial::{Axis, ElementaryTransform, Mat3, Vec3};
 use super::rigid::Rigid;
 use super::structure::PoseStep;
 use crate::model::{Placement, Rotation, Value};
+use crate::rounded_once::{hypot, sin_cos};
 
 /// Cosine and sine of an angle, exact at multiples of 90° that are closer than `snap`.
 fn turn(angle: f64, snap: f64, notice: &mut dyn FnMut(f64)) -> (f64, f64) {
@@ -13,7 +14,8 @@ fn turn(angle: f64, snap: f64, notice: &mut dyn FnMut(f64)) -> (f64, f64) {
     // A double next to π/2 is π/2: its cosine of 6e-17 is round-off whatever the caller wants.
     let round_off = 4.0 * f64::EPSILON * angle.abs();
     if off > snap.max(round_off) {
-        return (angle.cos(), angle.sin());
+        let (s, c) = sin_cos(angle);
+        return (c, s);
     }
     if off > round_off {
         notice(off);
@@ -23,7 +25,7 @@ fn turn(angle: f64, snap: f64, notice: &mut dyn FnMut(f64)) -> (f64, f64) {
 
 /// A unit vector; components below `snap` become zero.
 pub fn direction(axis: [f64; 3], snap: f64, notice: &mut dyn FnMut(f64)) -> Vec3<f64> {
-    let norm = |a: [f64; 3]| a[0].hypot(a[1]).hypot(a[2]);
+    let norm = |a: [f64; 3]| hypot(hypot(a[0], a[1]), a[2]);
     let n = norm(axis);
     let unit = axis.map(|x| {
         let x = x / n;

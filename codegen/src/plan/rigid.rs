@@ -4,6 +4,7 @@ use mbd_runtime::spatial::{Axis, Mat3, Vec3};
 
 use super::structure::PoseStep;
 use crate::model::Value;
+use crate::rounded_once::hypot;
 
 /// Below this, relative to one, a sine, cosine or ratio of lengths is round-off.
 pub const ROUND_OFF: f64 = 1e-14;
@@ -77,7 +78,7 @@ pub struct Screws {
 
 /// Round-off to exact zeros and right angles; the pair stays on the unit circle.
 fn clean_turn(c: f64, s: f64) -> (f64, f64) {
-    let n = c.hypot(s);
+    let n = hypot(c, s);
     let (c, s) = (c / n, s / n);
     if s.abs() < ROUND_OFF {
         (c.signum(), 0.0)
@@ -115,7 +116,7 @@ pub fn screws(t: &Rigid, lengths: f64) -> Screws {
     let (rot, pos) = (&t.rot, t.pos);
     let size = pos.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let scale = lengths.max(size);
-    let sin_alpha = rot[0][2].hypot(rot[1][2]);
+    let sin_alpha = hypot(rot[0][2], rot[1][2]);
     let mut steps = Vec::new();
     if sin_alpha < ROUND_OFF {
         // For parallel axes, the first screw only points x at the other axis.
@@ -173,6 +174,8 @@ pub fn all_steps(t: &Rigid) -> Vec<PoseStep> {
 
 #[cfg(test)]
 mod tests {
+    use mbd_runtime::Scalar;
+
     use super::*;
 
     #[test]
@@ -180,7 +183,7 @@ mod tests {
         for off in [0.0_f64, 1e-12, 1e-8, 1e-5, 1e-3, 0.1, 1.0, 2.0, 3.0] {
             for (s, c) in [(0.0, 1.0), (1.0, 0.0), (0.6, -0.8)] {
                 let angle = std::f64::consts::PI - off;
-                let (x, z) = if off == 0.0 { (0.0, -1.0) } else { (angle.sin(), angle.cos()) };
+                let (x, z) = if off == 0.0 { (0.0, -1.0) } else { Scalar::sin_cos(angle) };
                 let a = [c * x, s * x, z];
                 let r = Rigid::align_z(a);
                 let product = r.inverse().then(&r).rot;

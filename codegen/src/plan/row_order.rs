@@ -88,7 +88,7 @@ fn grams(plan: &Plan) -> Vec<Gram> {
     let moved = DISPLACEMENTS.iter().map(|size| {
         let mut q = start.clone();
         // Irrational steps, so that no symmetry is met.
-        let mut dx = (0..plan.dims.nv).map(|k| size * (1.0 + 2.0_f64.sqrt() * k as f64).sin()).collect();
+        let mut dx = (0..plan.dims.nv).map(|k| size * libm::sin(1.0 + 2.0_f64.sqrt() * k as f64)).collect();
         Chart::displace(&interpreter, &mut dx, &mut q);
         q
     });

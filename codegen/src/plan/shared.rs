@@ -1,5 +1,7 @@
 //! Coordinates shared by several joints: where their columns are open, and where they are solved.
 
+use std::collections::BTreeSet;
+
 use mbd_runtime::tree::{Source, Unknown};
 
 use super::structure::Plan;
@@ -7,10 +9,13 @@ use crate::model::JointMotion;
 
 /// Marks the nodes of every coordinate that more than one node follows.
 pub fn share(plan: &mut Plan) {
-    for v in 0..plan.dims.nv {
-        let members: Vec<usize> = (0..plan.nodes.len())
-            .filter(|&i| matches!(plan.nodes[i].source, Source::State { v: at, .. } if at == v))
-            .collect();
+    let mut followers = vec![Vec::new(); plan.dims.nv];
+    for (i, node) in plan.nodes.iter().enumerate() {
+        if let Source::State { v, .. } = node.source {
+            followers[v].push(i);
+        }
+    }
+    for (v, members) in followers.into_iter().enumerate() {
         let mimics = members.iter().any(|&i| {
             let joint = plan.nodes[i].joint.0;
             matches!(plan.model.joints[joint].motion, JointMotion::Mimic { .. })
@@ -27,16 +32,20 @@ pub fn share(plan: &mut Plan) {
     }
 }
 
+/// Keeps the column of an unknown open from its members inward to where they meet.
 fn open(plan: &mut Plan, g: usize, members: &[usize]) {
-    let paths: Vec<Vec<usize>> = members.iter().map(|&i| plan.ancestors(i)).collect();
-    let meeting = paths[0].iter().copied().find(|a| paths.iter().all(|path| path.contains(a)));
-    for path in &paths {
-        for &i in path.iter().take_while(|&&i| Some(i) != meeting) {
-            if !plan.nodes[i].elimination.open.contains(&g) {
+    // Children have larger numbers than their parents, so the last of the heads is no ancestor of another. The ground
+    // comes before all nodes.
+    let mut heads: BTreeSet<Option<usize>> = members.iter().copied().map(Some).collect();
+    let meeting = loop {
+        match heads.pop_last().flatten() {
+            Some(i) if !heads.is_empty() => {
                 plan.nodes[i].elimination.open.push(g);
+                heads.insert(plan.nodes[i].parent);
             }
+            last => break last,
         }
-    }
+    };
     match meeting {
         Some(i) if members.contains(&i) => plan.nodes[i].elimination.solve_after.push(g),
         Some(i) => plan.nodes[i].elimination.solve_before.push(g),

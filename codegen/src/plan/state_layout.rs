@@ -9,7 +9,7 @@ use crate::plan::{Plan, Slot};
 /// alphabetical order of their joints; angles of planar and unbounded joints as cosine and sine.
 pub fn pinocchio(plan: &Plan) -> Layout {
     let mut order: Vec<&Slot> = Vec::new();
-    visit(plan, None, &mut order);
+    visit(plan, &mut order);
     layout(plan, &order, |plan, slot| {
         let joint = &plan.model.joints[slot.joint];
         let spec = joint.kind.spec();
@@ -28,18 +28,19 @@ pub fn mujoco(plan: &Plan) -> Layout {
     })
 }
 
-fn visit<'a>(plan: &'a Plan, body: Option<usize>, order: &mut Vec<&'a Slot>) {
+fn visit<'a>(plan: &'a Plan, order: &mut Vec<&'a Slot>) {
+    let joints = &plan.model.joints;
+    // Joints on the ground, then those on every body.
+    let mut children = vec![Vec::new(); plan.model.bodies.len() + 1];
+    for (k, joint) in joints.iter().enumerate() {
+        children[joint.parent.map_or(0, |b| b + 1)].push(k);
+    }
+    children.iter_mut().for_each(|list| list.sort_by(|&a, &b| joints[b].name.cmp(&joints[a].name)));
     // A stack in place of recursion, because chains may be long.
-    let children = |body: Option<usize>| {
-        let mut joints: Vec<usize> =
-            (0..plan.model.joints.len()).filter(|&k| plan.model.joints[k].parent == body).collect();
-        joints.sort_by(|&a, &b| plan.model.joints[b].name.cmp(&plan.model.joints[a].name));
-        joints
-    };
-    let mut stack = children(body);
+    let mut stack = std::mem::take(&mut children[0]);
     while let Some(k) = stack.pop() {
-        order.extend(plan.slots.iter().filter(|s| s.joint == k));
-        stack.extend(children(Some(plan.model.joints[k].child)));
+        order.extend(Slot::of_joint(&plan.slots, k));
+        stack.append(&mut children[joints[k].child + 1]);
     }
 }
 

@@ -4,6 +4,7 @@ use mbd_runtime::spatial::{Axis, Mat3};
 use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes, INERTIAL_PARAMETERS};
 
 use crate::model::{JointSpec, LoopKind, Model, Param, Value};
+use crate::rounded_once::hypot;
 
 /// One elementary transform of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,6 +88,13 @@ pub struct Slot {
     pub joint: usize,
     /// First coordinate and first velocity, of the state or of the drives; `None` for mimics.
     pub at: Option<Source>,
+}
+
+impl Slot {
+    /// The slot of a joint among slots in the order of the joints.
+    pub(crate) fn of_joint(slots: &[Slot], joint: usize) -> Option<&Slot> {
+        slots.binary_search_by_key(&joint, |slot| slot.joint).ok().map(|k| &slots[k])
+    }
 }
 
 /// The structure of a mechanism.
@@ -213,16 +221,18 @@ impl Plan {
     /// Initial coordinates: those of the model's `start`s, neutral where it states none.
     pub fn start(&self) -> Vec<f64> {
         let mut q = vec![0.0; self.dims.nq];
+        let mut stated = vec![None; self.model.joints.len()];
+        // Of several, the first one counts.
+        self.model.starts.iter().rev().for_each(|s| stated[s.joint] = Some(s));
         for slot in &self.slots {
             let Some(Source::State { q: at, .. }) = slot.at else { continue };
             let kind = self.model.joints[slot.joint].kind;
-            let stated = self.model.starts.iter().find(|s| s.joint == slot.joint);
-            if let Some(stated) = stated {
+            if let Some(stated) = stated[slot.joint] {
                 q[at..].iter_mut().zip(&stated.q).for_each(|(q, stated)| *q = *stated);
             }
             if let Some(first) = kind.spec().quaternion() {
                 let turn = &mut q[at + first..at + first + 4];
-                match turn.iter().fold(0.0_f64, |n, x| n.hypot(*x)) {
+                match turn.iter().fold(0.0_f64, |n, x| hypot(n, *x)) {
                     0.0 => turn[3] = 1.0,
                     norm => turn.iter_mut().for_each(|x| *x /= norm),
                 }
@@ -235,8 +245,7 @@ impl Plan {
     pub fn held(&self) -> Vec<bool> {
         let mut held = vec![false; self.dims.nv];
         for start in self.model.starts.iter().filter(|s| s.held) {
-            let slot = self.slots.iter().find(|s| s.joint == start.joint);
-            if let Some(Source::State { v, .. }) = slot.and_then(|s| s.at) {
+            if let Some(Source::State { v, .. }) = Slot::of_joint(&self.slots, start.joint).and_then(|s| s.at) {
                 held[v..v + self.model.joints[start.joint].kind.nv()].fill(true);
             }
         }

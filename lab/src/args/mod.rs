@@ -3,6 +3,7 @@
 #[cfg_attr(not(feature = "generated"), allow(dead_code))]
 pub mod bench;
 pub mod experiments;
+pub mod interpreter;
 pub mod stability;
 
 use clap::{Parser, Subcommand};
@@ -22,6 +23,8 @@ pub enum Command {
     Experiments(experiments::ExperimentsArgs),
     /// Measure integrators: work against error, long runs, stress
     Bench(bench::BenchArgs),
+    /// Time the rates of the interpreter
+    Interpreter(interpreter::InterpreterArgs),
     /// Stress numerical stability: sweeps whose tables stand in reports/
     Stability(stability::StabilityArgs),
 }

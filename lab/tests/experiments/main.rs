@@ -17,7 +17,7 @@ use multibody::codegen::search;
 use multibody::runtime::constrained::CoordinatePartition;
 use multibody::runtime::integrate::{Rk4, Stepper, Verner9};
 use multibody::runtime::{AccelerationForm, Conjugate, Constrained, Energetic, Interpreter, System};
-use run::{files, folder, good, out, read, run_in};
+use run::{bad, files, folder, good, out, read, run, run_in};
 
 const END: f64 = 0.85;
 
@@ -229,4 +229,12 @@ fn the_command_measures_scaling() {
     assert!(number(&cells(text, "Figures 7.5", "10")[2]) > 1000.0);
     assert!(number(&cells(text, "Four-bars", "4")[2]) > 0.0);
     assert_eq!(files(&folder.join("figures")), ["figure_7_4.svg", "figure_7_5.svg", "figure_7_6.svg", "loops.svg"]);
+}
+
+#[test]
+fn the_interpreter_is_called() {
+    let mechanism = ["interpreter", "--mechanisms", "double_pendulum", "--calls", "3"];
+    assert_eq!(out(&good(run(&mechanism))), "");
+    good(run(&[&mechanism[..], &["--searched"]].concat()));
+    bad(run(&["interpreter", "--mechanisms", "pendulum"]), &["no mechanism `pendulum`", "double_pendulum, ur5"]);
 }

@@ -86,6 +86,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
     }
 
     /// Sum of two inertias at the same frame.
+    #[inline]
     pub fn plus(&self, o: &Self) -> Self {
         ArticulatedInertia {
             a: core::array::from_fn(|k| self.a[k] + o.a[k]),
@@ -95,6 +96,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
     }
 
     /// Entry `(i, k)` of the 6×6 matrix.
+    #[inline(always)]
     pub fn get(&self, i: usize, k: usize) -> S {
         match (i < 3, k < 3) {
             (true, true) => self.a[SYM[i][k]],
@@ -105,6 +107,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
     }
 
     /// Entry `(i, k)`, which is also entry `(k, i)`, for changing it.
+    #[inline(always)]
     pub fn get_mut(&mut self, i: usize, k: usize) -> &mut S {
         match (i < 3, k < 3) {
             (true, true) => &mut self.a[SYM[i][k]],
@@ -115,6 +118,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
     }
 
     /// Column `k`.
+    #[inline(always)]
     pub fn column(&self, k: usize) -> Force<S> {
         Force { lin: core::array::from_fn(|i| self.get(i, k)), ang: core::array::from_fn(|i| self.get(i + 3, k)) }
     }

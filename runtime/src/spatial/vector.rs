@@ -54,6 +54,7 @@ macro_rules! six_components {
             }
 
             /// Component `k`: 0–2 linear, 3–5 angular.
+            #[inline(always)]
             pub fn get(&self, k: usize) -> S {
                 if k < 3 {
                     self.lin[k]
@@ -63,6 +64,7 @@ macro_rules! six_components {
             }
 
             /// Component `k`, for changing it: 0–2 linear, 3–5 angular.
+            #[inline(always)]
             pub fn get_mut(&mut self, k: usize) -> &mut S {
                 if k < 3 {
                     &mut self.lin[k]

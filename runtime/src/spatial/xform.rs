@@ -30,6 +30,27 @@ impl Axis {
     }
 }
 
+/// Evaluates an expression with the indices of [`Axis::cyclic`]. It is compiled once for every axis, with indices that
+/// are constants then.
+macro_rules! for_axis {
+    ($axis:expr, |$a:pat_param, $b:pat_param, $n:pat_param| $result:expr) => {
+        match $axis {
+            Axis::X => {
+                let ($a, $b, $n) = (1, 2, 0);
+                $result
+            }
+            Axis::Y => {
+                let ($a, $b, $n) = (2, 0, 1);
+                $result
+            }
+            Axis::Z => {
+                let ($a, $b, $n) = (0, 1, 2);
+                $result
+            }
+        }
+    };
+}
+
 /// One elementary transform between a parent frame and a child frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ElementaryTransform<S> {
@@ -53,18 +74,22 @@ pub enum ElementaryTransform<S> {
     Rotate(Mat3<S>),
 }
 
+#[inline(always)]
 fn pair<S: Scalar>(c: S, s: S, x: S, y: S) -> (S, S) {
     (c * x - s * y, s * x + c * y)
 }
 
+#[inline(always)]
 fn pair_back<S: Scalar>(c: S, s: S, x: S, y: S) -> (S, S) {
     (c * x + s * y, c * y - s * x)
 }
 
+#[inline(always)]
 fn up3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
     core::array::from_fn(|i| r[i][0] * x[0] + r[i][1] * x[1] + r[i][2] * x[2])
 }
 
+#[inline(always)]
 fn down3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
     core::array::from_fn(|i| r[0][i] * x[0] + r[1][i] * x[1] + r[2][i] * x[2])
 }
@@ -88,6 +113,7 @@ fn congruence_sym<S: Scalar>(r: &Mat3<S>, m: &[S; 6]) -> [S; 6] {
 }
 
 /// Rotation of a symmetric matrix about axis `n`; its 2×2 block is computed from `t = s (xx − yy) + 2 c xy`.
+#[inline(always)]
 fn turn_sym<S: Scalar>(c: S, s: S, m: &mut [S; 6], a: usize, b: usize, n: usize) {
     let (aa, ab, bb) = (SYM[a][a], SYM[a][b], SYM[b][b]);
     let t = s * (m[aa] - m[bb]) + (c + c) * m[ab];
@@ -100,6 +126,7 @@ fn turn_sym<S: Scalar>(c: S, s: S, m: &mut [S; 6], a: usize, b: usize, n: usize)
 }
 
 /// Rotation of a general matrix about axis `n`; its 2×2 block is computed from `t = s (xx − yy) + c (xy + yx)`.
+#[inline(always)]
 fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: usize) {
     let t = s * (h[a][a] - h[b][b]) + c * (h[a][b] + h[b][a]);
     let (st, ct) = (s * t, c * t);
@@ -114,58 +141,70 @@ fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: u
 
 impl<S: Scalar> ElementaryTransform<S> {
     /// Components of a free vector of the parent in the child's axes.
+    #[inline(always)]
     pub fn vector(&self, x: Vec3<S>) -> Vec3<S> {
-        let mut x = x;
         match self {
-            ElementaryTransform::Turn { axis, c, s } => {
-                let (a, b, _) = axis.cyclic();
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                let mut x = x;
                 (x[a], x[b]) = pair_back(*c, *s, x[a], x[b]);
                 x
-            }
+            }),
             ElementaryTransform::Shift { .. } => x,
             ElementaryTransform::Rotate(r) => down3(r, x),
         }
     }
 
     /// Components of a free vector of the child in the parent's axes.
+    #[inline(always)]
     pub fn vector_back(&self, x: Vec3<S>) -> Vec3<S> {
-        let mut x = x;
         match self {
-            ElementaryTransform::Turn { axis, c, s } => {
-                let (a, b, _) = axis.cyclic();
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                let mut x = x;
                 (x[a], x[b]) = pair(*c, *s, x[a], x[b]);
                 x
-            }
+            }),
             ElementaryTransform::Shift { .. } => x,
             ElementaryTransform::Rotate(r) => up3(r, x),
         }
     }
 
     /// Velocity `X Ω` at the child's origin, in the child's axes, of a motion `Ω` given at the parent frame.
+    #[inline(always)]
     pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
         match self {
-            ElementaryTransform::Shift { axis, r } => {
-                let (a, b, _) = axis.cyclic();
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                let mut m = *m;
+                (m.lin[a], m.lin[b]) = pair_back(*c, *s, m.lin[a], m.lin[b]);
+                (m.ang[a], m.ang[b]) = pair_back(*c, *s, m.ang[a], m.ang[b]);
+                m
+            }),
+            ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
                 let mut m = *m;
                 m.lin[a] = m.lin[a] + *r * m.ang[b];
                 m.lin[b] = m.lin[b] - *r * m.ang[a];
                 m
-            }
-            _ => Motion { lin: self.vector(m.lin), ang: self.vector(m.ang) },
+            }),
+            ElementaryTransform::Rotate(r) => Motion { lin: down3(r, m.lin), ang: down3(r, m.ang) },
         }
     }
 
     /// Momentum or wrench `Xᵀ P` at the parent frame, of `P` given at the child frame.
+    #[inline(always)]
     pub fn force(&self, f: &Force<S>) -> Force<S> {
         match self {
-            ElementaryTransform::Shift { axis, r } => {
-                let (a, b, _) = axis.cyclic();
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                let mut f = *f;
+                (f.lin[a], f.lin[b]) = pair(*c, *s, f.lin[a], f.lin[b]);
+                (f.ang[a], f.ang[b]) = pair(*c, *s, f.ang[a], f.ang[b]);
+                f
+            }),
+            ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
                 let mut f = *f;
                 f.ang[a] = f.ang[a] - *r * f.lin[b];
                 f.ang[b] = f.ang[b] + *r * f.lin[a];
                 f
-            }
-            _ => Force { lin: self.vector_back(f.lin), ang: self.vector_back(f.ang) },
+            }),
+            ElementaryTransform::Rotate(r) => Force { lin: up3(r, f.lin), ang: up3(r, f.ang) },
         }
     }
 
@@ -178,14 +217,14 @@ impl<S: Scalar> ElementaryTransform<S> {
     }
 
     /// First moment in the parent frame, kg m, of a mass `m`, kg, whose first moment in the child frame is `s`.
+    #[inline(always)]
     pub fn moment(&self, m: S, s: Vec3<S>) -> Vec3<S> {
         match self {
-            ElementaryTransform::Shift { axis, r } => {
-                let (_, _, n) = axis.cyclic();
+            ElementaryTransform::Shift { axis, r } => for_axis!(axis, |_, _, n| {
                 let mut s = s;
                 s[n] = s[n] + m * *r;
                 s
-            }
+            }),
             _ => self.vector_back(s),
         }
     }
@@ -203,18 +242,24 @@ impl<S: Scalar> ElementaryTransform<S> {
 
     /// Inertia `Xᵀ M X` at the parent frame, of `M` given at the child frame.
     pub fn inertia(&self, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
+        let mut m = *m;
+        self.carry_inertia(&mut m);
+        m
+    }
+
+    /// [`ElementaryTransform::inertia`] in place: 21 numbers are not copied.
+    pub fn carry_inertia(&self, m: &mut ArticulatedInertia<S>) {
         match self {
-            ElementaryTransform::Turn { axis, c, s } => {
-                let (a, b, n) = axis.cyclic();
-                let mut m = *m;
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, n| {
                 turn_sym(*c, *s, &mut m.a, a, b, n);
                 turn_general(*c, *s, &mut m.h, a, b, n);
                 turn_sym(*c, *s, &mut m.j, a, b, n);
-                m
-            }
-            ElementaryTransform::Shift { axis, r } => shift_inertia(*axis, *r, m),
+            }),
+            ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, n| shift_inertia(*r, m, a, b, n)),
             ElementaryTransform::Rotate(r) => {
-                ArticulatedInertia { a: congruence_sym(r, &m.a), h: congruence(r, &m.h), j: congruence_sym(r, &m.j) }
+                m.a = congruence_sym(r, &m.a);
+                m.h = congruence(r, &m.h);
+                m.j = congruence_sym(r, &m.j);
             }
         }
     }
@@ -259,19 +304,19 @@ impl<S: Scalar> ElementaryTransform<S> {
 }
 
 /// `H'a* = Ha* − r A b*`, `H'b* = Hb* + r A a*`, then `J` from the old and the new `H`. No product is computed twice.
-fn shift_inertia<S: Scalar>(axis: Axis, r: S, m: &ArticulatedInertia<S>) -> ArticulatedInertia<S> {
-    let (a, b, n) = axis.cyclic();
-    let mut o = *m;
+#[inline(always)]
+fn shift_inertia<S: Scalar>(r: S, m: &mut ArticulatedInertia<S>, a: usize, b: usize, n: usize) {
+    let old = m.h;
+    let (h, j) = (&mut m.h, &mut m.j);
     for k in 0..3 {
-        o.h[a][k] = m.h[a][k] - r * m.a[SYM[b][k]];
-        o.h[b][k] = m.h[b][k] + r * m.a[SYM[a][k]];
+        h[a][k] = old[a][k] - r * m.a[SYM[b][k]];
+        h[b][k] = old[b][k] + r * m.a[SYM[a][k]];
     }
-    o.j[SYM[a][n]] = m.j[SYM[a][n]] - r * m.h[n][b];
-    o.j[SYM[b][n]] = m.j[SYM[b][n]] + r * m.h[n][a];
-    o.j[SYM[a][a]] = m.j[SYM[a][a]] - r * (m.h[a][b] + o.h[a][b]);
-    o.j[SYM[b][b]] = m.j[SYM[b][b]] + r * (m.h[b][a] + o.h[b][a]);
-    o.j[SYM[a][b]] = m.j[SYM[a][b]] + r * (m.h[a][a] - o.h[b][b]);
-    o
+    j[SYM[a][n]] = j[SYM[a][n]] - r * old[n][b];
+    j[SYM[b][n]] = j[SYM[b][n]] + r * old[n][a];
+    j[SYM[a][a]] = j[SYM[a][a]] - r * (old[a][b] + h[a][b]);
+    j[SYM[b][b]] = j[SYM[b][b]] + r * (old[b][a] + h[b][a]);
+    j[SYM[a][b]] = j[SYM[a][b]] + r * (old[a][a] - h[b][b]);
 }
 
 /// Rotation matrix of a unit quaternion `(x, y, z, w)`, from child components to parent components (A.55).

@@ -41,13 +41,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         match node.kind {
             Kind::Revolute => self.revolute(i, x, w),
-            Kind::Prismatic => w.joint[i].set(&[turn(S::zero()), shift(Axis::Z, node.slide + x)]),
-            Kind::Helical { pitch } => w.joint[i].set(&[shift(Axis::Z, node.slide + pitch * x), turn(x)]),
-            Kind::Planar => w.joint[i].set(&[shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
+            Kind::Prismatic => w.joint[i].set([turn(S::zero()), shift(Axis::Z, node.slide + x)]),
+            Kind::Helical { pitch } => w.joint[i].set([shift(Axis::Z, node.slide + pitch * x), turn(x)]),
+            Kind::Planar => w.joint[i].set([shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
             Kind::Spherical => {
-                w.joint[i].set(&[ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))])
+                w.joint[i].set([ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))])
             }
-            Kind::Floating => w.joint[i].set(&[
+            Kind::Floating => w.joint[i].set([
                 shift(Axis::X, q[0]),
                 shift(Axis::Y, q[1]),
                 shift(Axis::Z, q[2]),
@@ -73,11 +73,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         let (s, c) = quarter_turn(angle.sin_cos(), quarter);
         let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
-        let [px, py] = placing;
-        let placed = if turns { 2 } else { 0 };
-        let steps = [px, py, shift(Axis::Z, slide), turn];
-        let last = if node.elimination.non_rotating { 3 } else { 4 };
-        w.joint[i].set_with(placed, &steps[2 - placed..last]);
+        let ([px, py], slide) = (placing, shift(Axis::Z, slide));
+        match (turns, node.elimination.non_rotating) {
+            (false, false) => w.joint[i].set([slide, turn]),
+            (false, true) => w.joint[i].set([slide]),
+            (true, false) => w.joint[i].set_with(2, [px, py, slide, turn]),
+            (true, true) => w.joint[i].set_with(2, [px, py, slide]),
+        }
         if node.elimination.non_rotating {
             let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
@@ -92,6 +94,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// [`Sweeps::coordinate_rates`] for node `i` alone.
+    #[inline(always)]
     fn coordinate_rate_node(&self, i: usize, q: &[S], v: &[S], qd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { q: at, v: vat } = node.source else { return };

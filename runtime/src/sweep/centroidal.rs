@@ -36,7 +36,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.centroidal_matrix(com, w, matrix);
         self.trace.at(None, Quantity::Load);
         let roots = (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].parent.is_none());
-        let total = roots.fold(Force::zero(), |sum, i| sum.plus(&self.force_out(&w.poses, i, &w.force[i])));
+        let total = roots.fold(Force::zero(), |sum, i| sum.plus(&self.steps(&w.poses, i).force(w.force[i])));
         bias.copy_from_slice(&about(com, &total));
     }
 

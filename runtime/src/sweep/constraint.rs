@@ -145,7 +145,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let constraint = &self.tree.constraints[index];
             if constraint.is_cut() && (all || !constraint.at_hand()) {
                 let (rot, pos) = &mut w.constraints.reach[index][side];
-                self.steps(&w.poses, i).for_each(|step| step.pose(rot, pos));
+                self.steps(&w.poses, i).iter().for_each(|step| step.pose(rot, pos));
             }
         }
     }
@@ -292,7 +292,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         if let Source::State { v, .. } = node.source {
             (0..node.kind.nv()).for_each(|k| visit(v + k, node.ratio * node.kind.axis(k).dot(f)));
         }
-        self.force_out(poses, i, f)
+        self.steps(poses, i).force(*f)
     }
 
     /// `Eᵀ` of the wrenches that constraints put on the bodies of their loops as their directions turn,

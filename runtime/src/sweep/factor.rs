@@ -4,7 +4,7 @@
 use super::pass::{each_node, visit_force, visit_inertia, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{Freedom, Source, Unknown};
+use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses};
 use crate::Scalar;
 
@@ -41,6 +41,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
         for i in 0..self.tree.nodes.len() {
             f.m[i] = self.inertia(poses, i).articulated();
+        }
+        if !self.has_unknowns() {
+            return;
         }
         self.clear_open(f);
         for i in 0..self.tree.nodes.len() {
@@ -83,52 +86,53 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(Some(i), Quantity::Inertia);
             let at_parent = match inner.elimination.unknown == Some(g) {
                 true => inner.kind.axis(0).motion(S::one()),
-                false => self.leaving(poses, p).fold(f.screws[g * n + p], |m, step| step.motion(&m)),
+                false => self.leaving(poses, p).motion(f.screws[g * n + p]),
             };
-            f.screws[g * n + i] = self.entering(poses, i).fold(at_parent, |m, step| step.motion(&m));
+            f.screws[g * n + i] = self.entering(poses, i).motion(at_parent);
         }
     }
 
     /// `M*`, `U`, `Mj`, `M'` of node `i` (4.48, 4.44), after its children. For a plain revolute joint this reads: `U =
     /// M* E`, `Mj = EᵀU`, `M' = M* − U Mj⁻¹ Uᵀ`, and `XᵀM'X` is added to `M*` of the parent. The rest is for unknowns
     /// that are solved at another node than their joint's, and for joints that are eliminated in the frame before them.
+    #[inline(always)]
     fn factor_node(&self, i: usize, poses: &Poses<S>, first: &[usize], f: &mut Factor<S>) {
         let n = self.tree.nodes.len();
         let node = &self.tree.nodes[i];
-        let mut m = f.m[i]; // M*_i (4.48)
         self.trace.at(Some(i), Quantity::Inertia);
-        name::inertia(self.trace, "m", &m);
+        name::inertia(self.trace, "m", &f.m[i]); // M*_i (4.48)
         if node.elimination.before_joint {
-            m = self.leaving(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+            self.leaving(poses, i).carry_inertia(&mut f.m[i]);
             for g in node.elimination.open_before(0) {
-                let column = f.columns[g * n + i];
-                f.columns[g * n + i] = self.leaving(poses, i).rev().fold(column, |f, step| step.force(&f));
+                f.columns[g * n + i] = self.leaving(poses, i).force(f.columns[g * n + i]);
             }
         }
         self.trace.at(Some(i), Quantity::Pivot);
         for (k, &g) in node.elimination.solve_before.iter().enumerate() {
-            self.solve_unknown(g, Some(i), node.elimination.open_before(k + 1), &mut m, f);
+            self.solve_unknown(g, Some(i), node.elimination.open_before(k + 1), f);
         }
         for k in 0..node.kind.nv() {
-            self.eliminate(i, k, first[i] + k, &mut m, f);
+            self.eliminate(i, k, first[i] + k, f);
         }
         for (k, &g) in node.elimination.solve_after.iter().enumerate() {
-            self.solve_unknown(g, Some(i), node.elimination.open_after(k + 1), &mut m, f);
+            self.solve_unknown(g, Some(i), node.elimination.open_after(k + 1), f);
         }
-        f.m[i] = m; // M'_i (4.44)
-        name::inertia(self.trace, "mp", &m);
+        name::inertia(self.trace, "mp", &f.m[i]); // M'_i (4.44)
         let ng = self.tree.unknowns.len();
-        for (&h, &g) in node.elimination.ends.iter().flat_map(|h| node.elimination.screws.iter().map(move |g| (h, g))) {
-            let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
-            f.gram[g * ng + h] = x;
-            f.gram[h * ng + g] = x;
+        for &h in &node.elimination.ends {
+            for &g in &node.elimination.screws {
+                let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
+                f.gram[g * ng + h] = x;
+                f.gram[h * ng + g] = x;
+            }
         }
         let Some(parent) = node.parent else { return };
         self.trace.at(Some(i), Quantity::Inertia);
-        let carried = self.entering(poses, i).rev().fold(m, |m, step| step.inertia(&m));
+        let mut carried = f.m[i];
+        self.entering(poses, i).carry_inertia(&mut carried);
         f.m[parent] = f.m[parent].plus(&carried);
         for &g in &node.elimination.open {
-            let column = self.entering(poses, i).rev().fold(f.columns[g * n + i], |f, step| step.force(&f));
+            let column = self.entering(poses, i).force(f.columns[g * n + i]);
             f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
         }
     }
@@ -138,43 +142,69 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ground = &self.tree.solve_at_ground;
         for (k, &g) in ground.iter().enumerate() {
             self.trace.at(None, Quantity::Pivot);
-            let mut nothing = ArticulatedInertia::zero();
-            self.solve_unknown(g, None, ground[k + 1..].iter().copied(), &mut nothing, f);
+            self.solve_unknown(g, None, ground[k + 1..].iter().copied(), f);
         }
     }
 
     /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of its unknown.
-    fn eliminate(&self, i: usize, k: usize, freedom: usize, m: &mut ArticulatedInertia<S>, f: &mut Factor<S>) {
+    fn eliminate(&self, i: usize, k: usize, freedom: usize, f: &mut Factor<S>) {
         let node = &self.tree.nodes[i];
-        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
-        let e = node.kind.axis(k);
-        let armature = node.passive[k].armature;
-        let u = column(&e, m); // U = M* E
+        for_freedom!(node.kind, k, |e| self.eliminate_along(i, e, node.passive[k].armature, freedom, f));
+    }
+
+    /// [`Sweeps::eliminate`] for a freedom along `e`.
+    #[inline(always)]
+    fn eliminate_along(&self, i: usize, e: Freedom<S>, armature: S, freedom: usize, f: &mut Factor<S>) {
+        let node = &self.tree.nodes[i];
+        let u = column(&e, &f.m[i]); // U = M* E
         name::force(self.trace, "u", &u);
-        for h in node.elimination.open_after(0) {
-            f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
-        }
-        if let Some(g) = node.elimination.unknown {
-            let a = node.ratio;
-            let old = f.cross[freedom * ng + g];
-            let column = f.columns[g * n + i].plus(&u.times(a));
-            let rotor = a * a * armature;
-            f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
-            for h in node.elimination.open_after(0).filter(|&h| h != g) {
-                let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
-                f.gram[g * ng + h] = x;
-                f.gram[h * ng + g] = x;
+        if self.has_unknowns() {
+            self.cross_open(i, &e, freedom, f);
+            if let Some(g) = node.elimination.unknown {
+                return self.add_to_open(i, g, &e, freedom, &u.times(node.ratio), f);
             }
-            f.columns[g * n + i] = column;
-            return;
         }
         if let Source::Drive { .. } = node.source {
             f.pivots[freedom] = Pivot { u, k: Force::zero(), rho: S::zero(), armature };
             return;
         }
-        let pivot = reduce(&e, u, armature, m);
+        let pivot = &mut f.pivots[freedom];
+        reduce(&e, u, armature, &mut f.m[i], pivot);
         name::force(self.trace, "k", &pivot.k);
         self.trace.name(pivot.rho, "rho", "");
+        if self.has_unknowns() {
+            self.reduce_open(i, freedom, f);
+        }
+    }
+
+    /// Inertia between a freedom of node `i` and the open unknowns.
+    fn cross_open(&self, i: usize, e: &Freedom<S>, freedom: usize, f: &mut Factor<S>) {
+        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
+        for h in self.tree.nodes[i].elimination.open_after(0) {
+            f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
+        }
+    }
+
+    /// Adds the column of the freedom of node `i` to that of its unknown `g`.
+    fn add_to_open(&self, i: usize, g: usize, e: &Freedom<S>, freedom: usize, column: &Force<S>, f: &mut Factor<S>) {
+        let (n, ng, node) = (self.tree.nodes.len(), self.tree.unknowns.len(), &self.tree.nodes[i]);
+        let a = node.ratio;
+        let old = f.cross[freedom * ng + g];
+        let column = f.columns[g * n + i].plus(column);
+        let rotor = a * a * node.passive[0].armature;
+        f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
+        for h in node.elimination.open_after(0).filter(|&h| h != g) {
+            let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
+            f.gram[g * ng + h] = x;
+            f.gram[h * ng + g] = x;
+        }
+        f.columns[g * n + i] = column;
+    }
+
+    /// Takes an eliminated freedom of node `i` out of the columns of open unknowns.
+    fn reduce_open(&self, i: usize, freedom: usize, f: &mut Factor<S>) {
+        let pivot = f.pivots[freedom];
+        let (n, ng, node) = (self.tree.nodes.len(), self.tree.unknowns.len(), &self.tree.nodes[i]);
         for h in node.elimination.open_after(0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
@@ -185,36 +215,21 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
             }
         }
-        f.pivots[freedom] = pivot;
     }
 
     /// Eliminates unknown `g` at node `i` (`None`: the ground), `open` being those that stay open.
-    fn solve_unknown(
-        &self,
-        g: usize,
-        i: Option<usize>,
-        open: impl Iterator<Item = usize> + Clone,
-        m: &mut ArticulatedInertia<S>,
-        f: &mut Factor<S>,
-    ) {
+    fn solve_unknown(&self, g: usize, i: Option<usize>, open: impl Iterator<Item = usize> + Clone, f: &mut Factor<S>) {
         match self.tree.unknowns[g] {
-            Unknown::Velocity(_) => self.solve_open(g, i, open, m, f),
+            Unknown::Velocity(_) => self.solve_open(g, i, open, f),
             Unknown::Row(_) => {
                 let later = core::mem::take(&mut f.later[g]);
-                self.solve_open(g, i, later.iter().copied(), m, f);
+                self.solve_open(g, i, later.iter().copied(), f);
                 f.later[g] = later;
             }
         }
     }
 
-    fn solve_open(
-        &self,
-        g: usize,
-        i: Option<usize>,
-        open: impl Iterator<Item = usize> + Clone,
-        m: &mut ArticulatedInertia<S>,
-        f: &mut Factor<S>,
-    ) {
+    fn solve_open(&self, g: usize, i: Option<usize>, open: impl Iterator<Item = usize> + Clone, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         let u = i.map_or(Force::zero(), |i| f.columns[g * n + i]);
         let rho = match self.tree.unknowns[g] {
@@ -222,10 +237,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Unknown::Row(r) => self.row_pivot(g, r, f),
         };
         let k = u.times(rho);
-        for a in 0..6 {
-            for b in a..6 {
-                *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
-            }
+        if let Some(i) = i {
+            let m = &mut f.m[i];
+            upper_triangle(|a, b| *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b));
         }
         for h in open.clone() {
             f.unknown_cross[g * ng + h] = f.gram[g * ng + h];
@@ -246,43 +260,59 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 }
 
+/// Calls a function with the places of the upper triangle of a 6×6 matrix, row by row. They are constants where it is
+/// compiled.
+#[inline(always)]
+fn upper_triangle(mut at: impl FnMut(usize, usize)) {
+    macro_rules! rows {
+        ($($a:literal: $($b:literal)*;)*) => { $($(at($a, $b);)*)* };
+    }
+    rows!(0: 0 1 2 3 4 5; 1: 1 2 3 4 5; 2: 2 3 4 5; 3: 3 4 5; 4: 4 5; 5: 5;);
+}
+
 /// `U = M* E`.
+#[inline(always)]
 fn column<S: Scalar>(e: &Freedom<S>, m: &ArticulatedInertia<S>) -> Force<S> {
     match e {
-        Freedom::Unit(k) => m.column(*k),
+        Freedom::Unit(k) => for_component!(*k, |k| m.column(k)),
         Freedom::Screw(h) => m.column(5).plus(&m.column(2).times(*h)),
     }
 }
 
 /// `M' = M* − U Mj⁻¹ Uᵀ` (4.44). The row along `E` is known: `EᵀM' = armature · kᵀ`, zero without a rotor.
-fn reduce<S: Scalar>(e: &Freedom<S>, u: Force<S>, armature: S, m: &mut ArticulatedInertia<S>) -> Pivot<S> {
+#[inline(always)]
+fn reduce<S: Scalar>(e: &Freedom<S>, u: Force<S>, armature: S, m: &mut ArticulatedInertia<S>, pivot: &mut Pivot<S>) {
     let rho = S::one() / (e.dot(&u) + armature); // Mj⁻¹
-    let mut k = u.times(rho);
-    let known = match e {
-        Freedom::Unit(z) => *z,
-        Freedom::Screw(_) => 5,
-    };
+    *pivot = Pivot { u, k: u.times(rho), rho, armature };
+    let k = &mut pivot.k;
     let along = S::one() - armature * rho; // E · k
-    *k.get_mut(known) = match e {
-        Freedom::Unit(_) => along,
-        Freedom::Screw(h) => along - *h * k.lin[2],
-    };
-    for a in 0..6 {
-        for b in a..6 {
-            if a != known && b != known {
-                *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
+    match e {
+        Freedom::Unit(known) => for_component!(*known, |known| {
+            *k.get_mut(known) = along;
+            reduce_others(known, &u, k, m);
+            for b in 0..6 {
+                if b != known {
+                    *m.get_mut(known, b) = armature * k.get(b);
+                }
+            }
+            *m.get_mut(known, known) = armature * k.get(known);
+        }),
+        Freedom::Screw(h) => {
+            k.ang[2] = along - *h * k.lin[2];
+            reduce_others(5, &u, k, m);
+            for b in 0..6 {
+                *m.get_mut(5, b) = armature * k.get(b) - *h * m.get(2, b);
             }
         }
     }
-    for b in (0..6).filter(|&b| b != known) {
-        *m.get_mut(known, b) = match e {
-            Freedom::Unit(_) => armature * k.get(b),
-            Freedom::Screw(h) => armature * k.get(b) - *h * m.get(2, b),
-        };
-    }
-    *m.get_mut(known, known) = match e {
-        Freedom::Unit(_) => armature * k.get(known),
-        Freedom::Screw(h) => armature * k.get(known) - *h * m.get(2, known),
-    };
-    Pivot { u, k, rho, armature }
+}
+
+/// Entries of `M* − U kᵀ` outside row and column `known`.
+#[inline(always)]
+fn reduce_others<S: Scalar>(known: usize, u: &Force<S>, k: &Force<S>, m: &mut ArticulatedInertia<S>) {
+    upper_triangle(|a, b| {
+        if a != known && b != known {
+            *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
+        }
+    });
 }

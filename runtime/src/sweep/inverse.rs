@@ -25,7 +25,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn transmitted_wrench_node(&self, i: usize, w: &mut Workspace<S>) {
         let Some(parent) = self.tree.nodes[i].parent else { return };
         self.trace.at(Some(i), Quantity::Load);
-        let out = self.force_out(&w.poses, i, &w.force[i]);
+        let out = self.steps(&w.poses, i).force(w.force[i]);
         w.force[parent] = w.force[parent].plus(&out);
     }
 

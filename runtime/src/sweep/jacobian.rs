@@ -36,7 +36,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                     add(v + k, column(&node.kind.axis(k), &rot, pos).map(|x| node.ratio * x));
                 }
             }
-            self.steps(&w.poses, i).rev().for_each(|step| before(step, &mut rot, &mut pos));
+            self.steps(&w.poses, i).iter().rev().for_each(|step| before(step, &mut rot, &mut pos));
             at = node.parent;
         }
     }

@@ -35,7 +35,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Velocity);
         let outer = node.parent.map_or(Motion::zero(), |p| w.velocity.omega[p]);
-        let hat = self.motion_in(&w.poses, i, &outer);
+        let hat = self.steps(&w.poses, i).motion(outer);
         let mut omega = hat;
         for k in 0..node.kind.nv() {
             let rate = match node.source {
@@ -59,7 +59,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             Some(p) => (w.rotation[p], w.position[p]),
             None => ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]),
         };
-        self.steps(&w.poses, i).for_each(|step| step.pose(&mut rot, &mut pos));
+        self.steps(&w.poses, i).iter().for_each(|step| step.pose(&mut rot, &mut pos));
         (w.rotation[i], w.position[i]) = (rot, pos);
     }
 

@@ -117,10 +117,8 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
             running: |cx, visit| {
                 visit_rows(cx.sweeps.tree, &mut L::problem(cx.given, cx.w).solution.unknown_rate, visit);
             },
-            ..each_node!(TipToBase, |cx, i| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.bias_momentum_node(i, x.poses, x.first, x.factor, &x.load, x.solution);
-            })
+            ..each_node!(TipToBase, |cx, i| let x = L::problem(cx.given, cx.w);
+                cx.sweeps.bias_momentum_node(i, x.poses, x.first, x.factor, &x.load, x.solution))
         }
     }
 
@@ -135,20 +133,16 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
             running: |cx, visit| {
                 visit_rows(cx.sweeps.tree, &mut L::problem(cx.given, cx.w).solution.unknown_rate, visit);
             },
-            ..each_node!(BaseToTip, |cx, i| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.motion_node(i, x.poses, x.first, x.factor, &x.load, x.solution);
-            })
+            ..each_node!(BaseToTip, |cx, i| let x = L::problem(cx.given, cx.w);
+                cx.sweeps.motion_node(i, x.poses, x.first, x.factor, &x.load, x.solution))
         }
     }
 
     /// The solution put into the results, one number for each velocity.
     pub(super) const fn collect<L: Level>() -> Self {
         Sweep {
-            ..each_node!(BaseToTip, |cx, i| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.collect_rate_node(i, x.solution, x.first, cx.results.v);
-            })
+            ..each_node!(BaseToTip, |cx, i| let x = L::problem(cx.given, cx.w);
+                cx.sweeps.collect_rate_node(i, x.solution, x.first, cx.results.v))
         }
     }
 }

@@ -49,10 +49,11 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Gravity in the axes of node `i`, after its parent.
+    #[inline(always)]
     fn gravity_node(&self, i: usize, u: &Inputs<S>, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let g = self.tree.nodes[i].parent.map_or(u.gravity, |p| w.loads.gravity[p]);
-        w.loads.gravity[i] = self.steps(&w.poses, i).fold(g, |g, step| step.vector(g));
+        w.loads.gravity[i] = self.steps(&w.poses, i).vector(g);
         name::vector(self.trace, "g", &w.loads.gravity[i]);
     }
 
@@ -65,11 +66,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// First moment and mass of the subtree of node `i` added to its parent's, after its children.
+    #[inline(always)]
     fn moment_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         let mass = w.loads.mass[i];
         name::vector(self.trace, "s", &w.loads.moment[i]);
-        let out = self.steps(&w.poses, i).rev().fold(w.loads.moment[i], |s, step| step.moment(mass, s));
+        let out = self.steps(&w.poses, i).moment(mass, w.loads.moment[i]);
         match self.tree.nodes[i].parent {
             Some(p) => {
                 w.loads.moment[p] = add3(w.loads.moment[p], out);
@@ -84,7 +86,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn wrench_in_frame(&self, wrench: &TreeWrench<S>, given: &[S; 6], w: &Workspace<S>) -> Force<S> {
         let mut f = Force { lin: [given[0], given[1], given[2]], ang: [given[3], given[4], given[5]] };
         if wrench.axes == WrenchAxes::Ground {
-            let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+            let path = wrench.path.iter().flat_map(|&i| self.steps(&w.poses, i).iter()).copied();
             for step in path.chain(self.on_body(&w.poses, &wrench.frame)) {
                 f = Force { lin: step.vector(f.lin), ang: step.vector(f.ang) };
             }
@@ -96,7 +98,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn wrench_node(&self, i: usize, w: &mut Workspace<S>) {
         self.trace.at(Some(i), Quantity::Load);
         if let Some(p) = self.tree.nodes[i].parent {
-            let out = self.force_out(&w.poses, i, &w.loads.total[i]);
+            let out = self.steps(&w.poses, i).force(w.loads.total[i]);
             w.loads.total[p] = w.loads.total[p].plus(&out); // T*_i (4.22)
         }
     }

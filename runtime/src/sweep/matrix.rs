@@ -41,8 +41,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Adds the composite inertia of node `i` to that of its parent, after its children.
     pub(super) fn add_composite(&self, i: usize, w: &mut Workspace<S>) {
         let Some(p) = self.tree.nodes[i].parent else { return };
-        let composite = w.factor.m[i];
-        let carried = self.steps(&w.poses, i).rev().fold(composite, |m, step| step.inertia(&m));
+        let mut carried = w.factor.m[i];
+        self.steps(&w.poses, i).carry_inertia(&mut carried);
         w.factor.m[p] = w.factor.m[p].plus(&carried);
     }
 
@@ -59,7 +59,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                     true => self.tree.nodes[a].kind.axis(k).motion(S::one()),
                     false => w.screws[freedom * n + p],
                 };
-                w.screws[freedom * n + i] = self.motion_in(&w.poses, i, &at_parent);
+                w.screws[freedom * n + i] = self.steps(&w.poses, i).motion(at_parent);
             }
             from = self.tree.nodes[a].parent;
         }
@@ -79,7 +79,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             if self.tree.inner(p) {
                 return self.matrix_meeting((i, k, col), at, &force, w, out);
             }
-            force = self.force_out(&w.poses, at, &force);
+            force = self.steps(&w.poses, at).force(force);
             at = p;
         }
     }

@@ -32,12 +32,13 @@ pub mod pass;
 mod rates;
 mod regressor;
 mod solve;
+mod steps;
 
 pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
 pub use kinematics::FrameState;
 pub use newton::Accelerations;
 
-use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia};
+use crate::spatial::{ElementaryTransform, RigidInertia};
 use crate::tree::{Tree, TreeFrame};
 use crate::Scalar;
 
@@ -121,28 +122,11 @@ pub struct Sweeps<'a, S, T = ()> {
 }
 
 impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
-    /// `X Ω` from the parent frame to node `i`.
-    fn motion_in(&self, w: &crate::workspace::Poses<S>, i: usize, m: &Motion<S>) -> Motion<S> {
-        self.steps(w, i).fold(*m, |m, step| step.motion(&m))
-    }
-
-    /// `Xᵀ P` from node `i` to its parent frame.
-    fn force_out(&self, w: &crate::workspace::Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
-        self.steps(w, i).rev().fold(*f, |f, step| step.force(&f))
-    }
-
-    /// Whether the frame of the parent of node `i` does not turn with its body: then the placement of node `i` in it
-    /// does.
-    fn placement_turns(&self, i: usize) -> bool {
-        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].elimination.non_rotating)
-    }
-
-    /// Constant steps from the parent frame to the joint of node `i`.
-    fn place(&self, i: usize) -> &[ElementaryTransform<S>] {
-        match self.placement_turns(i) {
-            true => &[],
-            false => &self.tree.nodes[i].place,
-        }
+    /// Whether there are shared coordinates or constraints. Trees without them are common, and are spared all that is
+    /// about open columns.
+    #[inline(always)]
+    fn has_unknowns(&self) -> bool {
+        !self.tree.unknowns.is_empty()
     }
 
     /// Inertia of the body of node `i` in the node frame.
@@ -161,36 +145,5 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
     ) -> impl DoubleEndedIterator<Item = ElementaryTransform<S>> + 'b {
         let body = frame.node.filter(|&i| self.tree.nodes[i].elimination.non_rotating).map(|i| w.body[i].step());
         body.into_iter().chain(frame.place.iter().copied())
-    }
-
-    /// Steps from the parent frame to node `i`.
-    fn steps<'b>(
-        &'b self,
-        w: &'b crate::workspace::Poses<S>,
-        i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
-        self.place(i).iter().chain(w.joint[i].get())
-    }
-
-    /// The part of [`Sweeps::steps`] ahead of the frame that node `i` is eliminated in.
-    fn entering<'b>(
-        &'b self,
-        w: &'b crate::workspace::Poses<S>,
-        i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
-        let joint = &w.joint[i];
-        let steps = if self.tree.nodes[i].elimination.before_joint { joint.placing() } else { joint.get() };
-        self.place(i).iter().chain(steps)
-    }
-
-    /// The rest: from there to the node frame.
-    fn leaving<'b>(
-        &'b self,
-        w: &'b crate::workspace::Poses<S>,
-        i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
-        let own: &[ElementaryTransform<S>] =
-            if self.tree.nodes[i].elimination.before_joint { w.joint[i].own() } else { &[] };
-        own.iter()
     }
 }

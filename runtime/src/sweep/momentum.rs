@@ -49,7 +49,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
         if let Some(parent) = node.parent {
-            let out = self.force_out(&w.poses, i, &total);
+            let out = self.steps(&w.poses, i).force(total);
             w.force[parent] = w.force[parent].plus(&out);
         }
     }

@@ -145,27 +145,30 @@ impl<S, T> Sweep<S, T> {
 }
 
 /// A sweep that visits the nodes in a direction and does something at each, once as a function of a node and once with
-/// the loop over the tree, where the compiler can merge the two.
+/// the loop over the tree, where the compiler can merge the two. What a `let` makes ahead of it is the same at all nodes.
 macro_rules! each_node {
-    (TipToBase, |$cx:ident, $i:ident| $at_node:expr) => {
+    ($direction:ident, |$cx:ident, $i:ident| let $part:ident = $of_tree:expr; $at_node:expr) => {
         Sweep {
-            node: |$cx, $i| $at_node,
+            node: |$cx, $i| {
+                let $part = $of_tree;
+                $at_node
+            },
             tree: |context| {
                 let $cx = &mut context.reborrowed();
-                (0..$cx.sweeps.tree.nodes.len()).rev().for_each(|$i| $at_node);
+                let $part = $of_tree;
+                each_node!(@ $direction, $cx).for_each(|$i| $at_node);
             },
-            ..Sweep::idle($crate::sweep::pass::SweepDirection::TipToBase)
+            ..Sweep::idle($crate::sweep::pass::SweepDirection::$direction)
         }
     };
-    (BaseToTip, |$cx:ident, $i:ident| $at_node:expr) => {
-        Sweep {
-            node: |$cx, $i| $at_node,
-            tree: |context| {
-                let $cx = &mut context.reborrowed();
-                (0..$cx.sweeps.tree.nodes.len()).for_each(|$i| $at_node);
-            },
-            ..Sweep::idle($crate::sweep::pass::SweepDirection::BaseToTip)
-        }
+    ($direction:ident, |$cx:ident, $i:ident| $at_node:expr) => {
+        each_node!($direction, |$cx, $i| let _nothing = (); $at_node)
+    };
+    (@ TipToBase, $cx:ident) => {
+        (0..$cx.sweeps.tree.nodes.len()).rev()
+    };
+    (@ BaseToTip, $cx:ident) => {
+        (0..$cx.sweeps.tree.nodes.len())
     };
 }
 pub(super) use each_node;

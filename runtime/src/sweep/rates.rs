@@ -38,7 +38,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Momentum);
         if node.elimination.accumulates_momentum {
-            w.force[i] = self.leaving(&w.poses, i).rev().fold(w.force[i], |f, step| step.force(&f));
+            w.force[i] = self.leaving(&w.poses, i).force(w.force[i]);
         }
         let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].elimination.accumulates_momentum) else { return };
         let mut total = match node.elimination.accumulates_momentum {
@@ -54,12 +54,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
             }
         }
-        let out = self.entering(&w.poses, i).rev().fold(total, |f, step| step.force(&f));
+        let out = self.entering(&w.poses, i).force(total);
         w.force[parent] = w.force[parent].plus(&out);
     }
 
     /// `ṗ_i` (4.36) without `τ`, added to `pd`. `P*` is `M'Ω̂ + D'`, and for a single freedom only a quadratic form of
     /// it is needed.
+    #[inline(always)]
     fn momentum_rate_node(&self, i: usize, w: &Workspace<S>, pd: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
@@ -73,13 +74,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             return;
         }
         let m = &w.factor.m[i];
-        let (hat, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
+        let acting;
+        let (hat, d) = match self.has_unknowns() {
+            true => {
+                acting = self.acting(&w.first, &w.factor, &w.velocity, i);
+                (&acting.0, &acting.1)
+            }
+            false => (&w.velocity.hat[i], &w.velocity.d[i]),
+        };
         let gyro = match node.kind {
-            Kind::Revolute => gyro_turn(m, &hat, &d),
-            Kind::Prismatic => gyro_slide(m, &hat, &d),
-            Kind::Helical { pitch } => gyro_turn(m, &hat, &d) + pitch * gyro_slide(m, &hat, &d),
+            Kind::Revolute => gyro_turn(m, hat, d),
+            Kind::Prismatic => gyro_slide(m, hat, d),
+            Kind::Helical { pitch } => gyro_turn(m, hat, d) + pitch * gyro_slide(m, hat, d),
             Kind::Planar | Kind::Spherical | Kind::Floating => {
-                let force = w.velocity.omega[i].cross_force(&m.times(&hat).plus(&d));
+                let force = w.velocity.omega[i].cross_force(&m.times(hat).plus(d));
                 for k in 0..node.kind.nv() {
                     let axis = node.kind.axis(k);
                     let sum = self.applied(w, i, &axis) - axis.dot(&force);
@@ -93,6 +101,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `Eᵀ T*`: gravity and external wrenches.
+    #[inline(always)]
     pub(super) fn applied(&self, w: &Workspace<S>, i: usize, axis: &Freedom<S>) -> S {
         let weight = axis.dot(&self.weight(w, i));
         if self.tree.wrenches.is_empty() {
@@ -102,6 +111,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Damping and spring on freedom `k` of node `i`.
+    #[inline(always)]
     pub(super) fn passive(&self, node: &Node<S>, w: &Workspace<S>, i: usize, k: usize) -> S {
         let passive = &node.passive[k];
         let damper = -(passive.damping * w.velocity.rate[w.first[i] + k]);

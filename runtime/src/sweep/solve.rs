@@ -6,7 +6,7 @@
 use super::level::Load;
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{Freedom, Source, Unknown};
+use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Poses, Solution};
 use crate::Scalar;
 
@@ -23,6 +23,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `D`, `D'` and `(p − d) / Mj` of node `i`, after its children.
+    #[inline(always)]
     pub(super) fn bias_momentum_node(
         &self,
         i: usize,
@@ -35,7 +36,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::BiasMomentum);
         name::force(self.trace, "d", &sol.d[i]);
-        let mut d = self.leaving(poses, i).rev().fold(sol.d[i], |d, step| step.force(&d)); // D_i (4.49)
+        let mut d = sol.d[i]; // D_i (4.49)
+        if node.elimination.before_joint {
+            d = self.leaving(poses, i).force(d);
+        }
         for (k, &g) in node.elimination.solve_before.iter().enumerate() {
             let e = self.unknown_bias_momentum(g, f, load, sol, node.elimination.open_before(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
@@ -50,7 +54,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol.d[i] = d; // D'_i (4.45)
         name::force(self.trace, "dp", &d);
         if let Some(parent) = node.parent {
-            let carried = self.entering(poses, i).rev().fold(d, |d, step| step.force(&d));
+            let carried = self.entering(poses, i).force(d);
             sol.d[parent] = sol.d[parent].plus(&carried);
         }
     }
@@ -74,9 +78,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol: &mut Solution<S>,
         d: &mut Force<S>,
     ) {
+        for_freedom!(self.tree.nodes[i].kind, k, |axis| self.bias_momentum_along(i, k, axis, freedom, f, load, sol, d));
+    }
+
+    /// [`Sweeps::bias_momentum`] for a freedom along `axis`.
+    #[inline(always)]
+    fn bias_momentum_along(
+        &self,
+        i: usize,
+        k: usize,
+        axis: Freedom<S>,
+        freedom: usize,
+        f: &Factor<S>,
+        load: &Load<S>,
+        sol: &mut Solution<S>,
+        d: &mut Force<S>,
+    ) {
         let node = &self.tree.nodes[i];
-        let ng = self.tree.unknowns.len();
-        let axis = node.kind.axis(k);
         let pivot = &f.pivots[freedom];
         if let Some(g) = node.elimination.unknown {
             sol.unknown_rate[g] = sol.unknown_rate[g] + node.ratio * axis.dot(d);
@@ -96,8 +114,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 rate
             }
         };
-        for h in node.elimination.open_after(0) {
-            sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
+        if self.has_unknowns() {
+            let ng = self.tree.unknowns.len();
+            for h in node.elimination.open_after(0) {
+                sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
+            }
         }
         sol.e[freedom] = e;
     }
@@ -136,6 +157,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `Ω̂`, rates and `Ω` of node `i`, after its parent.
+    #[inline(always)]
     pub(super) fn motion_node(
         &self,
         i: usize,
@@ -145,11 +167,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         load: &Load<S>,
         sol: &mut Solution<S>,
     ) {
-        let ng = self.tree.unknowns.len();
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), load.what);
         let outer = node.parent.map_or(Motion::zero(), |p| sol.omega[p]);
-        let hat = self.entering(poses, i).fold(outer, |m, step| step.motion(&m));
+        let hat = self.entering(poses, i).motion(outer);
         sol.hat[i] = hat; // Ω̂_i
         let [hat_letter, letter, rate_letter] = load.letters();
         name::motion(self.trace, hat_letter, &hat);
@@ -158,38 +179,62 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         let mut omega = hat;
         for k in (0..node.kind.nv()).rev() {
-            let freedom = first[i] + k;
-            let axis = node.kind.axis(k);
-            let rate = match (node.elimination.unknown, node.source) {
-                (Some(g), _) => node.ratio * sol.unknown_rate[g],
-                (None, Source::Drive { .. }) => sol.e[freedom],
-                (None, Source::State { .. }) => {
-                    let pivot = &f.pivots[freedom];
-                    let open = |rate: S, h| rate - pivot.rho * f.cross[freedom * ng + h] * sol.unknown_rate[h];
-                    if let Freedom::Unit(z) = axis {
-                        // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
-                        let mut row = pivot.k;
-                        *row.get_mut(z) = -(pivot.armature * pivot.rho);
-                        let total = sol.e[freedom] - row.dot(&omega);
-                        let total = node.elimination.open_after(0).fold(total, open);
-                        sol.rate[freedom] = total - omega.get(z); // (4.40)
-                        self.trace.name(sol.rate[freedom], rate_letter, "");
-                        *omega.get_mut(z) = total;
-                        continue;
-                    }
-                    let rate = sol.e[freedom] - pivot.k.dot(&omega); // (4.40)
-                    node.elimination.open_after(0).fold(rate, open)
-                }
-            };
-            sol.rate[freedom] = rate;
+            let rate = for_freedom!(node.kind, k, |axis| self.rate_along(i, axis, first[i] + k, f, sol, &mut omega));
+            sol.rate[first[i] + k] = rate;
             self.trace.name(rate, rate_letter, "");
-            axis.add_to(&mut omega, rate);
         }
         for (k, &g) in node.elimination.solve_before.iter().enumerate().rev() {
             self.unknown_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
         }
-        sol.omega[i] = self.leaving(poses, i).fold(omega, |m, step| step.motion(&m)); // Ω_i
+        if node.elimination.before_joint {
+            omega = self.leaving(poses, i).motion(omega);
+        }
+        sol.omega[i] = omega; // Ω_i
         name::motion(self.trace, letter, &sol.omega[i]);
+    }
+
+    /// Rate of a freedom of node `i` along `axis` (4.40), which is added to the motion of the frame.
+    #[inline(always)]
+    fn rate_along(
+        &self,
+        i: usize,
+        axis: Freedom<S>,
+        freedom: usize,
+        f: &Factor<S>,
+        sol: &Solution<S>,
+        omega: &mut Motion<S>,
+    ) -> S {
+        let node = &self.tree.nodes[i];
+        let rate = match (node.elimination.unknown, node.source) {
+            (Some(g), _) => node.ratio * sol.unknown_rate[g],
+            (None, Source::Drive { .. }) => sol.e[freedom],
+            (None, Source::State { .. }) => {
+                let pivot = &f.pivots[freedom];
+                let less_open = |rate: S| match self.has_unknowns() {
+                    true => self.less_open(i, freedom, f, &sol.unknown_rate, rate),
+                    false => rate,
+                };
+                if let Freedom::Unit(z) = axis {
+                    // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
+                    let mut row = pivot.k;
+                    *row.get_mut(z) = -(pivot.armature * pivot.rho);
+                    let total = less_open(sol.e[freedom] - row.dot(omega));
+                    let rate = total - omega.get(z);
+                    *omega.get_mut(z) = total;
+                    return rate;
+                }
+                less_open(sol.e[freedom] - pivot.k.dot(omega))
+            }
+        };
+        axis.add_to(omega, rate);
+        rate
+    }
+
+    /// A rate less what the rates of open unknowns contribute to it.
+    fn less_open(&self, i: usize, freedom: usize, f: &Factor<S>, unknown_rate: &[S], rate: S) -> S {
+        let (ng, rho) = (self.tree.unknowns.len(), f.pivots[freedom].rho);
+        let open = self.tree.nodes[i].elimination.open_after(0);
+        open.fold(rate, |rate, h| rate - rho * f.cross[freedom * ng + h] * unknown_rate[h])
     }
 
     fn unknown_motion(
@@ -220,7 +265,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         i: usize,
     ) -> Force<S> {
         let (motion, d) = self.acting(first, f, sol, i);
-        self.leaving(poses, i).fold(f.m[i].times(&motion).plus(&d), |f, step| step.force_back(&f))
+        self.leaving(poses, i).iter().fold(f.m[i].times(&motion).plus(&d), |f, step| step.force_back(&f))
     }
 
     /// The motion that `M'` of node `i` acts on and what is to be added to it, in the frame it is eliminated in: `Ω̂`
@@ -238,6 +283,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Rates of the velocities of node `i` out of a solution.
+    #[inline(always)]
     pub(super) fn collect_rate_node(&self, i: usize, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v: at, .. } = node.source else { return };
@@ -249,16 +295,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 }
 
 /// `D' = D + U e` (4.45), the component along `E` being known: `EᵀD' = p − armature · e`.
+#[inline(always)]
 fn reduce<S: Scalar>(axis: &Freedom<S>, d: &mut Force<S>, u: &Force<S>, e: S, along: S) {
-    let known = match axis {
-        Freedom::Unit(k) => *k,
-        Freedom::Screw(_) => 5,
+    let others = |known: usize, d: &mut Force<S>| {
+        for k in 0..6 {
+            if k != known {
+                *d.get_mut(k) = d.get(k) + u.get(k) * e;
+            }
+        }
     };
-    for k in (0..6).filter(|&k| k != known) {
-        *d.get_mut(k) = d.get(k) + u.get(k) * e;
+    match axis {
+        Freedom::Unit(known) => for_component!(*known, |known| {
+            others(known, d);
+            *d.get_mut(known) = along;
+        }),
+        Freedom::Screw(h) => {
+            others(5, d);
+            d.ang[2] = along - *h * d.lin[2];
+        }
     }
-    *d.get_mut(known) = match axis {
-        Freedom::Unit(_) => along,
-        Freedom::Screw(h) => along - *h * d.lin[2],
-    };
 }

@@ -35,11 +35,13 @@ pub struct Elimination {
 
 impl Elimination {
     /// Unknowns still open after position `k` of `solve_before`.
+    #[inline]
     pub(crate) fn open_before(&self, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
         self.solve_before[k..].iter().chain(&self.solve_after).chain(&self.open).chain(&self.ends).copied()
     }
 
     /// Unknowns still open after position `k` of `solve_after`.
+    #[inline]
     pub(crate) fn open_after(&self, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
         self.solve_after[k..].iter().chain(&self.open).chain(&self.ends).copied()
     }

@@ -65,7 +65,7 @@ struct Errors([f64; 3]);
 impl Errors {
     fn new(mut errors: Vec<f64>) -> Errors {
         errors.sort_by(f64::total_cmp);
-        let mean = |e: &[f64]| (e.iter().map(|x| x.ln()).sum::<f64>() / e.len().max(1) as f64).exp();
+        let mean = |e: &[f64]| libm::exp(e.iter().map(|x| libm::log(*x)).sum::<f64>() / e.len().max(1) as f64);
         let (n, worst) = (errors.len(), &errors[errors.len() - errors.len() / RARE..]);
         let middle = errors.get(n / 2).copied().unwrap_or(1.0);
         Errors([mean(&errors), middle, mean(worst)].map(|x| x.max(FLOOR)))

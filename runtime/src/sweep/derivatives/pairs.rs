@@ -16,7 +16,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
         let joint = &poses.joint[i];
         let steps = if single(&self.tree.nodes[i]) { joint.placing() } else { joint.get() };
-        self.place(i).iter().chain(steps)
+        self.place(poses, i).iter().chain(steps)
     }
 
     /// Steps from there to the node frame.

@@ -52,7 +52,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Axis of freedom `k` of the node at `place` on the path of a wrench, in the frame of the wrench.
     fn axis_at(&self, wrench: &TreeWrench<S>, place: usize, k: usize, w: &Workspace<S>) -> Motion<S> {
         let axis = self.tree.nodes[wrench.path[place]].kind.axis(k).motion(S::one());
-        let outward = wrench.path[place + 1..].iter().flat_map(|&i| self.steps(&w.poses, i)).copied();
+        let outward = wrench.path[place + 1..].iter().flat_map(|&i| self.steps(&w.poses, i).iter()).copied();
         outward.chain(self.on_body(&w.poses, &wrench.frame)).fold(axis, |m, step| step.motion(&m))
     }
 }
