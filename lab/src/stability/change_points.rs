@@ -10,7 +10,7 @@ use multibody::codegen::search;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{close, complete, Closing, Effort, Projection, Stabilisation, WithPostStep};
 use multibody::runtime::integrate::{Solver, Step, StepError, Tolerances};
-use multibody::runtime::{Constrained, Interpreter, System};
+use multibody::runtime::{Constrained, System};
 
 use super::mechanisms::Mechanism;
 
@@ -136,7 +136,7 @@ impl Subject {
 
     /// Runs once.
     pub fn run(&self, way: Way, speed: f64) -> Run {
-        let mut system = interpreter(&self.plan);
+        let mut system = self.plan.default_interpreter();
         let mut q = self.start.clone();
         let (mut v, mut p) = (system.zero_momenta(), system.zero_momenta());
         v[self.mechanism.driver] = speed;
