@@ -1,5 +1,6 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
+pub mod c;
 mod check;
 mod choice;
 pub mod code;
@@ -11,7 +12,6 @@ pub mod identifiable;
 mod import;
 #[cfg(feature = "jit")]
 pub mod jit;
-#[cfg(feature = "jit")]
 mod lower;
 pub mod model;
 mod names;

@@ -15,7 +15,9 @@ use crate::output::OutputProgram;
 use crate::symbolic::Label;
 
 pub use memory::Memory;
+#[cfg(feature = "jit")]
 pub use sines::main_path;
+pub use sines::{reduced, within_quadrant};
 use straight::Lowering;
 
 /// An array that a function reads or writes.
