@@ -50,7 +50,7 @@ impl Function<'_> {
         let mut parameters = vec![format!("const {lower}_inputs *{upper}_RESTRICT in")];
         parameters.extend(spec.inputs.iter().map(|array| parameter(array, "const ")));
         parameters.extend(spec.results.iter().map(|array| parameter(array, "")));
-        format!("void {lower}_{}({})", spec.name, parameters.join(", "))
+        format!("void {lower}_{}(\n    {})", spec.name, parameters.join(",\n    "))
     }
 
     /// Lines of the documentation.

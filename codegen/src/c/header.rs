@@ -38,7 +38,7 @@ pub fn comment_block(out: &mut String, indent: &str, lines: &[String]) {
         [first, rest @ ..] => {
             let _ = writeln!(out, "{indent}/* {first}");
             for line in rest {
-                let _ = writeln!(out, "{indent} * {line}",);
+                let _ = writeln!(out, "{}", format!("{indent} * {line}").trim_end());
             }
             let _ = writeln!(out, "{indent} */");
         }

@@ -38,9 +38,9 @@ pub fn functions(prefix: &Prefix, precision: Precision) -> String {
         ("TOP", (bits - 1).to_string()),
         ("LOW", (bits - 2).to_string()),
         ("WORDS", (bits / 32).to_string()),
-        ("BIAS", ((1 << (exponent - 1)) - 1).to_string()),
+        ("LAST_WORD", (bits / 32 - 1).to_string()),
         ("LARGEST", ((1 << exponent) - 2).to_string()),
-        ("SHIFT", (62 + 1 - (1 << (exponent - 1)) - stored).to_string().replace('-', "- ")),
+        ("SHIFT", ((1 << (exponent - 1)) - 1 + stored - 62).to_string()),
         ("SCALE", ((1 << (exponent - 1)) - bits).to_string()),
         ("REST", (bits - stored - 1).to_string()),
     ];
@@ -98,7 +98,8 @@ fn high_word(precision: Precision) -> &'static str {
 /// The text, with words between `@` for what depends on the number type.
 const TEXT: &str = "
 /* Sine and cosine of y0 + y1 + quadrant * pi/2, for |y0| up to slightly above pi/4. */
-static inline void @PREFIX@_quadrant(@NUMBER@ y0, @NUMBER@ y1, uint32_t quadrant, @NUMBER@ *sine, @NUMBER@ *cosine)
+static inline void @PREFIX@_quadrant(
+    @NUMBER@ y0, @NUMBER@ y1, uint32_t quadrant, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
     const int odd = (quadrant & 1U) != 0U;
 @WITHIN_QUADRANT@
@@ -144,7 +145,7 @@ static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
      * three words long. */
     const @UINT@ one = 1U;
     const @UINT@ m = (magnitude & ((one << @STORED@) - 1U)) | (one << @STORED@);
-    const int at = biased + @SHIFT@;
+    const int at = biased - @SHIFT@;
     for (int k = 0; k < 3; k++) {
         window[k] = 0U;
         for (int part = 0; part < @WORDS@; part++) {
@@ -152,7 +153,7 @@ static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
             const uint64_t first = word < 40 ? two_over_pi[word] : 0U;
             const uint64_t second = word + 1 < 40 ? two_over_pi[word + 1] : 0U;
             const uint32_t bits = (uint32_t)((((first << 32) | second) << (at % 32)) >> 32);
-            window[k] |= (@UINT@)bits << (32 * (@WORDS@ - 1 - part));
+            window[k] |= (@UINT@)bits << (32 * (@LAST_WORD@ - part));
         }
     }
     const @UINT@ low = m * window[2];
@@ -200,7 +201,8 @@ static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *co
 }
 
 /* The same for n angles. The first loop has no branches, so that it becomes vector instructions where there are some. */
-static inline void @PREFIX@_sines_cosines(const @NUMBER@ *restrict x, @NUMBER@ *restrict sines, @NUMBER@ *restrict cosines, int n)
+static inline void @PREFIX@_sines_cosines(
+    const @NUMBER@ *restrict x, @NUMBER@ *restrict sines, @NUMBER@ *restrict cosines, int n)
 {
     int far = 0;
     for (int k = 0; k < n; k++) {

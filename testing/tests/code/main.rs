@@ -2,6 +2,7 @@
 
 mod assembly;
 mod bitwise;
+mod c;
 mod constrained;
 mod counts;
 mod eliminations;
