@@ -1,7 +1,5 @@
 //! Sine and cosine in C: the main path from the runtime's functions, and the reduction of large angles.
 
-use std::fmt::Write;
-
 use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64, TWO_OVER_PI};
 
 use super::instructions::{Value, Writer};
@@ -19,6 +17,7 @@ pub fn functions(prefix: &Prefix, precision: Precision) -> String {
         ("PREFIX", prefix.lower.clone()),
         ("NUMBER", number(precision).to_string()),
         ("LIMIT", literal(limit, precision)),
+        ("UPPER", prefix.upper.clone()),
         ("ZERO", literal(0.0, precision)),
         ("WITHIN_QUADRANT", quadrant_body(prefix, precision)),
         ("REDUCED", reduced_body(prefix, precision)),
@@ -50,24 +49,21 @@ pub fn functions(prefix: &Prefix, precision: Precision) -> String {
 /// Statements that compute `s` and `c` from `y0` and `y1`.
 fn quadrant_body(prefix: &Prefix, precision: Precision) -> String {
     let mut writer = Writer { temporaries: true, ..Writer::new(prefix, precision) };
-    let [s, c] = within_quadrant(&mut writer, ["y0", "y1"].map(Value::simple), precision, false);
-    let _ = write!(
-        writer.out,
-        "    const {number} s = odd ? {c} : {s};\n    const {number} c = odd ? {s} : {c};",
-        number = number(precision),
-        s = s.text,
-        c = c.text
-    );
-    writer.out
+    let pair = within_quadrant(&mut writer, ["y0", "y1"].map(Value::simple), precision, false);
+    for (name, value) in ["s", "c"].into_iter().zip(pair) {
+        writer.line(&format!("const {} {name} = {};", number(precision), value.text));
+    }
+    writer.out.trim_end().to_string()
 }
 
 /// Statements that reduce `x` and give the parts on.
 fn reduced_body(prefix: &Prefix, precision: Precision) -> String {
     let mut writer = Writer { temporaries: true, ..Writer::new(prefix, precision) };
-    let ([y0, y1], [_, n]) = reduced(&mut writer, Value::simple("x"), precision, false);
-    let call =
-        format!("{}_quadrant({}, {}, (uint32_t)(int32_t){}, sine, cosine);", prefix.lower, y0.text, y1.text, n.text);
-    writer.line(&call);
+    let ([y0, y1], [shifted, _]) = reduced(&mut writer, Value::simple("x"), precision, false);
+    let lower = &prefix.lower;
+    writer.line(&format!("{lower}_view shifted;"));
+    writer.line(&format!("shifted.number = {};", shifted.text));
+    writer.line(&format!("{lower}_quadrant({}, {}, shifted.bits, sine, cosine);", y0.text, y1.text));
     writer.out.trim_end().to_string()
 }
 
@@ -97,18 +93,40 @@ fn high_word(precision: Precision) -> &'static str {
 
 /// The text, with words between `@` for what depends on the number type.
 const TEXT: &str = "
-/* Sine and cosine of y0 + y1 + quadrant * pi/2, for |y0| up to slightly above pi/4. */
+/* A number and its bits. */
+typedef union {
+    @NUMBER@ number;
+    @UINT@ bits;
+} @PREFIX@_view;
+
+/* Functions that are hardly ever called stay out of the others. */
+#ifdef __GNUC__
+#define @UPPER@_RARE __attribute__((cold, noinline))
+#else
+#define @UPPER@_RARE
+#endif
+
+/* Sine and cosine of y0 + y1 + quadrant * pi/2, for |y0| up to slightly above pi/4. They are exchanged in odd quadrants,
+ * and their signs are changed in their bits, so that nothing branches. */
 static inline void @PREFIX@_quadrant(
-    @NUMBER@ y0, @NUMBER@ y1, uint32_t quadrant, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
+    @NUMBER@ y0, @NUMBER@ y1, @UINT@ quadrant, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
-    const int odd = (quadrant & 1U) != 0U;
+    const @UINT@ odd = 0U - (quadrant & 1U);
 @WITHIN_QUADRANT@
-    *sine = (quadrant & 2U) != 0U ? -s : s;
-    *cosine = ((quadrant + 1U) & 2U) != 0U ? -c : c;
+    @PREFIX@_view turned_sine;
+    @PREFIX@_view turned_cosine;
+    turned_sine.number = s;
+    turned_cosine.number = c;
+    const @UINT@ exchanged = (turned_sine.bits ^ turned_cosine.bits) & odd;
+    turned_sine.bits ^= exchanged ^ ((quadrant & 2U) << @LOW@);
+    turned_cosine.bits ^= exchanged ^ (((quadrant + 1U) & 2U) << @LOW@);
+    *sine = turned_sine.number;
+    *cosine = turned_cosine.number;
 }
 
-/* Sine and cosine of x, rad, for |x| <= @LIMIT@: x is reduced by pi/2 in several parts (Cody and Waite). */
-static inline void @PREFIX@_near(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
+/* Sine and cosine of x, rad, for |x| <= @LIMIT@: x is reduced by pi/2 in several parts (Cody and Waite). For other x the
+ * results mean nothing. */
+static inline void @PREFIX@_near(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
 @REDUCED@
 }
@@ -121,16 +139,13 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
 
 /* Sine and cosine of a larger x, by the reduction of Payne and Hanek: the bits of 2/pi that contribute to x * 2/pi
  * modulo 4 are multiplied as integers. NaN for infinities and NaN. */
-static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
+@UPPER@_RARE static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
     /* 2/pi as a binary fraction after 64 zero bits. */
     static const uint32_t two_over_pi[40] = {
 @TABLE@
     };
-    union {
-        @NUMBER@ number;
-        @UINT@ bits;
-    } view;
+    @PREFIX@_view view;
     @UINT@ window[3];
     view.number = x;
     const @UINT@ magnitude = (view.bits << 1) >> 1;
@@ -164,7 +179,7 @@ static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
      * nearest. */
     @UINT@ upper = (high << 2) | (mid >> @LOW@);
     @UINT@ lower = (mid << 2) | (low >> @LOW@);
-    const uint32_t negative = (uint32_t)(upper >> @TOP@);
+    const @UINT@ negative = upper >> @TOP@;
     if (negative != 0U) {
         lower = ~lower + 1U;
         upper = ~upper + (lower == 0U ? 1U : 0U);
@@ -183,7 +198,7 @@ static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
     const @NUMBER@ small = (@NUMBER@)rest * view.number;
     const @NUMBER@ y0 = big + small;
     const @NUMBER@ y1 = (big - y0) + small;
-    const uint32_t quadrant = (uint32_t)(high >> @LOW@) + negative;
+    const @UINT@ quadrant = (high >> @LOW@) + negative;
     @PREFIX@_quadrant(negative != 0U ? -y0 : y0, negative != 0U ? -y1 : y1, quadrant, sine, cosine);
     if (x < @ZERO@) {
         *sine = -*sine;
@@ -191,7 +206,7 @@ static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
 }
 
 /* Sine and cosine of x, rad, within one unit in the last place for every finite x. */
-static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *sine, @NUMBER@ *cosine)
+static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
     if (x >= -@LIMIT@ && x <= @LIMIT@) {
         @PREFIX@_near(x, sine, cosine);
@@ -206,12 +221,17 @@ static inline void @PREFIX@_sines_cosines(
 {
     int far = 0;
     for (int k = 0; k < n; k++) {
-        const int within = (x[k] >= -@LIMIT@) & (x[k] <= @LIMIT@);
-        @PREFIX@_near(within != 0 ? x[k] : @ZERO@, &sines[k], &cosines[k]);
-        far |= 1 - within;
+        @PREFIX@_near(x[k], &sines[k], &cosines[k]);
+        far |= 1 - ((x[k] >= -@LIMIT@) & (x[k] <= @LIMIT@));
     }
-    for (int k = 0; far != 0 && k < n; k++) {
-        @PREFIX@_sine_cosine(x[k], &sines[k], &cosines[k]);
+    if (far != 0) {
+        for (int k = 0; k < n; k++) {
+            @NUMBER@ sine;
+            @NUMBER@ cosine;
+            @PREFIX@_sine_cosine(x[k], &sine, &cosine);
+            sines[k] = sine;
+            cosines[k] = cosine;
+        }
     }
 }
 ";

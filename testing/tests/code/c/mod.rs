@@ -109,8 +109,8 @@ fn trees() {
 
 #[test]
 fn loops_and_rolled_code() {
-    let mut cases: Vec<Case> = (0..3).map(closed).chain((0..3).map(chain)).collect();
-    cases.extend([closed(3).single(), chain(4).single(), far(chain(5))]);
+    let mut cases: Vec<Case> = [1, 2].map(closed).into_iter().chain([0, 1].map(chain)).collect();
+    cases.extend([closed(2).single(), chain(3).single(), far(chain(5))]);
     compare("c_loops", &cases);
 }
 
