@@ -1,25 +1,65 @@
 //! `mbd generate`.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use multibody::codegen::{self, GenerateError, Options};
+use multibody::codegen::model::Model;
+use multibody::codegen::{self, c, GenerateError, Options};
 
-use super::args::GenerateArgs;
-use super::output::write_file;
+use super::args::{GenerateArgs, Language};
+#[cfg(feature = "fmu")]
+use super::fmu;
+use super::output::{write_file, write_files};
 use super::{source, Failure, Outcome};
 
-/// Runs `mbd generate`: prints the code or writes it to a file.
+/// Runs `mbd generate`: prints the code or writes it to files.
 pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
+    #[cfg(feature = "fmu")]
+    if args.lang == Language::Fmu {
+        return fmu::run(args);
+    }
+    // Wrong names of files are reported before anything is computed.
+    let c_files = (args.lang == Language::C).then(|| c_files(args.output.as_deref())).transpose()?;
     let model = source::model_of(&args.model)?;
-    let base = Options { runtime: args.runtime.clone(), source: shown(path), ..args.code.options(&model.name) };
+    let base = options(args, &model);
+    if let Some(CFiles { source: file, header, name }) = c_files {
+        let generated = c::generate(&model, &base, &name).map_err(failure)?;
+        source::tell_notices(path, &generated.notices);
+        return write_files(&[(&file, &generated.source), (&header, &generated.header)]);
+    }
     let generated = codegen::generate(&model, &base).map_err(failure)?;
     source::tell_notices(path, &generated.notices);
     match &args.output {
         Some(file) => write_file(file, &generated.source),
         None => Ok(out.write_all(generated.source.as_bytes())?),
     }
+}
+
+/// Options of the generator.
+pub fn options(args: &GenerateArgs, model: &Model) -> Options {
+    let source = shown(&args.model.model);
+    Options { runtime: args.runtime.clone(), source, ..args.code.options(&model.name) }
+}
+
+/// The two files of C.
+struct CFiles {
+    source: PathBuf,
+    header: PathBuf,
+    /// What both are called.
+    name: String,
+}
+
+fn c_files(output: Option<&Path>) -> Outcome<CFiles> {
+    let help = "name the source, as in -o robot.c; robot.h is written beside it";
+    let Some(source) = output else { return Err(Failure::new("C is written to two files", help)) };
+    let name = source.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-.+ ".contains(c));
+    if source.extension().is_none_or(|extension| extension != "c") || !plain {
+        let what = format!("`{}` is no name of a C source with letters, digits, `_` and `-`", source.display());
+        return Err(Failure::new(what, help));
+    }
+    Ok(CFiles { source: source.to_path_buf(), header: source.with_extension("h"), name })
 }
 
 /// Errors that remain possible with a valid model: unknown frames in the options, degrees of freedom without inertia.

@@ -1,5 +1,6 @@
 //! Tests of the command `mbd`, run as a program.
 
+mod c;
 mod certify;
 mod commands;
 mod documented;

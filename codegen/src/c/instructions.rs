@@ -65,6 +65,8 @@ pub struct Writer<'a> {
     pub plan: Option<&'a Plan>,
     /// Whether each operation gets a name of its own, `t0`.
     pub temporaries: bool,
+    /// Whether `a * b + c` has to be rounded once.
+    pub fused: bool,
     /// The statements.
     pub out: String,
     /// Input arrays that are read.
@@ -91,6 +93,7 @@ impl<'a> Writer<'a> {
             names,
             plan: None,
             temporaries: false,
+            fused: false,
             out,
             read,
             made: 0,
@@ -196,6 +199,9 @@ impl Instructions for Writer<'_> {
             Operation::Sub(a, b) => format!("{} - {}", a.factor(), b.factor()),
             Operation::Mul(a, b) => format!("{} * {}", a.factor(), b.factor()),
             Operation::Div(a, b) => format!("{} / {}", a.factor(), b.factor()),
+            Operation::Fma(a, b, c) if self.fused => {
+                format!("{}_FMA({}, {}, {})", prefix.upper, a.text, b.text, c.text)
+            }
             Operation::Fma(a, b, c) => sum(format!("{} * {}", a.factor(), b.factor()), &c),
             Operation::Negate(a) if !self.temporaries => return a.negated(),
             Operation::Negate(a) => a.negated().text,

@@ -17,6 +17,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod fmu;
 mod function;
 mod header;
 mod instructions;
@@ -35,6 +36,7 @@ use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::{Counts, Op};
 use crate::trace::{chosen_frames, coordinate_rates, sizes};
+pub use fmu::{fmu, Fmu};
 use function::Function;
 use names::{comment, number, Prefix};
 
@@ -130,7 +132,7 @@ fn files(input: &Input, programs: &[OutputProgram<Code>], name: &str) -> (String
     source += &format!("#include \"{name}.h\"\n\n");
     source += &preamble(prefix, options.precision, &needs);
     if needs.sines {
-        source += &sines::functions(prefix, options.precision);
+        source += &sines::functions(prefix, options.precision, options.arithmetic);
     }
     source += &header::inputs_init(prefix, &fields, options.precision);
     for function in &functions {

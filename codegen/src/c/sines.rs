@@ -5,10 +5,19 @@ use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64, TWO_OVER_PI};
 use super::instructions::{Value, Writer};
 use super::names::{literal, number, Prefix};
 use crate::lower::{reduced, within_quadrant};
-use crate::options::Precision;
+use crate::options::{Arithmetic, Precision};
 
 /// The functions for one angle and for several, and what they need.
-pub fn functions(prefix: &Prefix, precision: Precision) -> String {
+pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) -> String {
+    let plain = reduced_body(prefix, precision, false);
+    let (fma, reduced) = match arithmetic {
+        Arithmetic::Exact => (String::new(), plain),
+        Arithmetic::Fast => {
+            let fused = reduced_body(prefix, precision, true);
+            let reduced = format!("#ifdef {}_FMA\n{fused}\n#else\n{plain}\n#endif", prefix.upper);
+            (fused_operation(prefix, precision), reduced)
+        }
+    };
     let limit = match precision {
         Precision::F64 => LIMIT_F64,
         Precision::F32 => f64::from(LIMIT_F32),
@@ -20,7 +29,8 @@ pub fn functions(prefix: &Prefix, precision: Precision) -> String {
         ("UPPER", prefix.upper.clone()),
         ("ZERO", literal(0.0, precision)),
         ("WITHIN_QUADRANT", quadrant_body(prefix, precision)),
-        ("REDUCED", reduced_body(prefix, precision)),
+        ("FUSED_OPERATION", fma),
+        ("REDUCED", reduced),
         ("HIGH_WORD", high_word(precision).to_string()),
         ("TABLE", table()),
     ];
@@ -56,10 +66,27 @@ fn quadrant_body(prefix: &Prefix, precision: Precision) -> String {
     writer.out.trim_end().to_string()
 }
 
+/// The macro of fused multiply-adds where the processor has them.
+fn fused_operation(prefix: &Prefix, precision: Precision) -> String {
+    let (suffix, builtin) = match precision {
+        Precision::F64 => ("FMA", "__builtin_fma"),
+        Precision::F32 => ("FMAF", "__builtin_fmaf"),
+    };
+    format!(
+        "
+/* Fused multiply-adds where the processor has them; angles are then reduced in fewer operations. */
+#if defined(__GNUC__) && (defined(__FP_FAST_{suffix}) || defined(__FMA__))
+#define {}_FMA(a, b, c) {builtin}(a, b, c)
+#endif
+",
+        prefix.upper
+    )
+}
+
 /// Statements that reduce `x` and give the parts on.
-fn reduced_body(prefix: &Prefix, precision: Precision) -> String {
-    let mut writer = Writer { temporaries: true, ..Writer::new(prefix, precision) };
-    let ([y0, y1], [shifted, _]) = reduced(&mut writer, Value::simple("x"), precision, false);
+fn reduced_body(prefix: &Prefix, precision: Precision, fused: bool) -> String {
+    let mut writer = Writer { temporaries: true, fused, ..Writer::new(prefix, precision) };
+    let ([y0, y1], [shifted, _]) = reduced(&mut writer, Value::simple("x"), precision, fused);
     let lower = &prefix.lower;
     writer.line(&format!("{lower}_view shifted;"));
     writer.line(&format!("shifted.number = {};", shifted.text));
@@ -98,7 +125,7 @@ typedef union {
     @NUMBER@ number;
     @UINT@ bits;
 } @PREFIX@_view;
-
+@FUSED_OPERATION@
 /* Functions that are hardly ever called stay out of the others. */
 #ifdef __GNUC__
 #define @UPPER@_RARE __attribute__((cold, noinline))
@@ -193,7 +220,7 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
     /* angle * 2^(-@TOP@ - zeros) radians, split into two numbers exactly. */
     const @UINT@ angle = @PREFIX@_high(upper, @HALF_PI@);
     const @UINT@ rest = angle & ((one << @REST@) - 1U);
-    view.bits = (@UINT@)(@SCALE@ - zeros) << @STORED@;
+    view.bits = (@SCALE@U - (@UINT@)zeros) << @STORED@;
     const @NUMBER@ big = (@NUMBER@)(angle - rest) * view.number;
     const @NUMBER@ small = (@NUMBER@)rest * view.number;
     const @NUMBER@ y0 = big + small;
