@@ -24,6 +24,8 @@ mod sample;
 pub mod search;
 pub mod symbolic;
 mod trace;
+#[cfg(feature = "wasm")]
+pub mod wasm;
 
 /// Texts of messages, for the command and the macro.
 #[doc(hidden)]

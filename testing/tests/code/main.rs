@@ -10,4 +10,5 @@ mod emitted;
 mod machine_code;
 mod rewriting;
 mod rolled;
+mod wasm;
 mod wide;

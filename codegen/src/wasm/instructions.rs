@@ -1,0 +1,193 @@
+//! Single instructions of programs as those of WebAssembly.
+//!
+//! All arrays are at fixed addresses of the memory, so that an access needs no address but the number of a loop's turn.
+
+use wasm_encoder::{BlockType, Instruction, ValType};
+
+use super::body::{Body, Value};
+use super::number::Number;
+use crate::lower::{Array, Instructions, Memory, Operation, Place};
+
+/// Addresses of the arrays of a function.
+#[derive(Clone, Debug, Default)]
+pub struct Addresses {
+    pub inputs: Vec<usize>,
+    pub results: Vec<usize>,
+    /// Tables of rolled code.
+    pub tables: Vec<usize>,
+    /// Working memory.
+    pub work: usize,
+    pub memory: Memory,
+}
+
+/// Numbers of the functions for sines.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SineFunctions {
+    /// Of one angle.
+    pub one: u32,
+    /// Of a vector of angles.
+    pub vector: u32,
+}
+
+/// Writes the body of a function.
+pub struct Writer<'a> {
+    pub body: Body,
+    pub number: Number,
+    addresses: &'a Addresses,
+    functions: SineFunctions,
+    /// Whether a function for sines is called.
+    pub calls_sines: bool,
+    /// Products of the turn of the open loop and a number of bytes.
+    scaled: Vec<(Value, usize, Value)>,
+}
+
+/// A loop that is being written.
+pub struct Loop {
+    turn: Value,
+    /// The step from turn to turn, and the number at which the loop ends.
+    step: i32,
+    end: i32,
+    carried: Vec<Value>,
+}
+
+impl<'a> Writer<'a> {
+    pub fn new(body: Body, number: Number, addresses: &'a Addresses, functions: SineFunctions) -> Writer<'a> {
+        Writer { body, number, addresses, functions, calls_sines: false, scaled: Vec::new() }
+    }
+
+    /// Calls a function for sines.
+    pub fn call_sines(&mut self, number: Number, angle: Value) -> [Value; 2] {
+        let function = if number.lanes() > 1 { self.functions.vector } else { self.functions.one };
+        self.calls_sines = true;
+        let pair = self.body.step(Instruction::Call(function), &[angle], &[number.ty(); 2]);
+        [pair[0], pair[1]]
+    }
+
+    /// A vector of some numbers; the lanes after them are like the first.
+    pub fn gather(&mut self, numbers: &[Value]) -> Value {
+        let vector = Number::vector(self.number.precision());
+        let first = self.body.one(vector.splat(), &numbers[..1], ValType::V128);
+        let others = (1..).zip(&numbers[1..]);
+        others.fold(first, |all, (lane, x)| self.body.one(vector.replace_lane(lane), &[all, *x], ValType::V128))
+    }
+
+    /// Address and offset of an entry.
+    fn place(&mut self, place: Place<Value>) -> (Value, usize) {
+        let size = self.number.bytes();
+        let (address, first) = match place.array {
+            Array::Input(k) => (self.addresses.inputs[k], 0),
+            Array::Result(k) => (self.addresses.results[k], 0),
+            Array::Table(run) => (self.addresses.tables[run], 0),
+            array => (self.addresses.work, self.addresses.memory.start(array)),
+        };
+        let moved = place.turn.map(|(turn, stride)| self.scale(turn, size * stride));
+        (moved.unwrap_or(Value::I32(0)), address + size * (first + place.at))
+    }
+
+    /// A turn times a number of bytes.
+    fn scale(&mut self, turn: Value, bytes: usize) -> Value {
+        let known = self.scaled.iter().find(|(t, by, _)| (*t, *by) == (turn, bytes));
+        if let Some((.., scaled)) = known {
+            return *scaled;
+        }
+        let scaled = self.body.one(Instruction::I32Mul, &[turn, Value::I32(bytes as i32)], ValType::I32);
+        self.scaled.push((turn, bytes, scaled));
+        scaled
+    }
+
+    /// Writes an instruction that gives a number.
+    fn give(&mut self, instruction: Instruction<'static>, operands: &[Value]) -> Value {
+        self.body.one(instruction, operands, self.number.ty())
+    }
+}
+
+impl Instructions for Writer<'_> {
+    type Value = Value;
+    type Turn = Value;
+    type Loop = Loop;
+
+    fn constant(&mut self, x: f64) -> Value {
+        self.number.constant(x)
+    }
+
+    fn load(&mut self, place: Place<Value>) -> Value {
+        let (address, offset) = self.place(place);
+        self.give(self.number.load(offset), &[address])
+    }
+
+    fn store(&mut self, place: Place<Value>, value: Value) {
+        let (address, offset) = self.place(place);
+        self.body.none(self.number.store(offset), &[address, value]);
+    }
+
+    fn operation(&mut self, operation: Operation<Value>) -> Value {
+        let number = self.number;
+        match operation {
+            Operation::Add(a, b) => self.give(number.add(), &[a, b]),
+            Operation::Sub(a, b) => self.give(number.sub(), &[a, b]),
+            Operation::Mul(a, b) => self.give(number.mul(), &[a, b]),
+            Operation::Div(a, b) => self.give(number.div(), &[a, b]),
+            Operation::Fma(a, b, c) => {
+                let product = self.give(number.mul(), &[a, b]);
+                self.give(number.add(), &[product, c])
+            }
+            Operation::Negate(a) => self.give(number.negate(), &[a]),
+            Operation::ReciprocalAbove { value, floor } => {
+                let reciprocal = self.give(number.div(), &[number.constant(1.0), value]);
+                let below = self.body.one(number.not_above(), &[value, floor], ValType::I32);
+                self.give(Instruction::Select, &[number.constant(0.0), reciprocal, below])
+            }
+            Operation::Sqrt(a) => self.give(number.sqrt(), &[a]),
+        }
+    }
+
+    fn sines(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
+        let number = self.number;
+        let vector = Number::vector(number.precision());
+        let mut pairs = Vec::new();
+        for angles in angles.chunks(vector.lanes()) {
+            if let [angle] = *angles {
+                pairs.push(self.call_sines(number, angle));
+                continue;
+            }
+            let gathered = self.gather(angles);
+            let pair = self.call_sines(vector, gathered);
+            let lanes = 0..angles.len() as u8;
+            pairs.extend(lanes.map(|lane| pair.map(|x| self.give(vector.extract_lane(lane), &[x]))));
+        }
+        pairs
+    }
+
+    fn sines_of_array(&mut self, n: usize) {
+        let (number, vector) = (self.number, Number::vector(self.number.precision()));
+        let [angles, sines, cosines] = [Array::Angles, Array::Sines, Array::Cosines]
+            .map(|array| self.addresses.work + number.bytes() * self.addresses.memory.start(array));
+        let (open, turn, _) = self.open_loop(n.div_ceil(vector.lanes()), false, Vec::new());
+        let at = self.scale(turn, vector.bytes());
+        let angle = self.body.one(vector.load(angles), &[at], ValType::V128);
+        let [sine, cosine] = self.call_sines(vector, angle);
+        self.body.none(vector.store(sines), &[at, sine]);
+        self.body.none(vector.store(cosines), &[at, cosine]);
+        self.close_loop(open, Vec::new());
+    }
+
+    fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Value>) -> (Loop, Value, Vec<Value>) {
+        let turns = turns as i32;
+        let (first, step, end) = if backward { (turns - 1, -1, -1) } else { (0, 1, turns) };
+        let carried = self.body.variables(&start, &vec![self.number.ty(); start.len()]);
+        let turn = self.body.variables(&[Value::I32(first)], &[ValType::I32])[0];
+        self.body.none(Instruction::Loop(BlockType::Empty), &[]);
+        self.scaled.clear();
+        (Loop { turn, step, end, carried: carried.clone() }, turn, carried)
+    }
+
+    fn close_loop(&mut self, Loop { turn, step, end, carried }: Loop, next: Vec<Value>) -> Vec<Value> {
+        self.body.assign(&carried, &next);
+        let next = self.body.one(Instruction::I32Add, &[turn, Value::I32(step)], ValType::I32);
+        self.body.assign(&[turn], &[next]);
+        let again = self.body.one(Instruction::I32Ne, &[turn, Value::I32(end)], ValType::I32);
+        self.body.none(Instruction::BrIf(0), &[again]);
+        self.body.none(Instruction::End, &[]);
+        carried
+    }
+}

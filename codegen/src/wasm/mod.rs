@@ -1,0 +1,74 @@
+//! WebAssembly of the same programs as generated Rust, with a JavaScript wrapper and its types.
+
+mod body;
+mod instructions;
+mod layout;
+mod module;
+mod number;
+mod sines;
+mod wrapper;
+
+use crate::code::{compile, Code};
+use crate::emit::Input;
+use crate::error::GenerateError;
+use crate::model::Model;
+use crate::options::Options;
+use crate::output::{Output, OutputProgram};
+use crate::plan::Plan;
+use crate::search;
+use crate::symbolic::Counts;
+use crate::trace::{chosen_frames, coordinate_rates, sizes};
+use layout::Layout;
+use number::Number;
+use wrapper::Wrapper;
+
+/// A generated module and information about it.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct GeneratedWasm {
+    /// The binary module. It imports nothing.
+    pub module: Vec<u8>,
+    /// The wrapper, an ES module of JavaScript.
+    pub wrapper: String,
+    /// Declarations of the wrapper for TypeScript, `.d.ts`.
+    pub types: String,
+    /// Operations of each function.
+    pub counts: Vec<(Output, Counts)>,
+    /// Notices about changes, such as angles that became right angles.
+    pub notices: Vec<String>,
+}
+
+/// Generates WebAssembly for a checked model. [`Options::type_name`] is the name of the wrapper's class;
+/// [`Options::runtime`] and [`Options::chunk`] have no part in it.
+///
+/// # Errors
+/// Those of [`crate::generate()`].
+pub fn generate(model: &Model, options: &Options) -> Result<GeneratedWasm, GenerateError> {
+    let options = &options.of_model(!model.constraints.is_empty());
+    generate_from(&search::plan(model, options.searches()), options)
+}
+
+/// Generates WebAssembly with the eliminations of a plan; [`Options::plan`] has no part in it.
+///
+/// # Errors
+/// The same as of [`generate`].
+pub fn generate_from(plan: &Plan, options: &Options) -> Result<GeneratedWasm, GenerateError> {
+    let programs =
+        options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
+    let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();
+    let frames = &chosen_frames(plan, options)?;
+    let input = Input { plan, options, frames, sizes: sizes(plan, options, frames.len()) };
+    // As in Rust, for integrators.
+    let rates = options.outputs.contains(&Output::Rates);
+    let extra = rates.then(|| coordinate_rates(plan, options).map(Code::Straight));
+    let functions: Vec<&OutputProgram<Code>> = programs.iter().chain(&extra).collect();
+    let layout = Layout::new(&input, &functions, Number::vector(options.precision).lanes());
+    let wrapper = Wrapper::new(&input, &layout, &programs, &functions);
+    Ok(GeneratedWasm {
+        module: module::module(&layout, &functions, options.precision),
+        wrapper: wrapper.javascript(),
+        types: wrapper.types(),
+        counts,
+        notices: plan.notices.clone(),
+    })
+}
