@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::model::Model;
-use multibody::codegen::{self, c, GenerateError, Options};
+use multibody::codegen::{self, c, wasm, GenerateError, Options};
 
 use super::args::{GenerateArgs, Language};
 #[cfg(feature = "fmu")]
@@ -20,7 +20,9 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
         return fmu::run(args);
     }
     // Wrong names of files are reported before anything is computed.
-    let c_files = (args.lang == Language::C).then(|| c_files(args.output.as_deref())).transpose()?;
+    let file = args.output.as_deref();
+    let c_files = (args.lang == Language::C).then(|| c_files(file)).transpose()?;
+    let module = (args.lang == Language::Wasm).then(|| module_file(file)).transpose()?;
     let model = source::model_of(&args.model)?;
     let base = options(args, &model);
     if let Some(CFiles { source: file, header, name }) = c_files {
@@ -28,9 +30,19 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
         source::tell_notices(path, &generated.notices);
         return write_files(&[(&file, &generated.source), (&header, &generated.header)]);
     }
+    if let Some(module) = module {
+        let generated = wasm::generate(&model, &base).map_err(failure)?;
+        source::tell_notices(path, &generated.notices);
+        let (wrapper, types) = (module.with_extension("js"), module.with_extension("d.ts"));
+        return write_files(&[
+            (module, &generated.module[..]),
+            (&wrapper, generated.wrapper.as_bytes()),
+            (&types, generated.types.as_bytes()),
+        ]);
+    }
     let generated = codegen::generate(&model, &base).map_err(failure)?;
     source::tell_notices(path, &generated.notices);
-    match &args.output {
+    match file {
         Some(file) => write_file(file, &generated.source),
         None => Ok(out.write_all(generated.source.as_bytes())?),
     }
@@ -60,6 +72,17 @@ fn c_files(output: Option<&Path>) -> Outcome<CFiles> {
         return Err(Failure::new(what, help));
     }
     Ok(CFiles { source: source.to_path_buf(), header: source.with_extension("h"), name })
+}
+
+/// The file of a WebAssembly module, which stands beside its wrapper.
+fn module_file(file: Option<&Path>) -> Outcome<&Path> {
+    match file {
+        Some(file) if file.extension().is_some_and(|extension| extension == "wasm") => Ok(file),
+        _ => Err(Failure::new(
+            "WebAssembly needs the name of a file that ends with `.wasm`",
+            "`-o robot.wasm` writes robot.wasm, robot.js and robot.d.ts",
+        )),
+    }
 }
 
 /// Errors that remain possible with a valid model: unknown frames in the options, degrees of freedom without inertia.

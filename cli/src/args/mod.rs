@@ -58,7 +58,7 @@ pub enum Command {
     Check(CheckArgs),
     /// Count the operations of every output, sweep by sweep
     Count(CountArgs),
-    /// Generate Rust or C
+    /// Generate Rust, C or WebAssembly
     Generate(GenerateArgs),
     /// Evaluate states from a JSON file with the interpreter
     Eval(EvalArgs),
@@ -231,6 +231,8 @@ pub enum Language {
     /// The same as a unit for model exchange (FMI 2.0), an `.fmu`
     #[cfg(feature = "fmu")]
     Fmu,
+    /// WebAssembly, a module; beside it a JavaScript wrapper and its types
+    Wasm,
 }
 
 /// `mbd generate`.
@@ -239,6 +241,9 @@ pub enum Language {
     after_help = "Rust depends on the runtime alone: no allocation, no std. C depends on nothing: `-o robot.c` writes robot.c and robot.h.
 A unit for model exchange has rates, velocities and energies in doubles, its sources, and a shared library where a C compiler is found
 (docs/c.md). The comment at the top lists the order of the state and the operations of each function. The same model and options give the same bytes everywhere.
+
+WebAssembly is written to three files: `-o robot.wasm` also writes robot.js, a wrapper, and robot.d.ts, its types.
+docs/webassembly.md shows how to use them.
 
 In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
 file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."
@@ -254,7 +259,7 @@ pub struct GenerateArgs {
     /// Path of the runtime in generated Rust
     #[arg(long, value_name = "PATH", default_value = DEFAULT_RUNTIME, value_parser = rust_path)]
     pub runtime: String,
-    /// File to write in place of standard output
+    /// File to write in place of standard output; needed for WebAssembly
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }

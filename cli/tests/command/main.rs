@@ -8,3 +8,4 @@ mod eval;
 mod loops;
 mod run;
 mod trust;
+mod webassembly;
