@@ -22,7 +22,8 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     // Wrong names of files are reported before anything is computed.
     let file = args.output.as_deref();
     let c_files = (args.lang == Language::C).then(|| c_files(file)).transpose()?;
-    let module = (args.lang == Language::Wasm).then(|| module_file(file)).transpose()?;
+    let webassembly = matches!(args.lang, Language::Wasm | Language::WasmLanes);
+    let module = webassembly.then(|| module_file(file)).transpose()?;
     let model = source::model_of(&args.model)?;
     let base = options(args, &model);
     if let Some(CFiles { source: file, header, name }) = c_files {
@@ -31,7 +32,8 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
         return write_files(&[(&file, &generated.source), (&header, &generated.header)]);
     }
     if let Some(module) = module {
-        let generated = wasm::generate(&model, &base).map_err(failure)?;
+        let generate = if args.lang == Language::WasmLanes { wasm::generate_lanes } else { wasm::generate };
+        let generated = generate(&model, &base).map_err(failure)?;
         source::tell_notices(path, &generated.notices);
         let (wrapper, types) = (module.with_extension("js"), module.with_extension("d.ts"));
         return write_files(&[

@@ -233,6 +233,8 @@ pub enum Language {
     Fmu,
     /// WebAssembly, a module; beside it a JavaScript wrapper and its types
     Wasm,
+    /// The same for several states at once: two in double precision, four in single precision
+    WasmLanes,
 }
 
 /// `mbd generate`.

@@ -73,12 +73,13 @@ impl<'a> Writer<'a> {
 
     /// Address and offset of an entry.
     fn place(&mut self, place: Place<Value>) -> (Value, usize) {
-        let size = self.number.bytes();
-        let (address, first) = match place.array {
-            Array::Input(k) => (self.addresses.inputs[k], 0),
-            Array::Result(k) => (self.addresses.results[k], 0),
-            Array::Table(run) => (self.addresses.tables[run], 0),
-            array => (self.addresses.work, self.addresses.memory.start(array)),
+        let bytes = self.number.bytes();
+        let (address, first, size) = match place.array {
+            Array::Input(k) => (self.addresses.inputs[k], 0, bytes),
+            Array::Result(k) => (self.addresses.results[k], 0, bytes),
+            // The same for all states.
+            Array::Table(run) => (self.addresses.tables[run], 0, self.number.precision().bytes()),
+            array => (self.addresses.work, self.addresses.memory.start(array), bytes),
         };
         let moved = place.turn.map(|(turn, stride)| self.scale(turn, size * stride));
         (moved.unwrap_or(Value::I32(0)), address + size * (first + place.at))
@@ -112,7 +113,11 @@ impl Instructions for Writer<'_> {
 
     fn load(&mut self, place: Place<Value>) -> Value {
         let (address, offset) = self.place(place);
-        self.give(self.number.load(offset), &[address])
+        let load = match place.array {
+            Array::Table(_) => self.number.load_constant(offset),
+            _ => self.number.load(offset),
+        };
+        self.give(load, &[address])
     }
 
     fn store(&mut self, place: Place<Value>, value: Value) {
@@ -134,8 +139,12 @@ impl Instructions for Writer<'_> {
             Operation::Negate(a) => self.give(number.negate(), &[a]),
             Operation::ReciprocalAbove { value, floor } => {
                 let reciprocal = self.give(number.div(), &[number.constant(1.0), value]);
-                let below = self.body.one(number.not_above(), &[value, floor], ValType::I32);
-                self.give(Instruction::Select, &[number.constant(0.0), reciprocal, below])
+                let (condition, select) = match number.lanes() {
+                    1 => (ValType::I32, Instruction::Select),
+                    _ => (ValType::V128, Instruction::V128Bitselect),
+                };
+                let below = self.body.one(number.not_above(), &[value, floor], condition);
+                self.give(select, &[number.constant(0.0), reciprocal, below])
             }
             Operation::Sqrt(a) => self.give(number.sqrt(), &[a]),
         }
@@ -145,7 +154,7 @@ impl Instructions for Writer<'_> {
         let number = self.number;
         let vector = Number::vector(number.precision());
         let mut pairs = Vec::new();
-        for angles in angles.chunks(vector.lanes()) {
+        for angles in angles.chunks(vector.lanes() / number.lanes()) {
             if let [angle] = *angles {
                 pairs.push(self.call_sines(number, angle));
                 continue;
@@ -162,7 +171,7 @@ impl Instructions for Writer<'_> {
         let (number, vector) = (self.number, Number::vector(self.number.precision()));
         let [angles, sines, cosines] = [Array::Angles, Array::Sines, Array::Cosines]
             .map(|array| self.addresses.work + number.bytes() * self.addresses.memory.start(array));
-        let (open, turn, _) = self.open_loop(n.div_ceil(vector.lanes()), false, Vec::new());
+        let (open, turn, _) = self.open_loop(n.div_ceil(vector.lanes() / number.lanes()), false, Vec::new());
         let at = self.scale(turn, vector.bytes());
         let angle = self.body.one(vector.load(angles), &[at], ValType::V128);
         let [sine, cosine] = self.call_sines(vector, angle);

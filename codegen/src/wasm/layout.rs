@@ -1,11 +1,11 @@
 //! The memory of a module: where every array is.
 
+use super::number::Number;
 use super::sines;
 use crate::code::Code;
 use crate::emit::fields::fields;
 use crate::emit::Input;
 use crate::lower::Memory;
-use crate::options::Precision;
 use crate::output::OutputProgram;
 
 /// Arrays start at multiples of this, bytes: a vector.
@@ -20,7 +20,7 @@ pub struct Area {
     pub name: &'static str,
     /// What it is; empty where the function says so.
     pub doc: &'static str,
-    /// Lengths, the outermost first.
+    /// Lengths, the outermost first; the last one is that of the lanes where there are several.
     pub dims: Vec<usize>,
     /// Address, bytes.
     pub offset: usize,
@@ -43,8 +43,10 @@ pub struct FunctionAreas {
 }
 
 /// Where every array is.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Layout {
+    /// What functions compute with: the number of one state, or a vector of those of several.
+    pub number: Number,
     /// Inputs of all functions, arguments first. Those without entries are left out.
     pub inputs: Vec<Area>,
     /// In the order of the programs.
@@ -61,26 +63,27 @@ pub struct Layout {
 
 impl Layout {
     /// The memory for some functions.
-    pub fn new(input: &Input, programs: &[&OutputProgram<Code>], lanes: usize) -> Layout {
-        let mut layout = Layout::default();
+    pub fn new(input: &Input, programs: &[&OutputProgram<Code>], number: Number) -> Layout {
+        let (inputs, functions, data) = Default::default();
+        let mut layout = Layout { number, inputs, functions, work: 0, two_over_pi: 0, data, len: 0 };
         layout.inputs(input, programs);
-        let precision = input.options.precision;
         for program in programs {
             let results = program.spec.results.iter().map(|array| {
                 let dims = array.lengths(&input.sizes);
-                let offset = layout.reserve(precision.bytes() * dims.iter().product::<usize>());
-                Area { name: array.name, doc: "", dims, offset }
+                let offset = layout.reserve(number.bytes() * dims.iter().product::<usize>());
+                Area { name: array.name, doc: "", dims: layout.with_lanes(dims), offset }
             });
             let results = results.collect();
-            let memory = Memory::new(&program.program, lanes);
+            // Angles fill vectors.
+            let memory = Memory::new(&program.program, Number::vector(number.precision()).lanes() / number.lanes());
             layout.functions.push(FunctionAreas { results, tables: Vec::new(), memory });
         }
         let work = layout.functions.iter().map(|function| function.memory.len()).max().unwrap_or(0);
-        layout.work = layout.reserve(precision.bytes() * work);
+        layout.work = layout.reserve(number.bytes() * work);
         for (k, program) in programs.iter().enumerate() {
             let Code::Rolled(rolled) = &program.program else { continue };
             for run in &rolled.loops {
-                let table = layout.constants(&run.table.concat(), precision);
+                let table = layout.constants(&run.table.concat());
                 layout.functions[k].tables.push(table);
             }
         }
@@ -92,7 +95,7 @@ impl Layout {
 
     /// Inputs of any of the functions, with the values that they have at the start.
     fn inputs(&mut self, input: &Input, programs: &[&OutputProgram<Code>]) {
-        let Input { plan, options, sizes, .. } = input;
+        let Input { plan, sizes, .. } = input;
         let arguments = [
             ("q", "Coordinates, at the start those of the model."),
             ("p", "Momenta."),
@@ -103,14 +106,27 @@ impl Layout {
             let mut taken = programs.iter().flat_map(|program| program.spec.inputs);
             let Some(array) = taken.find(|array| array.name == name && array.len(sizes) > 0) else { continue };
             let value = if name == "q" { plan.start() } else { vec![0.0; array.len(sizes)] };
-            let offset = self.constants(&value, options.precision);
-            self.inputs.push(Area { name, doc, dims: array.lengths(sizes), offset });
+            self.input_area(name, doc, array.lengths(sizes), &value);
         }
         for field in fields(plan, sizes) {
             let zeros = || vec![0.0; field.dims.iter().product()];
-            let offset = self.constants(&field.value.clone().unwrap_or_else(zeros), options.precision);
-            self.inputs.push(Area { name: field.name, doc: field.doc, dims: field.dims, offset });
+            let value = field.value.clone().unwrap_or_else(zeros);
+            self.input_area(field.name, field.doc, field.dims, &value);
         }
+    }
+
+    /// An input, with the same value in all lanes.
+    fn input_area(&mut self, name: &'static str, doc: &'static str, dims: Vec<usize>, value: &[f64]) {
+        let lanes = self.number.lanes();
+        let value: Vec<f64> = value.iter().flat_map(|x| std::iter::repeat_n(*x, lanes)).collect();
+        let (offset, dims) = (self.constants(&value), self.with_lanes(dims));
+        self.inputs.push(Area { name, doc, dims, offset });
+    }
+
+    /// Lengths of an array that has some lengths for one state.
+    fn with_lanes(&self, mut dims: Vec<usize>) -> Vec<usize> {
+        dims.extend((self.number.lanes() > 1).then_some(self.number.lanes()));
+        dims
     }
 
     /// Reserves memory.
@@ -121,12 +137,13 @@ impl Layout {
     }
 
     /// Reserves memory that holds some numbers at the start.
-    fn constants(&mut self, numbers: &[f64], precision: Precision) -> usize {
-        let offset = self.reserve(precision.bytes() * numbers.len());
+    fn constants(&mut self, numbers: &[f64]) -> usize {
+        let number = Number::scalar(self.number.precision());
+        let offset = self.reserve(number.bytes() * numbers.len());
         if numbers.iter().any(|x| *x != 0.0) {
-            let bytes = numbers.iter().flat_map(|x| match precision {
-                Precision::F64 => x.to_le_bytes().to_vec(),
-                Precision::F32 => (*x as f32).to_le_bytes().to_vec(),
+            let bytes = numbers.iter().flat_map(|x| match number {
+                Number::F32 => (*x as f32).to_le_bytes().to_vec(),
+                _ => x.to_le_bytes().to_vec(),
             });
             self.data.push((offset, bytes.collect()));
         }

@@ -48,11 +48,33 @@ pub fn generate(model: &Model, options: &Options) -> Result<GeneratedWasm, Gener
     generate_from(&search::plan(model, options.searches()), options)
 }
 
+/// Generates WebAssembly that computes several states at once: as many as a vector of 16 bytes has numbers, two of
+/// double precision or four of single precision. The last index of every array is the state.
+///
+/// # Errors
+/// The same as of [`generate`].
+pub fn generate_lanes(model: &Model, options: &Options) -> Result<GeneratedWasm, GenerateError> {
+    let options = &options.of_model(!model.constraints.is_empty());
+    generate_lanes_from(&search::plan(model, options.searches()), options)
+}
+
 /// Generates WebAssembly with the eliminations of a plan; [`Options::plan`] has no part in it.
 ///
 /// # Errors
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options) -> Result<GeneratedWasm, GenerateError> {
+    files(plan, options, Number::scalar(options.precision))
+}
+
+/// Generates WebAssembly for several states with the eliminations of a plan; [`Options::plan`] has no part in it.
+///
+/// # Errors
+/// The same as of [`generate`].
+pub fn generate_lanes_from(plan: &Plan, options: &Options) -> Result<GeneratedWasm, GenerateError> {
+    files(plan, options, Number::vector(options.precision))
+}
+
+fn files(plan: &Plan, options: &Options, number: Number) -> Result<GeneratedWasm, GenerateError> {
     let programs =
         options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
     let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();
@@ -62,10 +84,10 @@ pub fn generate_from(plan: &Plan, options: &Options) -> Result<GeneratedWasm, Ge
     let rates = options.outputs.contains(&Output::Rates);
     let extra = rates.then(|| coordinate_rates(plan, options).map(Code::Straight));
     let functions: Vec<&OutputProgram<Code>> = programs.iter().chain(&extra).collect();
-    let layout = Layout::new(&input, &functions, Number::vector(options.precision).lanes());
+    let layout = Layout::new(&input, &functions, number);
     let wrapper = Wrapper::new(&input, &layout, &programs, &functions);
     Ok(GeneratedWasm {
-        module: module::module(&layout, &functions, options.precision),
+        module: module::module(&layout, &functions),
         wrapper: wrapper.javascript(),
         types: wrapper.types(),
         counts,

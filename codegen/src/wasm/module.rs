@@ -12,21 +12,21 @@ use super::number::Number;
 use super::sines;
 use crate::code::Code;
 use crate::lower::lower;
-use crate::options::Precision;
 use crate::output::OutputProgram;
 
 /// Name of the exported memory.
 pub const MEMORY: &str = "memory";
 
 /// A module that exports its memory and one function for each program.
-pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>], precision: Precision) -> Vec<u8> {
+pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>]) -> Vec<u8> {
+    let precision = layout.number.precision();
     let count = programs.len() as u32;
     let functions = SineFunctions { one: count, vector: count + 1 };
     let numbers = [Number::scalar(precision), Number::vector(precision)];
     let mut code = CodeSection::new();
     let mut has_sines = false;
     for (k, program) in programs.iter().enumerate() {
-        let (function, calls_sines) = body(layout, k, program, numbers[0], functions);
+        let (function, calls_sines) = body(layout, k, program, functions);
         code.function(&function);
         has_sines |= calls_sines;
     }
@@ -67,13 +67,7 @@ pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>], precision: Pre
 }
 
 /// The function of program `k`, and whether it calls a function for sines.
-fn body(
-    layout: &Layout,
-    k: usize,
-    program: &OutputProgram<Code>,
-    number: Number,
-    functions: SineFunctions,
-) -> (Function, bool) {
+fn body(layout: &Layout, k: usize, program: &OutputProgram<Code>, functions: SineFunctions) -> (Function, bool) {
     let areas = &layout.functions[k];
     let addresses = Addresses {
         inputs: program.inputs.iter().map(|array| layout.input(array.name)).collect(),
@@ -83,8 +77,8 @@ fn body(
         memory: areas.memory.clone(),
     };
     let (body, _) = Body::new(&[]);
-    let mut writer = Writer::new(body, number, &addresses, functions);
-    let lengths: Vec<usize> = areas.results.iter().map(|area| area.len()).collect();
+    let mut writer = Writer::new(body, layout.number, &addresses, functions);
+    let lengths: Vec<usize> = areas.results.iter().map(|area| area.len() / layout.number.lanes()).collect();
     lower(&mut writer, program, &lengths);
     (writer.body.finish(&[]), writer.calls_sines)
 }

@@ -194,6 +194,16 @@ impl Number {
         }
     }
 
+    /// Reads a constant at an offset, the same for all lanes.
+    pub fn load_constant(self, offset: usize) -> Instruction<'static> {
+        let at = memory(offset, self.precision());
+        match self {
+            Number::F64 | Number::F32 => self.load(offset),
+            Number::F64x2 => Instruction::V128Load64Splat(at),
+            Number::F32x4 => Instruction::V128Load32Splat(at),
+        }
+    }
+
     /// Writes a number at an offset.
     pub fn store(self, offset: usize) -> Instruction<'static> {
         let at = memory(offset, self.precision());

@@ -32,6 +32,10 @@ impl<'a> Wrapper<'a> {
         functions: &'a [&'a OutputProgram<Code>],
     ) -> Wrapper<'a> {
         let mut wrapper = Wrapper { input, layout, functions, top: Vec::new(), constants: constants(input) };
+        if let lanes @ 2.. = layout.number.lanes() {
+            let (doc, name) = (format!("{LANES_DOC}."), "LANES".to_string());
+            wrapper.constants.push(Constant { doc, name, value: Content::Number(lanes) });
+        }
         wrapper.top = lines(input.plan, input.options, programs);
         wrapper.memory_lines();
         wrapper
@@ -67,6 +71,10 @@ WebAssembly (little-endian). Functions leave inputs as they are. The memory afte
 Byte offset, number of entries, array:"
         );
         self.top.extend(text.lines().map(str::to_string));
+        if let lanes @ 2.. = self.layout.number.lanes() {
+            self.top
+                .insert(1, format!("It computes {lanes} states at once: the last index of every array is the state."));
+        }
         self.top.extend(rows);
     }
 
@@ -181,10 +189,14 @@ Byte offset, number of entries, array:"
     /// Documentation of the class.
     fn about(&self) -> Vec<String> {
         let outputs: Vec<&str> = self.functions.iter().map(|program| program.spec.name).collect();
-        vec![
+        let mut lines = vec![
             format!("Dynamics of `{}` in canonical form: {}.", self.input.plan.model.name, outputs.join(", ")),
             "Inputs are views of the module's memory: fill them, then call a function.".to_string(),
-        ]
+        ];
+        if self.layout.number.lanes() > 1 {
+            lines.push(format!("`LANES`: {LANES_DOC}; the last index of every array is the state."));
+        }
+        lines
     }
 
     /// Documentation of a function.
@@ -202,6 +214,8 @@ Byte offset, number of entries, array:"
         lines
     }
 }
+
+const LANES_DOC: &str = "Number of states that are computed at once";
 
 const MEMORY_DOC: &str = "The module's memory; it does not grow.";
 
@@ -260,10 +274,17 @@ fn shape(area: &Area) -> String {
 }
 
 fn area_doc(area: &Area) -> Vec<String> {
-    match area.dims[..] {
-        [_, n] => vec![format!("{} Entry (i, k) has index i * {n} + k.", area.doc)],
-        _ => vec![area.doc.to_string()],
+    let [_, others @ ..] = &area.dims[..] else { return vec![area.doc.to_string()] };
+    if others.is_empty() {
+        return vec![area.doc.to_string()];
     }
+    let mut indices = vec!["i"];
+    let index = ["j", "k", "l"].into_iter().zip(others).fold("i".to_string(), |index, (next, n)| {
+        indices.push(next);
+        let before = if index.contains(' ') { format!("({index})") } else { index };
+        format!("{before} * {n} + {next}")
+    });
+    vec![format!("{} Entry ({}) has index {index}.", area.doc, indices.join(", "))]
 }
 
 fn constant_doc(constant: &Constant) -> Vec<String> {

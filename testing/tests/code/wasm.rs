@@ -80,12 +80,43 @@ struct Job<'a> {
     name: String,
     plan: &'a Plan,
     options: &'a Options,
+    /// Number of states in each run.
+    lanes: usize,
     runs: Vec<Run>,
 }
 
 impl Job<'_> {
     fn of(case: &Case) -> Job<'_> {
-        Job { name: case.name.clone(), plan: &case.plan, options: &case.options, runs: case.runs() }
+        Job { name: case.name.clone(), plan: &case.plan, options: &case.options, lanes: 1, runs: case.runs() }
+    }
+
+    /// The same mechanism in several states at once, which come from different cases.
+    fn lanes<'a>(cases: &[&'a Case]) -> Job<'a> {
+        let (case, lanes) = (cases[0], cases.len());
+        let runs: Vec<Vec<Run>> = cases.iter().map(|case| case.runs()).collect();
+        let joined = (0..runs[0].len()).map(|k| {
+            let all: Vec<&Run> = runs.iter().map(|runs| &runs[k]).collect();
+            let interleaved = |entries: fn(&Run) -> &[f64]| {
+                let entries: Vec<&[f64]> = all.iter().map(|run| entries(run)).collect();
+                (0..entries[0].len()).flat_map(|at| entries.iter().map(move |x| x[at]).collect::<Vec<_>>()).collect()
+            };
+            let with_lanes =
+                |array: &InputArray| InputArray { dims: [&array.dims[..], &[lanes]].concat(), ..array.clone() };
+            Run {
+                inputs: all[0].inputs.iter().map(with_lanes).collect(),
+                given: interleaved(|run| &run.given),
+                lengths: all[0].lengths.iter().map(|len| len * lanes).collect(),
+                expected: interleaved(|run| &run.expected),
+                ..all[0].clone()
+            }
+        });
+        Job {
+            name: format!("{}_lanes", case.name),
+            plan: &case.plan,
+            options: &case.options,
+            lanes,
+            runs: joined.collect(),
+        }
     }
 }
 
@@ -93,11 +124,12 @@ impl Job<'_> {
 fn evaluate(test: &str, jobs: &[Job]) -> Vec<Vec<Vec<f64>>> {
     let folder = Folder::new(test);
     let (mut list, mut given) = (Vec::new(), Vec::new());
-    for Job { name, plan, options, runs } in jobs {
+    for Job { name, plan, options, lanes, runs } in jobs {
         let mut outputs: Vec<Output> = runs.iter().map(|run| run.output).collect();
         outputs.dedup();
         let options = Options { outputs, ..(*options).clone() };
-        let code = wasm::generate_from(plan, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let generate = if *lanes > 1 { wasm::generate_lanes_from } else { wasm::generate_from };
+        let code = generate(plan, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
         folder.write(&format!("{name}.wasm"), code.module);
         folder.write(&format!("{name}.js"), code.wrapper);
         let runs_as_text: Vec<String> = runs.iter().map(text).collect();
@@ -124,13 +156,14 @@ fn text(run: &Run) -> String {
     format!("{{\"output\": \"{}\", \"inputs\": [{}]}}", run.output.name(), inputs.join(", "))
 }
 
-/// Compares all cases of some seeds, every fourth also in single precision, and every eighth with derivatives or large angles.
+/// Compares all cases of some seeds, every fourth also in single precision, and every eighth with derivatives,
+/// with large angles, or with several states at once.
 /// Returns the number of outputs that are rolled, the largest number without Node.
 fn compare(test: &str, case: fn(u64) -> Case, seeds: u64) -> usize {
     if !node() {
         return usize::MAX;
     }
-    let mut cases = Vec::new();
+    let (mut cases, mut lanes) = (Vec::new(), Vec::new());
     for seed in 0..seeds {
         let case = case(seed);
         if seed % 4 == 1 {
@@ -140,9 +173,14 @@ fn compare(test: &str, case: fn(u64) -> Case, seeds: u64) -> usize {
             cases.push(far(case.clone()));
             cases.push(far(case.clone()).single());
         }
+        if seed % 8 == 3 {
+            lanes.push(vec![case.clone(), far(case.clone())]);
+            lanes.push([&case, &far(case.clone()), &case, &case].map(|case| case.clone().single()).to_vec());
+        }
         cases.push(Case { derivatives: seed % 8 == 0, ..case });
     }
-    let jobs: Vec<Job> = cases.iter().map(Job::of).collect();
+    let mut jobs: Vec<Job> = cases.iter().map(Job::of).collect();
+    jobs.extend(lanes.iter().map(|cases| Job::lanes(&cases.iter().collect::<Vec<_>>())));
     for (job, found) in jobs.iter().zip(evaluate(test, &jobs)) {
         for (run, found) in job.runs.iter().zip(found) {
             run.check(&format!("{}\n{}", job.name, to_toml(&job.plan.model)), &found);
@@ -218,7 +256,7 @@ fn sines_of_all_angles() {
         };
         let options = Options { precision, ..Options::default() };
         let runs = angles(precision).chunks_exact(JOINTS).map(run).collect();
-        let jobs = [Job { name: "sines".to_string(), plan: &plan, options: &options, runs }];
+        let jobs = [Job { name: "sines".to_string(), plan: &plan, options: &options, lanes: 1, runs }];
         for (run, found) in jobs[0].runs.iter().zip(&evaluate("sines", &jobs)[0]) {
             let found: Vec<f64> = found[..9 * JOINTS].chunks_exact(9).flat_map(|r| [r[3], r[0]]).collect();
             run.check(&format!("{:?}", run.given), &found);
