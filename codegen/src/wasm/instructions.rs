@@ -8,6 +8,20 @@ use super::body::{Body, Value};
 use super::number::Number;
 use crate::lower::{Array, Instructions, Memory, Operation, Place};
 
+/// A number whose sign may still have to be changed. Engines do not make a difference of a sum with a negated number,
+/// as optimising compilers do.
+#[derive(Clone, Copy, Debug)]
+pub struct Signed {
+    value: Value,
+    minus: bool,
+}
+
+impl From<Value> for Signed {
+    fn from(value: Value) -> Signed {
+        Signed { value, minus: false }
+    }
+}
+
 /// Addresses of the arrays of a function.
 #[derive(Clone, Debug, Default)]
 pub struct Addresses {
@@ -100,69 +114,98 @@ impl<'a> Writer<'a> {
     fn give(&mut self, instruction: Instruction<'static>, operands: &[Value]) -> Value {
         self.body.one(instruction, operands, self.number.ty())
     }
+
+    /// A number with its sign.
+    pub fn value(&mut self, Signed { value, minus }: Signed) -> Value {
+        match minus {
+            true => self.give(self.number.negate(), &[value]),
+            false => value,
+        }
+    }
+
+    /// The sum, with the bits of the addition of numbers with their signs.
+    fn sum(&mut self, a: Signed, b: Signed) -> Signed {
+        let (instruction, operands) = match (a.minus, b.minus) {
+            (false, false) => (self.number.add(), [a.value, b.value]),
+            (true, false) => (self.number.sub(), [b.value, a.value]),
+            (_, true) => (self.number.sub(), [self.value(a), b.value]),
+        };
+        self.give(instruction, &operands).into()
+    }
+
+    /// A product or quotient.
+    fn product(&mut self, instruction: Instruction<'static>, a: Signed, b: Signed) -> Signed {
+        Signed { value: self.give(instruction, &[a.value, b.value]), minus: a.minus != b.minus }
+    }
 }
 
 impl Instructions for Writer<'_> {
-    type Value = Value;
+    type Value = Signed;
     type Turn = Value;
     type Loop = Loop;
 
-    fn constant(&mut self, x: f64) -> Value {
-        self.number.constant(x)
+    fn constant(&mut self, x: f64) -> Signed {
+        self.number.constant(x).into()
     }
 
-    fn load(&mut self, place: Place<Value>) -> Value {
+    fn load(&mut self, place: Place<Value>) -> Signed {
         let (address, offset) = self.place(place);
         let load = match place.array {
             Array::Table(_) => self.number.load_constant(offset),
             _ => self.number.load(offset),
         };
-        self.give(load, &[address])
+        self.give(load, &[address]).into()
     }
 
-    fn store(&mut self, place: Place<Value>, value: Value) {
+    fn store(&mut self, place: Place<Value>, value: Signed) {
+        let value = self.value(value);
         let (address, offset) = self.place(place);
         self.body.none(self.number.store(offset), &[address, value]);
     }
 
-    fn operation(&mut self, operation: Operation<Value>) -> Value {
+    fn operation(&mut self, operation: Operation<Signed>) -> Signed {
         let number = self.number;
         match operation {
-            Operation::Add(a, b) => self.give(number.add(), &[a, b]),
-            Operation::Sub(a, b) => self.give(number.sub(), &[a, b]),
-            Operation::Mul(a, b) => self.give(number.mul(), &[a, b]),
-            Operation::Div(a, b) => self.give(number.div(), &[a, b]),
+            Operation::Add(a, b) => self.sum(a, b),
+            Operation::Sub(a, b) => self.sum(a, Signed { minus: !b.minus, ..b }),
+            Operation::Mul(a, b) => self.product(number.mul(), a, b),
+            Operation::Div(a, b) => self.product(number.div(), a, b),
             Operation::Fma(a, b, c) => {
-                let product = self.give(number.mul(), &[a, b]);
-                self.give(number.add(), &[product, c])
+                let product = self.product(number.mul(), a, b);
+                self.sum(product, c)
             }
-            Operation::Negate(a) => self.give(number.negate(), &[a]),
+            Operation::Negate(a) => Signed { minus: !a.minus, ..a },
             Operation::ReciprocalAbove { value, floor } => {
+                let (value, floor) = (self.value(value), self.value(floor));
                 let reciprocal = self.give(number.div(), &[number.constant(1.0), value]);
                 let (condition, select) = match number.lanes() {
                     1 => (ValType::I32, Instruction::Select),
                     _ => (ValType::V128, Instruction::V128Bitselect),
                 };
                 let below = self.body.one(number.not_above(), &[value, floor], condition);
-                self.give(select, &[number.constant(0.0), reciprocal, below])
+                self.give(select, &[number.constant(0.0), reciprocal, below]).into()
             }
-            Operation::Sqrt(a) => self.give(number.sqrt(), &[a]),
+            Operation::Sqrt(a) => {
+                let a = self.value(a);
+                self.give(number.sqrt(), &[a]).into()
+            }
         }
     }
 
-    fn sines(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
+    fn sines(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
+        let angles: Vec<Value> = angles.iter().map(|angle| self.value(*angle)).collect();
         let number = self.number;
         let vector = Number::vector(number.precision());
         let mut pairs = Vec::new();
         for angles in angles.chunks(vector.lanes() / number.lanes()) {
             if let [angle] = *angles {
-                pairs.push(self.call_sines(number, angle));
+                pairs.push(self.call_sines(number, angle).map(Signed::from));
                 continue;
             }
             let gathered = self.gather(angles);
             let pair = self.call_sines(vector, gathered);
             let lanes = 0..angles.len() as u8;
-            pairs.extend(lanes.map(|lane| pair.map(|x| self.give(vector.extract_lane(lane), &[x]))));
+            pairs.extend(lanes.map(|lane| pair.map(|x| self.give(vector.extract_lane(lane), &[x]).into())));
         }
         pairs
     }
@@ -180,23 +223,25 @@ impl Instructions for Writer<'_> {
         self.close_loop(open, Vec::new());
     }
 
-    fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Value>) -> (Loop, Value, Vec<Value>) {
+    fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Signed>) -> (Loop, Value, Vec<Signed>) {
+        let start: Vec<Value> = start.into_iter().map(|x| self.value(x)).collect();
         let turns = turns as i32;
         let (first, step, end) = if backward { (turns - 1, -1, -1) } else { (0, 1, turns) };
         let carried = self.body.variables(&start, &vec![self.number.ty(); start.len()]);
         let turn = self.body.variables(&[Value::I32(first)], &[ValType::I32])[0];
         self.body.none(Instruction::Loop(BlockType::Empty), &[]);
         self.scaled.clear();
-        (Loop { turn, step, end, carried: carried.clone() }, turn, carried)
+        (Loop { turn, step, end, carried: carried.clone() }, turn, carried.into_iter().map(Signed::from).collect())
     }
 
-    fn close_loop(&mut self, Loop { turn, step, end, carried }: Loop, next: Vec<Value>) -> Vec<Value> {
+    fn close_loop(&mut self, Loop { turn, step, end, carried }: Loop, next: Vec<Signed>) -> Vec<Signed> {
+        let next: Vec<Value> = next.into_iter().map(|x| self.value(x)).collect();
         self.body.assign(&carried, &next);
         let next = self.body.one(Instruction::I32Add, &[turn, Value::I32(step)], ValType::I32);
         self.body.assign(&[turn], &[next]);
         let again = self.body.one(Instruction::I32Ne, &[turn, Value::I32(end)], ValType::I32);
         self.body.none(Instruction::BrIf(0), &[again]);
         self.body.none(Instruction::End, &[]);
-        carried
+        carried.into_iter().map(Signed::from).collect()
     }
 }

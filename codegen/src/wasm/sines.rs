@@ -4,7 +4,7 @@ use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64, TWO_OVER_PI};
 use wasm_encoder::{BlockType, Function, Instruction, MemArg, MemArgTarget, ValType};
 
 use super::body::{Body, Value};
-use super::instructions::{Addresses, SineFunctions, Writer};
+use super::instructions::{Addresses, Signed, SineFunctions, Writer};
 use super::number::Number;
 use crate::lower::{reduced, within_quadrant};
 use crate::options::Precision;
@@ -57,8 +57,9 @@ pub fn function(number: Number, functions: SineFunctions, table: usize) -> Funct
 
 fn main_path(writer: &mut Writer, x: Value) -> [Value; 2] {
     let number = writer.number;
-    let (y, [shifted, _]) = reduced(writer, x, number.precision(), false);
-    let pair = within_quadrant(writer, y, number.precision(), false);
+    let (y, [shifted, _]) = reduced(writer, x.into(), number.precision(), false);
+    let pair = within_quadrant(writer, y, number.precision(), false).map(|x| writer.value(x));
+    let shifted = writer.value(shifted);
     let quadrant = number.to_bits(&mut writer.body, shifted);
     turned(writer, quadrant, pair)
 }
@@ -282,7 +283,8 @@ impl Far<'_, '_> {
         let y = [y0, y1].map(|y| self.signed(y, flip));
         let quadrant = self.shr(high, low_two);
         let quadrant = self.add(quadrant, negative);
-        let pair = within_quadrant(self.writer, y, number.precision(), false);
+        let pair = within_quadrant(self.writer, y.map(Signed::from), number.precision(), false);
+        let pair = pair.map(|x| self.writer.value(x));
         let [sin, cos] = turned(self.writer, quadrant, pair);
         let sin = self.signed(sin, sign);
         // Zero, or NaN where `x` is infinite or NaN.
