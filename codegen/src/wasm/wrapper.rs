@@ -60,21 +60,21 @@ impl<'a> Wrapper<'a> {
                 "rewritten for speed; products and sums are rounded separately, without fused operations"
             }
         };
+        let states = match self.layout.number.lanes() {
+            1 => String::new(),
+            lanes => format!("\nFunctions compute {lanes} states at once: the last index of every array is the state."),
+        };
         let text = format!(
             "
 Arithmetic: {arithmetic}.
 
 The module imports nothing. It exports `{MEMORY}`, which does not grow, and the functions, which have no arguments and
 give nothing back: all arrays are in the memory, the last index fastest, numbers of type {number} with the byte order of
-WebAssembly (little-endian). Functions leave inputs as they are. The memory after these arrays is the functions' own.
+WebAssembly (little-endian). Functions leave inputs as they are. The memory after these arrays is the functions' own.{states}
 
 Byte offset, number of entries, array:"
         );
         self.top.extend(text.lines().map(str::to_string));
-        if let lanes @ 2.. = self.layout.number.lanes() {
-            self.top
-                .insert(1, format!("It computes {lanes} states at once: the last index of every array is the state."));
-        }
         self.top.extend(rows);
     }
 
