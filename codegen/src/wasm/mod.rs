@@ -1,4 +1,20 @@
 //! WebAssembly of the same programs as generated Rust, with a JavaScript wrapper and its types.
+//!
+//! A module imports nothing: sines and cosines of all angles are part of it. Arguments and results are in its memory, at
+//! the places that the wrapper lists in its comment at the top. In exact arithmetic it gives the bits of the interpreter.
+//!
+//! ```
+//! use mbd_codegen::read::{self, ImportOptions};
+//! use mbd_codegen::{wasm, Options};
+//!
+//! let text = include_str!("../../../models/double_pendulum.toml");
+//! let model = read::model("double_pendulum.toml", text, &ImportOptions::default())?.model;
+//! let options = Options { type_name: "DoublePendulum".into(), ..Options::default() };
+//! let code = wasm::generate(&model, &options)?;
+//! assert!(code.module.starts_with(b"\0asm"));
+//! assert!(code.wrapper.contains("export class DoublePendulum"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod body;
 mod instructions;

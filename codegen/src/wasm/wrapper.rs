@@ -93,7 +93,9 @@ Byte offset, number of entries, array:"
 
     /// The comment at the top.
     fn head(&self) -> String {
-        let lines = self.top.iter().map(|line| format!("// {}", line.replace(char::is_control, "?")));
+        // JavaScript ends lines at more characters than Rust.
+        let ends_line = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+        let lines = self.top.iter().map(|line| format!("// {}", line.replace(ends_line, "?")));
         lines.map(|line| line.trim_end().to_string() + "\n").collect()
     }
 
@@ -227,13 +229,12 @@ const LOAD_DOC: [&str; 4] = [
 ];
 
 const LOAD: &str = "export async function load(source) {
-  const { WebAssembly, URL, fetch } = globalThis;
   let given = await source;
-  if (given instanceof WebAssembly.Module) {
-    return new @CLASS@(await WebAssembly.instantiate(given));
+  if (given instanceof globalThis.WebAssembly.Module) {
+    return new @CLASS@(await globalThis.WebAssembly.instantiate(given));
   }
-  if (typeof given === \"string\" || given instanceof URL) {
-    given = await fetch(given);
+  if (typeof given === \"string\" || given instanceof globalThis.URL) {
+    given = await globalThis.fetch(given);
   }
   if (typeof given?.arrayBuffer === \"function\") {
     if (given.ok === false) {
@@ -241,7 +242,7 @@ const LOAD: &str = "export async function load(source) {
     }
     given = await given.arrayBuffer();
   }
-  const { instance } = await WebAssembly.instantiate(given);
+  const { instance } = await globalThis.WebAssembly.instantiate(given);
   return new @CLASS@(instance);
 }
 ";
