@@ -9,6 +9,7 @@
 //! | `std` | yes | generated code uses what the processor turns out to have (AVX2, FMA, AVX-512) |
 //! | `codegen` | no | the module `codegen`: readers, checks and generator as a library, for build scripts and the interpreter |
 //! | `jit` | no | `codegen::jit`: machine code made at run time of models that are known at run time only |
+//! | `wasm` | no | `codegen::wasm`: WebAssembly with a JavaScript wrapper |
 //! | `rayon` | no | batches of states on several threads |
 //! | `diffsol` | no | the module `diffsol`: the stiff methods of the crate of that name |
 

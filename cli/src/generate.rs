@@ -1,24 +1,89 @@
 //! `mbd generate`.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use multibody::codegen::{self, GenerateError, Options};
+use multibody::codegen::model::Model;
+use multibody::codegen::{self, c, wasm, GenerateError, Options};
 
-use super::args::GenerateArgs;
-use super::output::write_file;
+use super::args::{GenerateArgs, Language};
+#[cfg(feature = "fmu")]
+use super::fmu;
+use super::output::{write_file, write_files};
 use super::{source, Failure, Outcome};
 
-/// Runs `mbd generate`: prints the code or writes it to a file.
+/// Runs `mbd generate`: prints the code or writes it to files.
 pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
+    #[cfg(feature = "fmu")]
+    if args.lang == Language::Fmu {
+        return fmu::run(args);
+    }
+    // Wrong names of files are reported before anything is computed.
+    let file = args.output.as_deref();
+    let c_files = (args.lang == Language::C).then(|| c_files(file)).transpose()?;
+    let webassembly = matches!(args.lang, Language::Wasm | Language::WasmLanes);
+    let module = webassembly.then(|| module_file(file)).transpose()?;
     let model = source::model_of(&args.model)?;
-    let base = Options { runtime: args.runtime.clone(), source: shown(path), ..args.code.options(&model.name) };
+    let base = options(args, &model);
+    if let Some(CFiles { source: file, header, name }) = c_files {
+        let generated = c::generate(&model, &base, &name).map_err(failure)?;
+        source::tell_notices(path, &generated.notices);
+        return write_files(&[(&file, &generated.source), (&header, &generated.header)]);
+    }
+    if let Some(module) = module {
+        let generate = if args.lang == Language::WasmLanes { wasm::generate_lanes } else { wasm::generate };
+        let generated = generate(&model, &base).map_err(failure)?;
+        source::tell_notices(path, &generated.notices);
+        let (wrapper, types) = (module.with_extension("js"), module.with_extension("d.ts"));
+        return write_files(&[
+            (module, &generated.module[..]),
+            (&wrapper, generated.wrapper.as_bytes()),
+            (&types, generated.types.as_bytes()),
+        ]);
+    }
     let generated = codegen::generate(&model, &base).map_err(failure)?;
     source::tell_notices(path, &generated.notices);
-    match &args.output {
+    match file {
         Some(file) => write_file(file, &generated.source),
         None => Ok(out.write_all(generated.source.as_bytes())?),
+    }
+}
+
+/// Options of the generator.
+pub fn options(args: &GenerateArgs, model: &Model) -> Options {
+    let source = shown(&args.model.model);
+    Options { runtime: args.runtime.clone(), source, ..args.code.options(&model.name) }
+}
+
+/// The two files of C.
+struct CFiles {
+    source: PathBuf,
+    header: PathBuf,
+    /// What both are called.
+    name: String,
+}
+
+fn c_files(output: Option<&Path>) -> Outcome<CFiles> {
+    let help = "name the source, as in -o robot.c; robot.h is written beside it";
+    let Some(source) = output else { return Err(Failure::new("C is written to two files", help)) };
+    let name = source.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-.+ ".contains(c));
+    if source.extension().is_none_or(|extension| extension != "c") || !plain {
+        let what = format!("`{}` is no name of a C source with letters, digits, `_` and `-`", source.display());
+        return Err(Failure::new(what, help));
+    }
+    Ok(CFiles { source: source.to_path_buf(), header: source.with_extension("h"), name })
+}
+
+/// The file of a WebAssembly module, which stands beside its wrapper.
+fn module_file(file: Option<&Path>) -> Outcome<&Path> {
+    match file {
+        Some(file) if file.extension().is_some_and(|extension| extension == "wasm") => Ok(file),
+        _ => Err(Failure::new(
+            "WebAssembly needs the name of a file that ends with `.wasm`",
+            "`-o robot.wasm` writes robot.wasm, robot.js and robot.d.ts",
+        )),
     }
 }
 

@@ -12,6 +12,8 @@ mod displacement;
 mod energy;
 mod eval;
 mod explain;
+#[cfg(feature = "fmu")]
+mod fmu;
 mod generate;
 mod identifiable;
 mod loops;

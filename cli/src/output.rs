@@ -38,7 +38,7 @@ pub fn write_file(path: &Path, content: &str) -> Outcome {
 }
 
 /// Writes several files that belong together: none is replaced before all have been written.
-pub fn write_files(files: &[(&Path, &str)]) -> Outcome {
+pub fn write_files<C: AsRef<[u8]>>(files: &[(&Path, C)]) -> Outcome {
     let mut written: Vec<(PathBuf, PathBuf, &Path)> = Vec::new();
     let result = files.iter().try_for_each(|(path, content)| {
         writable(path)?;

@@ -1,5 +1,6 @@
 //! Reads, checks and compiles descriptions of mechanisms into straight-line Rust.
 
+pub mod c;
 mod check;
 mod choice;
 pub mod code;
@@ -11,7 +12,6 @@ pub mod identifiable;
 mod import;
 #[cfg(feature = "jit")]
 pub mod jit;
-#[cfg(feature = "jit")]
 mod lower;
 pub mod model;
 mod names;
@@ -25,6 +25,8 @@ mod sample;
 pub mod search;
 pub mod symbolic;
 mod trace;
+#[cfg(feature = "wasm")]
+pub mod wasm;
 
 /// Texts of messages, for the command and the macro.
 #[doc(hidden)]

@@ -13,6 +13,16 @@ choice! {
     }
 }
 
+impl Precision {
+    /// Size of a number, bytes.
+    pub fn bytes(self) -> usize {
+        match self {
+            Precision::F64 => 8,
+            Precision::F32 => 4,
+        }
+    }
+}
+
 choice! {
     /// Arithmetic of the generated code.
     pub enum Arithmetic {

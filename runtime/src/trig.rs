@@ -45,7 +45,7 @@ pub const LIMIT_F32: f32 = 1600.0;
 const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
 /// 2/π as a binary fraction after 64 zero bits, with enough bits for the largest `f64`.
-const TWO_OVER_PI: [u32; 40] = [
+pub const TWO_OVER_PI: [u32; 40] = [
     0x00000000, 0x00000000, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab,
     0xdebbc561, 0xb7246e3a, 0x424dd2e0, 0x06492eea, 0x09d1921c, 0xfe1deb1c, 0xb129a73e, 0xe88235f5, 0x2ebb4484,
     0xe99c7026, 0xb45f7e41, 0x3991d639, 0x835339f4, 0x9c845f8b, 0xbdf9283b, 0x1ff897ff, 0xde05980f, 0xef2f118b,
@@ -84,7 +84,9 @@ macro_rules! sincos {
         $(#[$pair_doc:meta])* pair $pair:ident;
         $(#[$pairs_doc:meta])* pairs $pairs:ident;
         $(#[$path_doc:meta])* path $path:ident;
-        parts $fast:ident, $kernel:ident, $slow:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
+        $(#[$reduced_doc:meta])* reduced $reduced:ident;
+        $(#[$kernel_doc:meta])* kernel $kernel:ident;
+        parts $fast:ident, $slow:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
     ) => {
         $(#[$doc])*
         #[inline]
@@ -250,6 +252,13 @@ macro_rules! sincos {
         $(#[$path_doc])*
         #[inline(always)]
         pub fn $path<N: Number<$float>>(x: N) -> (N, N) {
+            let (y0, y1, quadrant) = $reduced(x);
+            $kernel(y0, y1, quadrant)
+        }
+
+        $(#[$reduced_doc])*
+        #[inline(always)]
+        pub fn $reduced<N: Number<$float>>(x: N) -> (N, N, N::Quadrant) {
             let constant = |c: $float| x.constant(c);
             let magic = constant($magic);
             let shifted = x.fma(constant($inv), magic);
@@ -262,7 +271,7 @@ macro_rules! sincos {
                 let w = n * constant($f2);
                 let b = a - w;
                 let lost = (a - b) - w;
-                return $kernel(b, (-n).fma(constant($f3), lost), quadrant);
+                return (b, (-n).fma(constant($f3), lost), quadrant);
             }
             // The product is exact; so is the difference, by Sterbenz's lemma.
             let a = x - n * constant($p1);
@@ -274,13 +283,12 @@ macro_rules! sincos {
             let v = n * constant($p3);
             let c = b - v;
             let lost_c = (b - c) - v;
-            $kernel(c, (lost_b + lost_c) - n * constant($p4), quadrant)
+            (c, (lost_b + lost_c) - n * constant($p4), quadrant)
         }
 
-        /// sin and cos of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4. `y1` is at most some ulps of
-        /// `y0`, except where both are tiny.
+        $(#[$kernel_doc])*
         #[inline(always)]
-        fn $kernel<N: Number<$float>>(y0: N, y1: N, quadrant: N::Quadrant) -> (N, N) {
+        pub fn $kernel<N: Number<$float>>(y0: N, y1: N, quadrant: N::Quadrant) -> (N, N) {
             let constant = |c: $float| y0.constant(c);
             let z = y0 * y0;
             let half = constant(0.5) * z;
@@ -373,7 +381,12 @@ sincos! {
     pairs pairs_f64;
     /// The main path on numbers of any kind, for |x| up to [`LIMIT_F64`]: the sine and cosine of `x`, rad.
     path path_f64;
-    parts fast_f64, kernel_f64, slow_f64, large_f64, repair_f64, block_f64, flat_f64
+    /// The first part of [`path_f64`]: `y0`, `y1` and the quadrant, with `x = y0 + y1 + quadrant · π/2`.
+    reduced reduced_f64;
+    /// The second part of [`path_f64`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
+    /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
+    kernel kernel_f64;
+    parts fast_f64, slow_f64, large_f64, repair_f64, block_f64, flat_f64
 }
 
 sincos! {
@@ -399,7 +412,12 @@ sincos! {
     pairs pairs_f32;
     /// The main path on numbers of any kind, for |x| up to [`LIMIT_F32`]: the sine and cosine of `x`, rad.
     path path_f32;
-    parts fast_f32, kernel_f32, slow_f32, large_f32, repair_f32, block_f32, flat_f32
+    /// The first part of [`path_f32`]: `y0`, `y1` and the quadrant, with `x = y0 + y1 + quadrant · π/2`.
+    reduced reduced_f32;
+    /// The second part of [`path_f32`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
+    /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
+    kernel kernel_f32;
+    parts fast_f32, slow_f32, large_f32, repair_f32, block_f32, flat_f32
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ const EXAMPLES: &str = "Examples:
   mbd check robot.urdf                                is the file sound, and what is in it?
   mbd count robot.urdf --base floating                what does each sweep cost?
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
+  mbd generate robot.urdf --lang c -o robot.c         the same in C99, with robot.h
   mbd simulate models/double_pendulum.toml            ten seconds, as CSV and as a picture
   mbd eval robot.urdf --input states.json             numbers out, to compare with other programs
   mbd certify robot.urdf --box states.json            guaranteed bounds over a box of states
@@ -57,7 +58,7 @@ pub enum Command {
     Check(CheckArgs),
     /// Count the operations of every output, sweep by sweep
     Count(CountArgs),
-    /// Generate Rust code
+    /// Generate Rust, C or WebAssembly
     Generate(GenerateArgs),
     /// Evaluate states from a JSON file with the interpreter
     Eval(EvalArgs),
@@ -220,11 +221,31 @@ pub struct CountArgs {
     pub json: bool,
 }
 
+/// Language of generated code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Language {
+    /// Rust, in one file
+    Rust,
+    /// C99: a source, and a header of the same name beside it
+    C,
+    /// The same as a unit for model exchange (FMI 2.0), an `.fmu`
+    #[cfg(feature = "fmu")]
+    Fmu,
+    /// WebAssembly, a module; beside it a JavaScript wrapper and its types
+    Wasm,
+    /// The same for several states at once: two in double precision, four in single precision
+    WasmLanes,
+}
+
 /// `mbd generate`.
 #[derive(Args)]
 #[command(
-    after_help = "The code depends on the runtime alone: no allocation, no std. Its header lists the order of the state and the operations
-of each function. The same model and options give the same bytes everywhere.
+    after_help = "Rust depends on the runtime alone: no allocation, no std. C depends on nothing: `-o robot.c` writes robot.c and robot.h.
+A unit for model exchange has rates, velocities and energies in doubles, its sources, and a shared library where a C compiler is found
+(docs/c.md). The comment at the top lists the order of the state and the operations of each function. The same model and options give the same bytes everywhere.
+
+WebAssembly is written to three files: `-o robot.wasm` also writes robot.js, a wrapper, and robot.d.ts, its types.
+docs/webassembly.md shows how to use them.
 
 In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
 file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."
@@ -234,10 +255,13 @@ pub struct GenerateArgs {
     pub model: ModelArgs,
     #[command(flatten)]
     pub code: CodeArgs,
-    /// Path of the runtime in the generated code
+    /// Language of the code
+    #[arg(long, value_enum, default_value_t = Language::Rust)]
+    pub lang: Language,
+    /// Path of the runtime in generated Rust
     #[arg(long, value_name = "PATH", default_value = DEFAULT_RUNTIME, value_parser = rust_path)]
     pub runtime: String,
-    /// File to write in place of standard output
+    /// File to write in place of standard output; needed for WebAssembly
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }

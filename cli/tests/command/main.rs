@@ -1,5 +1,6 @@
 //! Tests of the command `mbd`, run as a program.
 
+mod c;
 mod certify;
 mod commands;
 mod documented;
@@ -7,3 +8,4 @@ mod eval;
 mod loops;
 mod run;
 mod trust;
+mod webassembly;

@@ -1,4 +1,4 @@
-//! Constants of the generated type: dimensions, names, indices.
+//! Constants of a generated type: dimensions, names, indices.
 
 use std::fmt::Write;
 
@@ -7,110 +7,141 @@ use mbd_runtime::tree::Source;
 
 use super::names::constant;
 use super::numbers::literal;
+use super::Input;
 use crate::options::Options;
 use crate::output::Output;
-use crate::plan::Plan;
 
-/// Writer of constants.
-struct Constants<'a> {
-    out: &'a mut String,
+/// A constant.
+pub struct Constant {
+    /// One line of documentation.
+    pub doc: String,
+    /// Its name in upper case.
+    pub name: String,
+    /// Its value.
+    pub value: Content,
 }
 
-impl Constants<'_> {
-    fn one(&mut self, doc: &str, name: &str, ty: &str, value: &str) {
-        let _ = writeln!(self.out, "    /// {doc}\n    pub const {name}: {ty} = {value};");
+/// The value of a constant.
+pub enum Content {
+    /// A number or an index.
+    Number(usize),
+    /// Numbers or indices.
+    Numbers(Vec<usize>),
+    /// Names of the model.
+    Names(Vec<String>),
+    /// Numbers of the chosen precision.
+    Floats(Vec<f64>),
+    /// Yes or no for each of several things.
+    Flags(Vec<bool>),
+    /// Rows of constraints.
+    Rows(Vec<Row>),
+}
+
+impl Constant {
+    fn new(doc: &str, name: &str, value: Content) -> Constant {
+        Constant { doc: doc.to_string(), name: name.to_string(), value }
     }
 
-    fn list(&mut self, doc: &str, name: &str, ty: &str, values: &[String]) {
-        self.one(doc, name, &format!("[{ty}; {}]", values.len()), &format!("[{}]", values.join(", ")));
-    }
-
-    fn index(&mut self, prefix: &str, what: &str, name: &str, at: usize) {
+    fn index(prefix: &str, what: &str, name: &str, at: usize) -> Constant {
         let doc = format!("Index of {what} `{name}`.");
-        self.one(&doc, &format!("{prefix}_{}", constant(name)), "usize", &at.to_string());
+        Constant { doc, name: format!("{prefix}_{}", constant(name)), value: Content::Number(at) }
     }
 }
 
-/// Dimensions, names, indices; `frames` are those that were chosen.
-pub fn constants(out: &mut String, plan: &Plan, options: &Options, frames: &[usize]) {
-    let mut constants = Constants { out };
-    let quoted = |names: Vec<String>| names.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>();
-    constants.one("Number of coordinates.", "NQ", "usize", &plan.dims.nq.to_string());
-    constants.one("Number of velocities, momenta, joint forces.", "NV", "usize", &plan.dims.nv.to_string());
-    let (q, v) = (quoted(plan.coordinate_names()), quoted(plan.velocity_names()));
-    constants.list("Names of the coordinates, in the order of `q`.", "COORDINATES", "&'static str", &q);
-    constants.list("Names of the velocities, in the order of `v`, `p`, `tau`.", "VELOCITIES", "&'static str", &v);
+/// Dimensions, names, indices.
+pub fn constants(input: &Input) -> Vec<Constant> {
+    let plan = input.plan;
+    let mut constants = vec![
+        Constant::new("Number of coordinates.", "NQ", Content::Number(plan.dims.nq)),
+        Constant::new("Number of velocities, momenta, joint forces.", "NV", Content::Number(plan.dims.nv)),
+    ];
+    let (q, v) = (Content::Names(plan.coordinate_names()), Content::Names(plan.velocity_names()));
+    constants.push(Constant::new("Names of the coordinates, in the order of `q`.", "COORDINATES", q));
+    constants.push(Constant::new("Names of the velocities, in the order of `v`, `p`, `tau`.", "VELOCITIES", v));
     if !plan.model.starts.is_empty() {
-        let start: Vec<String> = plan.start().iter().map(|x| literal(*x, options.precision)).collect();
-        constants.list("Coordinates that the model starts with.", "START", options.precision.name(), &start);
-        let held: Vec<String> = plan.held().iter().map(|held| held.to_string()).collect();
+        let start = Content::Floats(plan.start().to_vec());
+        constants.push(Constant::new("Coordinates that the model starts with.", "START", start));
         let doc = "Velocities of joints that stay where they start when loops are closed.";
-        constants.list(doc, "HELD", "bool", &held);
+        constants.push(Constant::new(doc, "HELD", Content::Flags(plan.held().to_vec())));
     }
     let rows = plan.rows();
     if !rows.is_empty() {
-        row_constants(&mut constants, plan, options, &rows);
+        let columns = plan.entry_columns();
+        constants.push(Constant::new("Number of rows of the constraints.", "ROWS", Content::Number(rows.len())));
+        let doc = "Number of entries of `Φ` that can be other than zero.";
+        constants.push(Constant::new(doc, "ENTRIES", Content::Number(columns.len())));
+        constants.push(Constant::new("Rows of the constraints.", "CONSTRAINT_ROWS", Content::Rows(rows)));
+        let columns = Content::Numbers(columns);
+        constants.push(Constant::new("Velocity index of each entry of `Φ`.", "ENTRY_COLUMNS", columns));
     }
-    indices(&mut constants, plan, options, frames);
+    constants.extend(indices(input));
+    constants
 }
 
-/// Rows of the constraints, and the places of their entries.
-fn row_constants(constants: &mut Constants, plan: &Plan, options: &Options, rows: &[Row]) {
-    let (rt, columns) = (&options.runtime, plan.entry_columns());
-    constants.one("Number of rows of the constraints.", "ROWS", "usize", &rows.len().to_string());
-    let doc = "Number of entries of `Φ` that can be other than zero.";
-    constants.one(doc, "ENTRIES", "usize", &columns.len().to_string());
-    let each = rows.iter().map(|Row { constraint, holonomic, first, len }| {
-        format!("{rt}::system::Row {{ constraint: {constraint}, holonomic: {holonomic}, first: {first}, len: {len} }}")
-    });
-    let each: Vec<String> = each.collect();
-    constants.list("Rows of the constraints.", "CONSTRAINT_ROWS", &format!("{rt}::system::Row"), &each);
-    let columns: Vec<String> = columns.iter().map(|column| column.to_string()).collect();
-    constants.list("Velocity index of each entry of `Φ`.", "ENTRY_COLUMNS", "usize", &columns);
-}
-
-fn indices(constants: &mut Constants, plan: &Plan, options: &Options, frames: &[usize]) {
+fn indices(Input { plan, options, frames, .. }: &Input) -> Vec<Constant> {
+    let mut constants = Vec::new();
     for slot in &plan.slots {
         let name = &plan.model.joints[slot.joint].name;
         match slot.at {
             Some(Source::State { q, v }) => {
-                constants.index("Q", "the first coordinate of joint", name, q);
-                constants.index("V", "the first velocity of joint", name, v);
+                constants.push(Constant::index("Q", "the first coordinate of joint", name, q));
+                constants.push(Constant::index("V", "the first velocity of joint", name, v));
             }
             Some(Source::Drive { q, v }) => {
-                constants.index("DRIVE_Q", "the first prescribed position of joint", name, q);
-                constants.index("DRIVE_V", "the first prescribed rate of joint", name, v);
+                constants.push(Constant::index("DRIVE_Q", "the first prescribed position of joint", name, q));
+                constants.push(Constant::index("DRIVE_V", "the first prescribed rate of joint", name, v));
             }
             None => {}
         }
     }
     for constraint in &plan.constraints {
-        constants.index("ROW", "the first row of constraint", &constraint.name, constraint.first);
+        constants.push(Constant::index("ROW", "the first row of constraint", &constraint.name, constraint.first));
     }
     for (k, wrench) in plan.model.wrenches.iter().enumerate() {
-        constants.index("WRENCH", "external wrench", &wrench.name, k);
+        constants.push(Constant::index("WRENCH", "external wrench", &wrench.name, k));
     }
     for (k, param) in plan.model.params.iter().enumerate() {
-        constants.index("PARAM", "parameter", &param.name, k);
+        constants.push(Constant::index("PARAM", "parameter", &param.name, k));
     }
     if options.outputs.iter().any(|output| output.spec().of_frames()) {
         for (k, &frame) in frames.iter().enumerate() {
-            constants.index("FRAME", "frame", &plan.frames[frame].name, k);
+            constants.push(Constant::index("FRAME", "frame", &plan.frames[frame].name, k));
         }
     }
     if options.outputs.contains(&Output::Regressor) {
-        let names: Vec<String> = plan.parameter_names().iter().map(|n| format!("{n:?}")).collect();
-        constants.list(
-            "Names of the parameters, in the order of the columns of `y`.",
-            "REGRESSOR",
-            "&'static str",
-            &names,
-        );
+        let doc = "Names of the parameters, in the order of the columns of `y`.";
+        constants.push(Constant::new(doc, "REGRESSOR", Content::Names(plan.parameter_names())));
     }
     if options.outputs.contains(&Output::Reactions) {
         for (k, &node) in plan.joint_nodes.iter().enumerate() {
             let joint = plan.nodes[node].joint.0;
-            constants.index("REACTION", "the reaction of joint", &plan.model.joints[joint].name, k);
+            let name = &plan.model.joints[joint].name;
+            constants.push(Constant::index("REACTION", "the reaction of joint", name, k));
         }
     }
+    constants
+}
+
+/// The constants as Rust.
+pub fn write(out: &mut String, constants: &[Constant], options: &Options) {
+    let (rt, precision) = (&options.runtime, options.precision);
+    let list =
+        |ty: &str, values: Vec<String>| (format!("[{ty}; {}]", values.len()), format!("[{}]", values.join(", ")));
+    for Constant { doc, name, value } in constants {
+        let (ty, value) = match value {
+            Content::Number(n) => ("usize".to_string(), n.to_string()),
+            Content::Numbers(all) => list("usize", all.iter().map(usize::to_string).collect()),
+            Content::Names(all) => list("&'static str", all.iter().map(|name| format!("{name:?}")).collect()),
+            Content::Floats(all) => list(precision.name(), all.iter().map(|x| literal(*x, precision)).collect()),
+            Content::Flags(all) => list("bool", all.iter().map(bool::to_string).collect()),
+            Content::Rows(all) => {
+                list(&format!("{rt}::system::Row"), all.iter().map(|row| row_literal(row, rt)).collect())
+            }
+        };
+        let _ = writeln!(out, "    /// {doc}\n    pub const {name}: {ty} = {value};");
+    }
+}
+
+fn row_literal(Row { constraint, holonomic, first, len }: &Row, rt: &str) -> String {
+    format!("{rt}::system::Row {{ constraint: {constraint}, holonomic: {holonomic}, first: {first}, len: {len} }}")
 }

@@ -15,9 +15,17 @@ pub struct Field {
     pub name: &'static str,
     /// Lengths, the outermost first.
     pub dims: Vec<usize>,
-    /// Initial value in the constructor.
-    value: String,
-    doc: &'static str,
+    /// Initial value in the constructor where it is not zero.
+    pub value: Option<Vec<f64>>,
+    /// What it is.
+    pub doc: &'static str,
+}
+
+impl Field {
+    /// Initial value as an array literal.
+    fn literal(&self) -> String {
+        self.value.as_ref().map_or_else(|| nested(&self.dims, "0.0"), |value| format!("{value:?}"))
+    }
 }
 
 /// The fields of a type.
@@ -26,26 +34,20 @@ pub fn fields(plan: &Plan, sizes: &Sizes) -> Vec<Field> {
     let field = present.map(|field| {
         let (name, dims) = (field.array.name, field.array.lengths(sizes));
         let value = match name {
-            "drive_q" => neutral(plan, true),
-            "params" => format!("{:?}", plan.default_params()),
-            "gravity" => "[0.0, 0.0, -9.81]".to_string(),
-            _ => nested(&dims, "0.0"),
+            "drive_q" => Some(neutral(plan, true)),
+            "params" => Some(plan.default_params()),
+            "gravity" => Some(vec![0.0, 0.0, -9.81]),
+            _ => None,
         };
         Field { name, dims, value, doc: field.doc }
     });
     field.collect()
 }
 
-/// The neutral configuration as an array literal, of the state or of the drives.
-pub fn neutral(plan: &Plan, drives: bool) -> String {
+/// The neutral configuration, of the state or of the drives.
+pub fn neutral(plan: &Plan, drives: bool) -> Vec<f64> {
     let parts = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })) == drives && s.at.is_some());
-    let numbers: Vec<&str> = parts
-        .flat_map(|s| {
-            let neutral = plan.model.joints[s.joint].kind.spec().neutral();
-            neutral.into_iter().map(|x| if x == 0.0 { "0.0" } else { "1.0" })
-        })
-        .collect();
-    format!("[{}]", numbers.join(", "))
+    parts.flat_map(|s| plan.model.joints[s.joint].kind.spec().neutral()).collect()
 }
 
 /// The type with its fields, whose entries have type `entry`.
@@ -59,7 +61,7 @@ pub fn type_definition(out: &mut String, ty: &str, fields: &[Field], entry: &str
 
 /// The constructor.
 pub fn constructor(out: &mut String, options: &Options, fields: &[Field]) {
-    let values: Vec<String> = fields.iter().map(|field| format!("{}: {}", field.name, field.value)).collect();
+    let values: Vec<String> = fields.iter().map(|field| format!("{}: {}", field.name, field.literal())).collect();
     let _ = writeln!(
         out,
         "

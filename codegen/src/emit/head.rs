@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::numbers::{literal, minus, signed};
 use super::signature::{nested, Port, Signature};
 use crate::options::{Arithmetic, Options};
-use crate::output::InputArray;
+use crate::output::{locate, InputArray};
 use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
 
 /// Largest number of statements of a function that is inlined, so that small kernels become part of the caller's loop.
@@ -134,17 +134,6 @@ impl Head<'_> {
             ProgramResult::Node(id, neg) => format!("{}{}", minus(*neg), names[id]),
         }
     }
-}
-
-/// The array of an input, and its index there.
-pub fn locate(inputs: &[InputArray], mut k: usize) -> (&InputArray, usize) {
-    for array in inputs {
-        if k < array.len() {
-            return (array, k);
-        }
-        k -= array.len();
-    }
-    unreachable!("inputs are numbered through their arrays")
 }
 
 /// A tuple of any length.

@@ -1,12 +1,12 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
-mod constants;
-mod fields;
-mod head;
-mod header;
+pub(crate) mod constants;
+pub(crate) mod fields;
+pub(crate) mod head;
+pub(crate) mod header;
 mod lanes;
 pub(crate) mod names;
-mod numbers;
+pub(crate) mod numbers;
 mod rolled;
 mod signature;
 mod straight;
@@ -42,7 +42,10 @@ pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates:
     let mut out = String::new();
     let rates = options.outputs.contains(&Output::Rates);
     let fields = fields::fields(plan, &input.sizes);
-    header::header(&mut out, plan, options, programs);
+    for line in header::lines(plan, options, programs) {
+        let _ = writeln!(out, "{}", format!("// {line}").trim_end());
+    }
+    out.push('\n');
     let outputs: Vec<&str> = programs.iter().map(|p| p.spec.name).collect();
     let _ = writeln!(
         out,
@@ -56,7 +59,7 @@ pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates:
         "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {} {{",
         options.type_name
     );
-    constants::constants(&mut out, plan, options, input.frames);
+    constants::write(&mut out, &constants::constants(input), options);
     fields::constructor(&mut out, options, &fields);
     let functions: Vec<_> = programs.iter().chain(rates.then_some(coordinate_rates)).collect();
     let signatures: Vec<Signature> = functions.iter().map(|p| Signature::new(p.spec, &input.sizes)).collect();

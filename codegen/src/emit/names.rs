@@ -6,7 +6,9 @@ use mbd_runtime::sweep::Quantity;
 
 pub use crate::names::identifier;
 
+use crate::output::{locate, InputArray};
 use crate::plan::Plan;
+use crate::rolled::{Block, Place, RolledProgram};
 use crate::symbolic::{Entry, Label, Name, Op, Program};
 
 /// A name as an identifier in upper case, for constants.
@@ -63,10 +65,47 @@ pub struct Names {
 }
 
 impl Names {
+    /// Names that differ from some others.
+    pub fn besides(others: impl IntoIterator<Item = String>) -> Names {
+        Names { taken: others.into_iter().collect(), ..Names::default() }
+    }
+
+    /// Names of straight-line code.
+    pub fn straight(self, plan: &Plan, program: &Program, inputs: &[InputArray]) -> BTreeMap<u32, String> {
+        let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
+        let body = |node: Option<usize>| node.map_or("ground", |i| bodies[i].as_str()).to_string();
+        self.of(program, body, |k| input(inputs, k))
+    }
+
+    /// Names of a block of rolled code; in loops they contain the place of the link in its iteration.
+    pub fn block(
+        self,
+        plan: &Plan,
+        program: &RolledProgram,
+        block: &Block,
+        inputs: &[InputArray],
+    ) -> BTreeMap<u32, String> {
+        let body = |node: Option<usize>| match (node, &block.repeat) {
+            (None, _) => "ground".to_string(),
+            (Some(i), None) => identifier(&plan.nodes[i].name),
+            (Some(0), Some(_)) => "inner".to_string(),
+            (Some(_), Some(r)) if program.loops[r.run].period == 1 => "link".to_string(),
+            (Some(i), Some(_)) => format!("link{i}"),
+        };
+        let source = |k: usize| match block.inputs[k] {
+            Place::Given(k) | Place::GivenOfTurn { first: k, .. } => input(inputs, k),
+            Place::Kept(slot) => format!("kept_{slot}"),
+            Place::Column(column) => format!("table_{column}"),
+            Place::Row(row) => format!("row_{row}"),
+            Place::Carried(k) => format!("carried_{k}"),
+        };
+        self.of(&block.program, body, source)
+    }
+
     /// Names of a program's values, all different. A value that the sweeps have named is named after its body, its
     /// letter and its component, `link5_m_xx`, further ones of that name `link5_m_xx_2`; sums and products on the way
     /// to such values are numbered, `link5_t0`. `body` is the name of a body, `input` that of an input.
-    pub fn of(
+    fn of(
         mut self,
         program: &Program,
         body: impl Fn(Option<usize>) -> String,
@@ -109,4 +148,10 @@ impl Names {
             }
         }
     }
+}
+
+/// Name of an input: its array and its index there.
+fn input(inputs: &[InputArray], k: usize) -> String {
+    let (array, k) = locate(inputs, k);
+    format!("{}_{k}", array.name)
 }

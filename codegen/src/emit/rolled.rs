@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::head::{locate, Head};
-use super::names::{heading, identifier, Names};
+use super::head::Head;
+use super::names::{heading, Names};
 use super::numbers::{minus, signed};
 use crate::options::Precision;
 use crate::plan::Plan;
@@ -146,7 +146,7 @@ impl<'a> RolledWriter<'a> {
     /// Sines and cosines of all iterations together.
     fn sines(&self, out: &mut String, block: &Block, repeat: &Repeat) {
         let (run, turns) = (repeat.run, self.program.loops[repeat.run].table.len());
-        let names = self.names(block);
+        let names = Names::default().block(self.plan, self.program, block, self.head.inputs);
         let angles = pairs(&block.program);
         for k in 0..angles.len() {
             let _ = writeln!(out, "            let mut angles{k} = {};", self.head.rows(turns));
@@ -184,7 +184,7 @@ impl<'a> RolledWriter<'a> {
     /// Statements and results, in a loop those of one iteration. Results are first collected in an array, as in
     /// straight-line code.
     fn body(&self, out: &mut String, block: &Block, indent: &str) {
-        let names = self.names(block);
+        let names = Names::default().block(self.plan, self.program, block, self.head.inputs);
         let n = block.outputs.len();
         if n > 0 {
             let _ = writeln!(out, "{indent}let mut results = {};", self.head.rows(n));
@@ -227,28 +227,6 @@ impl<'a> RolledWriter<'a> {
             };
             let _ = writeln!(out, "{indent}{text}");
         }
-    }
-
-    /// Names of a block's values; in loops they contain the place of the link in its iteration.
-    fn names(&self, block: &Block) -> BTreeMap<u32, String> {
-        let body = |node: Option<usize>| match (node, &block.repeat) {
-            (None, _) => "ground".to_string(),
-            (Some(i), None) => identifier(&self.plan.nodes[i].name),
-            (Some(0), Some(_)) => "inner".to_string(),
-            (Some(_), Some(r)) if self.program.loops[r.run].period == 1 => "link".to_string(),
-            (Some(i), Some(_)) => format!("link{i}"),
-        };
-        let input = |k: usize| match block.inputs[k] {
-            Place::Given(k) | Place::GivenOfTurn { first: k, .. } => {
-                let (array, k) = locate(self.head.inputs, k);
-                format!("{}_{k}", array.name)
-            }
-            Place::Kept(slot) => format!("kept_{slot}"),
-            Place::Column(column) => format!("table_{column}"),
-            Place::Row(row) => format!("row_{row}"),
-            Place::Carried(k) => format!("carried_{k}"),
-        };
-        Names::default().of(&block.program, body, input)
     }
 
     fn value(&self, block: &Block, op: &Op, names: &BTreeMap<u32, String>) -> String {

@@ -8,8 +8,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use super::head::{locate, Head};
-use super::names::{heading, identifier, Names};
+use super::head::Head;
+use super::names::{heading, Names};
 use crate::plan::Plan;
 use crate::symbolic::angles::{nodes, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
@@ -36,13 +36,7 @@ struct Statement {
 impl<'a> Straight<'a> {
     /// Names every value after its body, quantity and component.
     pub fn new(plan: &'a Plan, program: &'a Program, head: Head<'a>) -> Self {
-        let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
-        let body = |node: Option<usize>| node.map_or("ground", |i| bodies[i].as_str()).to_string();
-        let input = |k: usize| {
-            let (array, k) = locate(head.inputs, k);
-            format!("{}_{k}", array.name)
-        };
-        let names = Names::default().of(program, body, input);
+        let names = Names::default().straight(plan, program, head.inputs);
         Straight { plan, head, program, names, angles: Angles::new(program) }
     }
 

@@ -83,7 +83,7 @@ impl Writer<'_> {
             alias("Scalar", t),
             alias("Coordinates", q),
             alias("Momenta", v),
-            method(&format!("neutral(&self) -> {q}"), &neutral(plan, false)),
+            method(&format!("neutral(&self) -> {q}"), &format!("{:?}", neutral(plan, false))),
             method(&format!("zero_momenta(&self) -> {v}"), &format!("[0.0; {}]", plan.dims.nv)),
             method(&format!("lie_joints(&self) -> &[{rt}::system::LieJoint]"), &format!("const {{ &[{joints}] }}")),
             method(

@@ -17,7 +17,9 @@ use crate::symbolic::Label;
 
 pub use memory::Memory;
 pub use registers::Spills;
+#[cfg(feature = "jit")]
 pub use sines::main_path;
+pub use sines::{reduced, within_quadrant};
 use straight::Lowering;
 
 /// An array that a function reads or writes.

@@ -3,20 +3,20 @@
 use std::cell::RefCell;
 use std::ops::{Add, Mul, Neg, Sub};
 
-use mbd_runtime::trig::{path_f32, path_f64, Number};
+use mbd_runtime::trig::{kernel_f32, kernel_f64, reduced_f32, reduced_f64, Number};
 
 use super::{Instructions, Operation};
 use crate::options::Precision;
 
-/// One instruction; its operands are numbers of instructions before it, of which the first is the angle.
+/// One instruction; its operands are numbers of instructions before it, of which the first are the inputs.
 type Step = Result<Operation<usize>, f64>;
 
-/// The instructions of the main path.
+/// Instructions that compute a part of the main path.
 struct Recording {
-    /// Instructions after the angle, constants as `Err`.
+    /// Number of inputs.
+    inputs: usize,
+    /// Instructions after the inputs, constants as `Err`.
     steps: Vec<Step>,
-    /// The number that holds the quadrant in its last bits, and the whole number of quarter turns.
-    quadrant: [usize; 2],
     /// Sine and cosine before they are turned by the quadrant.
     pair: [usize; 2],
 }
@@ -30,10 +30,9 @@ struct Recorded<'a, const FUSED: bool> {
 
 impl<const FUSED: bool> Recorded<'_, FUSED> {
     fn step(self, step: Step) -> Self {
-        let steps = &mut self.recording.borrow_mut().steps;
-        // The angle is number 0.
+        let Recording { inputs, steps, .. } = &mut *self.recording.borrow_mut();
         let known = steps.iter().position(|s| matches!((s, &step), (Err(a), Err(b)) if a == b));
-        let id = known.map_or(steps.len() + 1, |at| at + 1);
+        let id = *inputs + known.unwrap_or(steps.len());
         if known.is_none() {
             steps.push(step);
         }
@@ -82,11 +81,29 @@ impl<'a, const FUSED_: bool, F: Into<f64>> Number<F> for Recorded<'a, FUSED_> {
         [shifted, n]
     }
 
-    fn turned(quadrant: [Self; 2], sin: Self, cos: Self) -> (Self, Self) {
-        let mut recording = sin.recording.borrow_mut();
-        recording.quadrant = quadrant.map(|x| x.id);
-        recording.pair = [sin.id, cos.id];
+    fn turned(_: [Self; 2], sin: Self, cos: Self) -> (Self, Self) {
+        sin.recording.borrow_mut().pair = [sin.id, cos.id];
         (sin, cos)
+    }
+}
+
+impl Recording {
+    /// Nothing yet, of a function of so many inputs.
+    fn new(inputs: usize) -> RefCell<Recording> {
+        RefCell::new(Recording { inputs, steps: Vec::new(), pair: [0; 2] })
+    }
+
+    /// Tells a target the instructions. Returns the values of inputs and instructions.
+    fn tell<I: Instructions>(self, target: &mut I, inputs: Vec<I::Value>) -> Vec<I::Value> {
+        let mut values = inputs;
+        for step in self.steps {
+            let value = match step {
+                Err(x) => target.constant(x),
+                Ok(operation) => target.operation(operation.map(|id| values[id].clone())),
+            };
+            values.push(value);
+        }
+        values
     }
 }
 
@@ -94,6 +111,7 @@ impl<'a, const FUSED_: bool, F: Into<f64>> Number<F> for Recorded<'a, FUSED_> {
 /// [`mbd_runtime::trig::LIMIT_F64`] or [`mbd_runtime::trig::LIMIT_F32`], rad. `turned` gets the number whose last two
 /// bits are the quadrant, the quadrant as a whole number, and the sine and cosine within the quadrant; it exchanges
 /// these where the quadrant is odd, and gives them the quadrant's signs.
+#[cfg(feature = "jit")]
 pub fn main_path<I: Instructions>(
     target: &mut I,
     angle: I::Value,
@@ -101,27 +119,58 @@ pub fn main_path<I: Instructions>(
     fused: bool,
     turned: impl FnOnce(&mut I, [I::Value; 2], [I::Value; 2]) -> [I::Value; 2],
 ) -> [I::Value; 2] {
-    let recording = RefCell::new(Recording { steps: Vec::new(), quadrant: [0; 2], pair: [0; 2] });
-    fn record<const FUSED: bool>(recording: &RefCell<Recording>, precision: Precision) {
+    let (y, quadrant) = reduced(target, angle, precision, fused);
+    let pair = within_quadrant(target, y, precision, fused);
+    turned(target, quadrant, pair)
+}
+
+/// Tells a target the first part of the main path: `y0` and `y1` with `angle = y0 + y1 + n · π/2`, then the number whose
+/// last two bits are those of `n`, and `n`.
+pub fn reduced<I: Instructions>(
+    target: &mut I,
+    angle: I::Value,
+    precision: Precision,
+    fused: bool,
+) -> ([I::Value; 2], [I::Value; 2]) {
+    fn record<const FUSED: bool>(recording: &RefCell<Recording>, precision: Precision) -> [usize; 4] {
         let angle = Recorded::<FUSED> { recording, id: 0 };
+        let (y0, y1, [shifted, n]) = match precision {
+            Precision::F64 => reduced_f64::<Recorded<FUSED>>(angle),
+            Precision::F32 => reduced_f32::<Recorded<FUSED>>(angle),
+        };
+        [y0.id, y1.id, shifted.id, n.id]
+    }
+    let recording = Recording::new(1);
+    let places = match fused {
+        true => record::<true>(&recording, precision),
+        false => record::<false>(&recording, precision),
+    };
+    let values = recording.into_inner().tell(target, vec![angle]);
+    let [y0, y1, shifted, n] = places.map(|id| values[id].clone());
+    ([y0, y1], [shifted, n])
+}
+
+/// Tells a target the second part: sine and cosine of `y0 + y1` within the quadrant.
+pub fn within_quadrant<I: Instructions>(
+    target: &mut I,
+    y: [I::Value; 2],
+    precision: Precision,
+    fused: bool,
+) -> [I::Value; 2] {
+    fn record<const FUSED: bool>(recording: &RefCell<Recording>, precision: Precision) {
+        let [y0, y1] = [0, 1].map(|id| Recorded::<FUSED> { recording, id });
         match precision {
-            Precision::F64 => path_f64::<Recorded<FUSED>>(angle),
-            Precision::F32 => path_f32::<Recorded<FUSED>>(angle),
+            Precision::F64 => kernel_f64::<Recorded<FUSED>>(y0, y1, [y0; 2]),
+            Precision::F32 => kernel_f32::<Recorded<FUSED>>(y0, y1, [y0; 2]),
         };
     }
+    let recording = Recording::new(2);
     match fused {
         true => record::<true>(&recording, precision),
         false => record::<false>(&recording, precision),
     }
     let recording = recording.into_inner();
-    let mut values = vec![angle];
-    for step in recording.steps {
-        let value = match step {
-            Err(x) => target.constant(x),
-            Ok(operation) => target.operation(operation.map(|id| values[id].clone())),
-        };
-        values.push(value);
-    }
-    let [quadrant, pair] = [recording.quadrant, recording.pair].map(|ids| ids.map(|id| values[id].clone()));
-    turned(target, quadrant, pair)
+    let pair = recording.pair;
+    let values = recording.tell(target, y.to_vec());
+    pair.map(|id| values[id].clone())
 }

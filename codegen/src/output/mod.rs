@@ -5,6 +5,7 @@ mod program;
 mod spec;
 mod text;
 
+pub(crate) use program::locate;
 pub use program::{InputArray, OutputProgram};
 pub use spec::{Array, Availability, Dim, Field, Search, Sizes, Spec};
 pub use text::{help, table};

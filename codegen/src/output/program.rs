@@ -48,3 +48,14 @@ impl<P> OutputProgram<P> {
         OutputProgram { spec: self.spec, inputs: self.inputs, program: kind(self.program) }
     }
 }
+
+/// The array of an input of a program, and its index there.
+pub(crate) fn locate(inputs: &[InputArray], mut k: usize) -> (&InputArray, usize) {
+    for array in inputs {
+        if k < array.len() {
+            return (array, k);
+        }
+        k -= array.len();
+    }
+    unreachable!("inputs are numbered through their arrays")
+}

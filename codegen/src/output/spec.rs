@@ -21,6 +21,14 @@ macro_rules! dimensions {
                     Dim::Const(n) => n.to_string(),
                 }
             }
+
+            /// What it is, as a sentence; nothing for numbers that are the same for every model.
+            pub(crate) fn meaning(self) -> &'static str {
+                match self {
+                    $(Dim::$dim => $doc.trim_ascii(),)+
+                    Dim::Const(_) => "",
+                }
+            }
         }
 
         /// The numbers behind [`Dim`] for one model and the frames that were chosen.

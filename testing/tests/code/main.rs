@@ -2,6 +2,7 @@
 
 mod assembly;
 mod bitwise;
+mod c;
 mod constrained;
 mod counts;
 mod eliminations;
@@ -9,4 +10,5 @@ mod emitted;
 mod machine_code;
 mod rewriting;
 mod rolled;
+mod wasm;
 mod wide;

@@ -1,0 +1,216 @@
+//! Generated C, compiled by GCC and by Clang where they are there, against the programs that it was made of.
+//!
+//! In exact arithmetic both give the same bits, except for the signs of zeros: straight-line and rolled code, trees and
+//! loops, both precisions, sines and cosines of any angle.
+
+mod compiler;
+
+use std::fmt::Write;
+
+use compiler::{build, compilers, folder, run};
+use mbd_codegen::generate::InputArray;
+use mbd_codegen::read::{self, ImportOptions};
+use mbd_codegen::{c, Arithmetic, Options, Output, Precision};
+use mbd_runtime::trig::{sincos_f32, sincos_f64};
+use mbd_testing::conformance::{chain, closed, far, tree, Case, Run};
+use mbd_testing::random::Rng;
+
+/// What the programs of the tests have in common: numbers come from standard input and go to standard output.
+const READ_AND_WRITE: &str = "#include <stdio.h>
+static void take_double(double *x, int n) { while (n-- > 0) if (fread(x++, sizeof *x, 1, stdin) != 1) *(x - 1) = 0.0; }
+static void give_double(const double *x, int n) { while (n-- > 0) fwrite(x++, sizeof *x, 1, stdout); }
+static void take_float(float *x, int n) { double d; while (n-- > 0) { take_double(&d, 1); *x++ = (float)d; } }
+static void give_float(const float *x, int n) { double d; while (n-- > 0) { d = (double)*x++; give_double(&d, 1); } }
+/* Each program uses those of its precisions. */
+void (*const used[])(void) = { (void (*)(void))take_float, (void (*)(void))give_float, (void (*)(void))take_double, (void (*)(void))give_double };
+";
+
+fn number(precision: Precision) -> &'static str {
+    match precision {
+        Precision::F64 => "double",
+        Precision::F32 => "float",
+    }
+}
+
+/// Statements that call a function with inputs that are read and write its results.
+fn call(prefix: &str, number: &str, run: &Run) -> String {
+    let spec = run.output.spec();
+    let mut text = format!("{{\n    {prefix}_inputs in;\n    {prefix}_inputs_init(&in);\n");
+    let field = |array: &&InputArray| array.field && !array.is_empty();
+    let (fields, arguments) = (run.inputs.iter().filter(field), run.inputs.iter().filter(|array| !array.field));
+    let mut parameters = vec!["&in".to_string()];
+    for array in arguments {
+        let (name, n) = (array.name, array.len());
+        let _ = writeln!(text, "    {number} {name}[{}];\n    take_{number}({name}, {n});", n.max(1));
+        parameters.push(name.to_string());
+    }
+    for array in fields {
+        let _ = writeln!(text, "    take_{number}(in.{}, {});", array.name, array.len());
+    }
+    let results: Vec<(String, usize)> =
+        spec.results.iter().zip(&run.lengths).map(|(array, n)| (format!("{}_result", array.name), *n)).collect();
+    for (name, n) in &results {
+        let _ = writeln!(text, "    {number} {name}[{}];", n.max(&1));
+        parameters.push(name.clone());
+    }
+    let _ = writeln!(text, "    {prefix}_{}({});", spec.name, parameters.join(", "));
+    for (name, n) in &results {
+        let _ = writeln!(text, "    give_{number}({name}, {n});");
+    }
+    text + "}\n"
+}
+
+/// Compares cases, which one program runs.
+fn compare(test: &str, cases: &[Case]) {
+    let folder = folder(test);
+    let (mut includes, mut body) = (String::new(), String::new());
+    let (mut sources, mut given) = (vec!["main.c".to_string()], Vec::new());
+    let runs: Vec<(&Case, Vec<Run>)> = cases.iter().map(|case| (case, case.runs())).collect();
+    for (case, runs) in &runs {
+        let prefix = &case.name;
+        let options = Options {
+            type_name: prefix.clone(),
+            outputs: runs.iter().map(|run| run.output).collect(),
+            ..case.options.clone()
+        };
+        let code = c::generate_from(&case.plan, &options, prefix).unwrap_or_else(|e| panic!("{prefix}: {e}"));
+        assert_eq!(c::prefix(prefix), *prefix);
+        std::fs::write(folder.join(format!("{prefix}.h")), code.header).expect("the folder can be written");
+        std::fs::write(folder.join(format!("{prefix}.c")), code.source).expect("the folder can be written");
+        let _ = writeln!(includes, "#include \"{prefix}.h\"");
+        sources.push(format!("{prefix}.c"));
+        for run in runs {
+            body += &call(prefix, number(options.precision), run);
+            given.extend_from_slice(&run.given);
+        }
+    }
+    let main = format!("{READ_AND_WRITE}{includes}int main(void)\n{{\n{body}return 0;\n}}\n");
+    std::fs::write(folder.join("main.c"), main).expect("the folder can be written");
+    for compiler in compilers() {
+        let program = build(compiler, &folder, &sources, &["-O1", "-ffp-contract=off"]);
+        let found = &mut &self::run(&program, &given)[..];
+        for (case, runs) in &runs {
+            for run in runs {
+                let part = found.split_off(..run.expected.len()).expect("as many numbers as results");
+                run.check(&format!("{compiler}: {}", case.name), part);
+            }
+        }
+        assert!(found.is_empty());
+    }
+}
+
+#[test]
+fn trees() {
+    let mut cases: Vec<Case> = (0..6).map(tree).collect();
+    cases[0].derivatives = true;
+    cases.extend([tree(7).single(), far(tree(8)), far(tree(9)).single()]);
+    compare("c_trees", &cases);
+}
+
+#[test]
+fn loops_and_rolled_code() {
+    let mut cases: Vec<Case> = [1, 2].map(closed).into_iter().chain([0, 1].map(chain)).collect();
+    cases.extend([closed(2).single(), chain(3).single(), far(chain(5))]);
+    compare("c_loops", &cases);
+}
+
+/// Two bodies that turn about fixed axes: entries of their rotations are the sines and cosines of the angles.
+const TWO_ANGLES: &str = r#"
+name = "two_angles"
+gravity = [0, 0, -9.81]
+body = [
+    { name = "a", mass = 1.0, inertia = [1.0, 1.0, 1.0] },
+    { name = "b", mass = 1.0, inertia = [1.0, 1.0, 1.0] },
+]
+joint = [
+    { name = "a", type = "revolute", child = "a", axis = [0, 0, 1] },
+    { name = "b", type = "revolute", child = "b", axis = [0, 0, 1] },
+]
+"#;
+
+/// Angles over all exponents, near multiples of a quarter turn, and those that are not finite.
+fn angles() -> Vec<f64> {
+    let mut rng = Rng::new(1, 1);
+    let mut angles =
+        vec![0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN_POSITIVE, 1e6, 1600.0];
+    for exponent in -330..309 {
+        let size = 10.0_f64.powi(exponent);
+        angles.extend((0..6).map(|_| rng.around(1.0) * size));
+    }
+    angles.extend((0..3000).map(|k| f64::from(k) * 0.5 * std::f64::consts::PI));
+    angles.extend((0..2000).map(|_| rng.around(2e6)));
+    angles.truncate(angles.len() / 2 * 2);
+    angles
+}
+
+/// Sines and cosines, one after the other, of two angles in each call, by C.
+fn sines(test: &str, precision: Precision, angles: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
+    let folder = folder(test);
+    let model = read::model("two_angles.toml", TWO_ANGLES, &ImportOptions::default()).expect("a model").model;
+    let options = Options {
+        type_name: "Two".to_string(),
+        outputs: vec![Output::Frames],
+        frames: ["a", "b"].map(str::to_string).to_vec(),
+        precision,
+        arithmetic: Arithmetic::Exact,
+        ..Options::default()
+    };
+    let code = c::generate(&model, &options, "two").expect("code");
+    std::fs::write(folder.join("two.h"), code.header).expect("the folder can be written");
+    std::fs::write(folder.join("two.c"), code.source).expect("the folder can be written");
+    let (number, calls) = (number(precision), angles.len() / 2);
+    let main = format!(
+        "{READ_AND_WRITE}#include \"two.h\"
+int main(void)
+{{
+    two_inputs in;
+    two_inputs_init(&in);
+    for (int k = 0; k < {calls}; k++) {{
+        const {number} v[2] = {{ 0, 0 }};
+        {number} q[2];
+        {number} rotation[18];
+        {number} position[6];
+        {number} velocity[12];
+        take_{number}(q, 2);
+        two_frames(&in, q, v, rotation, position, velocity);
+        give_{number}(rotation + 3, 1);
+        give_{number}(rotation, 1);
+        give_{number}(rotation + 12, 1);
+        give_{number}(rotation + 9, 1);
+    }}
+    return 0;
+}}
+"
+    );
+    std::fs::write(folder.join("main.c"), main).expect("the folder can be written");
+    let sources = ["main.c", "two.c"].map(str::to_string);
+    let build = |compiler| build(compiler, &folder, &sources, &["-O3", "-ffp-contract=off"]);
+    compilers().into_iter().map(|compiler| (compiler, run(&build(compiler), angles))).collect()
+}
+
+fn assert_same(whose: &str, angles: &[f64], found: &[f64], expected: impl Fn(f64) -> [f64; 2]) {
+    assert_eq!(found.len(), 2 * angles.len());
+    for (angle, pair) in angles.iter().zip(found.as_chunks::<2>().0) {
+        let expected = expected(*angle);
+        let same = pair.iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
+        assert!(same, "{whose}: {angle:e}: {pair:?}, by the runtime {expected:?}");
+    }
+}
+
+#[test]
+fn sines_have_the_bits_of_the_runtime() {
+    let angles = angles();
+    for (compiler, found) in sines("c_sines_f64", Precision::F64, &angles) {
+        assert_same(compiler, &angles, &found, |x| {
+            let (sin, cos) = sincos_f64(x);
+            [sin, cos]
+        });
+    }
+    let angles: Vec<f64> = angles.into_iter().map(|x| f64::from(x as f32)).collect();
+    for (compiler, found) in sines("c_sines_f32", Precision::F32, &angles) {
+        assert_same(compiler, &angles, &found, |x| {
+            let (sin, cos) = sincos_f32(x as f32);
+            [sin, cos].map(f64::from)
+        });
+    }
+}
