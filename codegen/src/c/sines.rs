@@ -18,14 +18,15 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) 
             (fused_operation(prefix, precision), reduced)
         }
     };
-    let limit = match precision {
-        Precision::F64 => LIMIT_F64,
-        Precision::F32 => f64::from(LIMIT_F32),
+    let (limit, limit_bits) = match precision {
+        Precision::F64 => (LIMIT_F64, format!("UINT64_C({:#x})", LIMIT_F64.to_bits())),
+        Precision::F32 => (f64::from(LIMIT_F32), format!("UINT32_C({:#x})", LIMIT_F32.to_bits())),
     };
     let words = [
         ("PREFIX", prefix.lower.clone()),
         ("NUMBER", number(precision).to_string()),
         ("LIMIT", literal(limit, precision)),
+        ("LIMIT_BITS", limit_bits),
         ("UPPER", prefix.upper.clone()),
         ("ZERO", literal(0.0, precision)),
         ("WITHIN_QUADRANT", quadrant_body(prefix, precision)),
@@ -232,13 +233,21 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
     }
 }
 
+/* Whether x is beyond that range: large, infinite or NaN. The comparison is on the bits, so that NaN counts as large. */
+static inline int @PREFIX@_beyond(@NUMBER@ x)
+{
+    @PREFIX@_view view;
+    view.number = x;
+    return (view.bits << 1) > (@LIMIT_BITS@ << 1);
+}
+
 /* Sine and cosine of x, rad, within one unit in the last place for every finite x. */
 static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
-    if (x >= -@LIMIT@ && x <= @LIMIT@) {
-        @PREFIX@_near(x, sine, cosine);
-    } else {
+    if (@PREFIX@_beyond(x) != 0) {
         @PREFIX@_far(x, sine, cosine);
+    } else {
+        @PREFIX@_near(x, sine, cosine);
     }
 }
 
@@ -249,7 +258,7 @@ static inline void @PREFIX@_sines_cosines(
     int far = 0;
     for (int k = 0; k < n; k++) {
         @PREFIX@_near(x[k], &sines[k], &cosines[k]);
-        far |= 1 - ((x[k] >= -@LIMIT@) & (x[k] <= @LIMIT@));
+        far |= @PREFIX@_beyond(x[k]);
     }
     if (far != 0) {
         for (int k = 0; k < n; k++) {
