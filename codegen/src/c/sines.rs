@@ -7,8 +7,8 @@ use super::names::{literal, number, Prefix};
 use crate::lower::{reduced, within_quadrant};
 use crate::options::{Arithmetic, Precision};
 
-/// The functions for one angle and for several, and what they need.
-pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) -> String {
+/// The functions for one angle and, if it is called, for several, and what they need.
+pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, several: bool) -> String {
     let plain = reduced_body(prefix, precision, false);
     let (fma, reduced) = match arithmetic {
         Arithmetic::Exact => (String::new(), plain),
@@ -54,7 +54,8 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) 
         ("SCALE", ((1 << (exponent - 1)) - bits).to_string()),
         ("REST", (bits - stored - 1).to_string()),
     ];
-    words.iter().chain(&numbers).fold(TEXT.to_string(), |text, (word, by)| text.replace(&format!("@{word}@"), by))
+    let text = if several { [TEXT, SEVERAL].concat() } else { TEXT.to_string() };
+    words.iter().chain(&numbers).fold(text, |text, (word, by)| text.replace(&format!("@{word}@"), by))
 }
 
 /// Statements that compute `s` and `c` from `y0` and `y1`.
@@ -250,7 +251,10 @@ static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *restrict sine, @NU
         @PREFIX@_near(x, sine, cosine);
     }
 }
+";
 
+/// The same for several angles.
+const SEVERAL: &str = "
 /* The same for n angles. The first loop has no branches, so that it becomes vector instructions where there are some. */
 static inline void @PREFIX@_sines_cosines(
     const @NUMBER@ *restrict x, @NUMBER@ *restrict sines, @NUMBER@ *restrict cosines, int n)
