@@ -221,13 +221,21 @@ DOUBLE_PENDULUM_RARE static void double_pendulum_far(double x, double *restrict 
     }
 }
 
+/* Whether x is beyond that range: large, infinite or NaN. The comparison is on the bits, so that NaN counts as large. */
+static inline int double_pendulum_beyond(double x)
+{
+    double_pendulum_view view;
+    view.number = x;
+    return (view.bits << 1) > (UINT64_C(0x412e848000000000) << 1);
+}
+
 /* Sine and cosine of x, rad, within one unit in the last place for every finite x. */
 static inline void double_pendulum_sine_cosine(double x, double *restrict sine, double *restrict cosine)
 {
-    if (x >= -1000000.0 && x <= 1000000.0) {
-        double_pendulum_near(x, sine, cosine);
-    } else {
+    if (double_pendulum_beyond(x) != 0) {
         double_pendulum_far(x, sine, cosine);
+    } else {
+        double_pendulum_near(x, sine, cosine);
     }
 }
 
@@ -238,7 +246,7 @@ static inline void double_pendulum_sines_cosines(
     int far = 0;
     for (int k = 0; k < n; k++) {
         double_pendulum_near(x[k], &sines[k], &cosines[k]);
-        far |= 1 - ((x[k] >= -1000000.0) & (x[k] <= 1000000.0));
+        far |= double_pendulum_beyond(x[k]);
     }
     if (far != 0) {
         for (int k = 0; k < n; k++) {

@@ -131,13 +131,15 @@ fn files(input: &Input, programs: &[OutputProgram<Code>], name: &str) -> (String
     header::comment_block(&mut source, "", &top);
     source += &format!("#include \"{name}.h\"\n\n");
     source += &preamble(prefix, options.precision, &needs);
+    let definitions: Vec<String> = functions.iter().map(Function::definition).collect();
     if needs.sines {
-        source += &sines::functions(prefix, options.precision, options.arithmetic);
+        let several = definitions.iter().any(|text| text.contains(&format!("{}_sines_cosines(", prefix.lower)));
+        source += &sines::functions(prefix, options.precision, options.arithmetic, several);
     }
     source += &header::inputs_init(prefix, &fields, options.precision);
-    for function in &functions {
+    for text in definitions {
         source += "\n";
-        source += &function.definition();
+        source += &text;
     }
     (header, source)
 }

@@ -7,8 +7,8 @@ use super::names::{literal, number, Prefix};
 use crate::lower::{reduced, within_quadrant};
 use crate::options::{Arithmetic, Precision};
 
-/// The functions for one angle and for several, and what they need.
-pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) -> String {
+/// The functions for one angle and, if it is called, for several, and what they need.
+pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, several: bool) -> String {
     let plain = reduced_body(prefix, precision, false);
     let (fma, reduced) = match arithmetic {
         Arithmetic::Exact => (String::new(), plain),
@@ -18,14 +18,15 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) 
             (fused_operation(prefix, precision), reduced)
         }
     };
-    let limit = match precision {
-        Precision::F64 => LIMIT_F64,
-        Precision::F32 => f64::from(LIMIT_F32),
+    let (limit, limit_bits) = match precision {
+        Precision::F64 => (LIMIT_F64, format!("UINT64_C({:#x})", LIMIT_F64.to_bits())),
+        Precision::F32 => (f64::from(LIMIT_F32), format!("UINT32_C({:#x})", LIMIT_F32.to_bits())),
     };
     let words = [
         ("PREFIX", prefix.lower.clone()),
         ("NUMBER", number(precision).to_string()),
         ("LIMIT", literal(limit, precision)),
+        ("LIMIT_BITS", limit_bits),
         ("UPPER", prefix.upper.clone()),
         ("ZERO", literal(0.0, precision)),
         ("WITHIN_QUADRANT", quadrant_body(prefix, precision)),
@@ -53,7 +54,8 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic) 
         ("SCALE", ((1 << (exponent - 1)) - bits).to_string()),
         ("REST", (bits - stored - 1).to_string()),
     ];
-    words.iter().chain(&numbers).fold(TEXT.to_string(), |text, (word, by)| text.replace(&format!("@{word}@"), by))
+    let text = if several { [TEXT, SEVERAL].concat() } else { TEXT.to_string() };
+    words.iter().chain(&numbers).fold(text, |text, (word, by)| text.replace(&format!("@{word}@"), by))
 }
 
 /// Statements that compute `s` and `c` from `y0` and `y1`.
@@ -232,16 +234,27 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
     }
 }
 
+/* Whether x is beyond that range: large, infinite or NaN. The comparison is on the bits, so that NaN counts as large. */
+static inline int @PREFIX@_beyond(@NUMBER@ x)
+{
+    @PREFIX@_view view;
+    view.number = x;
+    return (view.bits << 1) > (@LIMIT_BITS@ << 1);
+}
+
 /* Sine and cosine of x, rad, within one unit in the last place for every finite x. */
 static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
-    if (x >= -@LIMIT@ && x <= @LIMIT@) {
-        @PREFIX@_near(x, sine, cosine);
-    } else {
+    if (@PREFIX@_beyond(x) != 0) {
         @PREFIX@_far(x, sine, cosine);
+    } else {
+        @PREFIX@_near(x, sine, cosine);
     }
 }
+";
 
+/// The same for several angles.
+const SEVERAL: &str = "
 /* The same for n angles. The first loop has no branches, so that it becomes vector instructions where there are some. */
 static inline void @PREFIX@_sines_cosines(
     const @NUMBER@ *restrict x, @NUMBER@ *restrict sines, @NUMBER@ *restrict cosines, int n)
@@ -249,7 +262,7 @@ static inline void @PREFIX@_sines_cosines(
     int far = 0;
     for (int k = 0; k < n; k++) {
         @PREFIX@_near(x[k], &sines[k], &cosines[k]);
-        far |= 1 - ((x[k] >= -@LIMIT@) & (x[k] <= @LIMIT@));
+        far |= @PREFIX@_beyond(x[k]);
     }
     if (far != 0) {
         for (int k = 0; k < n; k++) {
