@@ -4,7 +4,7 @@ use multibody::codegen::plan::Plan;
 use multibody::runtime::Interpreter;
 
 /// Velocities of the largest mass matrix whose condition is computed: the time grows with the cube of their number.
-const LARGEST: usize = 1000;
+pub const LARGEST: usize = 1000;
 
 /// Relative error at which not even the first digit of a result is known.
 const NO_DIGIT: f64 = 0.1;

@@ -33,6 +33,13 @@ pub fn start(path: &Path, plan: &Plan, q: &[f64]) -> Outcome {
             format!("the start has no digits: doubles near the value of `{name}` are {apart:.1e} rad or m apart");
         return Err(Failure::new(what, "start nearer to zero: --q, or the model's `start`"));
     }
+    if plan.dims.nv > condition::LARGEST {
+        let (n, most) = (plan.dims.nv, condition::LARGEST);
+        note(format_args!(
+            "{}: the condition of the mass matrix was not computed: {n} velocities, more than {most}",
+            path.display()
+        ));
+    }
     let mut interpreter = interpreter::<f64>(plan);
     if let Some((what, help)) = condition::of_mass_matrix(plan, &mut interpreter, q) {
         warn(path, &format!("at the start, {what}"), &help);

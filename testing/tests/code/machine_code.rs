@@ -135,6 +135,43 @@ fn compare_traits(whose: &str, plan: &Plan, s: &State) {
     check("multipliers", &r, &r2);
 }
 
+/// Rates of a random mechanism, every fifth with loops.
+fn compare_rates(seed: u64) {
+    let loops = seed.is_multiple_of(5);
+    let (model, state) = match loops {
+        true => {
+            let system = random_loops(seed, &LoopKnobs::everything(seed, 4));
+            (system.model, Some(system.state))
+        }
+        false => (random_model(seed, &Distribution::everything(seed, 5)), None),
+    };
+    let options = options(EliminationStrategy::Single, RolledCode::Auto, Arithmetic::Exact);
+    let plan = search::plan(&model, PlanOptions { rolled: RolledCode::Auto, ..PlanOptions::quick() });
+    let s = state.unwrap_or_else(|| random_state(&plan, seed));
+    let (mut c, mut i) = (compiled::<f64>(&plan, &options, &s), s.interpreter(&plan));
+    let p: Vec<f64> = s.v.iter().map(|x| 0.7 * x - 0.1).collect();
+    let mut rates = [0; 2].map(|_| (zeros(plan.dims.nq), zeros(plan.dims.nv)));
+    c.rates_at(0.0, &s.q, &p, &mut rates[0].0, &mut rates[0].1);
+    i.rates_at(0.0, &s.q, &p, &mut rates[1].0, &mut rates[1].1);
+    let [found, expected] = rates.map(|(qd, pd)| [qd, pd].concat());
+    mbd_testing::assert_same_bits(&format!("seed {seed}"), "rates", &plan.model, &found, &expected);
+}
+
+#[test]
+fn rates_of_many_models() {
+    (1000..1200).for_each(compare_rates);
+}
+
+#[test]
+#[ignore = "minutes: 10^5 models"]
+fn rates_of_a_hundred_thousand_models() {
+    std::thread::scope(|scope| {
+        for thread in 0..2 {
+            scope.spawn(move || (0..50_000).for_each(|k| compare_rates(10_000 + 2 * k + thread)));
+        }
+    });
+}
+
 fn zeros(n: usize) -> Vec<f64> {
     vec![0.0; n]
 }
