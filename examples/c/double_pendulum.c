@@ -279,14 +279,14 @@ void double_pendulum_rates(
     double sines0[2];
     double cosines0[2];
     double_pendulum_sines_cosines(angles0, sines0, cosines0, 2);
-    const double p_0 = p[0];
-    const double p_1 = p[1];
-    const double tau_0 = in->tau[0];
-    const double tau_1 = in->tau[1];
     const double lower_sin = sines0[1];
     const double lower_cos = cosines0[1];
     const double upper_sin = sines0[0];
     const double upper_cos = cosines0[0];
+    const double p_0 = p[0];
+    const double p_1 = p[1];
+    const double tau_0 = in->tau[0];
+    const double tau_1 = in->tau[1];
     /* lower: inertia carried to the parent, M* (4.48) */
     const double lower_u_y = 0.5 * lower_cos;
     /* upper: bias momentum D, D' (4.45, 4.49) */
@@ -348,10 +348,10 @@ void double_pendulum_momenta(
     double sine0;
     double cosine0;
     double_pendulum_sine_cosine(q_1, &sine0, &cosine0);
-    const double v_0 = v[0];
-    const double v_1 = v[1];
     /* lower: sine and cosine, rotation */
     const double lower_cos = cosine0;
+    const double v_0 = v[0];
+    const double v_1 = v[1];
     /* lower: momentum */
     const double lower_t0 = 0.5 * v_0;
     const double lower_t1 = 1.3334000000000001 * v_0;
@@ -380,12 +380,12 @@ void double_pendulum_energy(
     double sines0[2];
     double cosines0[2];
     double_pendulum_sines_cosines(angles0, sines0, cosines0, 2);
-    const double p_0 = p[0];
-    const double p_1 = p[1];
     const double lower_sin = sines0[1];
     const double lower_cos = cosines0[1];
     const double upper_sin = sines0[0];
     const double upper_cos = cosines0[0];
+    const double p_0 = p[0];
+    const double p_1 = p[1];
     /* lower: inertia carried to the parent, M* (4.48) */
     const double lower_u_y = 0.5 * lower_cos;
     /* upper: bias momentum D, D' (4.45, 4.49) */

@@ -1,9 +1,26 @@
-//! Working memory of a function.
+//! Working memory of a function, and the values that it holds.
 
-use super::{Array, Spills};
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Array;
 use crate::code::Code;
 use crate::rolled::Block;
 use crate::symbolic::angles::pairs;
+
+/// Which values of straight-line code leave the registers. Where the target's compiler decides that, there are none.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub struct Spills {
+    /// Whether it was decided here, for a processor that reads the last operand of an instruction from memory.
+    pub decided: bool,
+    /// Place in memory of every value that is stored after it was computed.
+    pub stored: BTreeMap<u32, usize>,
+    /// Values that are loaded before an operation, by the number of its node.
+    pub loaded: BTreeMap<u32, Vec<u32>>,
+    /// Number of places.
+    pub places: usize,
+    /// Operands that an operation is the last to use before they are loaded again, by the number of its node.
+    pub last: BTreeSet<(u32, u32)>,
+}
 
 /// Working memory of a function: lengths of its arrays, which follow one another.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

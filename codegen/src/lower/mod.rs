@@ -6,6 +6,7 @@
 //! `emit`, which has one text for one state and many.)
 
 mod memory;
+#[cfg(feature = "jit")]
 mod registers;
 mod rolled;
 mod sines;
@@ -15,8 +16,7 @@ use crate::code::Code;
 use crate::output::OutputProgram;
 use crate::symbolic::Label;
 
-pub use memory::Memory;
-pub use registers::Spills;
+pub use memory::{Memory, Spills};
 #[cfg(feature = "jit")]
 pub use sines::main_path;
 pub use sines::{reduced, within_quadrant};

@@ -7,29 +7,17 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::Spills;
 use crate::code::Code;
 use crate::symbolic::angles::{nodes, Angles};
 use crate::symbolic::{Op, Program};
-
-/// What has to be stored and loaded.
-#[derive(Debug, Default, PartialEq, Eq)]
-pub struct Spills {
-    /// Place in memory of every value that is stored after it was computed.
-    pub stored: BTreeMap<u32, usize>,
-    /// Values that are loaded before an operation, by the number of its node.
-    pub loaded: BTreeMap<u32, Vec<u32>>,
-    /// Number of places.
-    pub places: usize,
-    /// Operands that an operation is the last to use before they are loaded again, by the number of its node.
-    pub last: BTreeSet<(u32, u32)>,
-}
 
 impl Spills {
     /// Those of some code; loops are short and keep their values.
     pub fn of(code: &Code, registers: usize) -> Spills {
         match code {
             Code::Straight(program) => Spills::new(program, &Angles::new(program), registers),
-            Code::Rolled(_) => Spills::default(),
+            Code::Rolled(_) => Spills { decided: true, ..Spills::default() },
         }
     }
 
@@ -52,7 +40,7 @@ impl Spills {
         }
         let inputs: BTreeSet<u32> =
             order.iter().filter(|(_, op)| matches!(op, Op::Input(_))).map(|(id, _)| *id).collect();
-        let mut spills = Spills::default();
+        let mut spills = Spills { decided: true, ..Spills::default() };
         let mut memory: BTreeSet<u32> = early.clone();
         // Values in registers.
         let mut held: BTreeSet<u32> = BTreeSet::new();

@@ -48,7 +48,7 @@ impl<I: Instructions> Lowering<'_, I> {
         // Some processors write the result where the first operand was, and read the last one from memory.
         let gone = |o: Operand| matches!(o, Operand::Node(k) if self.spills.last.contains(&(id, k)));
         let loaded = |o: Operand| match o {
-            Operand::Const(_) => true,
+            Operand::Const(_) => self.spills.decided,
             Operand::Node(k) => gone(o) && self.spills.loaded.get(&id).is_some_and(|all| all.contains(&k)),
         };
         let last = |a: Operand, b: Operand| if loaded(a) && !loaded(b) { (b, a) } else { (a, b) };
