@@ -129,12 +129,7 @@ impl<I: Instructions> Lowering<'_, I> {
                             let pair = self.target.sines(&[values.get(*a)]);
                             values.pairs.extend([*a].into_iter().zip(pair));
                         }
-                        let [sin, cos] = values.pairs[a].clone();
-                        if matches!(op, Op::Sin(_)) {
-                            sin
-                        } else {
-                            cos
-                        }
+                        part(op, values.pairs[a].clone())
                     }
                     op => self.operation(*id, op, values),
                 };
@@ -188,13 +183,21 @@ impl<I: Instructions> Lowering<'_, I> {
             values.pairs.extend(angles.early.keys().copied().zip(self.target.sines(&early)));
             for (id, op, label) in &program.steps {
                 let (Op::Sin(a) | Op::Cos(a)) = op else { continue };
-                if let Some([sin, cos]) = values.pairs.get(a).cloned() {
-                    let value = if matches!(op, Op::Sin(_)) { sin } else { cos };
-                    self.define(&mut values, *id, *label, value);
+                if let Some(pair) = values.pairs.get(a).cloned() {
+                    self.define(&mut values, *id, *label, part(op, pair));
                 }
             }
         }
         self.steps(program, &mut values, |_| true, input, put);
         self.constants(program, put);
+    }
+}
+
+/// The sine or the cosine of a pair, whichever an operation is.
+fn part<V>(op: &Op, [sin, cos]: [V; 2]) -> V {
+    if matches!(op, Op::Sin(_)) {
+        sin
+    } else {
+        cos
     }
 }
