@@ -8,10 +8,11 @@ use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
 use mbd_runtime::system::Real;
+use mbd_runtime::trig::{sincos_f32, sincos_f64};
 
 use crate::chains::{general, planar};
 use crate::closed::{random_loops, LoopKnobs};
-use crate::random::{random_model, Distribution};
+use crate::random::{random_model, Distribution, Rng};
 use crate::state::{random_state, State};
 
 /// A mechanism in a state, and options in exact arithmetic.
@@ -115,7 +116,8 @@ impl Case {
     }
 }
 
-fn options(elimination: EliminationStrategy, rolled: RolledCode) -> Options {
+/// Options in exact arithmetic.
+pub fn exact(elimination: EliminationStrategy, rolled: RolledCode) -> Options {
     let plan = PlanOptions { elimination, rolled, ..PlanOptions::default() };
     Options { arithmetic: Arithmetic::Exact, plan, ..Options::default() }
 }
@@ -124,7 +126,7 @@ fn options(elimination: EliminationStrategy, rolled: RolledCode) -> Options {
 pub fn tree(seed: u64) -> Case {
     let model = random_model(seed, &Distribution::everything(seed, 6));
     let strategies = [EliminationStrategy::Single, EliminationStrategy::Fewest, EliminationStrategy::Fastest];
-    let options = options(strategies[(seed % 3) as usize], RolledCode::Never);
+    let options = exact(strategies[(seed % 3) as usize], RolledCode::Never);
     let plan = search::plan(&model, options.plan);
     let state = random_state(&plan, seed);
     Case::new(format!("tree{seed}"), plan, options, state)
@@ -133,7 +135,7 @@ pub fn tree(seed: u64) -> Case {
 /// A random mechanism with loops.
 pub fn closed(seed: u64) -> Case {
     let system = random_loops(seed, &LoopKnobs::everything(seed, 5));
-    let options = options(EliminationStrategy::Single, RolledCode::Never);
+    let options = exact(EliminationStrategy::Single, RolledCode::Never);
     let plan = search::plan(&system.model, options.plan);
     Case::new(format!("closed{seed}"), plan, options, system.state)
 }
@@ -142,7 +144,7 @@ pub fn closed(seed: u64) -> Case {
 pub fn chain(seed: u64) -> Case {
     let n = 6 + (seed % 7) as usize;
     let model = if seed.is_multiple_of(2) { general(seed, n) } else { planar(seed, n) };
-    let options = options(EliminationStrategy::Single, RolledCode::Always);
+    let options = exact(EliminationStrategy::Single, RolledCode::Always);
     let plan = search::plan(&model, options.plan);
     let state = random_state(&plan, seed);
     Case::new(format!("chain{seed}"), plan, options, state)
@@ -155,4 +157,53 @@ pub fn far(mut case: Case) -> Case {
         *x *= far[k % if k % 3 == 0 { 3 } else { 5 }];
     }
     Case { name: format!("{}_far", case.name), ..case }
+}
+
+/// Cases of the first seeds: every eighth with derivatives, every fourth also in single precision, every eighth also at
+/// far positions, in both precisions.
+pub fn sampled(case: fn(u64) -> Case, seeds: u64) -> Vec<Case> {
+    let of_seed = |seed: u64| {
+        let case = case(seed);
+        let mut all = vec![Case { derivatives: seed.is_multiple_of(8), ..case.clone() }];
+        if seed % 4 == 1 {
+            all.push(case.clone().single());
+        }
+        if seed % 8 == 2 {
+            all.extend([far(case.clone()), far(case).single()]);
+        }
+        all
+    };
+    (0..seeds).flat_map(of_seed).collect()
+}
+
+/// Angles on which sines are compared, rad: zeros, infinite ones, NaN, the ends of ranges, random ones over all
+/// exponents, next to multiples of a quarter turn, and around the end of the range that has a short way. Those for single
+/// precision are numbers of single precision.
+pub fn angles(precision: Precision) -> Vec<f64> {
+    use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
+    let mut rng = Rng::new(1, 1);
+    let mut angles =
+        vec![0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN_POSITIVE, 1e6, 1600.0];
+    let (least, most) = match precision {
+        Precision::F64 => (-1080.0, 1024.0),
+        Precision::F32 => (-155.0, 128.0),
+    };
+    for _ in 0..4000 {
+        let size = rng.range(least, most).exp2();
+        angles.extend([size * rng.around(1.0), (size * FRAC_2_PI).round() * FRAC_PI_2]);
+    }
+    angles.extend((0..3000).map(|k| f64::from(k) * FRAC_PI_2));
+    angles.extend((0..2000).map(|_| rng.around(2e6)));
+    match precision {
+        Precision::F64 => angles,
+        Precision::F32 => angles.into_iter().map(|x| f64::from(x as f32)).collect(),
+    }
+}
+
+/// Sine and cosine by the runtime; those of single precision are widened.
+pub fn sine_and_cosine(precision: Precision, angle: f64) -> [f64; 2] {
+    match precision {
+        Precision::F64 => sincos_f64(angle).into(),
+        Precision::F32 => <[f32; 2]>::from(sincos_f32(angle as f32)).map(f64::from),
+    }
 }

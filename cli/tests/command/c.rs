@@ -3,19 +3,10 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::run::{bad, err, files, folder, good, read, run_in, write, ROOT};
+use crate::run::{bad, err, files, folder, good, is_there, read, run_in, write, ROOT};
 
 const STRICT: [&str; 8] =
     ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O2", "-ffp-contract=fast"];
-
-/// Whether a program is there; a message says so if not.
-fn is_there(program: &str) -> bool {
-    let there = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
-    if !there {
-        eprintln!("skipped: `{program}` is not there");
-    }
-    there
-}
 
 /// Runs another program, which must succeed, and returns what it prints.
 fn printed(command: &mut Command) -> String {

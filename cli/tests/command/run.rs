@@ -95,3 +95,12 @@ pub fn read(folder: &Path, name: &str) -> String {
 pub fn json_of(output: &Output) -> Value {
     serde_json::from_str(out(output)).expect("JSON")
 }
+
+/// Whether a program is there; a message says so if not.
+pub fn is_there(program: &str) -> bool {
+    let there = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
+    if !there {
+        eprintln!("skipped: `{program}` is not there");
+    }
+    there
+}

@@ -7,6 +7,7 @@ mod constrained;
 mod counts;
 mod eliminations;
 mod emitted;
+mod external;
 mod machine_code;
 mod rewriting;
 mod rolled;

@@ -2,7 +2,6 @@
 //! for the signs of zeros.
 
 use std::fs;
-use std::path::PathBuf;
 use std::process::Command;
 
 use mbd_codegen::generate::InputArray;
@@ -10,10 +9,10 @@ use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{search, wasm, Options, Output, Precision};
-use mbd_runtime::trig::{sincos_f32, sincos_f64};
-use mbd_testing::conformance::{chain, closed, far, tree, Case, Run};
-use mbd_testing::random::Rng;
+use mbd_testing::conformance::{angles, chain, closed, far, sampled, sine_and_cosine, tree, Case, Run};
 use mbd_testing::toml::to_toml;
+
+use crate::external::{folder, is_there, write};
 
 /// Reads `runs.json` and the inputs of all runs, calls the functions of all modules by their wrappers, and writes the
 /// results one after the other.
@@ -44,36 +43,6 @@ for (const { name, runs } of JSON.parse(readFileSync("runs.json", "utf8"))) {
 }
 writeFileSync("found.bin", new Uint8Array(new Float64Array(found).buffer));
 "#;
-
-/// A folder for the files of a test, which is removed with it.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Folder {
-        let path = std::env::temp_dir().join(format!("mbd-wasm-{name}-{}", std::process::id()));
-        fs::create_dir_all(&path).expect("a folder for temporary files");
-        Folder(path)
-    }
-
-    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
-        fs::write(self.0.join(name), content).expect("files can be written");
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
-/// Whether there is Node.
-fn node() -> bool {
-    let there = Command::new("node").arg("--version").output().is_ok_and(|output| output.status.success());
-    if !there {
-        eprintln!("skipped: `node` is not installed");
-    }
-    there
-}
 
 /// Evaluations of the outputs of a plan.
 struct Job<'a> {
@@ -122,7 +91,7 @@ impl Job<'_> {
 
 /// Runs jobs. Gives the results of each run, one array after the other.
 fn evaluate(test: &str, jobs: &[Job]) -> Vec<Vec<Vec<f64>>> {
-    let folder = Folder::new(test);
+    let folder = &folder(&format!("wasm_{test}"));
     let (mut list, mut given) = (Vec::new(), Vec::new());
     for Job { name, plan, options, lanes, runs } in jobs {
         let mut outputs: Vec<Output> = runs.iter().map(|run| run.output).collect();
@@ -130,19 +99,19 @@ fn evaluate(test: &str, jobs: &[Job]) -> Vec<Vec<Vec<f64>>> {
         let options = Options { outputs, ..(*options).clone() };
         let generate = if *lanes > 1 { wasm::generate_lanes_from } else { wasm::generate_from };
         let code = generate(plan, &options).unwrap_or_else(|e| panic!("{name}: {e}"));
-        folder.write(&format!("{name}.wasm"), code.module);
-        folder.write(&format!("{name}.js"), code.wrapper);
+        write(folder, &format!("{name}.wasm"), code.module);
+        write(folder, &format!("{name}.js"), code.wrapper);
         let runs_as_text: Vec<String> = runs.iter().map(text).collect();
         list.push(format!("{{\"name\": \"{name}\", \"runs\": [{}]}}", runs_as_text.join(", ")));
         given.extend(runs.iter().flat_map(|run| &run.given).flat_map(|x| x.to_le_bytes()));
     }
-    folder.write("package.json", "{\"type\": \"module\"}");
-    folder.write("runs.json", format!("[{}]", list.join(", ")));
-    folder.write("given.bin", given);
-    folder.write("script.js", SCRIPT);
-    let output = Command::new("node").arg("script.js").current_dir(&folder.0).output().expect("there is Node");
+    write(folder, "package.json", "{\"type\": \"module\"}");
+    write(folder, "runs.json", format!("[{}]", list.join(", ")));
+    write(folder, "given.bin", given);
+    write(folder, "script.js", SCRIPT);
+    let output = Command::new("node").arg("script.js").current_dir(folder).output().expect("there is Node");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let found = fs::read(folder.0.join("found.bin")).expect("the script writes results");
+    let found = fs::read(folder.join("found.bin")).expect("the script writes results");
     let mut found = found.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().expect("eight bytes")));
     let mut results = |run: &Run| found.by_ref().take(run.lengths.iter().sum()).collect();
     let results = jobs.iter().map(|job| job.runs.iter().map(&mut results).collect()).collect();
@@ -156,29 +125,19 @@ fn text(run: &Run) -> String {
     format!("{{\"output\": \"{}\", \"inputs\": [{}]}}", run.output.name(), inputs.join(", "))
 }
 
-/// Compares all cases of some seeds, every fourth also in single precision, and every eighth with derivatives,
-/// with large angles, or with several states at once.
-/// Returns the number of outputs that are rolled, the largest number without Node.
+/// Compares the cases of some seeds, and at every eighth also several states at once. Returns the number of outputs that
+/// are rolled, the largest number without Node.
 fn compare(test: &str, case: fn(u64) -> Case, seeds: u64) -> usize {
-    if !node() {
+    if !is_there("node") {
         return usize::MAX;
     }
-    let (mut cases, mut lanes) = (Vec::new(), Vec::new());
-    for seed in 0..seeds {
-        let case = case(seed);
-        if seed % 4 == 1 {
-            cases.push(case.clone().single());
-        }
-        if seed % 8 == 2 {
-            cases.push(far(case.clone()));
-            cases.push(far(case.clone()).single());
-        }
-        if seed % 8 == 3 {
-            lanes.push(vec![case.clone(), far(case.clone())]);
-            lanes.push([&case, &far(case.clone()), &case, &case].map(|case| case.clone().single()).to_vec());
-        }
-        cases.push(Case { derivatives: seed % 8 == 0, ..case });
-    }
+    let cases = sampled(case, seeds);
+    let lanes = (3..seeds).step_by(8).flat_map(|seed| {
+        let (case, far) = (case(seed), far(case(seed)));
+        let single = [&case, &far, &case, &case].map(|case| case.clone().single()).to_vec();
+        [vec![case, far], single]
+    });
+    let lanes: Vec<Vec<Case>> = lanes.collect();
     let mut jobs: Vec<Job> = cases.iter().map(Job::of).collect();
     jobs.extend(lanes.iter().map(|cases| Job::lanes(&cases.iter().collect::<Vec<_>>())));
     for (job, found) in jobs.iter().zip(evaluate(test, &jobs)) {
@@ -205,29 +164,11 @@ fn rolled_code() {
     assert!(rolled > 60, "{rolled} outputs are rolled");
 }
 
-/// Angles over all exponents, next to multiples of π/2, infinite and NaN.
-fn angles(precision: Precision) -> Vec<f64> {
-    let mut rng = Rng::new(7, 1);
-    let mut angles = vec![0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN];
-    let (least, most) = match precision {
-        Precision::F64 => (-1080.0, 1024.0),
-        Precision::F32 => (-155.0, 128.0),
-    };
-    for _ in 0..4000 {
-        let size = rng.range(least, most).exp2();
-        angles.extend([
-            size * rng.around(1.0),
-            (size * std::f64::consts::FRAC_2_PI).round() * std::f64::consts::FRAC_PI_2,
-        ]);
-    }
-    angles
-}
-
 /// The rotation matrix of a revolute joint about z consists of the sine and the cosine. Five joints have their angles
 /// partly in vectors, partly alone.
 #[test]
 fn sines_of_all_angles() {
-    if !node() {
+    if !is_there("node") {
         return;
     }
     const JOINTS: usize = 5;
@@ -238,20 +179,13 @@ fn sines_of_all_angles() {
     let model = read::model("joints.toml", &text, &ImportOptions::default()).expect("a model").model;
     let plan = search::plan(&model, PlanOptions::default());
     for precision in [Precision::F64, Precision::F32] {
-        let pair = |x: f64| match precision {
-            Precision::F64 => sincos_f64(x),
-            Precision::F32 => {
-                let (sin, cos) = sincos_f32(x as f32);
-                (sin.into(), cos.into())
-            }
-        };
         let array = |name| InputArray { name, field: false, dims: vec![JOINTS] };
         let run = |given: &[f64]| Run {
             output: Output::Frames,
             inputs: vec![array("q")],
             given: given.to_vec(),
             lengths: vec![9 * JOINTS, 3 * JOINTS, 6 * JOINTS],
-            expected: given.iter().flat_map(|x| <[f64; 2]>::from(pair(*x))).collect(),
+            expected: given.iter().flat_map(|x| sine_and_cosine(precision, *x)).collect(),
             rolled: false,
         };
         let options = Options { precision, ..Options::default() };

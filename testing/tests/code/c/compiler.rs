@@ -2,29 +2,16 @@
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
+
+use crate::external::is_there;
 
 /// Flags with which all generated C compiles without a word.
 pub const STRICT: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"];
 
-/// Those of GCC and Clang that are there. A message says so where there is none.
+/// Those of GCC and Clang that are there.
 pub fn compilers() -> Vec<&'static str> {
-    let runs = |name: &&str| {
-        let command = Command::new(name).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
-        command.is_ok_and(|status| status.success())
-    };
-    let found: Vec<&str> = ["gcc", "clang"].into_iter().filter(runs).collect();
-    if found.is_empty() {
-        eprintln!("skipped: there is neither gcc nor clang");
-    }
-    found
-}
-
-/// A folder for the files of a test.
-pub fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
-    std::fs::create_dir_all(&folder).expect("the folder of tests can be written");
-    folder
+    ["gcc", "clang"].into_iter().filter(|name| is_there(name)).collect()
 }
 
 /// Compiles all sources of a folder, two at a time, and links them to a program.

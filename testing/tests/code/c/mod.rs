@@ -7,13 +7,13 @@ mod compiler;
 
 use std::fmt::Write;
 
-use compiler::{build, compilers, folder, run};
+use compiler::{build, compilers, run};
 use mbd_codegen::generate::InputArray;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{c, Arithmetic, Options, Output, Precision};
-use mbd_runtime::trig::{sincos_f32, sincos_f64};
-use mbd_testing::conformance::{chain, closed, far, tree, Case, Run};
-use mbd_testing::random::Rng;
+use mbd_testing::conformance::{angles, chain, closed, far, sine_and_cosine, tree, Case, Run};
+
+use crate::external::{folder, write};
 
 /// What the programs of the tests have in common: numbers come from standard input and go to standard output.
 const READ_AND_WRITE: &str = "#include <stdio.h>
@@ -75,8 +75,8 @@ fn compare(test: &str, cases: &[Case]) {
         };
         let code = c::generate_from(&case.plan, &options, prefix).unwrap_or_else(|e| panic!("{prefix}: {e}"));
         assert_eq!(c::prefix(prefix), *prefix);
-        std::fs::write(folder.join(format!("{prefix}.h")), code.header).expect("the folder can be written");
-        std::fs::write(folder.join(format!("{prefix}.c")), code.source).expect("the folder can be written");
+        write(&folder, &format!("{prefix}.h"), code.header);
+        write(&folder, &format!("{prefix}.c"), code.source);
         let _ = writeln!(includes, "#include \"{prefix}.h\"");
         sources.push(format!("{prefix}.c"));
         for run in runs {
@@ -85,7 +85,7 @@ fn compare(test: &str, cases: &[Case]) {
         }
     }
     let main = format!("{READ_AND_WRITE}{includes}int main(void)\n{{\n{body}return 0;\n}}\n");
-    std::fs::write(folder.join("main.c"), main).expect("the folder can be written");
+    write(&folder, "main.c", main);
     for compiler in compilers() {
         let program = build(compiler, &folder, &sources, &["-O1", "-ffp-contract=off"]);
         let found = &mut &self::run(&program, &given)[..];
@@ -128,21 +128,6 @@ joint = [
 ]
 "#;
 
-/// Angles over all exponents, near multiples of a quarter turn, and those that are not finite.
-fn angles() -> Vec<f64> {
-    let mut rng = Rng::new(1, 1);
-    let mut angles =
-        vec![0.0, -0.0, f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN_POSITIVE, 1e6, 1600.0];
-    for exponent in -330..309 {
-        let size = 10.0_f64.powi(exponent);
-        angles.extend((0..6).map(|_| rng.around(1.0) * size));
-    }
-    angles.extend((0..3000).map(|k| f64::from(k) * 0.5 * std::f64::consts::PI));
-    angles.extend((0..2000).map(|_| rng.around(2e6)));
-    angles.truncate(angles.len() / 2 * 2);
-    angles
-}
-
 /// Sines and cosines, one after the other, of two angles in each call, by C.
 fn sines(test: &str, precision: Precision, angles: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
     let folder = folder(test);
@@ -156,8 +141,8 @@ fn sines(test: &str, precision: Precision, angles: &[f64]) -> Vec<(&'static str,
         ..Options::default()
     };
     let code = c::generate(&model, &options, "two").expect("code");
-    std::fs::write(folder.join("two.h"), code.header).expect("the folder can be written");
-    std::fs::write(folder.join("two.c"), code.source).expect("the folder can be written");
+    write(&folder, "two.h", code.header);
+    write(&folder, "two.c", code.source);
     let (number, calls) = (number(precision), angles.len() / 2);
     let main = format!(
         "{READ_AND_WRITE}#include \"two.h\"
@@ -182,35 +167,26 @@ int main(void)
 }}
 "
     );
-    std::fs::write(folder.join("main.c"), main).expect("the folder can be written");
+    write(&folder, "main.c", main);
     let sources = ["main.c", "two.c"].map(str::to_string);
     let build = |compiler| build(compiler, &folder, &sources, &["-O3", "-ffp-contract=off"]);
     compilers().into_iter().map(|compiler| (compiler, run(&build(compiler), angles))).collect()
 }
 
-fn assert_same(whose: &str, angles: &[f64], found: &[f64], expected: impl Fn(f64) -> [f64; 2]) {
-    assert_eq!(found.len(), 2 * angles.len());
-    for (angle, pair) in angles.iter().zip(found.as_chunks::<2>().0) {
-        let expected = expected(*angle);
-        let same = pair.iter().zip(&expected).all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
-        assert!(same, "{whose}: {angle:e}: {pair:?}, by the runtime {expected:?}");
-    }
-}
-
 #[test]
 fn sines_have_the_bits_of_the_runtime() {
-    let angles = angles();
-    for (compiler, found) in sines("c_sines_f64", Precision::F64, &angles) {
-        assert_same(compiler, &angles, &found, |x| {
-            let (sin, cos) = sincos_f64(x);
-            [sin, cos]
-        });
-    }
-    let angles: Vec<f64> = angles.into_iter().map(|x| f64::from(x as f32)).collect();
-    for (compiler, found) in sines("c_sines_f32", Precision::F32, &angles) {
-        assert_same(compiler, &angles, &found, |x| {
-            let (sin, cos) = sincos_f32(x as f32);
-            [sin, cos].map(f64::from)
-        });
+    for (test, precision) in [("c_sines_f64", Precision::F64), ("c_sines_f32", Precision::F32)] {
+        let mut angles = angles(precision);
+        // Calls take two.
+        angles.truncate(angles.len() / 2 * 2);
+        for (compiler, found) in sines(test, precision, &angles) {
+            assert_eq!(found.len(), 2 * angles.len());
+            for (angle, pair) in angles.iter().zip(found.as_chunks::<2>().0) {
+                let expected = sine_and_cosine(precision, *angle);
+                let mut both = pair.iter().zip(&expected);
+                let same = both.all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
+                assert!(same, "{compiler}: {angle:e}: {pair:?}, by the runtime {expected:?}");
+            }
+        }
     }
 }
