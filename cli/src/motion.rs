@@ -202,7 +202,6 @@ impl PostStep<Timed> for Keeper {
     }
 }
 
-/// Gravity in ground axes with the default parameters, m/s².
 /// Gives gravity that is an input the default value of the field in generated code.
 fn set_gravity<S: Scalar>(plan: &Plan, interpreter: &mut Interpreter<S>) {
     if plan.model.gravity == Gravity::Input {

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use crate::error::GenerateError;
 use crate::options::{Options, Precision};
-use crate::output::{Output, OutputProgram};
+use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::{rolled, RolledProgram};
 use crate::symbolic::{Counts, Op, Operand, Program, ProgramResult};
-use crate::trace::trace;
+use crate::trace::{chosen_frames, coordinate_rates, sizes, trace};
 
 /// The code of an output.
 #[derive(Clone, Debug)]
@@ -28,16 +28,23 @@ impl Code {
         }
     }
 
+    /// The straight-line programs that it consists of: itself, or the blocks of rolled code.
+    pub fn blocks(&self) -> Vec<&Program> {
+        match self {
+            Code::Straight(program) => vec![program],
+            Code::Rolled(program) => program.blocks.iter().map(|block| &block.program).collect(),
+        }
+    }
+
+    /// The operations of all blocks, those of a loop's body once.
+    pub fn operations(&self) -> impl Iterator<Item = &Op> {
+        self.blocks().into_iter().flat_map(|program| program.steps.iter().map(|(_, op, _)| op))
+    }
+
     /// Bits of the constants that operations have.
     pub fn constants(&self) -> BTreeSet<u64> {
-        let of = |program: &Program| -> Vec<u64> {
-            let operands = program.steps.iter().flat_map(|(_, op, _)| op.operands());
-            operands.filter_map(|o| if let Operand::Const(bits) = o { Some(bits) } else { None }).collect()
-        };
-        match self {
-            Code::Straight(program) => of(program).into_iter().collect(),
-            Code::Rolled(program) => program.blocks.iter().flat_map(|block| of(&block.program)).collect(),
-        }
+        let bits = |o| if let Operand::Const(bits) = o { Some(bits) } else { None };
+        self.operations().flat_map(|op| op.operands()).filter_map(bits).collect()
     }
 
     /// Indices of the inputs that are read.
@@ -49,6 +56,48 @@ impl Code {
             }
             Code::Rolled(program) => program.used_inputs(),
         }
+    }
+}
+
+/// The programs of all outputs of some options, for one file of generated code.
+#[derive(Clone, Debug)]
+pub struct Programs {
+    /// Those of the outputs, in the order of the options.
+    pub outputs: Vec<OutputProgram<Code>>,
+    /// Coordinate rates of given velocities, which integrators need with the rates.
+    pub coordinate_rates: Option<OutputProgram<Code>>,
+    /// Chosen frames, as indices into the plan's.
+    pub frames: Vec<usize>,
+    /// Lengths of all arrays.
+    pub sizes: Sizes,
+}
+
+impl Programs {
+    /// Traces all of them.
+    ///
+    /// # Errors
+    /// See [`GenerateError`].
+    pub fn new(plan: &Plan, options: &Options) -> Result<Programs, GenerateError> {
+        let outputs =
+            options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
+        let frames = chosen_frames(plan, options)?;
+        let rates = options.outputs.contains(&Output::Rates);
+        Ok(Programs {
+            outputs,
+            coordinate_rates: rates.then(|| coordinate_rates(plan, options).map(Code::Straight)),
+            sizes: sizes(plan, options, frames.len()),
+            frames,
+        })
+    }
+
+    /// The programs of all functions.
+    pub fn functions(&self) -> Vec<&OutputProgram<Code>> {
+        self.outputs.iter().chain(&self.coordinate_rates).collect()
+    }
+
+    /// Operations of each output.
+    pub fn counts(&self, options: &Options) -> Vec<(Output, Counts)> {
+        options.outputs.iter().copied().zip(self.outputs.iter().map(|p| p.program.counts())).collect()
     }
 }
 

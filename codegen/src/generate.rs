@@ -1,6 +1,6 @@
 //! Generation of Rust code from a model and options. The macro, the command and build scripts all use it.
 
-use crate::code::{compile, Code};
+use crate::code::Programs;
 use crate::emit;
 #[doc(hidden)]
 pub use crate::emit::quantity;
@@ -11,7 +11,6 @@ pub use crate::output::{InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::Counts;
-use crate::trace::coordinate_rates;
 pub use crate::trace::{chosen_frames, sizes, trace};
 
 /// Generated code and information about it.
@@ -41,11 +40,7 @@ pub fn generate(model: &Model, options: &Options) -> Result<Generated, GenerateE
 /// # Errors
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, GenerateError> {
-    let programs =
-        options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
-    let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();
-    let frames = &chosen_frames(plan, options)?;
-    let input = emit::Input { plan, options, frames, sizes: sizes(plan, options, frames.len()) };
-    let source = emit::source(&input, &programs, &coordinate_rates(plan, options).map(Code::Straight));
-    Ok(Generated { source, counts, notices: plan.notices.clone() })
+    let programs = Programs::new(plan, options)?;
+    let source = emit::source(&emit::Input { plan, options, programs: &programs });
+    Ok(Generated { source, counts: programs.counts(options), notices: plan.notices.clone() })
 }

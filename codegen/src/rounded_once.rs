@@ -26,6 +26,11 @@ pub fn hypot(x: f64, y: f64) -> f64 {
     length(Double::constant(x), Double::constant(y)).to_f64()
 }
 
+/// Length of a vector, without overflow on the way.
+pub fn norm<const N: usize>(v: [f64; N]) -> f64 {
+    v.into_iter().fold(0.0, hypot)
+}
+
 /// Angle in rad of a vector of about unit length, from −π to π.
 pub fn atan2(y: f64, x: f64) -> f64 {
     let near = Double::constant(libm::atan2(y, x));

@@ -28,9 +28,12 @@
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
 #![allow(clippy::excessive_precision, clippy::approx_constant)]
 
+mod bits;
 mod number;
 
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
+use bits::{chunk32, chunk64};
+pub use bits::{QUARTER_PI, TWO_OVER_PI};
 use number::In;
 pub use number::Number;
 
@@ -44,36 +47,13 @@ pub const LIMIT_F32: f32 = 1600.0;
 /// as the others.
 const VECTORS: bool = cfg!(any(target_arch = "x86_64", target_arch = "aarch64"));
 
-/// 2/π as a binary fraction after 64 zero bits, with enough bits for the largest `f64`.
-pub const TWO_OVER_PI: [u32; 40] = [
-    0x00000000, 0x00000000, 0xa2f9836e, 0x4e441529, 0xfc2757d1, 0xf534ddc0, 0xdb629599, 0x3c439041, 0xfe5163ab,
-    0xdebbc561, 0xb7246e3a, 0x424dd2e0, 0x06492eea, 0x09d1921c, 0xfe1deb1c, 0xb129a73e, 0xe88235f5, 0x2ebb4484,
-    0xe99c7026, 0xb45f7e41, 0x3991d639, 0x835339f4, 0x9c845f8b, 0xbdf9283b, 0x1ff897ff, 0xde05980f, 0xef2f118b,
-    0x5a0a6d1f, 0x6d367ecf, 0x27cb09b7, 0x4f463f66, 0x9e5fea2d, 0x7527bac7, 0xebe5f17b, 0x3d0739f7, 0x8a5292ea,
-    0x6bfb5fb1, 0x1f8d5d08, 0x56033046, 0xfc7b6bab,
-];
-
-/// The 32 bits of [`TWO_OVER_PI`] from bit `at` on.
-#[inline]
-fn chunk32(at: u32) -> u32 {
-    let word = |i: u32| u64::from(TWO_OVER_PI.get(i as usize).copied().unwrap_or(0));
-    let (i, shift) = (at / 32, at % 32);
-    ((((word(i) << 32) | word(i + 1)) << shift) >> 32) as u32
-}
-
-/// The 64 bits of [`TWO_OVER_PI`] from bit `at` on.
-#[inline]
-fn chunk64(at: u32) -> u64 {
-    (u64::from(chunk32(at)) << 32) | u64::from(chunk32(at.wrapping_add(32)))
-}
-
 /// The functions for one float type. Constants, polynomials and the integer types are arguments.
 macro_rules! sincos {
     (
         float $float:ident, bits $uint:ident, wide $wide:ident, chunk $chunk:ident, mantissa $mant:literal;
         limit $limit:expr;
         two_over_pi $inv:literal, magic $magic:literal;
-        pi_half $p1:literal, $p2:literal, $p3:literal, $p4:literal, integer $pi_int:literal;
+        pi_half $p1:literal, $p2:literal, $p3:literal, $p4:literal;
         fused $f1:literal, $f2:literal, $f3:literal;
         fma $fma:ident, width $width:literal;
         sin($zs:ident, $fs:ident, $cs:ident) $s1:literal, $sin_tail:expr;
@@ -338,7 +318,7 @@ macro_rules! sincos {
             // No float is so close to a multiple of π/2 that fewer than BITS significant bits remain.
             let zeros = fraction.leading_zeros();
             let leading = (fraction.wrapping_shl(zeros) >> BITS) as $uint;
-            let angle = (($wide::from(leading) * $pi_int) >> BITS) as $uint;
+            let angle = (($wide::from(leading) * $wide::from((QUARTER_PI >> (64 - BITS)) as $uint)) >> BITS) as $uint;
             // angle · 2^(1 − BITS − zeros) radians, split into two floats exactly.
             let scale = <$float>::from_bits($uint::from((BIAS + 1).wrapping_sub(BITS).wrapping_sub(zeros) as u16) << MANT);
             let rest: $uint = angle & ((1 << (BITS - MANT - 1)) - 1);
@@ -358,8 +338,7 @@ sincos! {
     float f64, bits u64, wide u128, chunk chunk64, mantissa 52;
     limit LIMIT_F64;
     two_over_pi 0.6366197723675814, magic 6755399441055744.0;
-    pi_half 1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32,
-        integer 0xc90fdaa22168c235;
+    pi_half 1.5707963267341256, 6.077100506303966e-11, 2.0222662487111665e-21, 8.4784276603689e-32;
     fused 1.5707963267948966, 6.12323399538461e-17, 3.5215598651832e-27;
     fma fma_f64, width 8;
     sin(z, fma, c) -1.66666666666666324348e-01,
@@ -393,7 +372,7 @@ sincos! {
     float f32, bits u32, wide u64, chunk chunk32, mantissa 23;
     limit LIMIT_F32;
     two_over_pi 0.63661975, magic 12582912.0;
-    pi_half 1.5706787, 0.000117614865, 9.91804e-10, 2.8960740e-13, integer 0xc90fdaa2;
+    pi_half 1.5706787, 0.000117614865, 9.91804e-10, 2.8960740e-13;
     fused 1.57079637, -4.37139533e-8, 2.56334407e-12;
     fma fma_f32, width 16;
     sin(z, fma, c) -0.16666655, fma(z, c(-0.00019521112), c(0.008332202));

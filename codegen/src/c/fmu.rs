@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::files;
 use super::names::{literal, Prefix};
-use crate::code::compile;
-use crate::emit::fields::{fields, neutral, Field};
+use crate::code::Programs;
+use crate::emit::fields::{fields, Field};
 use crate::emit::Input;
 use crate::error::GenerateError;
 use crate::model::Model;
@@ -13,7 +13,6 @@ use crate::options::{Options, Precision};
 use crate::output::Output;
 use crate::plan::Plan;
 use crate::search;
-use crate::trace::sizes;
 
 /// The text files of a unit. Zipped, with a shared library under `binaries` if there is one, they are the `.fmu`.
 #[derive(Clone, Debug)]
@@ -45,13 +44,12 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
     let outputs = vec![Output::Rates, Output::Velocities, Output::Energy];
     let options = Options { outputs, precision: Precision::F64, frames: Vec::new(), ..options.clone() };
     let plan = &search::plan(model, options.searches());
-    let programs =
-        options.outputs.iter().map(|&output| compile(plan, output, &options)).collect::<Result<Vec<_>, _>>()?;
-    let input = Input { plan, options: &options, frames: &[], sizes: sizes(plan, &options, 0) };
+    let programs = Programs::new(plan, &options)?;
+    let input = Input { plan, options: &options, programs: &programs };
     let prefix = Prefix::new(&options.type_name);
     let identifier = prefix.lower.clone();
-    let (header, source) = files(&input, &programs, &identifier);
-    let fields = fields(plan, &input.sizes);
+    let (header, source) = files(&input, &identifier);
+    let fields = fields(plan, &programs.sizes);
     let variables = variables(plan, &fields);
     let guid = format!("{:016x}", fingerprint(&[&header, &source, &described(&identifier, "", &variables, plan)]));
     let files = vec![
@@ -65,14 +63,12 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
 
 /// Coordinates and momenta at the start: those of the model, with no momentum.
 fn start(plan: &Plan) -> Vec<f64> {
-    let q = if plan.model.starts.is_empty() { neutral(plan, false) } else { plan.start().to_vec() };
-    q.into_iter().chain(vec![0.0; plan.dims.nv]).collect()
+    plan.start().into_iter().chain(vec![0.0; plan.dims.nv]).collect()
 }
 
 /// Values of the inputs at the start, in the order of the struct.
 fn given(fields: &[Field]) -> Vec<f64> {
-    let value = |field: &Field| field.value.clone().unwrap_or_else(|| vec![0.0; field.dims.iter().product()]);
-    fields.iter().flat_map(value).collect()
+    fields.iter().flat_map(Field::values).collect()
 }
 
 /// The variables in the order of their value references.
@@ -94,9 +90,7 @@ fn variables(plan: &Plan, fields: &[Field]) -> Vec<Variable> {
         all.push(Variable { name, description: "Rate of a state", role: calculated("local"), real });
     }
     for field in fields {
-        let n = field.dims.iter().product::<usize>();
-        let start = field.value.clone().unwrap_or_else(|| vec![0.0; n]);
-        for (k, x) in start.into_iter().enumerate() {
+        for (k, x) in field.values().into_iter().enumerate() {
             let name = match field.name {
                 "tau" => format!("tau.{}", v[k]),
                 "params" => format!("params.{}", plan.model.params[k].name),

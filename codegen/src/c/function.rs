@@ -10,7 +10,7 @@ use crate::emit::head::count_line;
 use crate::emit::names::Names;
 use crate::emit::Input;
 use crate::lower::{lower, Memory, Spills};
-use crate::output::{Array, Dim, OutputProgram};
+use crate::output::{flat_entry, Array, Dim, OutputProgram};
 use crate::rolled::RolledProgram;
 
 /// A function that is written.
@@ -41,7 +41,7 @@ impl Function<'_> {
     pub fn declaration(&self) -> String {
         let (lower, upper) = (&self.prefix.lower, &self.prefix.upper);
         let number = number(self.input.options.precision);
-        let parameter = |array: &Array, constant: &str| match array.len(&self.input.sizes) {
+        let parameter = |array: &Array, constant: &str| match array.len(&self.input.programs.sizes) {
             // There are no arrays without entries.
             0 => format!("{constant}{number} *{upper}_RESTRICT {}", array.name),
             _ => format!("{constant}{number} {}[{upper}_RESTRICT {}]", array.name, entries(self.prefix, array.dims)),
@@ -58,16 +58,8 @@ impl Function<'_> {
         let spec = self.program.spec;
         let mut lines: Vec<String> = spec.doc().map(comment).collect();
         for array in spec.inputs.iter().chain(spec.results).filter(|array| array.dims.len() > 1) {
-            let indices = ["i", "j", "k"];
-            let mut flat = String::new();
-            for (index, dim) in indices.iter().zip(array.dims) {
-                flat = match flat.as_str() {
-                    "" => index.to_string(),
-                    sum if sum.contains(' ') => format!("({sum}) * {} + {index}", length(self.prefix, *dim)),
-                    first => format!("{first} * {} + {index}", length(self.prefix, *dim)),
-                };
-            }
-            let indices = indices[..array.dims.len()].join(", ");
+            let lengths: Vec<String> = array.dims.iter().map(|dim| length(self.prefix, *dim)).collect();
+            let (indices, flat) = flat_entry(&lengths);
             lines.push(format!("Entry ({indices}) of `{name}` is `{name}[{flat}]`.", name = array.name));
         }
         lines.extend(count_line(&self.program.program.counts()));
@@ -103,14 +95,14 @@ impl Function<'_> {
             scoped: matches!(program.program, Code::Rolled(_)),
             ..Writer::new(prefix, precision)
         };
-        let lengths: Vec<usize> = spec.results.iter().map(|array| array.len(&input.sizes)).collect();
+        let lengths: Vec<usize> = spec.results.iter().map(|array| array.len(&input.programs.sizes)).collect();
         lower(&mut writer, program, &lengths, &Spills::default());
         writer.close();
         let mut out = format!("{}\n{{\n", self.declaration());
         let read: BTreeSet<&str> = writer.read.iter().map(|k| program.inputs[*k].name).collect();
         let reads_fields = writer.read.iter().any(|k| program.inputs[*k].field);
         let unread = spec.inputs.iter().filter(|array| !read.contains(array.name));
-        let unwritten = spec.results.iter().filter(|array| array.len(&input.sizes) == 0);
+        let unwritten = spec.results.iter().filter(|array| array.len(&input.programs.sizes) == 0);
         let unused = unread.chain(unwritten).map(|array| array.name);
         for name in (!reads_fields).then_some("in").into_iter().chain(unused) {
             let _ = writeln!(out, "    (void){name};");

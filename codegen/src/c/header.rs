@@ -9,7 +9,7 @@ use crate::emit::constants::{constants, Constant, Content};
 use crate::emit::fields::{neutral, Field};
 use crate::emit::Input;
 use crate::options::{Arithmetic, Precision};
-use crate::output::{Dim, FIELDS};
+use crate::output::{flat_entry, Dim, FIELDS};
 use mbd_runtime::system::Row;
 
 /// What every file says about its compilation.
@@ -105,11 +105,11 @@ fn dimensions(out: &mut String, prefix: &Prefix, input: &Input, functions: &[Fun
     let mut done: BTreeSet<String> =
         constants.iter().map(|constant| format!("{}_{}", prefix.upper, constant.name)).collect();
     let arrays = functions.iter().flat_map(|f| f.program.spec.inputs.iter().chain(f.program.spec.results));
-    let fields = FIELDS.iter().map(|field| &field.array).filter(|array| array.len(&input.sizes) > 0);
-    for dim in fields.chain(arrays).filter(|array| array.len(&input.sizes) > 0).flat_map(|array| array.dims) {
+    let fields = FIELDS.iter().map(|field| &field.array).filter(|array| array.len(&input.programs.sizes) > 0);
+    for dim in fields.chain(arrays).filter(|array| array.len(&input.programs.sizes) > 0).flat_map(|array| array.dims) {
         let name = length(prefix, *dim);
         if !matches!(dim, Dim::Const(_) | Dim::Gravity) && done.insert(name.clone()) {
-            let _ = writeln!(out, "/* {} */\n#define {name} {}", dim.meaning(), input.sizes.of(*dim));
+            let _ = writeln!(out, "/* {} */\n#define {name} {}", dim.meaning(), input.programs.sizes.of(*dim));
         }
     }
 }
@@ -121,9 +121,13 @@ fn inputs(out: &mut String, prefix: &Prefix, input: &Input, fields: &[Field]) {
     for field in fields {
         let array = FIELDS.iter().map(|field| &field.array).find(|array| array.name == field.name);
         let dims = array.map_or(String::new(), |array| entries(prefix, array.dims));
-        let more = match field.dims[..] {
-            [_, n] => format!(" Entry (i, k) is `{}[i * {n} + k]`.", field.name),
-            _ => String::new(),
+        let more = match field.dims.len() {
+            1 => String::new(),
+            _ => {
+                let lengths: Vec<String> = field.dims.iter().map(usize::to_string).collect();
+                let (indices, flat) = flat_entry(&lengths);
+                format!(" Entry ({indices}) is `{}[{flat}]`.", field.name)
+            }
         };
         let _ = writeln!(out, "    /* {}{more} */\n    {number} {}[{dims}];", comment(field.doc), field.name);
     }

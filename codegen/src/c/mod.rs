@@ -24,7 +24,7 @@ mod instructions;
 mod names;
 mod sines;
 
-use crate::code::{compile, Code};
+use crate::code::{Code, Programs};
 use crate::emit::fields::fields;
 use crate::emit::header::lines;
 use crate::emit::Input;
@@ -35,7 +35,6 @@ use crate::output::{Output, OutputProgram};
 use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::{Counts, Op};
-use crate::trace::{chosen_frames, coordinate_rates, sizes};
 pub use fmu::{fmu, Fmu};
 use function::Function;
 use names::{comment, number, Prefix};
@@ -69,13 +68,9 @@ pub fn generate(model: &Model, options: &Options, name: &str) -> Result<Generate
 /// # Errors
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options, name: &str) -> Result<GeneratedC, GenerateError> {
-    let programs =
-        options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
-    let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();
-    let frames = &chosen_frames(plan, options)?;
-    let input = Input { plan, options, frames, sizes: sizes(plan, options, frames.len()) };
-    let (header, source) = files(&input, &programs, name);
-    Ok(GeneratedC { header, source, counts, notices: plan.notices.clone() })
+    let programs = Programs::new(plan, options)?;
+    let (header, source) = files(&Input { plan, options, programs: &programs }, name);
+    Ok(GeneratedC { header, source, counts: programs.counts(options), notices: plan.notices.clone() })
 }
 
 /// What all names in the C of a type start with: `double_pendulum` for `DoublePendulum`; macros have it in upper case.
@@ -94,33 +89,23 @@ struct Needs {
 impl Needs {
     fn of(programs: &[&OutputProgram<Code>]) -> Needs {
         let mut needs = Needs::default();
-        for program in programs {
-            let blocks: Vec<_> = match &program.program {
-                Code::Straight(straight) => vec![straight],
-                Code::Rolled(rolled) => rolled.blocks.iter().map(|block| &block.program).collect(),
-            };
-            for (_, op, _) in blocks.iter().flat_map(|block| &block.steps) {
-                needs.sines |= matches!(op, Op::Sin(_) | Op::Cos(_));
-                needs.roots |= matches!(op, Op::Sqrt(_));
-                needs.reciprocals |= matches!(op, Op::ReciprocalAbove(_));
-            }
+        for op in programs.iter().flat_map(|program| program.program.operations()) {
+            needs.sines |= matches!(op, Op::Sin(_) | Op::Cos(_));
+            needs.roots |= matches!(op, Op::Sqrt(_));
+            needs.reciprocals |= matches!(op, Op::ReciprocalAbove(_));
         }
         needs
     }
 }
 
 /// Header and source.
-fn files(input: &Input, programs: &[OutputProgram<Code>], name: &str) -> (String, String) {
+fn files(input: &Input, name: &str) -> (String, String) {
     let (options, prefix) = (input.options, &Prefix::new(&input.options.type_name));
-    // As in Rust, for integrators.
-    let rates = options.outputs.contains(&Output::Rates);
-    let extra = rates.then(|| coordinate_rates(input.plan, options).map(Code::Straight));
-    let programs_of_functions: Vec<_> = programs.iter().chain(&extra).collect();
-    let needs = Needs::of(&programs_of_functions);
-    let functions: Vec<Function> =
-        programs_of_functions.into_iter().map(|program| Function { prefix, input, program }).collect();
-    let fields = fields(input.plan, &input.sizes);
-    let mut top: Vec<String> = lines(input.plan, options, programs).iter().map(|line| comment(line)).collect();
+    let programs = input.programs.functions();
+    let needs = Needs::of(&programs);
+    let functions: Vec<Function> = programs.into_iter().map(|program| Function { prefix, input, program }).collect();
+    let fields = fields(input.plan, &input.programs.sizes);
+    let mut top: Vec<String> = lines(input).iter().map(|line| comment(line)).collect();
     top.push(String::new());
     top.extend(header::compilation(input));
     if needs.roots {

@@ -1,10 +1,10 @@
 //! Sine and cosine in C: the main path from the runtime's functions, and the reduction of large angles.
 
-use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64, TWO_OVER_PI};
+use mbd_runtime::trig::{QUARTER_PI, TWO_OVER_PI};
 
 use super::instructions::{Value, Writer};
 use super::names::{literal, number, Prefix};
-use crate::lower::{reduced, within_quadrant};
+use crate::lower::{limit, reduced, within_quadrant};
 use crate::options::{Arithmetic, Precision};
 
 /// The functions for one angle and, if it is called, for several, and what they need.
@@ -18,9 +18,10 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, 
             (fused_operation(prefix, precision), reduced)
         }
     };
-    let (limit, limit_bits) = match precision {
-        Precision::F64 => (LIMIT_F64, format!("UINT64_C({:#x})", LIMIT_F64.to_bits())),
-        Precision::F32 => (f64::from(LIMIT_F32), format!("UINT32_C({:#x})", LIMIT_F32.to_bits())),
+    let limit = limit(precision);
+    let limit_bits = match precision {
+        Precision::F64 => format!("UINT64_C({:#x})", limit.to_bits()),
+        Precision::F32 => format!("UINT32_C({:#x})", (limit as f32).to_bits()),
     };
     let words = [
         ("PREFIX", prefix.lower.clone()),
@@ -36,13 +37,13 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, 
         ("TABLE", table()),
     ];
     let (uint, bits, stored, quarter) = match precision {
-        Precision::F64 => ("uint64_t", 64, 52, "UINT64_C(0xc90fdaa22168c235)"),
-        Precision::F32 => ("uint32_t", 32, 23, "UINT32_C(0xc90fdaa2)"),
+        Precision::F64 => ("uint64_t", 64, 52, format!("UINT64_C({QUARTER_PI:#x})")),
+        Precision::F32 => ("uint32_t", 32, 23, format!("UINT32_C({:#x})", QUARTER_PI >> 32)),
     };
     let exponent = bits - 1 - stored;
     let numbers = [
         ("UINT", uint.to_string()),
-        ("HALF_PI", quarter.to_string()),
+        ("QUARTER_PI", quarter),
         ("QUIET_NAN", format!("((({uint})1 << {}) - 1U) << {}", exponent + 1, stored - 1)),
         ("STORED", stored.to_string()),
         ("TOP", (bits - 1).to_string()),
@@ -220,7 +221,7 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
         zeros++;
     }
     /* angle * 2^(-@TOP@ - zeros) radians, split into two numbers exactly. */
-    const @UINT@ angle = @PREFIX@_high(upper, @HALF_PI@);
+    const @UINT@ angle = @PREFIX@_high(upper, @QUARTER_PI@);
     const @UINT@ rest = angle & ((one << @REST@) - 1U);
     view.bits = (@SCALE@U - (@UINT@)zeros) << @STORED@;
     const @NUMBER@ big = (@NUMBER@)(angle - rest) * view.number;

@@ -1,7 +1,6 @@
 //! Bodies: masses, inertias, sizes.
 
 use super::is_zero;
-use super::names::norm;
 use super::numbers::{Numbers, Quantity};
 use super::symmetric::eigenvalues;
 use crate::diag::Severity;
@@ -9,6 +8,7 @@ use crate::import::raw::{RawBody, RawModel};
 use crate::import::source::Span;
 use crate::import::words::quote;
 use crate::model::{Body, Joint, Rotation, Value};
+use crate::rounded_once::norm;
 
 /// Slack of the triangle inequality and of positivity, relative to the largest moment: numbers written with seven
 /// digits pass.

@@ -1,11 +1,12 @@
 //! Joints: axes, passive elements, source of motion.
 
-use super::names::{norm, Names};
+use super::names::Names;
 use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion};
 use crate::import::source::{Findings, Span};
 use crate::import::words::{list, quote};
 use crate::model::{Joint, JointKind, JointMotion, JointSpec, Value, JOINTS};
+use crate::rounded_once::norm;
 
 /// What each coordinate measures.
 pub(super) fn quantities(kind: &JointSpec) -> Vec<Quantity> {

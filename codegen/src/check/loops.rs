@@ -1,7 +1,7 @@
 //! Loops: what they bind and how.
 
 use super::decay;
-use super::names::{norm, End, Names};
+use super::names::{End, Names};
 use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawConstraint, RawLoop, RawModel, RawNumber};
 use crate::import::source::{Findings, Span, Spanned};
@@ -10,6 +10,7 @@ use crate::model::{
     Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, LoopNumbers, LoopSpec, Mount, Placement,
     Value, LOOPS,
 };
+use crate::rounded_once::norm;
 
 /// Cosine up to which two axes pass for being at right angles: seven digits.
 const RIGHT_ANGLE: f64 = 1e-6;

@@ -7,6 +7,7 @@ use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
 use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Placement, Rotation, Unit, Value};
+use crate::rounded_once::norm;
 
 type Mat3 = [[f64; 3]; 3];
 
@@ -218,7 +219,7 @@ fn steiner(m: f64, a: [f64; 3], b: [f64; 3]) -> Mat3 {
 }
 
 fn unit(v: [f64; 3]) -> [f64; 3] {
-    let n = super::names::norm(v);
+    let n = norm(v);
     v.map(|x| x / n)
 }
 

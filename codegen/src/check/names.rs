@@ -6,15 +6,9 @@ use crate::import::raw::RawModel;
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::{did_you_mean, list, quote};
 use crate::names::{identifier, rust_name};
-use crate::rounded_once::hypot;
 
 /// Name of the fixed world.
 const GROUND: &str = "ground";
-
-/// Euclidean length, without overflow on the way.
-pub(super) fn norm(v: [f64; 3]) -> f64 {
-    hypot(hypot(v[0], v[1]), v[2])
-}
 
 /// Name of the model: as stated, or from the file.
 pub(super) fn model_name(raw: &RawModel, findings: &mut Findings) -> String {

@@ -1,10 +1,10 @@
 //! Numbers with parameters resolved, and suspicions about their units.
 
-use super::names::norm;
 use crate::import::raw::{RawModel, RawNumber, RawParam, RawPlacement, RawRotation, RawValue, RawVec3};
 use crate::import::source::{Findings, Spanned};
 use crate::import::words::{did_you_mean, quote};
 use crate::model::{Param, Placement, Rotation, Unit, Value};
+use crate::rounded_once::norm;
 use std::collections::HashMap;
 
 /// What a number measures, for suspicions about its unit.

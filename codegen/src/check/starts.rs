@@ -1,13 +1,12 @@
 //! Where the closing of loops begins.
 
 use super::joints::{quantities, span_of};
-use super::names::norm;
 use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
 use crate::model::{JointSpec, Start, Value};
-use crate::rounded_once::hypot;
+use crate::rounded_once::norm;
 
 /// What is stated, with joints by their index in the file.
 pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
@@ -122,7 +121,7 @@ fn constant(x: &RawNumber, quantity: Quantity, what: &str, numbers: &mut Numbers
 
 /// Scales a quaternion to unit length.
 fn unit(q: &mut [f64], what: &str, span: Span, findings: &mut Findings) {
-    let n = hypot(norm([q[0], q[1], q[2]]), q[3]);
+    let n = norm([q[0], q[1], q[2], q[3]]);
     let order = "write a unit quaternion in the order x, y, z, w: no rotation is `0, 0, 0, 1`";
     if n < 1e-9 {
         findings.error(span, format!("{what}: the quaternion in `start` is zero"), order);

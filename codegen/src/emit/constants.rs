@@ -59,10 +59,10 @@ pub fn constants(input: &Input) -> Vec<Constant> {
     constants.push(Constant::new("Names of the coordinates, in the order of `q`.", "COORDINATES", q));
     constants.push(Constant::new("Names of the velocities, in the order of `v`, `p`, `tau`.", "VELOCITIES", v));
     if !plan.model.starts.is_empty() {
-        let start = Content::Floats(plan.start().to_vec());
+        let start = Content::Floats(plan.start());
         constants.push(Constant::new("Coordinates that the model starts with.", "START", start));
         let doc = "Velocities of joints that stay where they start when loops are closed.";
-        constants.push(Constant::new(doc, "HELD", Content::Flags(plan.held().to_vec())));
+        constants.push(Constant::new(doc, "HELD", Content::Flags(plan.held())));
     }
     let rows = plan.rows();
     if !rows.is_empty() {
@@ -78,7 +78,7 @@ pub fn constants(input: &Input) -> Vec<Constant> {
     constants
 }
 
-fn indices(Input { plan, options, frames, .. }: &Input) -> Vec<Constant> {
+fn indices(Input { plan, options, programs }: &Input) -> Vec<Constant> {
     let mut constants = Vec::new();
     for slot in &plan.slots {
         let name = &plan.model.joints[slot.joint].name;
@@ -104,7 +104,7 @@ fn indices(Input { plan, options, frames, .. }: &Input) -> Vec<Constant> {
         constants.push(Constant::index("PARAM", "parameter", &param.name, k));
     }
     if options.outputs.iter().any(|output| output.spec().of_frames()) {
-        for (k, &frame) in frames.iter().enumerate() {
+        for (k, &frame) in programs.frames.iter().enumerate() {
             constants.push(Constant::index("FRAME", "frame", &plan.frames[frame].name, k));
         }
     }

@@ -22,6 +22,11 @@ pub struct Field {
 }
 
 impl Field {
+    /// Initial values of all entries.
+    pub fn values(&self) -> Vec<f64> {
+        self.value.clone().unwrap_or_else(|| vec![0.0; self.dims.iter().product()])
+    }
+
     /// Initial value as an array literal.
     fn literal(&self) -> String {
         self.value.as_ref().map_or_else(|| nested(&self.dims, "0.0"), |value| format!("{value:?}"))

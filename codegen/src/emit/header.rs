@@ -2,14 +2,12 @@
 
 use mbd_runtime::tree::Source;
 
-use crate::code::Code;
+use super::Input;
 use crate::model::{ConstraintKind, Gravity, Mount, Value};
-use crate::options::Options;
-use crate::output::OutputProgram;
 use crate::plan::Plan;
 
 /// Source, options, state, constraints, counts: the lines of the comment.
-pub fn lines(plan: &Plan, options: &Options, programs: &[OutputProgram<Code>]) -> Vec<String> {
+pub fn lines(Input { plan, options, programs }: &Input) -> Vec<String> {
     let version = env!("CARGO_PKG_VERSION");
     let source = if options.source.is_empty() { "a model in memory" } else { &options.source };
     let tau = if options.efforts { "field `tau`" } else { "none" };
@@ -29,7 +27,7 @@ pub fn lines(plan: &Plan, options: &Options, programs: &[OutputProgram<Code>]) -
     lines.push(
         "Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):".to_string(),
     );
-    lines.extend(programs.iter().map(|program| {
+    lines.extend(programs.outputs.iter().map(|program| {
         let c = program.program.counts();
         let (name, sum) = (program.spec.name, c.total());
         let [additions, multiplications, divisions] = [c.additions, c.multiplications, c.divisions];

@@ -14,9 +14,9 @@ mod traits;
 
 use std::fmt::Write;
 
-use crate::code::Code;
+use crate::code::{Code, Programs};
 use crate::options::Options;
-use crate::output::{Output, OutputProgram, Sizes};
+use crate::output::{Output, OutputProgram};
 use crate::plan::Plan;
 use head::Head;
 use signature::Signature;
@@ -29,24 +29,22 @@ pub struct Input<'a> {
     pub plan: &'a Plan,
     /// Options of the generator.
     pub options: &'a Options,
-    /// Chosen frames, as indices into the plan's.
-    pub frames: &'a [usize],
-    /// Lengths of all arrays.
-    pub sizes: Sizes,
+    /// The programs of all functions, with chosen frames and lengths of arrays.
+    pub programs: &'a Programs,
 }
 
 /// Source of one type with a function for each program, and implementations of the runtime's traits for which it has
 /// the functions.
-pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates: &OutputProgram<Code>) -> String {
-    let Input { plan, options, .. } = *input;
+pub fn source(input: &Input) -> String {
+    let Input { plan, options, programs } = *input;
     let mut out = String::new();
     let rates = options.outputs.contains(&Output::Rates);
-    let fields = fields::fields(plan, &input.sizes);
-    for line in header::lines(plan, options, programs) {
+    let fields = fields::fields(plan, &programs.sizes);
+    for line in header::lines(input) {
         let _ = writeln!(out, "{}", format!("// {line}").trim_end());
     }
     out.push('\n');
-    let outputs: Vec<&str> = programs.iter().map(|p| p.spec.name).collect();
+    let outputs: Vec<&str> = programs.outputs.iter().map(|p| p.spec.name).collect();
     let _ = writeln!(
         out,
         "/// Dynamics of `{}` in canonical form: {}. Set the fields between calls.",
@@ -61,8 +59,8 @@ pub fn source(input: &Input, programs: &[OutputProgram<Code>], coordinate_rates:
     );
     constants::write(&mut out, &constants::constants(input), options);
     fields::constructor(&mut out, options, &fields);
-    let functions: Vec<_> = programs.iter().chain(rates.then_some(coordinate_rates)).collect();
-    let signatures: Vec<Signature> = functions.iter().map(|p| Signature::new(p.spec, &input.sizes)).collect();
+    let functions = programs.functions();
+    let signatures: Vec<Signature> = functions.iter().map(|p| Signature::new(p.spec, &programs.sizes)).collect();
     let kernels = functions.iter().zip(&signatures).enumerate().map(|(id, (program, signature))| {
         let ports = signature.ports(&program.inputs, &program.program.used_inputs());
         lanes::Kernel { id, signature, ports }

@@ -72,10 +72,7 @@ impl<S: Number> Shared<S> {
                 return Err(CompileError::TooLarge { output, operations: None, most });
             }
             let program = compile(plan, output, options)?;
-            let operations = match &program.program {
-                Code::Straight(straight) => straight.steps.len(),
-                Code::Rolled(rolled) => rolled.blocks.iter().map(|block| block.program.steps.len()).sum(),
-            };
+            let operations = program.program.operations().count();
             match operations > most {
                 true => Err(CompileError::TooLarge { output, operations: Some(operations), most }),
                 false => self.machine_code(&program),

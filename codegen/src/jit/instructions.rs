@@ -9,10 +9,9 @@ use cranelift::codegen::ir::{BlockArg, Function, MemFlags, SigRef, Signature, St
 use cranelift::prelude::*;
 
 use crate::code::Code;
-use crate::lower::{self, main_path, Array, Instructions, Memory, Operation, Place, Spills};
+use crate::lower::{self, limit, main_path, Array, Instructions, Memory, Operation, Place, Spills};
 use crate::options::Precision;
 use crate::output::{InputArray, OutputProgram, FIELDS};
-use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64};
 
 /// Largest number of arguments of a function; the fields follow them in the table of inputs.
 pub const ARGUMENTS: usize = 3;
@@ -194,10 +193,7 @@ impl Writer<'_> {
                     angle = self.b.ins().insertlane(angle, *x, lane as u8);
                 }
             }
-            let limit = self.constant(match self.shape.precision {
-                Precision::F64 => LIMIT_F64,
-                Precision::F32 => f64::from(LIMIT_F32),
-            });
+            let limit = self.constant(limit(self.shape.precision));
             let size = self.b.ins().fabs(angle);
             // NaN is not within the range.
             let fits = self.b.ins().fcmp(FloatCC::LessThanOrEqual, size, limit);

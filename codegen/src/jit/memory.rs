@@ -130,15 +130,7 @@ impl<S: Number> MachineCode<S> {
         arithmetic: Arithmetic,
     ) -> Result<Self, CompileError> {
         let fast = arithmetic == Arithmetic::Fast;
-        let mut flags = settings::builder();
-        // Straight-line code is optimised already, and its order decides what stays in registers.
-        let optimisation = if matches!(program.program, Code::Straight(_)) { "none" } else { "speed" };
-        for (name, value) in [("opt_level", optimisation), ("enable_verifier", "false"), ("is_pic", "false")] {
-            flags.set(name, value).map_err(CompileError::machine)?;
-        }
-        let isa = cranelift::native::builder().map_err(CompileError::machine)?;
-        let isa = isa.finish(settings::Flags::new(flags)).map_err(CompileError::machine)?;
-        let mut module = JITModule::new(JITBuilder::with_isa(isa, default_libcall_names()));
+        let mut module = compiler(&program.program)?;
         let (address, call) = (module.target_config().pointer_type(), module.target_config().default_call_conv);
         let signature = |parameters: usize| {
             let mut signature = Signature::new(call);
@@ -227,6 +219,19 @@ impl<S: Number> MachineCode<S> {
         // SAFETY: see the head of this file.
         unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
     }
+}
+
+/// A compiler for some code on this processor.
+fn compiler(code: &Code) -> Result<JITModule, CompileError> {
+    let mut flags = settings::builder();
+    // Straight-line code is optimised already, and its order decides what stays in registers.
+    let optimisation = if matches!(code, Code::Straight(_)) { "none" } else { "speed" };
+    for (name, value) in [("opt_level", optimisation), ("enable_verifier", "false"), ("is_pic", "false")] {
+        flags.set(name, value).map_err(CompileError::machine)?;
+    }
+    let isa = cranelift::native::builder().map_err(CompileError::machine)?;
+    let isa = isa.finish(settings::Flags::new(flags)).map_err(CompileError::machine)?;
+    Ok(JITModule::new(JITBuilder::with_isa(isa, default_libcall_names())))
 }
 
 fn numbers<S: Number>(table: Vec<f64>) -> Box<[S]> {

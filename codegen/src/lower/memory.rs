@@ -7,13 +7,24 @@ use crate::code::Code;
 use crate::rolled::Block;
 use crate::symbolic::angles::pairs;
 
+/// Where a value is loaded from.
+// Only machine code decides about registers.
+#[cfg_attr(not(feature = "jit"), expect(dead_code))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Home {
+    /// The input of this number.
+    Input(usize),
+    /// This place in the working memory, where it is stored after it was computed.
+    Stored(usize),
+}
+
 /// Which values of straight-line code leave the registers. Where the target's compiler decides that, there are none.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Spills {
     /// Whether it was decided here, for a processor that reads the last operand of an instruction from memory.
     pub decided: bool,
-    /// Place in memory of every value that is stored after it was computed.
-    pub stored: BTreeMap<u32, usize>,
+    /// Where the values are that leave the registers.
+    pub homes: BTreeMap<u32, Home>,
     /// Values that are loaded before an operation, by the number of its node.
     pub loaded: BTreeMap<u32, Vec<u32>>,
     /// Number of places.

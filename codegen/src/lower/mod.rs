@@ -19,7 +19,7 @@ use crate::symbolic::Label;
 pub use memory::{Memory, Spills};
 #[cfg(feature = "jit")]
 pub use sines::main_path;
-pub use sines::{reduced, within_quadrant};
+pub use sines::{limit, reduced, within_quadrant};
 use straight::Lowering;
 
 /// An array that a function reads or writes.
@@ -54,6 +54,18 @@ pub struct Place<T> {
     pub at: usize,
     /// In a loop the number of the turn, and by how many entries the place moves from turn to turn.
     pub turn: Option<(T, usize)>,
+}
+
+impl<T> Place<T> {
+    /// The same entry in every turn.
+    pub fn fixed(array: Array, at: usize) -> Place<T> {
+        Place { array, at, turn: None }
+    }
+
+    /// An entry that moves on by `stride` entries with every turn.
+    pub fn moving(array: Array, at: usize, turn: T, stride: usize) -> Place<T> {
+        Place { array, at, turn: Some((turn, stride)) }
+    }
 }
 
 /// An operation on numbers.

@@ -7,6 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::memory::Home;
 use super::Spills;
 use crate::code::Code;
 use crate::symbolic::angles::{nodes, Angles};
@@ -38,8 +39,6 @@ impl Spills {
                 uses.entry(id).or_default().push(k);
             }
         }
-        let inputs: BTreeSet<u32> =
-            order.iter().filter(|(_, op)| matches!(op, Op::Input(_))).map(|(id, _)| *id).collect();
         let mut spills = Spills { decided: true, ..Spills::default() };
         let mut memory: BTreeSet<u32> = early.clone();
         // Values in registers.
@@ -68,13 +67,13 @@ impl Spills {
             let gone = operands.iter().filter(|operand| !held.contains(operand));
             spills.last.extend(gone.map(|operand| (*id, *operand)));
         }
-        spills.assign(&order, &memory, &inputs);
+        spills.assign(&order, &memory);
         spills
     }
 
     /// Gives places to the values in memory; one that is not used any more leaves its place to another. Inputs have
     /// places of their own.
-    fn assign(&mut self, order: &[(u32, &Op)], memory: &BTreeSet<u32>, inputs: &BTreeSet<u32>) {
+    fn assign(&mut self, order: &[(u32, &Op)], memory: &BTreeSet<u32>) {
         let mut last: BTreeMap<u32, usize> = BTreeMap::new();
         for (k, (id, _)) in order.iter().enumerate() {
             last.extend(self.loaded.get(id).into_iter().flatten().map(|value| (*value, k)));
@@ -89,11 +88,18 @@ impl Spills {
         for value in last.keys().filter(|value| !computed.contains(value)) {
             self.give(*value, &mut free);
         }
-        for (k, (id, _)) in order.iter().enumerate() {
-            let ended = ends.get(&k).into_iter().flatten();
-            free.extend(ended.filter_map(|value| self.stored.get(value)));
-            if memory.contains(id) && !inputs.contains(id) {
-                self.give(*id, &mut free);
+        for (k, (id, op)) in order.iter().enumerate() {
+            for value in ends.get(&k).into_iter().flatten() {
+                if let Some(Home::Stored(place)) = self.homes.get(value) {
+                    free.push(*place);
+                }
+            }
+            match op {
+                _ if !memory.contains(id) => {}
+                Op::Input(k) => {
+                    self.homes.insert(*id, Home::Input(*k as usize));
+                }
+                _ => self.give(*id, &mut free),
             }
         }
     }
@@ -101,6 +107,6 @@ impl Spills {
     fn give(&mut self, value: u32, free: &mut Vec<usize>) {
         let place = free.pop().unwrap_or(self.places);
         self.places = self.places.max(place + 1);
-        self.stored.insert(value, place);
+        self.homes.insert(value, Home::Stored(place));
     }
 }

@@ -17,6 +17,13 @@ struct Turn<'a, I: Instructions> {
     carried: &'a [I::Value],
 }
 
+impl<I: Instructions> Turn<'_, I> {
+    /// Number `at` of its row.
+    fn row(&self, program: &RolledProgram, at: usize) -> Place<I::Turn> {
+        Place::moving(Array::Rows(self.run), at, self.k, program.loops[self.run].row)
+    }
+}
+
 impl<I: Instructions> Lowering<'_, I> {
     pub fn rolled(&mut self, program: &RolledProgram) {
         for (number, block) in program.blocks.iter().enumerate() {
@@ -32,19 +39,21 @@ impl<I: Instructions> Lowering<'_, I> {
 
     /// An input of a block.
     fn source(&mut self, program: &RolledProgram, source: Source, turn: Option<&Turn<I>>) -> I::Value {
-        let moved = |(array, at), stride, turn: &Turn<I>| Place { array, at, turn: Some((turn.k, stride)) };
         let place = match (source, turn) {
             (Source::Given(k), _) => {
                 let (array, at) = self.inputs[k];
-                Place { array, at, turn: None }
+                Place::fixed(array, at)
             }
-            (Source::Kept(at), _) => Place { array: Array::Kept, at, turn: None },
-            (Source::GivenOfTurn { first, stride }, Some(turn)) => moved(self.inputs[first], stride, turn),
+            (Source::Kept(at), _) => Place::fixed(Array::Kept, at),
+            (Source::GivenOfTurn { first, stride }, Some(turn)) => {
+                let (array, at) = self.inputs[first];
+                Place::moving(array, at, turn.k, stride)
+            }
             (Source::Column(column), Some(turn)) => {
                 let columns = program.loops[turn.run].table.first().map_or(0, Vec::len);
-                moved((Array::Table(turn.run), column), columns, turn)
+                Place::moving(Array::Table(turn.run), column, turn.k, columns)
             }
-            (Source::Row(row), Some(turn)) => moved((Array::Rows(turn.run), row), program.loops[turn.run].row, turn),
+            (Source::Row(row), Some(turn)) => turn.row(program, row),
             (Source::Carried(k), Some(turn)) => return turn.carried[k].clone(),
             (source, None) => unreachable!("{source:?} outside of a loop"),
         };
@@ -53,15 +62,17 @@ impl<I: Instructions> Lowering<'_, I> {
 
     /// Gives a value to an output of a block; those that are carried to the next turn are the caller's.
     fn give(&mut self, program: &RolledProgram, target: Target, turn: Option<&Turn<I>>, value: I::Value) {
-        let moved = |(array, at), stride, turn: &Turn<I>| Place { array, at, turn: Some((turn.k, stride)) };
         let place = match (target, turn) {
             (Target::Result(k), _) => {
                 let (array, at) = self.results[k];
-                Place { array, at, turn: None }
+                Place::fixed(array, at)
             }
-            (Target::Kept(at), _) => Place { array: Array::Kept, at, turn: None },
-            (Target::ResultOfTurn { first, stride }, Some(turn)) => moved(self.results[first], stride, turn),
-            (Target::Row(row), Some(turn)) => moved((Array::Rows(turn.run), row), program.loops[turn.run].row, turn),
+            (Target::Kept(at), _) => Place::fixed(Array::Kept, at),
+            (Target::ResultOfTurn { first, stride }, Some(turn)) => {
+                let (array, at) = self.results[first];
+                Place::moving(array, at, turn.k, stride)
+            }
+            (Target::Row(row), Some(turn)) => turn.row(program, row),
             (Target::Carried(_), Some(_)) => return,
             (target, None) => unreachable!("{target:?} outside of a loop"),
         };
@@ -107,7 +118,7 @@ impl<I: Instructions> Lowering<'_, I> {
         let ends = self.target.close_loop(open, next);
         for ((_, end), value) in repeat.carried.iter().zip(ends) {
             if let Some(at) = *end {
-                self.target.store(Place { array: Array::Kept, at, turn: None }, value);
+                self.target.store(Place::fixed(Array::Kept, at), value);
             }
         }
     }
@@ -126,7 +137,7 @@ impl<I: Instructions> Lowering<'_, I> {
             s.give(program, block.outputs[k], Some(&turn), value);
         });
         for (n, angle) in angles.keys().enumerate() {
-            let place = Place { array: Array::Angles, at: n * turns, turn: Some((k, 1)) };
+            let place = Place::moving(Array::Angles, n * turns, k, 1);
             self.target.store(place, values.get(*angle));
         }
         self.target.close_loop(open, Vec::new());
@@ -138,7 +149,7 @@ impl<I: Instructions> Lowering<'_, I> {
             for (n, pair) in angles.values().enumerate() {
                 let Some(part) = pair.iter().position(|node| *node == Some(*id)) else { continue };
                 let array = [Array::Sines, Array::Cosines][part];
-                let value = self.target.load(Place { array, at: n * turns, turn: Some((k, 1)) });
+                let value = self.target.load(Place::moving(array, n * turns, k, 1));
                 let value = self.signed(value, *minus);
                 self.give(program, *target, Some(&turn), value);
             }

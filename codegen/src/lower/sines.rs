@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::ops::{Add, Mul, Neg, Sub};
 
-use mbd_runtime::trig::{kernel_f32, kernel_f64, reduced_f32, reduced_f64, Number};
+use mbd_runtime::trig::{kernel_f32, kernel_f64, reduced_f32, reduced_f64, Number, LIMIT_F32, LIMIT_F64};
 
 use super::{Instructions, Operation};
 use crate::options::Precision;
@@ -107,8 +107,16 @@ impl Recording {
     }
 }
 
+/// Largest angle of the main path, rad.
+pub fn limit(precision: Precision) -> f64 {
+    match precision {
+        Precision::F64 => LIMIT_F64,
+        Precision::F32 => f64::from(LIMIT_F32),
+    }
+}
+
 /// Tells a target the main path of sine and cosine (see [`mbd_runtime::trig`]), which holds for angles up to
-/// [`mbd_runtime::trig::LIMIT_F64`] or [`mbd_runtime::trig::LIMIT_F32`], rad. `turned` gets the number whose last two
+/// [`limit`]. `turned` gets the number whose last two
 /// bits are the quadrant, the quadrant as a whole number, and the sine and cosine within the quadrant; it exchanges
 /// these where the quadrant is odd, and gives them the quadrant's signs.
 #[cfg(feature = "jit")]

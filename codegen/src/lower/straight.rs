@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::memory::Home;
 use super::{Array, Instructions, Operation, Place, Spills};
 use crate::symbolic::angles::Angles;
 use crate::symbolic::{FlooredReciprocal, Fma, Label, Op, Operand, Program, ProgramResult};
@@ -101,24 +102,15 @@ impl<I: Instructions> Lowering<'_, I> {
                 results.entry(*id).or_default().push((k, *minus));
             }
         }
-        // Loops have no spills.
-        let inputs: BTreeMap<u32, u32> = match self.spills.loaded.is_empty() {
-            true => BTreeMap::new(),
-            false => program
-                .steps
-                .iter()
-                .filter_map(|(id, op, _)| if let Op::Input(k) = op { Some((*id, *k)) } else { None })
-                .collect(),
-        };
         for (id, op, label) in &program.steps {
             if !wanted(*id) {
                 continue;
             }
             if values.of[*id as usize].is_none() {
                 for value in self.spills.loaded.get(id).into_iter().flatten() {
-                    let again = match inputs.get(value) {
-                        Some(k) => input(self, *k as usize),
-                        None => self.target.load(self.spilled(*value)),
+                    let again = match self.spills.homes[value] {
+                        Home::Input(k) => input(self, k),
+                        Home::Stored(at) => self.target.load(Place::fixed(Array::Spilled, at)),
                     };
                     values.of[*value as usize] = Some(again);
                 }
@@ -142,16 +134,11 @@ impl<I: Instructions> Lowering<'_, I> {
         }
     }
 
-    /// Place of a value that leaves the registers.
-    fn spilled(&self, value: u32) -> Place<I::Turn> {
-        Place { array: Array::Spilled, at: self.spills.stored[&value], turn: None }
-    }
-
     /// Sets the value of a node, and stores it if it leaves the registers.
     fn define(&mut self, values: &mut Values<I::Value>, id: u32, label: Label, value: I::Value) {
         let value = self.target.named(values.block, id, label, value);
-        if self.spills.stored.contains_key(&id) {
-            self.target.store(self.spilled(id), value.clone());
+        if let Some(Home::Stored(at)) = self.spills.homes.get(&id) {
+            self.target.store(Place::fixed(Array::Spilled, *at), value.clone());
         }
         values.of[id as usize] = Some(value);
     }
@@ -171,11 +158,11 @@ impl<I: Instructions> Lowering<'_, I> {
         let mut values = Values::new(0, program);
         let input = |s: &mut Self, k: usize| {
             let (array, at) = s.inputs[k];
-            s.target.load(Place { array, at, turn: None })
+            s.target.load(Place::fixed(array, at))
         };
         let put = |s: &mut Self, k: usize, value| {
             let (array, at) = s.results[k];
-            s.target.store(Place { array, at, turn: None }, value);
+            s.target.store(Place::fixed(array, at), value);
         };
         if !angles.early.is_empty() {
             self.steps(program, &mut values, |id| angles.before.contains(&id), input, |_, _, _| {});

@@ -6,7 +6,7 @@ mod spec;
 mod text;
 
 pub(crate) use program::locate;
-pub use program::{InputArray, OutputProgram};
+pub use program::{flat_entry, InputArray, OutputProgram};
 pub use spec::{Array, Availability, Dim, Field, Search, Sizes, Spec};
 pub use text::{help, table};
 

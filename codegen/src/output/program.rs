@@ -14,6 +14,17 @@ pub struct InputArray {
     pub dims: Vec<usize>,
 }
 
+/// Documentation of entry (i, j, ...) of a flat array, the last index fastest: its indices, and its index in the array.
+/// `lengths` are those of the array, the outermost first.
+pub fn flat_entry(lengths: &[String]) -> (String, String) {
+    let indices: Vec<&str> = ["i", "j", "k", "l"].into_iter().take(lengths.len()).collect();
+    let flat = indices.iter().zip(lengths).skip(1).fold("i".to_string(), |before, (index, length)| {
+        let before = if before.contains(' ') { format!("({before})") } else { before };
+        format!("{before} * {length} + {index}")
+    });
+    (indices.join(", "), flat)
+}
+
 impl InputArray {
     /// An array of the table.
     pub fn new(array: &Array, field: bool, sizes: &Sizes) -> InputArray {

@@ -5,7 +5,7 @@ use mbd_runtime::spatial::{Axis, ElementaryTransform, Mat3, Vec3};
 use super::rigid::Rigid;
 use super::structure::PoseStep;
 use crate::model::{Placement, Rotation, Value};
-use crate::rounded_once::{hypot, sin_cos};
+use crate::rounded_once::{norm, sin_cos};
 
 /// Cosine and sine of an angle, exact at multiples of 90° that are closer than `snap`.
 fn turn(angle: f64, snap: f64, notice: &mut dyn FnMut(f64)) -> (f64, f64) {
@@ -25,7 +25,6 @@ fn turn(angle: f64, snap: f64, notice: &mut dyn FnMut(f64)) -> (f64, f64) {
 
 /// A unit vector; components below `snap` become zero.
 pub fn direction(axis: [f64; 3], snap: f64, notice: &mut dyn FnMut(f64)) -> Vec3<f64> {
-    let norm = |a: [f64; 3]| hypot(hypot(a[0], a[1]), a[2]);
     let n = norm(axis);
     let unit = axis.map(|x| {
         let x = x / n;

@@ -4,7 +4,7 @@ use mbd_runtime::spatial::{Axis, Mat3};
 use mbd_runtime::tree::{Dims, Elimination, Kind, Source, Unknown, WrenchAxes, INERTIAL_PARAMETERS};
 
 use crate::model::{JointSpec, LoopKind, Model, Param, Value};
-use crate::rounded_once::hypot;
+use crate::rounded_once::norm;
 
 /// One elementary transform of a pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -232,7 +232,7 @@ impl Plan {
             }
             if let Some(first) = kind.spec().quaternion() {
                 let turn = &mut q[at + first..at + first + 4];
-                match turn.iter().fold(0.0_f64, |n, x| hypot(n, *x)) {
+                match norm([turn[0], turn[1], turn[2], turn[3]]) {
                     0.0 => turn[3] = 1.0,
                     norm => turn.iter_mut().for_each(|x| *x /= norm),
                 }

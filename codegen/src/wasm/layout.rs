@@ -69,7 +69,7 @@ impl Layout {
         layout.inputs(input, programs);
         for program in programs {
             let results = program.spec.results.iter().map(|array| {
-                let dims = array.lengths(&input.sizes);
+                let dims = array.lengths(&input.programs.sizes);
                 let offset = layout.reserve(number.bytes() * dims.iter().product::<usize>());
                 Area { name: array.name, doc: "", dims: layout.with_lanes(dims), offset }
             });
@@ -99,7 +99,7 @@ impl Layout {
 
     /// Inputs of any of the functions, with the values that they have at the start.
     fn inputs(&mut self, input: &Input, programs: &[&OutputProgram<Code>]) {
-        let Input { plan, sizes, .. } = input;
+        let (plan, sizes) = (input.plan, &input.programs.sizes);
         let arguments = [
             ("q", "Coordinates, at the start those of the model."),
             ("p", "Momenta."),
@@ -113,8 +113,7 @@ impl Layout {
             self.input_area(name, doc, array.lengths(sizes), &value);
         }
         for field in fields(plan, sizes) {
-            let zeros = || vec![0.0; field.dims.iter().product()];
-            let value = field.value.clone().unwrap_or_else(zeros);
+            let value = field.values();
             self.input_area(field.name, field.doc, field.dims, &value);
         }
     }

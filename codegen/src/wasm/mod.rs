@@ -24,16 +24,15 @@ mod number;
 mod sines;
 mod wrapper;
 
-use crate::code::{compile, Code};
+use crate::code::Programs;
 use crate::emit::Input;
 use crate::error::GenerateError;
 use crate::model::Model;
 use crate::options::Options;
-use crate::output::{Output, OutputProgram};
+use crate::output::Output;
 use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::Counts;
-use crate::trace::{chosen_frames, coordinate_rates, sizes};
 use layout::Layout;
 use number::Number;
 use wrapper::Wrapper;
@@ -91,22 +90,15 @@ pub fn generate_lanes_from(plan: &Plan, options: &Options) -> Result<GeneratedWa
 }
 
 fn files(plan: &Plan, options: &Options, number: Number) -> Result<GeneratedWasm, GenerateError> {
-    let programs =
-        options.outputs.iter().map(|&output| compile(plan, output, options)).collect::<Result<Vec<_>, _>>()?;
-    let counts = options.outputs.iter().copied().zip(programs.iter().map(|p| p.program.counts())).collect();
-    let frames = &chosen_frames(plan, options)?;
-    let input = Input { plan, options, frames, sizes: sizes(plan, options, frames.len()) };
-    // As in Rust, for integrators.
-    let rates = options.outputs.contains(&Output::Rates);
-    let extra = rates.then(|| coordinate_rates(plan, options).map(Code::Straight));
-    let functions: Vec<&OutputProgram<Code>> = programs.iter().chain(&extra).collect();
+    let programs = Programs::new(plan, options)?;
+    let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());
     let layout = Layout::new(&input, &functions, number);
-    let wrapper = Wrapper::new(&input, &layout, &programs, &functions);
+    let wrapper = Wrapper::new(&input, &layout, &functions);
     Ok(GeneratedWasm {
         module: module::module(&layout, &functions),
         wrapper: wrapper.javascript(),
         types: wrapper.types(),
-        counts,
+        counts: programs.counts(options),
         notices: plan.notices.clone(),
     })
 }

@@ -1,16 +1,13 @@
 //! Functions for sines and cosines: the main path of the runtime's functions, and the reduction of large angles.
 
-use mbd_runtime::trig::{LIMIT_F32, LIMIT_F64, TWO_OVER_PI};
+use mbd_runtime::trig::{QUARTER_PI, TWO_OVER_PI};
 use wasm_encoder::{BlockType, Function, Instruction, MemArg, MemArgTarget, ValType};
 
 use super::body::{Body, Value};
 use super::instructions::{Addresses, Signed, SineFunctions, Writer};
 use super::number::Number;
-use crate::lower::{reduced, within_quadrant};
+use crate::lower::{limit, reduced, within_quadrant};
 use crate::options::Precision;
-
-/// π/4 as a binary fraction.
-const QUARTER_PI: u64 = 0xc90f_daa2_2168_c235;
 
 /// 2/π as the functions expect it in the memory: from the last bits to the first.
 pub fn table() -> Vec<u8> {
@@ -22,10 +19,7 @@ pub fn function(number: Number, functions: SineFunctions, table: usize) -> Funct
     let (body, parameters) = Body::new(&[number.ty()]);
     let (x, addresses) = (parameters[0], Addresses::default());
     let mut writer = Writer::new(body, number, &addresses, functions);
-    let limit = number.constant(match number.precision() {
-        Precision::F64 => LIMIT_F64,
-        Precision::F32 => f64::from(LIMIT_F32),
-    });
+    let limit = number.constant(limit(number.precision()));
     let body = &mut writer.body;
     let size = body.one(number.abs(), &[x], number.ty());
     // NaN is not within the range.
@@ -172,7 +166,7 @@ impl Far<'_, '_> {
     /// Three words of 2/π, the first one first, from bit `at` of the table on.
     fn window(&mut self, at: Value) -> [Value; 3] {
         let (precision, number) = (self.number().precision(), self.number());
-        let (bytes, bits) = (precision.bytes(), 8 * precision.bytes() as u64);
+        let (bytes, bits) = (precision.bytes(), self.len());
         let body = &mut self.writer.body;
         // In the memory, the last word comes first.
         let end = Value::I32((8 * table().len() - 3 * 8 * bytes) as i32);
@@ -207,25 +201,74 @@ impl Far<'_, '_> {
         })
     }
 
+    /// Stored bits of the mantissa.
+    fn mantissa(&self) -> u64 {
+        match self.number().precision() {
+            Precision::F64 => 52,
+            Precision::F32 => 23,
+        }
+    }
+
+    /// Bits of a number.
+    fn len(&self) -> u64 {
+        8 * self.number().precision().bytes() as u64
+    }
+
+    fn bias(&self) -> u64 {
+        (1 << (self.len() - 2 - self.mantissa())) - 1
+    }
+
+    fn constant(&self, x: u64) -> Value {
+        self.number().bits(x)
+    }
+
     /// Sine and cosine of `x` beyond the main path.
     fn pair(&mut self, x: Value) -> [Value; 2] {
         let number = self.number();
-        let (ty, bits_ty) = (number.ty(), number.bits_ty());
-        let bits = 8 * number.precision().bytes() as u64;
-        let mantissa = match number.precision() {
-            Precision::F64 => 52,
-            Precision::F32 => 23,
-        };
-        let bias = (1 << (bits - 2 - mantissa)) - 1;
-        let constant = |x: u64| number.bits(x);
-        let (top, low_two) = (constant(bits - 1), constant(bits - 2));
         let signed = number.to_bits(&mut self.writer.body, x);
-        let sign = self.and(signed, constant(1 << (bits - 1)));
+        let sign = self.and(signed, self.constant(1 << (self.len() - 1)));
         let magnitude = self.xor(signed, sign);
-        let biased = self.shr(magnitude, constant(mantissa));
-        let fraction = self.and(magnitude, constant((1 << mantissa) - 1));
-        let m = self.or(fraction, constant(1 << mantissa));
-        let at = self.add(biased, constant(62_u64.wrapping_sub(bias + mantissa)));
+        let (y, quadrant) = self.reduced(magnitude);
+        let pair = within_quadrant(self.writer, y.map(Signed::from), number.precision(), false);
+        let pair = pair.map(|x| self.writer.value(x));
+        let [sin, cos] = turned(self.writer, quadrant, pair);
+        let sin = self.signed(sin, sign);
+        // Zero, or NaN where `x` is infinite or NaN.
+        let finite = self.writer.body.one(number.sub(), &[x, x], number.ty());
+        [sin, cos].map(|x| self.writer.body.one(number.add(), &[x, finite], number.ty()))
+    }
+
+    /// The angle within its quadrant, as a sum of two numbers, and the quadrant, of a number by the bits of its
+    /// magnitude.
+    fn reduced(&mut self, magnitude: Value) -> ([Value; 2], Value) {
+        let (number, mantissa, bits) = (self.number(), self.mantissa(), self.len());
+        let (top, low_two) = (self.constant(bits - 1), self.constant(bits - 2));
+        let biased = self.shr(magnitude, self.constant(mantissa));
+        let fraction = self.and(magnitude, self.constant((1 << mantissa) - 1));
+        let m = self.or(fraction, self.constant(1 << mantissa));
+        let at = self.add(biased, self.constant(62_u64.wrapping_sub(self.bias() + mantissa)));
+        let [low, mid, high] = self.product(m, at);
+        // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around the
+        // nearest, in two words.
+        let [upper, lower] = [(high, mid), (mid, low)].map(|(first, second)| {
+            let first = self.shl(first, self.constant(2));
+            let second = self.shr(second, low_two);
+            self.or(first, second)
+        });
+        let negative = self.shr(upper, top);
+        let mask = self.word(number.bits_sub(), self.constant(0), negative);
+        let [upper, lower] = [upper, lower].map(|word| self.xor(word, mask));
+        let lower = self.add(lower, negative);
+        let over = self.below(lower, negative);
+        let upper = self.add(upper, over);
+        let y = self.radians(upper, lower);
+        let flip = self.shl(negative, top);
+        let quadrant = self.shr(high, low_two);
+        (y.map(|y| self.signed(y, flip)), self.add(quadrant, negative))
+    }
+
+    /// The last three words of the product of `m` and 2/π from bit `at` on, the last one first.
+    fn product(&mut self, m: Value, at: Value) -> [Value; 3] {
         let window = self.window(at);
         let low = self.mul(m, window[2]);
         let carry = self.high(m, window[2]);
@@ -235,61 +278,40 @@ impl Far<'_, '_> {
         let upper = self.high(m, window[1]);
         let high = self.add(product, upper);
         let over = self.below(mid, carry);
-        let high = self.add(high, over);
-        // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around the
-        // nearest, in two words.
-        let [upper, lower] = [(high, mid), (mid, low)].map(|(first, second)| {
-            let first = self.shl(first, constant(2));
-            let second = self.shr(second, low_two);
-            self.or(first, second)
-        });
-        let negative = self.shr(upper, top);
-        let mask = self.word(number.bits_sub(), constant(0), negative);
-        let [upper, lower] = [upper, lower].map(|word| self.xor(word, mask));
-        let lower = self.add(lower, negative);
-        let over = self.below(lower, negative);
-        let upper = self.add(upper, over);
+        [low, mid, self.add(high, over)]
+    }
+
+    /// A fraction of a quadrant in two words, in radians: the sum of two numbers, of which the second is small.
+    fn radians(&mut self, upper: Value, lower: Value) -> [Value; 2] {
+        let (number, mantissa, bits) = (self.number(), self.mantissa(), self.len());
+        let ty = number.ty();
         // The upper word is not zero: no number is so close to a multiple of π/2.
-        let count = match number.precision() {
-            Precision::F64 => Instruction::I64Clz,
-            Precision::F32 => Instruction::I32Clz,
+        let (count, convert) = match number.precision() {
+            Precision::F64 => (Instruction::I64Clz, Instruction::F64ConvertI64U),
+            Precision::F32 => (Instruction::I32Clz, Instruction::F32ConvertI32U),
         };
-        let zeros = self.writer.body.one(count, &[upper], bits_ty);
+        let zeros = self.writer.body.one(count, &[upper], number.bits_ty());
         let upper = self.shl(upper, zeros);
-        let others = self.xor(zeros, top);
-        let lower = self.shr(lower, constant(1));
+        let others = self.xor(zeros, self.constant(bits - 1));
+        let lower = self.shr(lower, self.constant(1));
         let lower = self.shr(lower, others);
         let leading = self.or(upper, lower);
-        let angle = self.high(leading, constant(QUARTER_PI >> (64 - bits)));
+        let angle = self.high(leading, self.constant(QUARTER_PI >> (64 - bits)));
         // angle · 2^(1 − bits − zeros) radians, split into two numbers exactly.
-        let exponent = self.word(number.bits_sub(), constant((bias + 1).wrapping_sub(bits)), zeros);
-        let scale = self.shl(exponent, constant(mantissa));
+        let least = self.constant((self.bias() + 1).wrapping_sub(bits));
+        let exponent = self.word(number.bits_sub(), least, zeros);
+        let scale = self.shl(exponent, self.constant(mantissa));
         let scale = number.number_of(&mut self.writer.body, scale);
-        let rest = self.and(angle, constant((1 << (bits - mantissa - 1)) - 1));
+        let rest = self.and(angle, self.constant((1 << (bits - mantissa - 1)) - 1));
         let most = self.word(number.bits_sub(), angle, rest);
         let [big, small] = [most, rest].map(|word| {
-            let convert = match number.precision() {
-                Precision::F64 => Instruction::F64ConvertI64U,
-                Precision::F32 => Instruction::F32ConvertI32U,
-            };
-            let part = self.writer.body.one(convert, &[word], ty);
+            let part = self.writer.body.one(convert.clone(), &[word], ty);
             self.writer.body.one(number.mul(), &[part, scale], ty)
         });
         let body = &mut self.writer.body;
         let y0 = body.one(number.add(), &[big, small], ty);
         let lost = body.one(number.sub(), &[big, y0], ty);
-        let y1 = body.one(number.add(), &[lost, small], ty);
-        let flip = self.shl(negative, top);
-        let y = [y0, y1].map(|y| self.signed(y, flip));
-        let quadrant = self.shr(high, low_two);
-        let quadrant = self.add(quadrant, negative);
-        let pair = within_quadrant(self.writer, y.map(Signed::from), number.precision(), false);
-        let pair = pair.map(|x| self.writer.value(x));
-        let [sin, cos] = turned(self.writer, quadrant, pair);
-        let sin = self.signed(sin, sign);
-        // Zero, or NaN where `x` is infinite or NaN.
-        let finite = self.writer.body.one(number.sub(), &[x, x], ty);
-        [sin, cos].map(|x| self.writer.body.one(number.add(), &[x, finite], ty))
+        [y0, body.one(number.add(), &[lost, small], ty)]
     }
 
     /// A number with its sign changed where the sign bit of `sign` is set.

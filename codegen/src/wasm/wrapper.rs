@@ -10,7 +10,7 @@ use crate::emit::head::count_line;
 use crate::emit::header::lines;
 use crate::emit::Input;
 use crate::options::{Arithmetic, Precision};
-use crate::output::OutputProgram;
+use crate::output::{flat_entry, OutputProgram};
 use mbd_runtime::system::Row;
 
 /// What both files are written from.
@@ -24,19 +24,14 @@ pub struct Wrapper<'a> {
 }
 
 impl<'a> Wrapper<'a> {
-    /// `programs` are those of the outputs, `functions` all that the module has.
-    pub fn new(
-        input: &'a Input<'a>,
-        layout: &'a Layout,
-        programs: &[OutputProgram<Code>],
-        functions: &'a [&'a OutputProgram<Code>],
-    ) -> Wrapper<'a> {
+    /// `functions` are the programs of all functions that the module has.
+    pub fn new(input: &'a Input<'a>, layout: &'a Layout, functions: &'a [&'a OutputProgram<Code>]) -> Wrapper<'a> {
         let mut wrapper = Wrapper { input, layout, functions, top: Vec::new(), constants: constants(input) };
         if let lanes @ 2.. = layout.number.lanes() {
             let (doc, name) = (format!("{LANES_DOC}."), "LANES".to_string());
             wrapper.constants.push(Constant { doc, name, value: Content::Number(lanes) });
         }
-        wrapper.top = lines(input.plan, input.options, programs);
+        wrapper.top = lines(input);
         wrapper.memory_lines();
         wrapper
     }
@@ -275,17 +270,12 @@ fn shape(area: &Area) -> String {
 }
 
 fn area_doc(area: &Area) -> Vec<String> {
-    let [_, others @ ..] = &area.dims[..] else { return vec![area.doc.to_string()] };
-    if others.is_empty() {
+    if area.dims.len() < 2 {
         return vec![area.doc.to_string()];
     }
-    let mut indices = vec!["i"];
-    let index = ["j", "k", "l"].into_iter().zip(others).fold("i".to_string(), |index, (next, n)| {
-        indices.push(next);
-        let before = if index.contains(' ') { format!("({index})") } else { index };
-        format!("{before} * {n} + {next}")
-    });
-    vec![format!("{} Entry ({}) has index {index}.", area.doc, indices.join(", "))]
+    let lengths: Vec<String> = area.dims.iter().map(usize::to_string).collect();
+    let (indices, index) = flat_entry(&lengths);
+    vec![format!("{} Entry ({indices}) has index {index}.", area.doc)]
 }
 
 fn constant_doc(constant: &Constant) -> Vec<String> {
