@@ -57,6 +57,7 @@ impl<S: Copy> Kind<S> {
     }
 
     /// Column `k` of the joint matrix `E`.
+    #[inline]
     pub fn axis(&self, k: usize) -> Freedom<S> {
         match self {
             Kind::Revolute => Freedom::Unit(5),

@@ -172,19 +172,13 @@ impl<S: Scalar> ElementaryTransform<S> {
     #[inline(always)]
     pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
         match self {
-            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
-                let mut m = *m;
-                (m.lin[a], m.lin[b]) = pair_back(*c, *s, m.lin[a], m.lin[b]);
-                (m.ang[a], m.ang[b]) = pair_back(*c, *s, m.ang[a], m.ang[b]);
-                m
-            }),
             ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
                 let mut m = *m;
                 m.lin[a] = m.lin[a] + *r * m.ang[b];
                 m.lin[b] = m.lin[b] - *r * m.ang[a];
                 m
             }),
-            ElementaryTransform::Rotate(r) => Motion { lin: down3(r, m.lin), ang: down3(r, m.ang) },
+            _ => Motion { lin: self.vector(m.lin), ang: self.vector(m.ang) },
         }
     }
 
@@ -192,19 +186,13 @@ impl<S: Scalar> ElementaryTransform<S> {
     #[inline(always)]
     pub fn force(&self, f: &Force<S>) -> Force<S> {
         match self {
-            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
-                let mut f = *f;
-                (f.lin[a], f.lin[b]) = pair(*c, *s, f.lin[a], f.lin[b]);
-                (f.ang[a], f.ang[b]) = pair(*c, *s, f.ang[a], f.ang[b]);
-                f
-            }),
             ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
                 let mut f = *f;
                 f.ang[a] = f.ang[a] - *r * f.lin[b];
                 f.ang[b] = f.ang[b] + *r * f.lin[a];
                 f
             }),
-            ElementaryTransform::Rotate(r) => Force { lin: up3(r, f.lin), ang: up3(r, f.ang) },
+            _ => Force { lin: self.vector_back(f.lin), ang: self.vector_back(f.ang) },
         }
     }
 

@@ -7,11 +7,11 @@ macro_rules! for_freedom {
     ($kind:expr, $k:expr, |$axis:ident| $result:expr) => {
         match $kind {
             $crate::tree::Kind::Revolute => {
-                let $axis = $crate::tree::Freedom::Unit(5);
+                let $axis = $crate::tree::Kind::Revolute.axis($k);
                 $result
             }
             $crate::tree::Kind::Prismatic => {
-                let $axis = $crate::tree::Freedom::Unit(2);
+                let $axis = $crate::tree::Kind::Prismatic.axis($k);
                 $result
             }
             kind => {
