@@ -6,7 +6,16 @@ use multibody::codegen::Output;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::Stabilisation;
 
-use super::{OutputList, DEFAULT_RUNTIME};
+use super::generate::{OutputList, DEFAULT_RUNTIME};
+
+/// Parser of an option whose values the library lists.
+macro_rules! choice {
+    ($choice:ty) => {
+        $crate::args::values::one_of(<$choice>::ALL.map(|c| (c, c.name(), c.meaning())))
+    };
+}
+
+pub(super) use choice;
 
 /// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
