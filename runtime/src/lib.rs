@@ -18,6 +18,7 @@ pub mod batch;
 pub mod catalogue;
 mod constant;
 pub mod constrained;
+pub mod contact;
 mod dual;
 mod error;
 pub mod integrate;

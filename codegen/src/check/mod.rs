@@ -48,7 +48,7 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     loops::rigid(raw, &constraints, &joints, &bodies, findings);
     let constraints = constraints.into_iter().flatten().map(|c| placed(c, &place)).collect();
     let starts = starts::placed(starts, &place);
-    let model = Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, starts };
+    let model = Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, contacts: Vec::new(), starts };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
     (!findings.has_errors()).then_some(model)

@@ -3,12 +3,14 @@
 //! SI units, radians. No file format and no symbolic expression is known here.
 
 mod constraint;
+mod contact;
 mod joint;
 
 use std::fmt;
 use std::sync::Arc;
 
 pub use constraint::{Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, Stands, LOOPS};
+pub use contact::Contact;
 pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR};
 
@@ -251,6 +253,8 @@ pub struct Model {
     pub wrenches: Vec<Wrench>,
     /// Loops and couplings, in file order.
     pub constraints: Vec<Constraint>,
+    /// Contacts: of pairs of shapes in file order, then stops of joints in the order of the joints.
+    pub contacts: Vec<Contact>,
     /// Initial coordinates, where they are not neutral.
     pub starts: Vec<Start>,
 }

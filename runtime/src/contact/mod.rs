@@ -1,0 +1,44 @@
+//! Contacts: pairs of bodies that can touch, and stops of joints.
+//!
+//! A contact is a constraint that acts only while its bodies are pressed together. Its first row is the normal one: its
+//! residual is the gap (m; rad for stops of rotations), positive while the bodies are apart. Where there is friction, two
+//! tangential rows follow.
+
+/// How a contact with restitution throws its bodies apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RestitutionLaw {
+    /// The normal impulse of expansion is the coefficient times that of compression. It never adds energy.
+    #[default]
+    Poisson,
+    /// The work of expansion is the square of the coefficient times that of compression. It never adds energy.
+    Stronge,
+    /// The normal velocity after the impact is the coefficient times that before it, reversed. With friction it may add
+    /// energy.
+    Newton,
+}
+
+/// A contact of a system, by its rows among those of the system's constraints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact<S> {
+    /// Its normal row.
+    pub row: usize,
+    /// Whether the two rows after it are tangential ones, at right angles to each other.
+    pub tangents: bool,
+    /// Coefficient of Coulomb's friction; zero without tangential rows.
+    pub friction: S,
+    /// Coefficient of restitution, from 0 (the bodies stay together) to 1.
+    pub restitution: S,
+    /// Law of restitution.
+    pub law: RestitutionLaw,
+}
+
+impl<S> Contact<S> {
+    /// Number of its rows.
+    pub fn rows(&self) -> usize {
+        if self.tangents {
+            3
+        } else {
+            1
+        }
+    }
+}
