@@ -4,6 +4,7 @@ pub mod c;
 mod check;
 mod choice;
 pub mod code;
+mod contacts;
 pub mod diag;
 mod emit;
 mod error;

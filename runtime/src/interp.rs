@@ -120,6 +120,34 @@ impl<S: Scalar> Interpreter<S> {
         }
     }
 
+    /// The interpreter in which only some rows of the constraints act, with zero inputs and the gravity of this one. Its
+    /// rows have the numbers that they have here; those that do not act have no residuals, entries and multipliers.
+    ///
+    /// `acts` has one entry for each row.
+    pub fn acting(&self, acts: &[bool]) -> Self {
+        let reduced = Self::new(self.physical.clone().acting(acts), self.gravity);
+        let (rows, entry_columns) = (self.rows.clone(), self.entry_columns.clone());
+        Interpreter { rows, entry_columns, names: self.names.clone(), ..reduced }
+    }
+
+    /// Exchanges its inputs with those of another interpreter of the same mechanism.
+    pub(crate) fn swap_inputs(&mut self, other: &mut Self) {
+        use core::mem::swap;
+        swap(&mut self.tau, &mut other.tau);
+        swap(&mut self.drive_q, &mut other.drive_q);
+        swap(&mut self.drive_v, &mut other.drive_v);
+        swap(&mut self.drive_a, &mut other.drive_a);
+        swap(&mut self.wrenches, &mut other.wrenches);
+        swap(&mut self.gravity, &mut other.gravity);
+    }
+
+    /// Velocities of the rows of the constraints, `(q, v) → Φ v` with what prescribed motions add, one number for each
+    /// row.
+    pub fn row_velocities(&mut self, q: &[S], v: &[S], out: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.row_velocities(q, v, &inputs!(self), &mut self.work, out);
+    }
+
     /// Takes the names of the velocities and of the constraints, in their order, for the messages of errors.
     #[must_use]
     pub fn with_names(mut self, velocities: Vec<String>, constraints: Vec<String>) -> Self {

@@ -325,6 +325,8 @@ pub struct Constraint<S> {
     pub slots: Vec<usize>,
     /// Its first row among all.
     pub first: usize,
+    /// The first entry of its rows among all entries of `Φ`.
+    pub entry: usize,
     /// Velocities that it binds, in ascending order.
     pub velocities: Vec<usize>,
     /// Rate at which position errors decay (Baumgarte), 1/s.
@@ -384,6 +386,24 @@ pub struct Dims {
 }
 
 impl<S> Tree<S> {
+    /// Places of the rows that do not act, as closed columns: constraints none of whose rows act are removed. Rows keep
+    /// their numbers, and have no residuals, entries and multipliers.
+    ///
+    /// `acts` has one entry for each row. With every choice of rows the sweeps eliminate those that act in the same
+    /// order.
+    #[must_use]
+    pub fn acting(mut self, acts: &[bool]) -> Tree<S> {
+        let rows = |c: &Constraint<S>| c.first..c.first + c.slots.len();
+        let silent = |g: usize| matches!(self.unknowns[g], Unknown::Row(r) if !acts[r]);
+        for node in &mut self.nodes {
+            node.elimination.retain_columns(|g| !silent(g));
+        }
+        self.solve_at_ground.retain(|&g| !silent(g));
+        self.constraints.retain(|c| acts[rows(c)].contains(&true));
+        self.accelerations = self.accelerations.map(|tree| alloc::boxed::Box::new(tree.acting(acts)));
+        self
+    }
+
     /// Whether number `g` of [`Tree::unknowns`] is a row of one of the constraints.
     pub fn is_slot(&self, g: usize) -> bool {
         self.constraints.iter().any(|c| c.slots.contains(&g))

@@ -39,6 +39,7 @@ impl Plan {
         }
         plan.dims.wrenches = plan.wrenches.len();
         plan.joint_nodes.clear();
+        plan.contact_frames.clear();
         plan.constraints = constraints;
         (plan, numbers)
     }

@@ -17,6 +17,8 @@ impl Plan {
         let (dims, slots) = slots(model);
         let mounts = constraints::mounts(model, &elements, snap);
         let framed = frames::choose(model, &elements, &slots, &mounts);
+        let mut loops = framed.mounts;
+        let contact_frames = loops.split_off(model.constraints.len());
         let mut plan = Plan {
             model: model.clone(),
             nodes: framed.nodes,
@@ -28,13 +30,14 @@ impl Plan {
             slots,
             wrenches: Vec::new(),
             constraints: Vec::new(),
+            contact_frames,
             notices,
             matrix_depth: 0,
             accelerations: None,
         };
         plan.wrenches = wrenches(model, &plan.frames);
         shared::share(&mut plan);
-        constraints::constrain(&mut plan, framed.mounts);
+        constraints::constrain(&mut plan, &model.constraints, &loops);
         row_order::order(&mut plan);
         plan
     }

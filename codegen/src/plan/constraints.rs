@@ -1,4 +1,4 @@
-//! Loops and couplings of the model on the nodes of the plan.
+//! Loops, couplings and contacts of the model on the nodes of the plan.
 
 use std::collections::BTreeSet;
 
@@ -9,9 +9,9 @@ use super::elements::{Carried, Elements};
 use super::placement::{constant, direction, placement};
 use super::rigid::Rigid;
 use super::structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PoseStep};
-use crate::model::{ConstraintKind, LoopKind, Model, Mount, Stands, Value};
+use crate::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Stands, Value};
 
-/// Frames of loops: the element that carries each, and its pose with the axes that the rows need.
+/// Frames of loops and then of contacts: the element that carries each, and its pose with the axes that the rows need.
 pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carried; 2]>> {
     let carried = |mount: &Mount, turn: Option<PoseStep>| {
         let (carrier, mut pose) = mount.body.map_or((None, Vec::new()), |b| elements.bodies[b].clone());
@@ -19,7 +19,8 @@ pub fn mounts(model: &Model, elements: &Elements, snap: f64) -> Vec<Option<[Carr
         pose.extend(turn);
         (carrier, pose)
     };
-    let each = model.constraints.iter().map(|c| match &c.kind {
+    let loops = model.constraints.iter().map(|c| &c.kind);
+    let each = loops.chain(model.contacts.iter().map(|c| &c.kind)).map(|kind| match kind {
         ConstraintKind::Loop { kind, first, second } => {
             let [a, b] = turns(kind, snap);
             Some([carried(first, a), carried(second, b)])
@@ -57,10 +58,9 @@ fn turns(kind: &LoopKind, snap: f64) -> [Option<PoseStep>; 2] {
     turns
 }
 
-/// Puts the model's constraints on the nodes, after [`super::shared::share`]. `frames` are those of [`mounts`].
-pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
-    let constraints = plan.model.constraints.clone();
-    for (constraint, frames) in constraints.into_iter().zip(frames) {
+/// Puts constraints on the nodes, after [`super::shared::share`]. `frames` are theirs of [`mounts`].
+pub fn constrain(plan: &mut Plan, constraints: &[Constraint], frames: &[Option<[PlanFrame; 2]>]) {
+    for (constraint, frames) in constraints.iter().cloned().zip(frames.iter().cloned()) {
         let (bond, members) = match (constraint.kind, frames) {
             (ConstraintKind::Loop { kind, .. }, Some(mut frames)) => {
                 let ground = frames.iter().any(|f| f.node.is_none());
@@ -97,13 +97,28 @@ pub fn constrain(plan: &mut Plan, frames: Vec<Option<[PlanFrame; 2]>>) {
             PlanBond::Coupling { .. } => 1,
         };
         let first = plan.dims.rows;
+        let entry = plan.constraints.last().map_or(0, |c| c.entry + c.slots.len() * c.velocities.len());
         plan.dims.rows += count;
         let slots: Vec<usize> = (0..count).map(|k| plan.unknowns.len() + k).collect();
         plan.unknowns.extend((first..first + count).map(Unknown::Row));
         open(plan, &slots, &bond, &members);
         let velocities = velocities(plan, &bond.cycle());
         let decay = constraint.decay;
-        plan.constraints.push(PlanConstraint { name: constraint.name, bond, slots, first, velocities, decay });
+        plan.constraints.push(PlanConstraint { name: constraint.name, bond, slots, first, entry, velocities, decay });
+    }
+}
+
+impl Plan {
+    /// The plan with the rows of all contacts after those of the constraints. Its trees are to be reduced to the rows that
+    /// act ([`mbd_runtime::tree::Tree::acting`]).
+    pub(crate) fn with_contacts(&self) -> Plan {
+        let mut plan = self.clone();
+        let contacts = self.model.contacts.iter();
+        let contacts = contacts.map(|c| Constraint::new(c.name.clone(), c.kind.clone(), Value::ZERO));
+        constrain(&mut plan, &contacts.collect::<Vec<_>>(), &self.contact_frames);
+        plan.contact_frames.clear();
+        plan.accelerations = self.accelerations.as_ref().map(|other| Box::new(other.with_contacts()));
+        plan
     }
 }
 

@@ -189,6 +189,7 @@ impl PlanConstraint {
         };
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
         let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
-        Constraint { bond, slots, first: self.first, velocities, decay, compliance: None }
+        let (first, entry) = (self.first, self.entry);
+        Constraint { bond, slots, first, entry, velocities, decay, compliance: None }
     }
 }

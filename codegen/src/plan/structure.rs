@@ -120,6 +120,8 @@ pub struct Plan {
     pub wrenches: Vec<(usize, WrenchAxes)>,
     /// Loops and couplings.
     pub constraints: Vec<PlanConstraint>,
+    /// The two frames of every contact between bodies, until contacts are among the constraints.
+    pub contact_frames: Vec<Option<[PlanFrame; 2]>>,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
     /// See [`mbd_runtime::tree::Tree`].
@@ -162,6 +164,8 @@ pub struct PlanConstraint {
     pub slots: Vec<usize>,
     /// Its first row.
     pub first: usize,
+    /// The first entry of its rows among all entries of `Φ`.
+    pub entry: usize,
     /// Velocities that it binds, in ascending order.
     pub velocities: Vec<usize>,
     /// See [`mbd_runtime::tree::Constraint`].
@@ -184,9 +188,9 @@ impl Plan {
         self.state_names(|spec| spec.coordinates.iter().map(|c| c.name).collect())
     }
 
-    /// Names of the loops and couplings, in the order of the description.
+    /// Names of the loops and couplings in the order of the description, then of the contacts if they are among them.
     pub fn constraint_names(&self) -> Vec<String> {
-        self.model.constraints.iter().map(|c| c.name.clone()).collect()
+        self.constraints.iter().map(|c| c.name.clone()).collect()
     }
 
     /// Names of the velocities (momenta, joint forces), in state order.

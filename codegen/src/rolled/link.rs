@@ -230,6 +230,7 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
         bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b }),
         slots: constraint.slots.clone(),
         first: constraint.first,
+        entry: constraint.entry,
         decay: None,
         compliance: None,
         velocities: Vec::new(),

@@ -42,7 +42,7 @@ mod post_step;
 mod projection;
 mod radau;
 mod rattle;
-mod rows;
+pub(crate) mod rows;
 
 pub use crate::error::ConstraintError;
 #[cfg(feature = "alloc")]

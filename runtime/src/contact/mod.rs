@@ -4,6 +4,14 @@
 //! residual is the gap (m; rad for stops of rotations), positive while the bodies are apart. Where there is friction, two
 //! tangential rows follow.
 
+#[cfg(feature = "alloc")]
+mod interpreted;
+mod touching;
+
+#[cfg(feature = "alloc")]
+pub use interpreted::ContactInterpreter;
+pub use touching::Touching;
+
 /// How a contact with restitution throws its bodies apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RestitutionLaw {
@@ -39,6 +47,29 @@ impl<S> Contact<S> {
             3
         } else {
             1
+        }
+    }
+}
+
+/// What a contact does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// The bodies are apart, or about to be: no force.
+    #[default]
+    Open,
+    /// The bodies stay together and slide, or may slide freely: the normal row acts, and friction against the motion.
+    Slide,
+    /// The bodies stay together and do not slide: all rows act.
+    Stick,
+}
+
+impl Mode {
+    /// Whether row `k` of the contact acts.
+    pub fn acts(self, k: usize) -> bool {
+        match self {
+            Mode::Open => false,
+            Mode::Slide => k == 0,
+            Mode::Stick => true,
         }
     }
 }

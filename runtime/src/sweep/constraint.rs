@@ -390,11 +390,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Entries of `Φ`, placed as [`Tree::entry_columns`] says, after the rows.
     pub(super) fn row_entries(&self, w: &Workspace<S>, entries: &mut [S]) {
         entries.fill(S::zero());
-        let mut first = 0;
         for constraint in &self.tree.constraints {
             let bound = &constraint.velocities;
             self.trace.at(None, Quantity::Constraint);
-            for r in constraint.range() {
+            for (k, r) in constraint.range().enumerate() {
+                let first = constraint.entry + k * bound.len();
                 let entries = &mut entries[first..first + bound.len()];
                 let mut put = |v: usize, x: S| {
                     if let Ok(at) = bound.binary_search(&v) {
@@ -414,7 +414,30 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                         }
                     }
                 }
-                first += bound.len();
+            }
+        }
+    }
+
+    /// Velocities of the rows after a velocity sweep: of cuts along their directions, of couplings from the rates of
+    /// their nodes.
+    pub(super) fn velocities_of_rows(&self, w: &Workspace<S>, out: &mut [S]) {
+        out.fill(S::zero());
+        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            match &constraint.bond {
+                Bond::Cut(cut) => {
+                    let at = &w.constraints.relative[index];
+                    let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
+                    let relative = difference(&b, &at.motion(&a));
+                    for r in constraint.range() {
+                        out[r] = w.constraints.rows[r].e.dot(&relative);
+                    }
+                }
+                Bond::Coupling { terms, .. } => {
+                    let r = constraint.first;
+                    for (i, ratio) in terms {
+                        out[r] = out[r] + *ratio * w.velocity.rate[w.first[*i]];
+                    }
+                }
             }
         }
     }

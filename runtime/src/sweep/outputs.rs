@@ -281,6 +281,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.row_entries(w, entries);
     }
 
+    /// Velocities of the rows of the constraints at velocities `v`: `Φ v` and what prescribed motions add to it.
+    pub fn row_velocities(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [S]) {
+        let given = Arguments::new(q, v, u);
+        let mut cx = self.context(&given, w, Results::none());
+        cx.articulate();
+        cx.sweep([Sweep::ALL_PATHS, Sweep::ALL_ROWS, Sweep::VELOCITY]);
+        self.velocities_of_rows(w, out);
+    }
+
     /// Articulated inertia with all freedoms and unknowns eliminated.
     pub fn factor(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
         let given = Arguments::new(q, &[], u);

@@ -95,6 +95,7 @@ impl<S: Scalar> Constraint<S> {
             bond,
             slots: self.slots.clone(),
             first: self.first,
+            entry: self.entry,
             velocities: self.velocities.clone(),
             decay: self.decay.map(of),
             compliance: self.compliance.map(of),
