@@ -7,6 +7,7 @@ mod args;
 mod certify;
 mod check;
 mod condition;
+mod contacts;
 mod count;
 mod displacement;
 mod energy;

@@ -1,6 +1,7 @@
 //! A writer of the TOML format. It prints failing cases and tests the reader.
 
 mod constraints;
+mod contacts;
 
 use std::fmt::Write;
 
@@ -59,6 +60,7 @@ pub fn to_toml_in(model: &Model, order: Order) -> String {
     }
     for j in w.order(order) {
         w.joint(&mut out, &model.joints[j]);
+        w.limits(&mut out, j);
         w.start(&mut out, j);
     }
     for frame in &model.frames {
@@ -76,6 +78,8 @@ pub fn to_toml_in(model: &Model, order: Order) -> String {
         }
     }
     w.constraints(&mut out);
+    w.shapes(&mut out);
+    w.contacts(&mut out);
     out
 }
 

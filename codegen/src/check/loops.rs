@@ -185,7 +185,7 @@ pub(super) fn rigid(
     findings: &mut Findings,
 ) {
     let welded = merged(joints, bodies.len(), |j| j.kind.nv() == 0);
-    let led = merged(joints, bodies.len(), |j| j.kind.nv() == 0 || j.motion == JointMotion::Prescribed);
+    let led = merged(joints, bodies.len(), led);
     for (source, constraint) in raw.constraints.iter().zip(constraints) {
         let (RawConstraint::Loop(source), Some(constraint)) = (source, constraint) else { continue };
         let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };
@@ -206,8 +206,13 @@ pub(super) fn rigid(
     }
 }
 
+/// Whether a joint leaves no freedom.
+pub(super) fn led(joint: &Joint) -> bool {
+    joint.kind.nv() == 0 || joint.motion == JointMotion::Prescribed
+}
+
 /// For each body the innermost one it is joined to without a freedom; `None` is the ground.
-fn merged(joints: &[Joint], bodies: usize, rigid: impl Fn(&Joint) -> bool) -> Vec<Option<usize>> {
+pub(super) fn merged(joints: &[Joint], bodies: usize, rigid: impl Fn(&Joint) -> bool) -> Vec<Option<usize>> {
     let mut root = vec![None; bodies];
     for joint in joints {
         root[joint.child] = if rigid(joint) { joint.parent.and_then(|b| root[b]) } else { Some(joint.child) };

@@ -9,7 +9,7 @@ use crate::import::words::quote;
 use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Placement, Rotation, Unit, Value};
 use crate::rounded_once::norm;
 
-type Mat3 = [[f64; 3]; 3];
+pub(super) type Mat3 = [[f64; 3]; 3];
 
 /// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2
 /// leaves 1e-11.
@@ -117,14 +117,14 @@ fn own(body: &Body, model: &Model) -> Option<Inertia> {
     for (slot, x) in entries.iter_mut().zip(body.inertia) {
         *slot = x.constant()?;
     }
-    let r = matrix(&body.inertia_axes, model);
+    let r = matrix(&body.inertia_axes, &|x| at_default(x, model));
     let about_com = multiply(&multiply(&r, &full(entries)), &transpose(&r));
     Some(Inertia { mass, first: com.map(|x| mass * x), about_origin: add(about_com, steiner(mass, com, com)) })
 }
 
 /// The inertia seen from the parent frame, at zero coordinates (used for fixed joints only).
 fn moved(i: Inertia, placement: &Placement, model: &Model) -> Inertia {
-    let r = matrix(&placement.rotation, model);
+    let r = matrix(&placement.rotation, &|x| at_default(x, model));
     let d = placement.xyz.map(|x| at_default(x, model));
     let first = apply(&r, i.first);
     let turned = multiply(&multiply(&r, &i.about_origin), &transpose(&r));
@@ -195,7 +195,8 @@ fn resistance(i: &Inertia, columns: &[([f64; 3], [f64; 3])], armature: &[f64]) -
     pivots
 }
 
-fn matrix(rotation: &Rotation, model: &Model) -> Mat3 {
+/// The matrix of a rotation whose numbers have the values that `at` gives.
+pub(super) fn matrix(rotation: &Rotation, at: &dyn Fn(Value) -> f64) -> Mat3 {
     let about = |axis: [f64; 3], angle: f64| {
         let (s, c) = Scalar::sin_cos(angle);
         let [x, y, z] = axis;
@@ -204,9 +205,9 @@ fn matrix(rotation: &Rotation, model: &Model) -> Mat3 {
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| c * one(i, j) + s * skew[i][j] + (1.0 - c) * axis[i] * axis[j]))
     };
     match rotation {
-        Rotation::AxisAngle { axis, angle } => about(unit(*axis), at_default(*angle, model)),
+        Rotation::AxisAngle { axis, angle } => about(unit(*axis), at(*angle)),
         Rotation::Rpy(rpy) => {
-            let [roll, pitch, yaw] = rpy.map(|x| at_default(x, model));
+            let [roll, pitch, yaw] = rpy.map(at);
             let zy = multiply(&about([0.0, 0.0, 1.0], yaw), &about([0.0, 1.0, 0.0], pitch));
             multiply(&zy, &about([1.0, 0.0, 0.0], roll))
         }
@@ -231,7 +232,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-fn apply(m: &Mat3, v: [f64; 3]) -> [f64; 3] {
+pub(super) fn apply(m: &Mat3, v: [f64; 3]) -> [f64; 3] {
     m.map(|row| dot(row, v))
 }
 

@@ -1,13 +1,17 @@
 //! From a model as read to a checked one: names, tree, physics. The same for every format.
 
 mod bodies;
+mod contacts;
 mod couplings;
+mod elementary;
 mod joints;
 mod loops;
 mod massless;
 mod names;
 mod numbers;
+mod shapes;
 mod starts;
+mod stops;
 mod symmetric;
 mod tree;
 
@@ -34,6 +38,9 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     let frames = frames(raw, &names, &mut numbers);
     let wrenches = wrenches(raw, &names, numbers.findings);
     let constraints = constraints(raw, &names, &frames, &mut numbers);
+    let shapes = shapes::shapes(raw, &names, &mut numbers);
+    let surfaces = contacts::Surfaces::new(raw, &mut numbers);
+    let stops = stops::stops(raw, &mut numbers);
     let starts = starts::starts(raw, &mut numbers);
     let links = tree::links(raw, &names, numbers.findings);
     let order = tree::order(raw, &names, &links, numbers.findings);
@@ -48,7 +55,13 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     loops::rigid(raw, &constraints, &joints, &bodies, findings);
     let constraints = constraints.into_iter().flatten().map(|c| placed(c, &place)).collect();
     let starts = starts::placed(starts, &place);
-    let model = Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, contacts: Vec::new(), starts };
+    stops::starts_between(raw, &order, &starts, findings);
+    let mut contacts = contacts::between(raw, &shapes, &surfaces, &joints, &bodies, findings);
+    contacts.extend(stops::placed(stops, &place));
+    contacts::distinct(raw, &contacts, findings);
+    let shapes = shapes.into_iter().flatten().collect();
+    let model =
+        Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, shapes, contacts, starts };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
     (!findings.has_errors()).then_some(model)

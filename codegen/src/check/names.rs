@@ -67,7 +67,9 @@ impl<'r> Names<'r> {
         unique(raw.joints.iter().map(|j| ("joint", &j.name)), findings);
         unique(raw.params.iter().map(|p| ("parameter", &p.name)), findings);
         unique(raw.wrenches.iter().map(|w| ("wrench", w.name.as_ref().unwrap_or(&w.body))), findings);
-        unique(raw.constraints.iter().map(|c| (c.kind(), c.name())), findings);
+        let contacts = raw.contacts.iter().map(|c| ("contact", &c.name));
+        unique(raw.constraints.iter().map(|c| (c.kind(), c.name())).chain(contacts), findings);
+        unique(raw.shapes.iter().map(|s| ("shape", &s.name)), findings);
         let mut names = Names { raw, bodies: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
         for (k, b) in raw.bodies.iter().enumerate() {
             names.bodies.entry(&b.name.value).or_insert(k);

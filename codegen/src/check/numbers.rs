@@ -103,6 +103,15 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
         number.into().map_or(Value::ZERO, |n| self.value(n, quantity, what))
     }
 
+    /// A number that no parameter may replace; `help` says what to write instead. NaN for what was reported.
+    pub(super) fn constant(&mut self, number: &RawNumber, quantity: Quantity, what: &str, help: &str) -> f64 {
+        if let RawValue::Param(_) = number.value {
+            self.findings.error(number.span, format!("{what} cannot depend on a parameter"), help);
+            return f64::NAN;
+        }
+        self.value(number, quantity, what).constant().unwrap_or(f64::NAN)
+    }
+
     pub(super) fn vec3(&mut self, list: &RawVec3, quantity: Quantity, what: &str) -> [Value; 3] {
         [0, 1, 2].map(|k| self.value(&list.value[k], quantity, what))
     }

@@ -2,10 +2,10 @@
 
 use super::joints::{quantities, span_of};
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
+use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::model::{JointSpec, Start, Value};
+use crate::model::{JointSpec, Start};
 use crate::rounded_once::norm;
 
 /// What is stated, with joints by their index in the file.
@@ -108,15 +108,8 @@ fn length(got: usize, n: usize, kind: &JointSpec, what: &str, span: Span, findin
 
 /// A constant; NaN where there is none.
 fn constant(x: &RawNumber, quantity: Quantity, what: &str, numbers: &mut Numbers) -> f64 {
-    if let RawValue::Param(_) = x.value {
-        let message = format!("{what}: `start` cannot depend on a parameter");
-        numbers.findings.error(x.span, message, "write a constant: the model begins there, whatever its parameters");
-        return f64::NAN;
-    }
-    match numbers.value(x, quantity, &format!("{what}: `start`")) {
-        Value::Const(x) => x,
-        Value::Param(_) => f64::NAN,
-    }
+    let help = "write a constant: the model begins there, whatever its parameters";
+    numbers.constant(x, quantity, &format!("{what}: `start`"), help)
 }
 
 /// Scales a quaternion to unit length.

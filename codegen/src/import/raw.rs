@@ -5,7 +5,8 @@
 //! reader has reported already stands here as [`RawValue::Invalid`] or `None`, so that nothing is reported twice.
 
 use super::source::{Span, Spanned};
-use crate::model::{JointSpec, LoopSpec, WrenchAxes};
+use crate::model::{JointSpec, LoopSpec, ShapeSpec, WrenchAxes};
+use mbd_runtime::contact::RestitutionLaw;
 
 /// A number of the description.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,6 +141,21 @@ pub struct RawJoint {
     pub start: Option<RawFreedoms>,
     /// Whether they do not change when loops are closed.
     pub held: Option<Spanned<bool>>,
+    /// Stops.
+    pub limits: Option<RawLimits>,
+    /// Coefficient of restitution of the stops; 0 where `None`.
+    pub limit_restitution: Option<RawNumber>,
+}
+
+/// Stops of a joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawLimits {
+    /// The whole entry.
+    pub span: Span,
+    /// Least coordinate, rad or m; no stop where `None`.
+    pub lower: Option<RawNumber>,
+    /// Greatest coordinate, rad or m; no stop where `None`.
+    pub upper: Option<RawNumber>,
 }
 
 impl RawJoint {
@@ -167,6 +183,8 @@ impl RawJoint {
             mimic: None,
             start: None,
             held: None,
+            limits: None,
+            limit_restitution: None,
         }
     }
 }
@@ -254,6 +272,49 @@ impl RawConstraint {
     }
 }
 
+/// A shape. Dimensions the type has no use for, and missing ones, are reported by the checks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawShape {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Body, or `ground`; the ground where `None`.
+    pub body: Option<Spanned<String>>,
+    /// Type; `None` where it was reported already.
+    pub kind: Option<Spanned<&'static ShapeSpec>>,
+    /// Pose in the body frame.
+    pub placement: RawPlacement,
+    /// Radius, m.
+    pub radius: Option<RawNumber>,
+    /// Length, m.
+    pub length: Option<RawNumber>,
+    /// Lengths of edges, m.
+    pub size: Option<RawVec3>,
+    /// Direction across a plane; z where `None`.
+    pub normal: Option<Spanned<[f64; 3]>>,
+}
+
+/// What surfaces do to each other when they touch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RawSurface {
+    /// Coefficient of friction.
+    pub friction: Option<RawNumber>,
+    /// Coefficient of restitution.
+    pub restitution: Option<RawNumber>,
+    /// Law of restitution.
+    pub law: Option<Spanned<RestitutionLaw>>,
+}
+
+/// A contact between two shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawContact {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Names of the shapes; `None` where it was reported already.
+    pub between: Option<[Spanned<String>; 2]>,
+    /// Its surfaces; that of all contacts, [`RawModel::surface`], where an entry is `None`.
+    pub surface: RawSurface,
+}
+
 /// An external wrench.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawWrench {
@@ -293,6 +354,14 @@ pub struct RawModel {
     pub wrenches: Vec<RawWrench>,
     /// Loops and couplings, in file order.
     pub constraints: Vec<RawConstraint>,
+    /// Shapes, in file order.
+    pub shapes: Vec<RawShape>,
+    /// Contacts that are described one by one, in file order.
+    pub contacts: Vec<RawContact>,
+    /// What holds for contacts that do not state it: no friction, no restitution, Poisson's law where `None`.
+    pub surface: RawSurface,
+    /// Where contacts between all pairs of shapes are asked for.
+    pub all_pairs: Option<Span>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -313,6 +382,10 @@ impl RawModel {
             frames: Vec::new(),
             wrenches: Vec::new(),
             constraints: Vec::new(),
+            shapes: Vec::new(),
+            contacts: Vec::new(),
+            surface: RawSurface::default(),
+            all_pairs: None,
             incomplete: false,
             lenient: false,
         }

@@ -95,7 +95,12 @@ impl<'a> Findings<'a> {
 
     /// Adds a finding.
     pub fn add(&mut self, severity: Severity, span: Span, message: impl Into<String>, help: impl Into<String>) {
-        let Origin { file, line, column } = self.origin(span);
+        self.add_at(severity, self.origin(span), message, help);
+    }
+
+    /// Adds a finding at a place.
+    fn add_at(&mut self, severity: Severity, at: Origin, message: impl Into<String>, help: impl Into<String>) {
+        let Origin { file, line, column } = at;
         self.list.push(Diagnostic {
             severity,
             file: file.to_string(),
@@ -109,6 +114,11 @@ impl<'a> Findings<'a> {
     /// Adds an error: the file cannot be used.
     pub fn error(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
         self.add(Severity::Error, span, message, help);
+    }
+
+    /// Adds an error at the place of a part of the model.
+    pub fn error_at(&mut self, origin: &Origin, message: impl Into<String>, help: impl Into<String>) {
+        self.add_at(Severity::Error, origin.clone(), message, help);
     }
 
     /// Adds a warning: something is ignored or suspicious.

@@ -1,8 +1,8 @@
-//! Contacts of the model: pairs of places that can touch, and stops of joints.
+//! Contacts of the model: pairs of places that can touch, and stops of joints; the one table of the kinds of shapes.
 
 use mbd_runtime::contact::RestitutionLaw;
 
-use super::{ConstraintKind, Origin};
+use super::{ConstraintKind, Mount, Origin, Words};
 
 /// A contact: a constraint that acts only while its bodies are pressed together.
 ///
@@ -21,6 +21,129 @@ pub struct Contact {
     pub restitution: f64,
     /// Law of restitution.
     pub law: RestitutionLaw,
+    /// The two shapes, indices into [`Model::shapes`](super::Model::shapes), the one on the first frame in front; `None`
+    /// for stops.
+    pub shapes: Option<[usize; 2]>,
     /// Place of its description.
     pub origin: Origin,
+}
+
+/// Kinds of shapes, in the shape's own axes, with its origin in their middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShapeKind {
+    /// The origin alone.
+    Point,
+    /// A ball.
+    Sphere {
+        /// Radius, m.
+        radius: f64,
+    },
+    /// A cylinder about z that ends in half balls.
+    Capsule {
+        /// Radius, m.
+        radius: f64,
+        /// Length of the straight part, m.
+        length: f64,
+    },
+    /// A cuboid.
+    Box {
+        /// Lengths of its edges along x, y and z, m.
+        size: [f64; 3],
+    },
+    /// A cylinder about z; a thin disc where its length is zero.
+    Cylinder {
+        /// Radius, m.
+        radius: f64,
+        /// Length, m.
+        length: f64,
+    },
+    /// The half space behind a plane through the origin.
+    Plane {
+        /// Direction out of it, of any length but zero.
+        normal: [f64; 3],
+    },
+}
+
+/// The properties of a kind of shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ShapeSpec {
+    /// Its words.
+    pub words: Words,
+    /// Keys of its dimensions: `radius`, `length`, `size` or `normal`.
+    pub keys: &'static [&'static str],
+}
+
+/// Every kind of shape, in the order of the variants of [`ShapeKind`].
+pub static SHAPES: [ShapeSpec; 6] = [
+    ShapeSpec { words: Words::new("point", &[], &["vertex", "corner"]), keys: &[] },
+    ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
+    ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
+    ShapeSpec { words: Words::new("box", &[], &["cube", "cuboid", "block"]), keys: &["size"] },
+    ShapeSpec { words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]), keys: &["radius", "length"] },
+    ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
+];
+
+impl ShapeSpec {
+    /// Its word in models and messages.
+    pub fn word(&self) -> &'static str {
+        self.words.word
+    }
+}
+
+impl ShapeKind {
+    /// Properties of its kind.
+    pub fn spec(&self) -> &'static ShapeSpec {
+        let index = match self {
+            ShapeKind::Point => 0,
+            ShapeKind::Sphere { .. } => 1,
+            ShapeKind::Capsule { .. } => 2,
+            ShapeKind::Box { .. } => 3,
+            ShapeKind::Cylinder { .. } => 4,
+            ShapeKind::Plane { .. } => 5,
+        };
+        &SHAPES[index]
+    }
+
+    /// Its word in models and messages.
+    pub fn word(&self) -> &'static str {
+        self.spec().word()
+    }
+}
+
+/// A shape that is fixed to a body or to the ground. It acts only in contacts that name it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Name, unique among the shapes.
+    pub name: String,
+    /// Its body, and its pose in the body frame.
+    pub mount: Mount,
+    /// Kind and dimensions.
+    pub kind: ShapeKind,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shape_is_listed_once_and_the_documents_have_the_same_table() {
+        let (radius, length, normal) = (1.0, 2.0, [0.0, 0.0, 1.0]);
+        let all = [
+            ShapeKind::Point,
+            ShapeKind::Sphere { radius },
+            ShapeKind::Capsule { radius, length },
+            ShapeKind::Box { size: [1.0, 2.0, 3.0] },
+            ShapeKind::Cylinder { radius, length },
+            ShapeKind::Plane { normal },
+        ];
+        assert_eq!(all.map(|kind| *kind.spec()), SHAPES);
+        Words::assert_distinct(SHAPES.iter().map(|spec| &spec.words));
+        let document = include_str!("../../../docs/model-format.md");
+        for spec in &SHAPES {
+            let keys: Vec<String> = spec.keys.iter().map(|key| format!("`{key}`")).collect();
+            let row = format!("| `{}` | {} |", spec.word(), keys.join(", ")).replace("|  |", "| |");
+            assert!(document.lines().any(|line| line.starts_with(&row)), "docs/model-format.md has no row\n{row}");
+        }
+    }
 }

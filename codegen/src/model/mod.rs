@@ -10,7 +10,7 @@ use std::fmt;
 use std::sync::Arc;
 
 pub use constraint::{Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, Stands, LOOPS};
-pub use contact::Contact;
+pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
 pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR};
 
@@ -253,6 +253,8 @@ pub struct Model {
     pub wrenches: Vec<Wrench>,
     /// Loops and couplings, in file order.
     pub constraints: Vec<Constraint>,
+    /// Shapes that contacts are between, in file order.
+    pub shapes: Vec<Shape>,
     /// Contacts: of pairs of shapes in file order, then stops of joints in the order of the joints.
     pub contacts: Vec<Contact>,
     /// Initial coordinates, where they are not neutral.

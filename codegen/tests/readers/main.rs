@@ -5,5 +5,6 @@ mod large;
 mod mutate;
 mod mutation;
 mod toml_constraints;
+mod toml_contacts;
 mod toml_reader;
 mod urdf_second_opinion;

@@ -19,7 +19,11 @@ pub(super) fn worst<S: Real>(x: &[S]) -> (usize, S) {
 }
 
 /// Columns and values of a row of `Φ`.
-pub(crate) fn row<'a, S>(row: &Row, columns: &'a [usize], entries: &'a [S]) -> impl Iterator<Item = (&'a usize, &'a S)> {
+pub(crate) fn row<'a, S>(
+    row: &Row,
+    columns: &'a [usize],
+    entries: &'a [S],
+) -> impl Iterator<Item = (&'a usize, &'a S)> {
     let range = row.first..row.first + row.len;
     columns.get(range.clone()).unwrap_or(&[]).iter().zip(entries.get(range).unwrap_or(&[]))
 }

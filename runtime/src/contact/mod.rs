@@ -4,13 +4,22 @@
 //! residual is the gap (m; rad for stops of rotations), positive while the bodies are apart. Where there is friction, two
 //! tangential rows follow.
 
+mod assembly;
+mod hybrid;
 #[cfg(feature = "alloc")]
 mod interpreted;
+mod solver;
 mod touching;
+mod with_contacts;
 
+pub use hybrid::{Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, Stretch};
 #[cfg(feature = "alloc")]
 pub use interpreted::ContactInterpreter;
+pub use solver::{
+    impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
+};
 pub use touching::Touching;
+pub use with_contacts::WithContacts;
 
 /// How a contact with restitution throws its bodies apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! Events: times at which a function of the state reaches zero, found on the dense output.
 
+use super::root;
 use super::solver::Solver;
 use super::stepper::Stepper;
 use super::StepError;
@@ -219,47 +220,21 @@ where
     }
 
     /// Where function `k` reaches zero between its last value and `b`, where it has: in the last step, `θ`, not before
-    /// the root. By the ITP method of Oliveira and Takahashi (ACM TOMS 47, 2020): as fast as a secant, never slower
-    /// than halving by more than one evaluation.
+    /// the root.
     fn locate<const N: usize>(
         &mut self,
         system: &mut Y,
         events: &mut impl Events<Y, N>,
         track: &Track<Y::Scalar, N>,
         k: usize,
-        (mut b, mut at_b): (Y::Scalar, Y::Scalar),
+        b: (Y::Scalar, Y::Scalar),
     ) -> Y::Scalar {
-        let c = Y::Scalar::constant;
-        let (mut a, mut at_a) = (track.at[k], track.value[k]);
         let (t, h) = self.last_step();
-        let size = t.to_f64().abs().max((t + h).to_f64().abs());
-        let epsilon = Y::Scalar::epsilon();
-        let half_width = (2.0 * epsilon * size / h.to_f64()).max(epsilon);
-        let first = (b - a).to_f64();
-        let mut room = half_width * libm::exp2(libm::ceil(libm::log2(first / (2.0 * half_width))).max(0.0) + 1.0);
-        while (b - a).to_f64() > 2.0 * half_width {
-            let middle = c(0.5) * (a + b);
-            let width = (b - a).to_f64();
-            let secant = (at_b * a - at_a * b) / (at_b - at_a);
-            let off = (middle - secant).to_f64();
-            let (sign, shift) = (1.0_f64.copysign(off), 0.2 / first * width * width);
-            let x = if shift <= off.abs() { secant + c(sign * shift) } else { middle };
-            let reach = room - 0.5 * width;
-            let x = if (x - middle).to_f64().abs() <= reach { x } else { middle - c(sign * reach) };
-            let x = if x > a && x < b { x } else { middle };
-            if !(x > a && x < b) {
-                break;
-            }
+        root::root((track.at[k], track.value[k]), b, root::resolution(t, h), |x| {
             let time = self.look(system, x);
             let value = self.values(system, time, events)[k];
-            if track.reached(k, value) {
-                (b, at_b) = (x, value);
-            } else {
-                (a, at_a) = (x, value);
-            }
-            room *= 0.5;
-        }
-        b
+            (value, track.reached(k, value))
+        })
     }
 }
 

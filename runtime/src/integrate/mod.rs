@@ -48,6 +48,7 @@ mod lie_joint;
 mod linear;
 mod middle;
 mod newton;
+pub(crate) mod root;
 mod rosenbrock;
 #[cfg(test)]
 mod scenes;

@@ -176,6 +176,7 @@ pub fn random_model(seed: u64, distribution: &Distribution) -> Model {
         frames,
         wrenches,
         constraints: Vec::new(),
+        shapes: Vec::new(),
         contacts: Vec::new(),
         starts: Vec::new(),
     }

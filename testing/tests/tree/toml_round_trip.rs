@@ -142,3 +142,23 @@ fn ends_without_a_frame_are_written_with_one() {
     assert_eq!(read.constraints, model.constraints);
     assert_eq!(read.frames.len(), model.frames.len() + 1);
 }
+
+/// The scenes with contacts: what is written gives the model again, with all places of all pairs of shapes.
+#[test]
+fn reader_gives_the_contacts_that_were_written() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/contacts");
+    let mut contacts = 0;
+    for entry in std::fs::read_dir(folder).expect("the scenes").flatten() {
+        let text = std::fs::read_to_string(entry.path()).expect("UTF-8");
+        // A pair of shapes that is not supported yet is an error.
+        let Ok(read) = read::model("scene.toml", &text, &Default::default()) else { continue };
+        contacts += read.model.contacts.len();
+        for order in [Order::DepthFirst, Order::BreadthFirst] {
+            let text = to_toml_in(&read.model, order);
+            let again = read::model("scene.toml", &text, &Default::default());
+            let again = again.unwrap_or_else(|findings| panic!("{findings}\n{text}")).model;
+            assert_eq!(again, read.model, "{}\n{text}", entry.path().display());
+        }
+    }
+    assert!(contacts > 25, "{contacts}");
+}

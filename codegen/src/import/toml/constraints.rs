@@ -38,7 +38,7 @@ fn one_loop(table: &Table, findings: &mut Findings) -> Option<RawLoop> {
     table.reject_unknown(&keys, "a loop", findings);
     let name = table.required_text("name", findings);
     let kind = loop_type(table, findings);
-    let between = between(table, findings);
+    let between = between(table, "bodies, frames or `ground`", findings);
     let directions = directions.into_iter().filter_map(|key| Some((key, table.direction(key, findings)?))).collect();
     let row = row(table, findings);
     let single = numbers.into_iter().filter(|key| *key != "row").chain(["decay"]);
@@ -69,12 +69,13 @@ fn loop_type(table: &Table, findings: &mut Findings) -> Option<Spanned<&'static 
     kind(table, &LOOPS, |spec| &spec.words, special, findings)
 }
 
-fn between(table: &Table, findings: &mut Findings) -> Option<[Spanned<String>; 2]> {
-    let example = "`between = [\"first\", \"second\"]`, bodies, frames or `ground`";
+/// Two names of what `ends` says.
+pub(super) fn between(table: &Table, ends: &str, findings: &mut Findings) -> Option<[Spanned<String>; 2]> {
+    let example = format!("`between = [\"first\", \"second\"]`, {ends}");
     if !table.has("between") {
-        table.missing("between", example, findings);
+        table.missing("between", &example, findings);
     }
-    let list = table.texts("between", example, findings)?;
+    let list = table.texts("between", &example, findings)?;
     let count = list.value.len();
     <[Spanned<String>; 2]>::try_from(list.value)
         .map_err(|_| {

@@ -1,10 +1,10 @@
 //! `[[body]]`, `[[joint]]`, `[[frame]]` and `[[wrench]]`.
 
 use super::super::raw::{
-    RawBody, RawFrame, RawFreedoms, RawJoint, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation,
-    RawValue, RawWrench,
+    RawBody, RawFrame, RawFreedoms, RawJoint, RawLimits, RawMimic, RawModel, RawMotion, RawNumber, RawPlacement,
+    RawRotation, RawValue, RawWrench,
 };
-use super::super::source::{Findings, Spanned};
+use super::super::source::{Findings, Span, Spanned};
 use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
@@ -31,6 +31,8 @@ const JOINT: &[&str] = &[
     "mimic",
     "start",
     "held",
+    "limits",
+    "limit_restitution",
 ];
 const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 const WRENCH: &[&str] = &["name", "body", "frame"];
@@ -86,7 +88,7 @@ fn inertia(table: &Table, findings: &mut Findings) -> Option<Spanned<[RawNumber;
     }
 }
 
-fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
+pub(super) fn placement(table: &Table, findings: &mut Findings) -> RawPlacement {
     let xyz = table.vec3("xyz", Unit::Plain, findings);
     if table.has("rpy") && table.has("rotate") {
         let message = format!("{}`rpy` and `rotate` together", table.prefix());
@@ -163,11 +165,38 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         mimic: mimic(&table, units, findings),
         start,
         held: table.flag("held", findings),
+        limits: limits(&table, units[0], findings),
+        limit_restitution: table.number("limit_restitution", Unit::Plain, findings),
         ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
     if name.is_some() {
         raw.joints.push(joint);
     }
+}
+
+/// `[lower, upper]`, or a table of one or both.
+fn limits(table: &Table, unit: Unit, findings: &mut Findings) -> Option<RawLimits> {
+    let value = table.raw("limits")?;
+    let (span, what): (Span, _) = (value.span().into(), format!("{}`limits`", table.prefix()));
+    if let DeValue::Table(t) = value.get_ref() {
+        if !t.contains_key("deg") && !t.contains_key("param") {
+            let inner = Table::new(t, span, what.clone());
+            inner.reject_unknown(&["lower", "upper"], "the limits of a joint", findings);
+            if t.is_empty() {
+                findings.error(span, format!("{what} is an empty table"), "write `[lower, upper]`, or one of them");
+            }
+            let [lower, upper] = ["lower", "upper"].map(|key| inner.number(key, unit, findings));
+            return Some(RawLimits { span, lower, upper });
+        }
+    }
+    let list = numbers::numbers(value, &[unit], &what, findings)?;
+    let count = list.len();
+    let Ok([lower, upper]) = <[RawNumber; 2]>::try_from(list) else {
+        let help = "write `[lower, upper]`, or `{ lower = .. }` or `{ upper = .. }` for one of them";
+        findings.error(span, format!("{what} needs 2 numbers and has {count}"), help);
+        return None;
+    };
+    Some(RawLimits { span, lower: Some(lower), upper: Some(upper) })
 }
 
 fn mimic(table: &Table, units: &[Unit], findings: &mut Findings) -> Option<RawMimic> {

@@ -1,6 +1,7 @@
 //! The TOML model format (docs/model-format.md). Here: the document and its top level.
 
 mod constraints;
+mod contacts;
 mod entries;
 mod kinds;
 mod numbers;
@@ -14,7 +15,9 @@ use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use super::{Base, ImportOptions};
 
-const KEYS: &[&str] = &["name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling"];
+const KEYS: &[&str] = &[
+    "name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact", "contacts",
+];
 
 /// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the
 /// default, gravity replaces that of the file.
@@ -66,6 +69,7 @@ fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
         entries::wrench(table, &mut raw, findings);
     }
     constraints::all(&top, &mut raw, findings);
+    contacts::all(&top, &mut raw, findings);
     Some(raw)
 }
 

@@ -1,0 +1,240 @@
+//! Motions of mechanisms with contacts: the run, its record, and the table of its events.
+
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use multibody::codegen::plan::Plan;
+use multibody::runtime::catalogue::{self, BoxedMethod};
+use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
+use multibody::runtime::contact::{
+    Cause, ContactEvent, ContactInterpreter, ContactObserver, ContactStatistics, Hybrid, HybridError, Mode, Stretch,
+    WithContacts,
+};
+use multibody::runtime::integrate::Statistics;
+use multibody::runtime::Conjugate;
+
+use super::motion::{Record, Settings};
+use super::{Failure, Outcome};
+
+/// A mechanism with contacts in the interpreter.
+type Mechanism = ContactInterpreter<f64>;
+type System = WithContacts<Mechanism>;
+
+/// Number of events that are printed.
+const SHOWN: usize = 12;
+
+/// A motion with contacts.
+pub struct Touched {
+    /// Its rows.
+    pub record: Record,
+    /// Its events, in the order of time.
+    pub events: Vec<ContactEvent<f64>>,
+    /// What happened at the contacts.
+    pub contacts: ContactStatistics,
+    /// The contacts that are closed at the end.
+    pub closed: Vec<(usize, Mode)>,
+    /// Computing time, s.
+    pub seconds: f64,
+}
+
+/// Keeps rows and events.
+struct Observer {
+    record: Record,
+    events: Vec<ContactEvent<f64>>,
+    every: f64,
+    time: f64,
+    q: Vec<f64>,
+    p: Vec<f64>,
+}
+
+impl Observer {
+    /// Time of the next row, s.
+    fn next(&self) -> f64 {
+        let row = self.record.t.len() as f64 * self.every;
+        // A row that differs from the end by rounding only is at the end.
+        if row > self.time * (1.0 - 1e-12) {
+            self.time
+        } else {
+            row
+        }
+    }
+
+    fn row(&mut self, system: &mut System, t: f64) {
+        let (mechanism, record) = (system.system_mut(), &mut self.record);
+        let mut v = vec![0.0; self.p.len()];
+        mechanism.velocities(&self.q, &self.p, &mut v);
+        let energy = mechanism.energy(&self.q, &self.p);
+        record.t.push(t);
+        record.q.push(self.q.clone());
+        record.v.push(v);
+        record.p.push(self.p.clone());
+        record.energy.push(energy);
+        let change = energy.0 + energy.1 - (record.energy[0].0 + record.energy[0].1);
+        record.ends.t.push(t);
+        record.ends.change.push(change);
+        record.ends.scale = record.ends.scale.max(energy.0);
+    }
+}
+
+impl ContactObserver<Mechanism> for Observer {
+    fn stretch(&mut self, system: &mut System, stretch: &mut dyn Stretch<Mechanism>) {
+        let [_, end] = stretch.span();
+        while self.next() <= end && self.record.t.last().is_some_and(|last| *last < self.time) {
+            let t = self.next();
+            let (mut q, mut p) = (std::mem::take(&mut self.q), std::mem::take(&mut self.p));
+            stretch.state(system, t, &mut q, &mut p);
+            (self.q, self.p) = (q, p);
+            self.row(system, t);
+        }
+    }
+
+    fn event(&mut self, _system: &mut System, event: &ContactEvent<f64>) {
+        self.events.push(*event);
+    }
+}
+
+/// The method of the settings around which contacts are followed.
+fn method(settings: &Settings, system: &System) -> Outcome<BoxedMethod<'static, System>> {
+    let Some(method) = catalogue::explicit(settings.method, system, false) else {
+        let names: Vec<&str> = catalogue::EXPLICIT.iter().map(|entry| entry.name).collect();
+        return Err(Failure::new(
+            format!("--method {}: a motion with contacts takes explicit methods only", settings.method),
+            format!("take one of {}", names.join(", ")),
+        ));
+    };
+    let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
+    Ok(Box::new(WithPostStep::new(system, method, Projection::new(system, settings.hold, effort))))
+}
+
+/// Simulates from given coordinates and velocities.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Touched> {
+    let mut mechanism: Mechanism = plan.default_contact_interpreter();
+    mechanism.check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
+    let mut p = v.clone();
+    mechanism.conjugate_momenta(&q, &v, &mut p);
+    let mut system = WithContacts::new(mechanism);
+    let method = method(settings, &system)?;
+    let failed = |e: HybridError| failure(plan, &e);
+    let mut observer =
+        Observer { record: Record::default(), events: Vec::new(), every: settings.every, time: settings.time, q, p };
+    let clock = Instant::now();
+    observer.row(&mut system, 0.0);
+    let (q, p) = (observer.q.clone(), observer.p.clone());
+    let mut motion = Hybrid::new(&mut system, method, settings.step, 0.0, &q, &p).map_err(failed)?;
+    motion.run(&mut system, settings.time, &mut observer).map_err(failed)?;
+    let statistics: Statistics = motion.statistics();
+    let modes = system.modes().iter().copied().enumerate();
+    Ok(Touched {
+        record: Record { statistics, ..observer.record },
+        events: observer.events,
+        contacts: *motion.contact_statistics(),
+        closed: modes.filter(|(_, mode)| *mode != Mode::Open).collect(),
+        seconds: clock.elapsed().as_secs_f64(),
+    })
+}
+
+/// The failure of a run: the contact by its name.
+fn failure(plan: &Plan, error: &HybridError) -> Failure {
+    match error {
+        HybridError::Overlap { contact, gap } => Failure::new(
+            format!("the bodies of contact `{}` overlap by {:.3e} at the start", name(plan, *contact), -gap),
+            "give --q with a position where they are apart or touch",
+        ),
+        other => Failure::new(
+            format!("the simulation failed: {other}"),
+            "a smaller --tolerance, or a shorter --time, shows what came before; nothing was written",
+        ),
+    }
+}
+
+/// Name of a contact.
+fn name(plan: &Plan, k: usize) -> &str {
+    plan.model.contacts.get(k).map_or("?", |c| c.name.as_str())
+}
+
+fn cause(cause: Cause) -> &'static str {
+    match cause {
+        Cause::Landed => "lands",
+        Cause::Unloaded => "opens",
+        Cause::Slipped => "slips",
+        Cause::Stopped => "stops",
+        _ => "changes",
+    }
+}
+
+fn mode(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Open => "open",
+        Mode::Slide => "slides",
+        Mode::Stick => "sticks",
+    }
+}
+
+/// The first events, the contacts at the end, and what impacts took.
+pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
+    let Touched { events, contacts, closed, .. } = touched;
+    let (count, impacts) = (contacts.events, contacts.impacts);
+    writeln!(out, "events: {count}, {impacts} of them with an impact, {} changes of contact modes", contacts.switches)?;
+    for event in events.iter().take(SHOWN) {
+        let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), cause(event.cause));
+        if event.impact.is_some() {
+            let _ = write!(line, " at {:.6} m/s", event.approach);
+        }
+        if let Some(rest) = event.rest {
+            let _ = write!(line, ", bounces end at {rest:.9} s");
+        }
+        writeln!(out, "{line}, then {}", mode(event.modes[1]))?;
+    }
+    if events.len() > SHOWN {
+        writeln!(out, "  and {} more", events.len() - SHOWN)?;
+    }
+    if closed.is_empty() {
+        writeln!(out, "contacts at the end: all open")?;
+    } else {
+        let list: Vec<String> = closed.iter().map(|(k, m)| format!("{} {}", name(plan, *k), mode(*m))).collect();
+        writeln!(out, "contacts at the end: {}", list.join(", "))?;
+    }
+    let record = &touched.record;
+    let energy = |k: usize| record.energy[k].0 + record.energy[k].1;
+    let last = record.energy.len() - 1;
+    writeln!(
+        out,
+        "energy: {:.9} J at the start, {:.9} J at the end; impacts took {:.9} J",
+        energy(0),
+        energy(last),
+        contacts.lost
+    )?;
+    if contacts.impacts > 0 {
+        writeln!(
+            out,
+            "impacts: residual at most {:.1e} of the impulses, {} limited so that none gains energy",
+            contacts.residual, contacts.limited
+        )?;
+    }
+    Ok(())
+}
+
+/// The events as a table.
+pub fn table(plan: &Plan, events: &[ContactEvent<f64>]) -> String {
+    let mut text = String::from("t,contact,event,mode,approach,energy\n");
+    for event in events {
+        let energy = event.impact.map_or(0.0, |impact| impact.energy);
+        let (what, then) = (cause(event.cause), mode(event.modes[1]));
+        let _ = writeln!(
+            text,
+            "{},{},{what},{then},{},{energy}",
+            event.time,
+            super::simulate::quoted(name(plan, event.contact)),
+            event.approach
+        );
+    }
+    text
+}
+
+/// Name of the file with the events beside the table of the motion.
+pub fn beside(csv: &Path) -> std::path::PathBuf {
+    let stem = csv.file_stem().map_or_else(Default::default, |s| s.to_string_lossy().into_owned());
+    csv.with_file_name(format!("{stem}_events.csv"))
+}

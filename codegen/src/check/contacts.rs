@@ -1,0 +1,294 @@
+//! Contacts between shapes.
+
+use std::collections::{HashMap, HashSet};
+
+use mbd_runtime::contact::RestitutionLaw;
+
+use super::elementary::{elementary, moved, Elementary, SUPPORTED};
+use super::loops::{led, merged};
+use super::numbers::{Numbers, Quantity};
+use crate::import::raw::{RawContact, RawModel, RawNumber, RawSurface};
+use crate::import::source::{Findings, Span, Spanned};
+use crate::import::words::{did_you_mean, list, quote};
+use crate::model::{Body, ConstraintKind, Contact, Freedom, Joint, Shape, ShapeKind, Unit};
+use crate::names::identifier;
+
+/// Coefficients of friction above this one are suspicious: racing tyres have 2.
+const ROUGH: f64 = 10.0;
+
+/// What to write in place of a parameter.
+const CONSTANT: &str = "write a constant: coefficients of contacts are given again when they are simulated";
+
+/// What two surfaces do to each other.
+#[derive(Clone, Copy)]
+struct Surface {
+    friction: f64,
+    restitution: f64,
+    law: RestitutionLaw,
+}
+
+/// The surfaces of all contacts.
+pub(super) struct Surfaces {
+    /// Those of the contacts that are described one by one.
+    each: Vec<Surface>,
+    /// That of the others.
+    others: Surface,
+}
+
+impl Surfaces {
+    /// Reads the surfaces and judges their numbers.
+    pub(super) fn new(raw: &RawModel, numbers: &mut Numbers) -> Surfaces {
+        let none = Surface { friction: 0.0, restitution: 0.0, law: RestitutionLaw::default() };
+        let others = surface(&raw.surface, none, "`contacts`", numbers);
+        let one = |c: &RawContact| surface(&c.surface, others, &format!("contact {}", quote(&c.name.value)), numbers);
+        Surfaces { each: raw.contacts.iter().map(one).collect(), others }
+    }
+}
+
+fn surface(raw: &RawSurface, otherwise: Surface, what: &str, numbers: &mut Numbers) -> Surface {
+    let friction = raw.friction.as_ref().map(|x| friction(x, what, numbers));
+    let surface = Surface {
+        friction: friction.unwrap_or(otherwise.friction),
+        restitution: raw
+            .restitution
+            .as_ref()
+            .map_or(otherwise.restitution, |x| restitution(x, "restitution", what, numbers)),
+        law: raw.law.as_ref().map_or(otherwise.law, |law| law.value),
+    };
+    // Where the entry repeats nothing of its own, the finding stands at what it takes over.
+    let own = raw.law.as_ref().map(|law| law.span);
+    let own = own.or(raw.restitution.as_ref().map(|x| x.span)).or(raw.friction.as_ref().map(|x| x.span));
+    let gains = surface.law == RestitutionLaw::Newton && surface.friction > 0.0 && surface.restitution > 0.0;
+    if let (Some(span), true) = (own, gains) {
+        let message = format!("{what}: Newton's law of restitution with friction can add energy");
+        numbers.findings.warning(span, message, "write `law = \"poisson\"` or `law = \"stronge\"`, which never do");
+    }
+    surface
+}
+
+fn friction(x: &RawNumber, what: &str, numbers: &mut Numbers) -> f64 {
+    let value = numbers.constant(x, Quantity::Plain, &format!("{what}: `friction`"), CONSTANT);
+    let help = "write the tangential force at which it slips over the normal force: 0 is smooth, rubber has about 1";
+    if value < 0.0 {
+        numbers.findings.error(x.span, format!("{what}: negative `friction`"), help);
+    } else if value > ROUGH {
+        numbers.findings.warning(x.span, format!("{what}: a `friction` of {value} is very rough"), help);
+    }
+    value
+}
+
+/// A coefficient of restitution under `key`.
+pub(super) fn restitution(x: &RawNumber, key: &str, what: &str, numbers: &mut Numbers) -> f64 {
+    let value = numbers.constant(x, Quantity::Plain, &format!("{what}: `{key}`"), CONSTANT);
+    // NaN stands for what was reported.
+    if !value.is_nan() && !(0.0..=1.0).contains(&value) {
+        let help = "write a number from 0, nothing bounces, to 1, no energy is lost";
+        numbers.findings.error(x.span, format!("{what}: `{key}` is not between 0 and 1"), help);
+    }
+    value
+}
+
+/// A pair of shapes with what stands in messages about it.
+struct Pair {
+    name: Spanned<String>,
+    shapes: [usize; 2],
+    surface: Surface,
+    /// Place of the second shape's name.
+    at: Span,
+}
+
+/// The contacts between shapes. `shapes` as in `raw`, `joints` in their final order.
+pub(super) fn between(
+    raw: &RawModel,
+    shapes: &[Option<Shape>],
+    surfaces: &Surfaces,
+    joints: &[Joint],
+    bodies: &[Body],
+    findings: &mut Findings,
+) -> Vec<Contact> {
+    let welded = merged(joints, bodies.len(), |j| j.kind.nv() == 0);
+    let led = merged(joints, bodies.len(), led);
+    let mut index = HashMap::new();
+    for (k, shape) in raw.shapes.iter().enumerate() {
+        index.entry(shape.name.value.as_str()).or_insert(k);
+    }
+    let mut contacts = Vec::new();
+    let mut listed = HashSet::new();
+    for (contact, surface) in raw.contacts.iter().zip(&surfaces.each) {
+        let Some([a, b]) = ends(contact, raw, &index, findings) else { continue };
+        listed.insert([a.min(b), a.max(b)]);
+        let at = contact.between.as_ref().map_or(contact.name.span, |ends| ends[1].span);
+        let pair = Pair { name: contact.name.clone(), shapes: [a, b], surface: *surface, at };
+        let [Some(first), Some(second)] = [&shapes[a], &shapes[b]] else { continue };
+        if apart(&pair, [first, second], &welded, &led, bodies, findings) {
+            contacts.extend(pair.contacts([first, second], findings).unwrap_or_else(|| {
+                unsupported(&pair, [first, second], findings);
+                Vec::new()
+            }));
+        }
+    }
+    if let Some(span) = raw.all_pairs {
+        let neighbours = neighbours(joints, &welded);
+        let far = |a: &Shape, b: &Shape| {
+            let of = |root: &[Option<usize>], s: &Shape| s.mount.body.and_then(|b| root[b]);
+            let (p, q) = (of(&welded, a), of(&welded, b));
+            of(&led, a) != of(&led, b) && !neighbours.contains(&(p, q)) && !neighbours.contains(&(q, p))
+        };
+        contacts.extend(all(raw, shapes, surfaces.others, &listed, span, &far, findings));
+    }
+    contacts
+}
+
+/// The shapes that a contact names.
+fn ends(
+    contact: &RawContact,
+    raw: &RawModel,
+    index: &HashMap<&str, usize>,
+    findings: &mut Findings,
+) -> Option<[usize; 2]> {
+    let names = contact.between.as_ref()?;
+    let mut end = |name: &Spanned<String>| {
+        let found = index.get(name.value.as_str()).copied();
+        if found.is_none() && !raw.incomplete {
+            let all = || raw.shapes.iter().map(|s| s.name.value.as_str());
+            let help = did_you_mean(&name.value, all(), || match raw.shapes.is_empty() {
+                true => "describe it as a `[[shape]]`".into(),
+                false => format!("the shapes are {}", list(all())),
+            });
+            let message = format!("contact {}: {} is not a shape", quote(&contact.name.value), quote(&name.value));
+            findings.error(name.span, message, help);
+        }
+        found
+    };
+    let (first, second) = (end(&names[0]), end(&names[1]));
+    Some([first?, second?])
+}
+
+/// Whether the bodies of two shapes can move against each other; reports them otherwise.
+fn apart(
+    pair: &Pair,
+    [a, b]: [&Shape; 2],
+    welded: &[Option<usize>],
+    led: &[Option<usize>],
+    bodies: &[Body],
+    findings: &mut Findings,
+) -> bool {
+    let of = |root: &[Option<usize>], s: &Shape| s.mount.body.and_then(|b| root[b]);
+    let body = |s: &Shape| s.mount.body.map_or("the ground".into(), |b| format!("body {}", quote(&bodies[b].name)));
+    let what = format!("contact {}", quote(&pair.name.value));
+    let on = format!("{what}: {} and {}", quote(&a.name), quote(&b.name));
+    let (message, help) = if a.mount.body == b.mount.body {
+        let help = "let `between` name shapes on two different bodies, one of which may be the ground";
+        (format!("{on} are both on {}", body(a)), help)
+    } else if of(welded, a) == of(welded, b) {
+        let help = "remove the contact, or give a joint between them a type other than `fixed`";
+        (format!("{what}: fixed joints join {} to {}", body(a), body(b)), help)
+    } else if of(led, a) == of(led, b) {
+        let message = format!("{what}: every joint between {} and {} is fixed or prescribed", body(a), body(b));
+        (message, "remove the contact, or free one of those joints")
+    } else {
+        return true;
+    };
+    findings.error(pair.at, message, help);
+    false
+}
+
+impl Pair {
+    /// As many contacts as the shapes have places to touch at; `None` where the pair is not supported.
+    fn contacts(&self, [a, b]: [&Shape; 2], findings: &Findings) -> Option<Vec<Contact>> {
+        let direct = elementary(&a.kind, &b.kind).map(|places| (places, [a, b], self.shapes));
+        let [i, j] = self.shapes;
+        let (places, [a, b], shapes) = direct.or_else(|| Some((elementary(&b.kind, &a.kind)?, [b, a], [j, i])))?;
+        let origin = findings.origin(self.name.span);
+        let many = places.len() > 1;
+        let one = |(k, place): (usize, &Elementary)| {
+            let (first, second) = (moved(&a.mount, place.first), moved(&b.mount, place.second));
+            Contact {
+                name: if many { format!("{}/{}", self.name.value, k + 1) } else { self.name.value.clone() },
+                kind: ConstraintKind::Loop { kind: place.kind, first, second },
+                friction: self.surface.friction,
+                restitution: self.surface.restitution,
+                law: self.surface.law,
+                shapes: Some(shapes),
+                origin: origin.clone(),
+            }
+        };
+        Some(places.iter().enumerate().map(one).collect())
+    }
+}
+
+fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
+    let what = format!("contact {}", quote(&pair.name.value));
+    let message = format!("{what}: a {} and a {} cannot touch", a.kind.word(), b.kind.word());
+    let box_and_plane = matches!(a.kind, ShapeKind::Box { .. } | ShapeKind::Cylinder { .. });
+    let help = match box_and_plane || a.kind == b.kind {
+        true => format!("{SUPPORTED}; describe one of the two by spheres or points"),
+        false => SUPPORTED.into(),
+    };
+    findings.error(pair.at, message, help);
+}
+
+/// Contacts of every pair of shapes for which `far` holds, without those that are `listed`.
+fn all(
+    raw: &RawModel,
+    shapes: &[Option<Shape>],
+    surface: Surface,
+    listed: &HashSet<[usize; 2]>,
+    span: Span,
+    far: &dyn Fn(&Shape, &Shape) -> bool,
+    findings: &mut Findings,
+) -> Vec<Contact> {
+    let (mut contacts, mut left_out) = (Vec::new(), Vec::new());
+    for (j, second) in shapes.iter().enumerate() {
+        for (i, first) in shapes[..j].iter().enumerate() {
+            let (Some(a), Some(b)) = (first, second) else { continue };
+            if listed.contains(&[i, j]) || !far(a, b) {
+                continue;
+            }
+            let name = Spanned::new(format!("{}/{}", a.name, b.name), raw.shapes[j].name.span);
+            let pair = Pair { name, shapes: [i, j], surface, at: span };
+            match pair.contacts([a, b], findings) {
+                Some(found) => contacts.extend(found),
+                None => left_out.push(pair.name.value),
+            }
+        }
+    }
+    if !left_out.is_empty() {
+        let (n, names) = (left_out.len(), list(left_out.iter().map(String::as_str)));
+        let message = format!("{n} pair{} of shapes cannot touch: {names}", if n == 1 { "" } else { "s" });
+        findings.warning(span, message, SUPPORTED);
+    }
+    contacts
+}
+
+/// Pairs of bodies (as roots of what is welded together) that one joint connects. A joint to the ground that lets its
+/// body travel makes no neighbours: what falls onto the floor hangs on such a joint.
+fn neighbours(joints: &[Joint], welded: &[Option<usize>]) -> HashSet<(Option<usize>, Option<usize>)> {
+    let travels = |j: &Joint| j.kind.spec().freedoms.iter().any(|f: &Freedom| f.unit == Unit::Metre);
+    let pair = |j: &Joint| (j.parent.and_then(|b| welded[b]), welded[j.child]);
+    joints.iter().filter(|j| !(travels(j) && pair(j).0.is_none())).map(pair).collect()
+}
+
+/// Reports numbered contacts, contacts of pairs and stops whose names are taken. Names that stand in the file are
+/// compared with the others.
+pub(super) fn distinct(raw: &RawModel, contacts: &[Contact], findings: &mut Findings) {
+    let written: HashSet<&str> = raw.contacts.iter().map(|c| c.name.value.as_str()).collect();
+    let mut taken: HashMap<String, String> = HashMap::new();
+    for constraint in &raw.constraints {
+        taken.insert(identifier(&constraint.name().value), constraint.name().value.clone());
+    }
+    for name in &written {
+        taken.insert(identifier(name), (*name).to_string());
+    }
+    for contact in contacts.iter().filter(|c| !written.contains(c.name.as_str())) {
+        if let Some(other) = taken.insert(identifier(&contact.name), contact.name.clone()) {
+            let message = format!(
+                "contact {} and {} become the same identifier in generated code",
+                quote(&contact.name),
+                quote(&other)
+            );
+            let help = "rename what one of them is named after: a contact, a shape, a joint, a loop or a coupling";
+            findings.error_at(&contact.origin, message, help);
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! The one table of the pairs of shapes that can touch.
+
+use super::massless::{apply, matrix};
+use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
+
+/// What [`elementary`] has, for messages.
+pub(super) const SUPPORTED: &str = "a `plane` can touch a `point`, `sphere`, `capsule`, `box` or `cylinder`";
+
+/// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
+/// shapes, not turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Elementary {
+    /// Geometry.
+    pub(super) kind: LoopKind,
+    /// Origin of the first frame in the first shape, m.
+    pub(super) first: [f64; 3],
+    /// Origin of the second frame in the second shape, m.
+    pub(super) second: [f64; 3],
+}
+
+const MIDDLE: [f64; 3] = [0.0; 3];
+
+/// The places where the first shape can touch the second; `None` for pairs that are not supported in this order.
+pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<Elementary>> {
+    let places = match (*first, *second) {
+        (ShapeKind::Plane { normal }, ShapeKind::Point) => vec![ball(normal, 0.0, MIDDLE)],
+        (ShapeKind::Plane { normal }, ShapeKind::Sphere { radius }) => vec![ball(normal, radius, MIDDLE)],
+        (ShapeKind::Plane { normal }, ShapeKind::Capsule { radius, length }) => {
+            ends(length).into_iter().map(|at| ball(normal, radius, at)).collect()
+        }
+        (ShapeKind::Plane { normal }, ShapeKind::Box { size }) => {
+            corners(size).into_iter().map(|at| ball(normal, 0.0, at)).collect()
+        }
+        (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length }) => {
+            let kind = LoopKind::RollingDisc { normal, axis: [0.0, 0.0, 1.0], radius: Value::Const(radius) };
+            ends(length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
+        }
+        _ => return None,
+    };
+    Some(places)
+}
+
+/// A ball about a place of the second shape on the plane of the first.
+fn ball(normal: [f64; 3], radius: f64, second: [f64; 3]) -> Elementary {
+    let kind = LoopKind::RollingBall { normal, radius: Value::Const(radius) };
+    Elementary { kind, first: MIDDLE, second }
+}
+
+/// The ends of a line of this length along z; one where it has none.
+fn ends(length: f64) -> Vec<[f64; 3]> {
+    match length == 0.0 {
+        true => vec![MIDDLE],
+        false => vec![[0.0, 0.0, -0.5 * length], [0.0, 0.0, 0.5 * length]],
+    }
+}
+
+/// The corners of a box, x changing fastest.
+fn corners(size: [f64; 3]) -> Vec<[f64; 3]> {
+    let side = |corner: usize, k: usize| if corner >> k & 1 == 0 { -0.5 * size[k] } else { 0.5 * size[k] };
+    (0..8).map(|corner| [0, 1, 2].map(|k| side(corner, k))).collect()
+}
+
+/// The frame of a shape moved to a place in its own axes. The place of a shape that has others than its origin is
+/// constant.
+pub(super) fn moved(mount: &Mount, to: [f64; 3]) -> Mount {
+    let Placement { xyz, rotation } = mount.placement;
+    if to == MIDDLE {
+        return mount.clone();
+    }
+    let at = |x: Value| x.constant().unwrap_or(f64::NAN);
+    let to = apply(&matrix(&rotation, &at), to);
+    let xyz = [0, 1, 2].map(|k| Value::Const(at(xyz[k]) + to[k]));
+    Mount { body: mount.body, placement: Placement { xyz, rotation } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Rotation;
+
+    /// A box has corners at the same distance from its middle; turned about z by a right angle, its x is the body's y.
+    #[test]
+    fn corners_stand_at_the_ends_of_the_edges() {
+        let all = corners([2.0, 4.0, 6.0]);
+        assert_eq!((all[0], all[1], all[7]), ([-1.0, -2.0, -3.0], [1.0, -2.0, -3.0], [1.0, 2.0, 3.0]));
+        let rotation = Rotation::Rpy([Value::ZERO, Value::ZERO, Value::Const(std::f64::consts::FRAC_PI_2)]);
+        let xyz = [Value::Const(10.0), Value::ZERO, Value::ZERO];
+        let mount = Mount { body: Some(0), placement: Placement { xyz, rotation } };
+        let got = moved(&mount, all[7]).placement.xyz.map(|x| x.constant().unwrap_or(f64::NAN));
+        // Rounding of one product of each component.
+        assert!(got.iter().zip([8.0, 1.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-14), "{got:?}");
+    }
+
+    #[test]
+    fn as_many_places_as_shapes_have_ends() {
+        let plane = ShapeKind::Plane { normal: [0.0, 1.0, 0.0] };
+        let (radius, length) = (0.1, 0.4);
+        let count = |shape| elementary(&plane, &shape).map(|places| places.len());
+        assert_eq!(count(ShapeKind::Point), Some(1));
+        assert_eq!(count(ShapeKind::Sphere { radius }), Some(1));
+        assert_eq!(count(ShapeKind::Capsule { radius, length }), Some(2));
+        assert_eq!(count(ShapeKind::Box { size: [1.0; 3] }), Some(8));
+        assert_eq!(count(ShapeKind::Cylinder { radius, length }), Some(2));
+        assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0 }), Some(1));
+        assert_eq!(count(plane), None);
+    }
+}

@@ -1,0 +1,114 @@
+//! Shapes: where they are, and how large.
+
+use super::names::Names;
+use super::numbers::{Numbers, Quantity};
+use crate::import::raw::{RawModel, RawNumber, RawShape};
+use crate::import::source::Span;
+use crate::import::words::quote;
+use crate::model::{Mount, Rotation, Shape, ShapeKind, ShapeSpec, Value, SHAPES};
+
+/// What to write in place of a parameter.
+const CONSTANT: &str = "write a constant: parameters do not change shapes";
+
+/// All shapes, in the order of the file; `None` where something was reported that leaves a shape without meaning.
+pub(super) fn shapes(raw: &RawModel, names: &Names, numbers: &mut Numbers) -> Vec<Option<Shape>> {
+    raw.shapes.iter().map(|s| shape(s, names, numbers)).collect()
+}
+
+fn shape(raw: &RawShape, names: &Names, numbers: &mut Numbers) -> Option<Shape> {
+    let what = format!("shape {}", quote(&raw.name.value));
+    let body = match &raw.body {
+        None => Some(None),
+        Some(name) => names.body(name, "", &what, numbers.findings),
+    };
+    let placement = numbers.placement(&raw.placement, &what);
+    let spec = raw.kind.as_ref()?.value;
+    entries(raw, spec, &what, numbers);
+    let kind = kind(raw, spec, &what, numbers)?;
+    let shape = Shape { name: raw.name.value.clone(), mount: Mount { body: body?, placement }, kind };
+    still(raw, &shape, &what, numbers);
+    Some(shape)
+}
+
+/// Reports dimensions that are superfluous or missing.
+fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) {
+    let word = spec.word();
+    let given = [
+        ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
+        ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
+        ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
+        ("normal", raw.normal.as_ref().map(|x| x.span), ""),
+    ];
+    for (key, span, example) in given {
+        match (span, spec.keys.contains(&key)) {
+            (Some(span), false) => {
+                let takers = SHAPES.iter().filter(|s| s.keys.contains(&key)).map(|s| quote(s.word()));
+                let takers = takers.collect::<Vec<_>>().join(" or ");
+                let help = format!("remove it, or make the shape {takers}");
+                numbers.findings.error(span, format!("{what}: a {word} has no `{key}`"), help);
+            }
+            // A plane without a normal is across z.
+            (None, true) if key != "normal" => {
+                let message = format!("{what}: a {word} needs a `{key}`");
+                numbers.findings.error(raw.name.span, message, format!("add {example}"));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> Option<ShapeKind> {
+    let mut length = |number: &Option<RawNumber>, key: &str, least: &str| {
+        number.as_ref().map(|x| size(x, key, least, what, numbers))
+    };
+    match spec.word() {
+        "point" => Some(ShapeKind::Point),
+        "sphere" => Some(ShapeKind::Sphere { radius: length(&raw.radius, "radius", MORE)? }),
+        "capsule" => {
+            let (radius, length) = (length(&raw.radius, "radius", MORE), length(&raw.length, "length", MORE));
+            Some(ShapeKind::Capsule { radius: radius?, length: length? })
+        }
+        "cylinder" => {
+            let (radius, length) = (length(&raw.radius, "radius", MORE), length(&raw.length, "length", DISC));
+            Some(ShapeKind::Cylinder { radius: radius?, length: length? })
+        }
+        "box" => {
+            let edges = raw.size.as_ref()?;
+            Some(ShapeKind::Box { size: [0, 1, 2].map(|k| size(&edges.value[k], "size", MORE, what, numbers)) })
+        }
+        _ => {
+            let normal = raw.normal.as_ref().map(|n| numbers.direction(n, &format!("{what}: `normal`")));
+            Some(ShapeKind::Plane { normal: normal.unwrap_or(Some([0.0, 0.0, 1.0]))? })
+        }
+    }
+}
+
+const MORE: &str = "write a length in metres, greater than 0";
+const DISC: &str = "write a length in metres; 0 makes it a thin disc";
+
+/// A length that is not negative, and not zero where `help` does not allow it.
+fn size(x: &RawNumber, key: &str, help: &str, what: &str, numbers: &mut Numbers) -> f64 {
+    let value = numbers.constant(x, Quantity::Length, &format!("{what}: `{key}`"), CONSTANT);
+    if value < 0.0 || (value == 0.0 && help == MORE) {
+        let problem = if value < 0.0 { "is negative" } else { "is 0" };
+        numbers.findings.error(x.span, format!("{what}: `{key}` {problem}"), help);
+    }
+    value
+}
+
+/// Corners and ends are places that are known when the code is generated; only a point, a sphere or a plane can be moved
+/// by a parameter.
+fn still(raw: &RawShape, shape: &Shape, what: &str, numbers: &mut Numbers) {
+    if matches!(shape.kind, ShapeKind::Point | ShapeKind::Sphere { .. } | ShapeKind::Plane { .. }) {
+        return;
+    }
+    let rotation = match shape.mount.placement.rotation {
+        Rotation::Rpy(rpy) => rpy.to_vec(),
+        Rotation::AxisAngle { angle, .. } => vec![angle],
+    };
+    if shape.mount.placement.xyz.iter().chain(&rotation).any(|v| matches!(v, Value::Param(_))) {
+        let span: Span = raw.placement.xyz.as_ref().map_or(raw.name.span, |xyz| xyz.span);
+        let message = format!("{what}: the place of a {} cannot depend on a parameter", shape.kind.word());
+        numbers.findings.error(span, message, "write constants, or use spheres or points, which may be moved");
+    }
+}

@@ -1,0 +1,475 @@
+//! Motion with contacts: steps of any method between events, and what happens at the events.
+
+mod land;
+mod resolve;
+mod select;
+mod watch;
+
+use super::{
+    Certificate, Contact, ContactError, Effort, Impact, ImpactOrder, Mode, Problem, Touch, Touching, WithContacts,
+};
+use crate::error::StepError;
+use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
+use crate::system::Real;
+use crate::Scalar;
+use watch::Watched;
+
+/// Rules of a motion with contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ContactRules {
+    /// Work for the forces and impulses of contacts.
+    pub effort: Effort,
+    /// Whether the impulses of several contacts act at once or one after the other.
+    pub order: ImpactOrder,
+    /// Gap below which bodies touch, m (rad for stops of rotations).
+    pub touching: f64,
+    /// Height of a bounce, m (rad), below which no more bounces are followed: the bodies stay together.
+    pub bounce: f64,
+    /// Speed of slip, m/s, below which bodies do not slide.
+    pub slip: f64,
+    /// Largest number of events within a step of the integration, or at one instant.
+    pub events: u32,
+}
+
+impl Default for ContactRules {
+    fn default() -> Self {
+        ContactRules {
+            effort: Effort::default(),
+            order: ImpactOrder::default(),
+            touching: 1e-11,
+            bounce: 1e-12,
+            slip: 1e-10,
+            events: 1000,
+        }
+    }
+}
+
+/// Reason of an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// Bodies came together.
+    Landed,
+    /// The normal force of a closed contact went to zero.
+    Unloaded,
+    /// The force of a sticking contact reached the friction cone.
+    Slipped,
+    /// A sliding contact came to rest.
+    Stopped,
+}
+
+/// An event of a motion with contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ContactEvent<S> {
+    /// Time, s.
+    pub time: S,
+    /// The contact that caused it.
+    pub contact: usize,
+    /// Its reason.
+    pub cause: Cause,
+    /// Its mode before and after.
+    pub modes: [Mode; 2],
+    /// Speed at which the contact approached, m/s; zero where it did not.
+    pub approach: S,
+    /// The impact, where there was one.
+    pub impact: Option<Impact<S>>,
+    /// Time at which the contact's bounces would have ended, where they were followed no longer, s.
+    pub rest: Option<S>,
+}
+
+/// What happened in a motion with contacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct ContactStatistics {
+    /// Events.
+    pub events: u64,
+    /// Events with an impact.
+    pub impacts: u64,
+    /// Changes of modes.
+    pub switches: u64,
+    /// Contacts that were closed because their bounces had become too small.
+    pub settled: u64,
+    /// Impacts whose expansion was reduced, so that no energy was gained.
+    pub limited: u64,
+    /// Kinetic energy that impacts have taken, J.
+    pub lost: f64,
+    /// Largest relative residual of an impact.
+    pub residual: f64,
+}
+
+/// Reason why a motion with contacts cannot go on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum HybridError {
+    /// A step failed.
+    Step(StepError),
+    /// No forces or impulses of the contacts were found.
+    Contact {
+        /// Time, s.
+        time: f64,
+        /// The error of the solver.
+        error: ContactError,
+    },
+    /// Bodies overlap where the motion starts.
+    Overlap {
+        /// The contact.
+        contact: usize,
+        /// Its gap, m or rad.
+        gap: f64,
+    },
+    /// More events follow one another than the rules allow.
+    TooManyEvents {
+        /// Time, s.
+        time: f64,
+        /// Their number.
+        events: u32,
+    },
+    /// Something at an event is not finite.
+    NotFinite {
+        /// Time, s.
+        time: f64,
+    },
+}
+
+impl From<StepError> for HybridError {
+    fn from(error: StepError) -> Self {
+        HybridError::Step(error)
+    }
+}
+
+impl core::fmt::Display for HybridError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            HybridError::Step(error) => write!(f, "{error}"),
+            HybridError::Contact { time, error } => write!(f, "at t = {time} s: {error}"),
+            HybridError::Overlap { contact, gap } => write!(
+                f,
+                "contact {contact} starts with a gap of {gap:.3e}: the bodies overlap; start where they are apart or touch"
+            ),
+            HybridError::TooManyEvents { time, events } => write!(
+                f,
+                "{events} events follow one another at t = {time} s: loosen the rules (`bounce`, `touching`), or raise `events`"
+            ),
+            HybridError::NotFinite { time } => {
+                write!(f, "a state or a force at the event at t = {time} s is not finite: look for a singular configuration")
+            }
+        }
+    }
+}
+
+impl core::error::Error for HybridError {}
+
+/// A stretch of a motion without events: one step of the integration, or what comes before the event within it.
+pub trait Stretch<Y: Touching> {
+    /// Times of its ends, s.
+    fn span(&self) -> [Y::Scalar; 2];
+    /// The state at a time within it.
+    fn state(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta);
+}
+
+/// The last step of a solver, up to a part of it.
+struct LastStep<'a, Y: Touching, M> {
+    solver: &'a mut Solver<WithContacts<Y>, M>,
+    end: Y::Scalar,
+}
+
+impl<Y, M> Stretch<Y> for LastStep<'_, Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    fn span(&self) -> [Y::Scalar; 2] {
+        let (t, h) = self.solver.last_step();
+        [t, t + self.end * h]
+    }
+
+    fn state(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        let (start, h) = self.solver.last_step();
+        self.solver.dense(system, (t - start) / h, q, p);
+    }
+}
+
+/// Follows a motion with contacts.
+pub trait ContactObserver<Y: Touching> {
+    /// Called for every stretch of the motion between events.
+    fn stretch(&mut self, _system: &mut WithContacts<Y>, _stretch: &mut dyn Stretch<Y>) {}
+
+    /// Called for every event, after it was resolved.
+    fn event(&mut self, _system: &mut WithContacts<Y>, _event: &ContactEvent<Y::Scalar>) {}
+}
+
+impl<Y: Touching> ContactObserver<Y> for () {}
+
+/// What is remembered of a contact's last departure.
+#[derive(Clone, Copy, Debug)]
+struct Departure<S> {
+    time: S,
+    /// Speed of departure, m/s; zero where there was none.
+    speed: S,
+}
+
+/// A motion with contacts by a method `M`. It owns the state; [`Hybrid::state`] copies it.
+///
+/// Between events, the mechanism moves with the contacts that are closed as constraints. Within each step, gaps, normal
+/// forces, friction cones and speeds of slip are watched on the dense output; where one of them reaches zero, the step is
+/// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
+/// within a step too, which its rate tells.
+#[derive(Clone, Debug)]
+pub struct Hybrid<Y: Touching, M> {
+    solver: Solver<WithContacts<Y>, M>,
+    /// Rules.
+    pub rules: ContactRules,
+    start: (Y::Scalar, Y::Coordinates, Y::Momenta),
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    displacement: Y::Momenta,
+    rates: (Y::Coordinates, Y::Momenta),
+    /// Watched functions at the ends of a stretch of a step.
+    left: Y::PerContact<Watched<Y::Scalar>>,
+    right: Y::PerContact<Watched<Y::Scalar>>,
+    departures: Y::PerContact<Departure<Y::Scalar>>,
+    touching: Touches<Y>,
+    /// Whether the forces of the closed contacts are not unique.
+    redundant: bool,
+    /// Acceleration with which a contact falls back whose bounces have become too small, m/s² (rad/s²); zero without one.
+    settling: Y::Scalar,
+    /// Whether nothing can move.
+    immobile: bool,
+    /// The contact, cause and force of an event that is being resolved, where they decide on the mode that follows.
+    forced: Option<(usize, Cause, [Y::Scalar; 3])>,
+    /// Events at the last instant.
+    crowded: (Y::Scalar, u32),
+    statistics: ContactStatistics,
+}
+
+/// The contacts of an event, and memory for their impulses and forces.
+#[derive(Clone, Debug)]
+struct Touches<Y: Touching> {
+    count: usize,
+    order: Y::PerContact<usize>,
+    problem: Y::PerContact<Touch<Y::Scalar>>,
+    open: Y::PerContact<Mode>,
+    modes: Y::PerContact<Mode>,
+    slip: Y::PerContact<[Y::Scalar; 2]>,
+    /// Contacts that stay closed although they would depart slowly.
+    settles: Y::PerContact<bool>,
+    a: Y::Delassus,
+    b: Y::Delassus,
+    impulses: Y::Delassus,
+    work: Y::Delassus,
+}
+
+impl<Y, M> Hybrid<Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    /// At time `t` (s) and a state. Contacts that touch there are closed, or impacts if their bodies approach.
+    ///
+    /// # Errors
+    /// [`HybridError`].
+    pub fn new(
+        system: &mut WithContacts<Y>,
+        method: M,
+        step: Step,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<Self, HybridError> {
+        let zero = Y::Scalar::zero();
+        let solver = Solver::new(system, method, step, t, q, p)?;
+        let inner = system.system();
+        let departure = Departure { time: t, speed: zero };
+        let mut hybrid = Hybrid {
+            solver,
+            rules: ContactRules::default(),
+            start: (t, q.clone(), p.clone()),
+            q: q.clone(),
+            p: p.clone(),
+            displacement: p.clone(),
+            rates: (q.clone(), p.clone()),
+            left: inner.per_contact(Watched::zero()),
+            right: inner.per_contact(Watched::zero()),
+            departures: inner.per_contact(departure),
+            touching: Touches::new(inner),
+            redundant: false,
+            settling: zero,
+            immobile: false,
+            forced: None,
+            crowded: (t, 0),
+            statistics: ContactStatistics::default(),
+        };
+        hybrid.restart(system, t, q, p)?;
+        Ok(hybrid)
+    }
+
+    /// Starts again from another state, with all contacts that do not touch there open.
+    ///
+    /// # Errors
+    /// [`HybridError`].
+    pub fn restart(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), HybridError> {
+        let zero = Y::Scalar::zero();
+        self.touching.modes.as_mut().fill(Mode::Open);
+        self.touching.slip.as_mut().fill([zero; 2]);
+        system.set_modes(self.touching.modes.as_ref(), self.touching.slip.as_ref());
+        self.q.as_mut().copy_from_slice(q.as_ref());
+        self.p.as_mut().copy_from_slice(p.as_ref());
+        system.look(t, &self.q, &self.p);
+        for k in 0..self.count(system) {
+            let gap = system.gap(k).to_f64();
+            if gap < -100.0 * self.rules.touching {
+                return Err(HybridError::Overlap { contact: k, gap });
+            }
+        }
+        self.departures.as_mut().fill(Departure { time: t, speed: zero });
+        self.settle_modes(system, t, None)?;
+        Ok(())
+    }
+
+    /// Time of the state, s.
+    pub fn time(&self) -> Y::Scalar {
+        self.solver.time()
+    }
+
+    /// The state.
+    pub fn state(&mut self, system: &WithContacts<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        self.solver.state(system, q, p);
+    }
+
+    /// Work of the integration so far.
+    pub fn statistics(&self) -> Statistics {
+        self.solver.statistics()
+    }
+
+    /// What happened at the contacts so far.
+    pub fn contact_statistics(&self) -> &ContactStatistics {
+        &self.statistics
+    }
+
+    /// Limits of the work.
+    pub fn limits_mut(&mut self) -> &mut Limits {
+        &mut self.solver.limits
+    }
+
+    /// The method.
+    pub fn method(&self) -> &M {
+        self.solver.method()
+    }
+
+    /// Takes steps until `t_end` (s) is reached exactly.
+    ///
+    /// # Errors
+    /// [`HybridError`]; the state is then that of the last step or event.
+    pub fn run(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t_end: Y::Scalar,
+        observer: &mut impl ContactObserver<Y>,
+    ) -> Result<(), HybridError> {
+        while self.time() < t_end {
+            self.advance(system, t_end, observer)?;
+        }
+        Ok(())
+    }
+
+    /// Takes one step, not beyond `t_end` (s), or goes to the first event of that step and resolves it.
+    ///
+    /// # Errors
+    /// As [`Hybrid::run`].
+    pub fn advance(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t_end: Y::Scalar,
+        observer: &mut impl ContactObserver<Y>,
+    ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
+        let Hybrid { solver, start, .. } = self;
+        start.0 = solver.time();
+        solver.state(system, &mut start.1, &mut start.2);
+        system.note_slip(start.0, &start.1, &start.2);
+        solver.advance(system, t_end)?;
+        let found = self.first_event(system)?;
+        let end = found.map_or(Y::Scalar::one(), |found| found.theta);
+        observer.stretch(system, &mut LastStep { solver: &mut self.solver, end });
+        let Some(found) = found else {
+            self.stand_still(system)?;
+            return Ok(None);
+        };
+        let t = self.go_to(system, &found)?;
+        let event = self.resolve(system, t, &found)?;
+        if let Some(event) = &event {
+            observer.event(system, event);
+        }
+        Ok(event)
+    }
+
+    /// Takes back what rounding moves where nothing can move: a step without events then ends where it started.
+    fn stand_still(&mut self, system: &mut WithContacts<Y>) -> Result<(), HybridError> {
+        if !self.immobile {
+            return Ok(());
+        }
+        let (t, h) = (self.solver.time(), self.solver.last_step().1);
+        self.immobile = system.at_rest();
+        if self.immobile {
+            let Hybrid { solver, start, .. } = self;
+            solver.restart(system, t, &start.1, &start.2)?;
+            solver.limits.first_step = 2.0 * h.to_f64();
+        }
+        Ok(())
+    }
+
+    fn count(&self, system: &WithContacts<Y>) -> usize {
+        system.modes().len()
+    }
+}
+
+impl<Y: Touching> Touches<Y> {
+    fn new(system: &Y) -> Self {
+        let rows: usize = system.contacts().iter().map(Contact::rows).sum();
+        let touch = Touch {
+            contact: Contact {
+                row: 0,
+                tangents: false,
+                friction: Y::Scalar::zero(),
+                restitution: Y::Scalar::zero(),
+                law: super::RestitutionLaw::Poisson,
+            },
+            slip: None,
+        };
+        Touches {
+            count: 0,
+            order: system.per_contact(0),
+            problem: system.per_contact(touch),
+            open: system.per_contact(Mode::Open),
+            modes: system.per_contact(Mode::Open),
+            slip: system.per_contact([Y::Scalar::zero(); 2]),
+            settles: system.per_contact(false),
+            a: system.zero_delassus(rows * rows),
+            b: system.zero_delassus(rows),
+            impulses: system.zero_delassus(rows),
+            work: system.zero_delassus(super::work_len(rows)),
+        }
+    }
+
+    /// The contacts that take part.
+    fn order(&self) -> &[usize] {
+        &self.order.as_ref()[..self.count]
+    }
+
+    /// Number of their rows.
+    fn rows(&self) -> usize {
+        self.problem.as_ref()[..self.count].iter().map(|touch| touch.contact.rows()).sum()
+    }
+}
+
+/// The relative residual of a solution.
+fn residual<S: Real>(certificate: &Certificate<S>) -> f64 {
+    certificate.residual.to_f64()
+}

@@ -1,0 +1,244 @@
+//! What happens at an event: impulses, then the modes of the motion that follows.
+
+use super::watch::Found;
+use super::{residual, Cause, ContactEvent, Departure, Hybrid, HybridError};
+use crate::contact::{impact, Impact, ImpactOptions, Mode, Touching, WithContacts};
+use crate::integrate::Stepper;
+use crate::system::Real;
+use crate::Scalar;
+
+/// Speeds of approach below this part of the fastest of an event count as zero.
+const SLOW: f64 = 1e-9;
+
+impl<Y, M> Hybrid<Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    /// Resolves an event at time `t`, whose state is in `self.q` and `self.p`; `None` if nothing changes there.
+    pub(super) fn resolve(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        found: &Found<Y::Scalar>,
+    ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
+        self.crowd(t)?;
+        let switches = self.statistics.switches;
+        let before = system.modes()[found.contact];
+        let mut event = ContactEvent {
+            time: t,
+            contact: found.contact,
+            cause: found.cause,
+            modes: [before; 2],
+            approach: Y::Scalar::zero(),
+            impact: None,
+            rest: None,
+        };
+        system.look(t, &self.q, &self.p);
+        self.forced = (!self.redundant).then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
+        self.settle_modes(system, t, Some(&mut event))?;
+        self.forced = None;
+        event.modes[1] = system.modes()[found.contact];
+        // Forces of redundant contacts may have been redistributed, and nothing else.
+        let happened = event.impact.is_some() || event.cause == Cause::Stopped || self.statistics.switches > switches;
+        self.statistics.events += u64::from(happened);
+        Ok(happened.then_some(event))
+    }
+
+    /// Counts the events at one instant.
+    fn crowd(&mut self, t: Y::Scalar) -> Result<(), HybridError> {
+        let (last, count) = self.crowded;
+        let same = !((t - last).to_f64() > 4.0 * Y::Scalar::epsilon() * t.to_f64().abs());
+        self.crowded = (t, if same { count + 1 } else { 0 });
+        match self.crowded.1 > self.rules.events {
+            true => Err(HybridError::TooManyEvents { time: t.to_f64(), events: self.crowded.1 }),
+            false => Ok(()),
+        }
+    }
+
+    /// Impulses and modes of the contacts that touch at the state that was looked at last, which is in `self.q` and
+    /// `self.p`; the motion starts again from there.
+    pub(super) fn settle_modes(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        event: Option<&mut ContactEvent<Y::Scalar>>,
+    ) -> Result<(), HybridError> {
+        self.take_touching(system);
+        let event = self.collide(system, t, event)?;
+        self.stay(system, t, event.as_ref().map(|impact| impact.energy));
+        self.select(system, t)?;
+        let changed = self.touching.modes.as_ref().iter().zip(system.modes()).filter(|(new, old)| new != old);
+        self.statistics.switches += changed.count() as u64;
+        system.set_modes(self.touching.modes.as_ref(), self.touching.slip.as_ref());
+        system.look(t, &self.q, &self.p);
+        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        if !self.p.as_ref().iter().chain(self.q.as_ref()).all(|x| x.is_finite()) {
+            return Err(HybridError::NotFinite { time: t.to_f64() });
+        }
+        self.evaluate(system, t, false);
+        self.redundant = self.has_redundant_rows(system);
+        self.solver.limits.first_step = 0.0;
+        self.solver.restart(system, t, &self.q, &self.p)?;
+        Ok(())
+    }
+
+    /// Takes into the problem what is closed or touches without departing.
+    fn take_touching(&mut self, system: &WithContacts<Y>) {
+        self.touching.count = 0;
+        for k in 0..self.count(system) {
+            let near = system.gap(k).to_f64() <= self.rules.touching;
+            if system.modes()[k] != Mode::Open || near {
+                self.take(system, k);
+            }
+        }
+    }
+
+    /// Impulses, where bodies that touch approach each other.
+    fn collide(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        event: Option<&mut ContactEvent<Y::Scalar>>,
+    ) -> Result<Option<Impact<Y::Scalar>>, HybridError> {
+        let zero = Y::Scalar::zero();
+        self.touching.settles.as_mut().fill(false);
+        let fastest = self.touching.order().iter().fold(zero, |most, &k| {
+            let rate = -system.gap_rate(k);
+            if rate > most {
+                rate
+            } else {
+                most
+            }
+        });
+        if !(fastest.to_f64() > self.rules.slip) {
+            return Ok(None);
+        }
+        let rest = self.mark_settling(system, t);
+        self.assemble(system, t);
+        let touching = &mut self.touching;
+        let rows = touching.rows();
+        let mut i = 0;
+        for &k in &touching.order.as_ref()[..touching.count] {
+            let c = system.contact(k);
+            for row in c.row..c.row + c.rows() {
+                touching.b.as_mut()[i] = system.at.velocities.as_ref()[row];
+                i += 1;
+            }
+        }
+        let problem = super::Problem {
+            a: &touching.a.as_ref()[..rows * rows],
+            b: &touching.b.as_ref()[..rows],
+            touches: &touching.problem.as_ref()[..touching.count],
+        };
+        let impulses = &mut touching.impulses.as_mut()[..rows];
+        impulses.fill(zero);
+        let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order, ..ImpactOptions::default() };
+        let result = impact(&problem, &options, impulses, touching.work.as_mut())
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        system.kick(&touching.order.as_ref()[..touching.count], &touching.impulses.as_ref()[..rows]);
+        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        self.note(&result);
+        if let Some(event) = event {
+            event.approach = -system.gap_rate(event.contact);
+            event.rest = rest;
+            event.impact = Some(result);
+        }
+        // Velocities after the impact, with no contact held.
+        system.set_modes(self.touching.open.as_ref(), self.touching.slip.as_ref());
+        system.look(t, &self.q, &self.p);
+        Ok(Some(result))
+    }
+
+    fn note(&mut self, result: &Impact<Y::Scalar>) {
+        self.statistics.impacts += 1;
+        self.statistics.lost -= result.energy.to_f64();
+        self.statistics.limited += u64::from(result.limited.is_some());
+        self.statistics.residual = self.statistics.residual.max(residual(&result.certificate));
+    }
+
+    /// Marks contacts whose bounces have become smaller than the rules follow, and makes their impact plastic. Gives the
+    /// time at which the bounces of the last one would have ended.
+    fn mark_settling(&mut self, system: &WithContacts<Y>, t: Y::Scalar) -> Option<Y::Scalar> {
+        let (zero, one, two) = (Y::Scalar::zero(), Y::Scalar::one(), Y::Scalar::constant(2.0));
+        let mut rest = None;
+        self.settling = zero;
+        for i in 0..self.touching.count {
+            let k = self.touching.order()[i];
+            let Departure { time, speed } = self.departures.as_ref()[k];
+            let approach = -system.gap_rate(k);
+            let lands = system.modes()[k] == Mode::Open && approach.to_f64() > self.rules.slip;
+            if !(lands && speed > zero && t > time) {
+                continue;
+            }
+            // The bodies have come back with about the speed with which they departed.
+            let acceleration = (speed + approach) / (t - time);
+            let height = approach * approach / (two * acceleration);
+            if !(height.to_f64() < self.rules.bounce) {
+                continue;
+            }
+            let contact = &mut self.touching.problem.as_mut()[i].contact;
+            let e = contact.restitution;
+            contact.restitution = zero;
+            self.touching.settles.as_mut()[k] = true;
+            self.settling = acceleration;
+            self.statistics.settled += 1;
+            rest = Some(if e < one { t + two * e * approach / (acceleration * (one - e)) } else { t });
+        }
+        rest
+    }
+
+    /// Keeps in the problem the contacts whose bodies do not depart, and notes the departures of the others.
+    fn stay(&mut self, system: &WithContacts<Y>, t: Y::Scalar, impact: Option<Y::Scalar>) {
+        let zero = Y::Scalar::zero();
+        let taken = self.touching.count;
+        let fastest = (0..taken).fold(zero, |most, i| {
+            let rate = system.gap_rate(self.touching.order()[i]).abs();
+            if rate > most {
+                rate
+            } else {
+                most
+            }
+        });
+        let slow = self.rules.slip.max(SLOW * fastest.to_f64());
+        self.touching.count = 0;
+        // What is kept takes the place of what was before it.
+        for i in 0..taken {
+            let k = self.touching.order.as_ref()[i];
+            let rate = system.gap_rate(k);
+            // Where bounces of one contact are followed no longer, those of others that it throws up are not either.
+            let height = rate * rate / (self.settling + self.settling);
+            let settles = self.touching.settles.as_ref()[k] || height.to_f64() < self.rules.bounce;
+            let departs = rate.to_f64() > slow && !settles;
+            if departs && impact.is_some() {
+                self.departures.as_mut()[k] = Departure { time: t, speed: rate };
+            }
+            if !departs {
+                self.take(system, k);
+            }
+        }
+    }
+
+    /// Whether rows of the closed contacts depend on one another; notes whether anything can move.
+    fn has_redundant_rows(&mut self, system: &mut WithContacts<Y>) -> bool {
+        let rows = self.touching.rows();
+        let a = self.touching.a.as_ref();
+        let most =
+            (0..rows).fold(Y::Scalar::zero(), |most, i| if a[i * rows + i] > most { a[i * rows + i] } else { most });
+        let least = Y::Scalar::constant(1e-12) * most;
+        system.find_pivots(&self.q);
+        let independent = system.sigma.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count();
+        self.immobile = independent == self.p.as_ref().len() && system.at_rest();
+        let mut i = 0;
+        let mut redundant = false;
+        for &k in self.touching.order() {
+            let (c, mode) = (system.contact(k), system.modes()[k]);
+            for j in 0..c.rows() {
+                let left_out = system.sigma.as_ref()[c.row + j] == Y::Scalar::zero();
+                redundant |= mode.acts(j) && left_out && a[i * rows + i] > least;
+                i += 1;
+            }
+        }
+        redundant
+    }
+}

@@ -1,0 +1,306 @@
+//! The functions that are watched within a step, and the first of their zeros.
+
+use super::{Cause, Hybrid, HybridError};
+use crate::contact::{Mode, Touching, WithContacts};
+use crate::integrate::root::{resolution, root};
+use crate::integrate::Stepper;
+use crate::system::Real;
+use crate::Scalar;
+
+/// Number of stretches of a step at whose ends the functions are evaluated.
+const STRETCHES: u32 = 4;
+/// How often a stretch is halved in search of a point where a function is positive.
+const HALVINGS: u32 = 40;
+
+/// The functions of one contact: it stays in its mode while both are positive.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Watched<S> {
+    /// Gap of an open contact, normal force of a closed one.
+    pub first: S,
+    /// Rate of the gap of an open contact.
+    pub rate: S,
+    /// Speed of slip along the direction where the step began; distance of the force from the friction cone.
+    pub second: Option<S>,
+}
+
+/// An event of the last step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Found<S> {
+    pub contact: usize,
+    pub cause: Cause,
+    /// Where in the step.
+    pub theta: S,
+}
+
+/// The causes that a mode can have.
+fn causes(mode: Mode) -> [Cause; 2] {
+    match mode {
+        Mode::Open => [Cause::Landed; 2],
+        Mode::Slide => [Cause::Unloaded, Cause::Stopped],
+        Mode::Stick => [Cause::Unloaded, Cause::Slipped],
+    }
+}
+
+impl<S: Real> Watched<S> {
+    pub(super) fn zero() -> Self {
+        Watched { first: S::zero(), rate: S::zero(), second: None }
+    }
+
+    fn value(&self, which: usize) -> Option<S> {
+        if which == 0 {
+            Some(self.first)
+        } else {
+            self.second
+        }
+    }
+}
+
+impl<Y, M> Hybrid<Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    /// Evaluates the functions at the state in `self.q`, `self.p`.
+    pub(super) fn evaluate(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, right: bool) {
+        system.look(t, &self.q, &self.p);
+        let closed = system.modes().iter().any(|mode| *mode != Mode::Open);
+        if closed {
+            system.loads(t, &self.q, true);
+        }
+        let out = if right { &mut self.right } else { &mut self.left };
+        for (k, out) in out.as_mut().iter_mut().enumerate() {
+            *out = system.watched(k);
+        }
+    }
+
+    /// Evaluates them at `θ` in the last step.
+    fn sample(&mut self, system: &mut WithContacts<Y>, theta: Y::Scalar, right: bool) {
+        let (t, h) = self.solver.last_step();
+        self.solver.dense(system, theta, &mut self.q, &mut self.p);
+        self.evaluate(system, t + theta * h, right);
+    }
+
+    /// One of the functions at `θ` in the last step.
+    fn value_at(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        k: usize,
+        theta: Y::Scalar,
+        of: impl Fn(&Watched<Y::Scalar>) -> Y::Scalar,
+    ) -> Y::Scalar {
+        let (t, h) = self.solver.last_step();
+        self.solver.dense(system, theta, &mut self.q, &mut self.p);
+        system.look(t + theta * h, &self.q, &self.p);
+        if system.modes()[k] != Mode::Open {
+            system.loads(t + theta * h, &self.q, true);
+        }
+        of(&system.watched(k))
+    }
+
+    /// The first event of the last step. `self.left` has the functions at its start.
+    pub(super) fn first_event(
+        &mut self,
+        system: &mut WithContacts<Y>,
+    ) -> Result<Option<Found<Y::Scalar>>, HybridError> {
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
+        if self.left.as_ref().is_empty() {
+            return Ok(None);
+        }
+        self.sample(system, one, true);
+        let (_, h) = self.solver.last_step();
+        if system.modes().iter().all(|mode| *mode == Mode::Open) && self.apart(h) {
+            core::mem::swap(&mut self.left, &mut self.right);
+            return Ok(None);
+        }
+        let mut from = zero;
+        for j in 1..=STRETCHES {
+            let to = Y::Scalar::constant(f64::from(j) / f64::from(STRETCHES));
+            self.sample(system, to, true);
+            let mut first: Option<Found<Y::Scalar>> = None;
+            for k in 0..self.left.as_ref().len() {
+                for which in 0..2 {
+                    if let Some(found) = self.zero_of(system, k, which, (from, to)) {
+                        if first.is_none_or(|other| found.theta < other.theta) {
+                            first = Some(found);
+                        }
+                    }
+                }
+            }
+            if first.is_some() {
+                return Ok(first);
+            }
+            core::mem::swap(&mut self.left, &mut self.right);
+            from = to;
+        }
+        self.overloaded(system)
+    }
+
+    /// The event at which the forces of redundant contacts stop to be possible, if they have in the last step. Their
+    /// distribution is not unique; the one that the constraints give may leave the friction cones although another does
+    /// not. So the forces are solved for wherever it does.
+    fn overloaded(&mut self, system: &mut WithContacts<Y>) -> Result<Option<Found<Y::Scalar>>, HybridError> {
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
+        let Some(contact) = self.doubtful(system) else { return Ok(None) };
+        if self.holds_at(system, one)? {
+            return Ok(None);
+        }
+        let (t, h) = self.solver.last_step();
+        let (mut a, mut b) = (zero, one);
+        let width = Y::Scalar::constant(2.0 * resolution(t, h));
+        while b - a > width {
+            let middle = Y::Scalar::constant(0.5) * (a + b);
+            if !(middle > a && middle < b) {
+                break;
+            }
+            if self.holds_at(system, middle)? {
+                a = middle;
+            } else {
+                b = middle;
+            }
+        }
+        Ok(Some(Found { contact, cause: Cause::Unloaded, theta: b }))
+    }
+
+    /// The first closed contact whose force at the end of the step is not possible.
+    fn doubtful(&self, system: &WithContacts<Y>) -> Option<usize> {
+        let zero = Y::Scalar::zero();
+        let beyond = |(w, mode): (&Watched<Y::Scalar>, &Mode)| match mode {
+            Mode::Open => false,
+            Mode::Slide => w.first < zero,
+            Mode::Stick => w.first < zero || w.second.is_some_and(|x| x < zero),
+        };
+        self.left.as_ref().iter().zip(system.modes()).position(beyond)
+    }
+
+    /// Whether the modes are those that the forces at `θ` in the last step give.
+    fn holds_at(&mut self, system: &mut WithContacts<Y>, theta: Y::Scalar) -> Result<bool, HybridError> {
+        let (t, h) = self.solver.last_step();
+        self.solver.dense(system, theta, &mut self.q, &mut self.p);
+        system.look(t + theta * h, &self.q, &self.p);
+        self.take_closed(system);
+        self.select(system, t + theta * h)?;
+        Ok(self.touching.modes.as_ref() == system.modes())
+    }
+
+    /// Whether no gap can have closed within a step of `h` s, with twice the speeds at its ends.
+    fn apart(&self, h: Y::Scalar) -> bool {
+        let ends = self.left.as_ref().iter().zip(self.right.as_ref());
+        let two = Y::Scalar::constant(2.0);
+        ends.fold(true, |apart, (a, b)| {
+            let least = if a.first < b.first { a.first } else { b.first };
+            let fastest = if a.rate.abs() > b.rate.abs() { a.rate.abs() } else { b.rate.abs() };
+            apart && least > two * h * fastest
+        })
+    }
+
+    /// The first zero of a function between two points of the step, at whose ends `self.left` and `self.right` are.
+    fn zero_of(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        k: usize,
+        which: usize,
+        (from, to): (Y::Scalar, Y::Scalar),
+    ) -> Option<Found<Y::Scalar>> {
+        let zero = Y::Scalar::zero();
+        let (a, b) = (self.left.as_ref()[k], self.right.as_ref()[k]);
+        let (at_a, at_b) = (a.value(which)?, b.value(which)?);
+        let mode = system.modes()[k];
+        if self.redundant && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
+            return None;
+        }
+        let cause = causes(mode)[which];
+        let value = move |w: &Watched<Y::Scalar>| w.value(which).unwrap_or(zero);
+        let mut end = (to, at_b);
+        if !(at_b <= zero) {
+            // Both ends are positive: only a gap with a minimum between them can have been zero.
+            if mode != Mode::Open || !(a.rate < zero && b.rate > zero) {
+                return None;
+            }
+            let lowest = self.root(system, k, (from, -a.rate), (to, -b.rate), |w| -w.rate);
+            let gap = self.value_at(system, k, lowest, value);
+            if gap > zero {
+                return None;
+            }
+            end = (lowest, gap);
+        }
+        let mut start = (from, at_a);
+        if !(at_a > zero) {
+            // The function starts on zero, and has been positive since if it is an event.
+            start = self.positive(system, k, (from, end.0), value)?;
+        }
+        let theta = self.root(system, k, start, end, value);
+        Some(Found { contact: k, cause, theta })
+    }
+
+    /// A point within a stretch where a function is positive, with its value.
+    fn positive(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        k: usize,
+        (from, to): (Y::Scalar, Y::Scalar),
+        value: impl Fn(&Watched<Y::Scalar>) -> Y::Scalar,
+    ) -> Option<(Y::Scalar, Y::Scalar)> {
+        let mut width = to - from;
+        for _ in 0..HALVINGS {
+            width = Y::Scalar::constant(0.5) * width;
+            let x = from + width;
+            let found = self.value_at(system, k, x, &value);
+            if found > Y::Scalar::zero() {
+                return Some((x, found));
+            }
+        }
+        None
+    }
+
+    /// Where a function reaches zero between two points of the step.
+    fn root(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        k: usize,
+        a: (Y::Scalar, Y::Scalar),
+        b: (Y::Scalar, Y::Scalar),
+        value: impl Fn(&Watched<Y::Scalar>) -> Y::Scalar,
+    ) -> Y::Scalar {
+        let (t, h) = self.solver.last_step();
+        root(a, b, resolution(t, h), |x| {
+            let found = self.value_at(system, k, x, &value);
+            (found, found <= Y::Scalar::zero())
+        })
+    }
+}
+
+impl<Y: Touching> WithContacts<Y> {
+    /// Whether all velocities are rounding errors, after [`WithContacts::look`].
+    pub(super) fn at_rest(&self) -> bool {
+        self.at.v.as_ref().iter().all(|v| v.to_f64().abs() < 1e-12)
+    }
+
+    /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
+    pub(super) fn gap(&self, k: usize) -> Y::Scalar {
+        self.at.gaps.as_ref()[self.contact(k).row]
+    }
+
+    /// Rate of the gap of contact `k`, m/s or rad/s, after [`WithContacts::look`].
+    pub(super) fn gap_rate(&self, k: usize) -> Y::Scalar {
+        self.at.velocities.as_ref()[self.contact(k).row]
+    }
+
+    /// The functions of contact `k`, after [`WithContacts::look`] and, if it is closed, [`WithContacts::loads`].
+    fn watched(&self, k: usize) -> Watched<Y::Scalar> {
+        let zero = Y::Scalar::zero();
+        let c = self.contact(k);
+        let [normal, x, y] = self.at.forces.as_ref()[k];
+        match self.modes()[k] {
+            Mode::Open => Watched { first: self.gap(k), rate: self.gap_rate(k), second: None },
+            Mode::Slide => {
+                let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
+                let rubs = c.tangents && c.friction > zero;
+                Watched { first: normal, rate: zero, second: rubs.then_some(vx * a + vy * b) }
+            }
+            Mode::Stick => {
+                let tangential = (x * x + y * y).sqrt();
+                Watched { first: normal, rate: zero, second: Some(c.friction * normal - tangential) }
+            }
+        }
+    }
+}

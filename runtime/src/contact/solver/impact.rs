@@ -1,0 +1,189 @@
+//! Impacts: compression, expansion, and the limit that no energy is gained.
+
+use super::local::Block;
+use super::{energy, routh, solve, solve_above, velocity, Certificate, ContactError, Effort, Problem, Terms};
+use crate::contact::RestitutionLaw;
+use crate::system::Real;
+
+/// In which order the contacts of an impact act.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ImpactOrder {
+    /// All at once.
+    #[default]
+    Simultaneous,
+    /// The one whose bodies approach fastest, then the next, until none approach: Newton's cradle.
+    Sequential,
+}
+
+/// Rules of impacts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct ImpactOptions {
+    /// Work for the impulses.
+    pub effort: Effort,
+    /// Order of the contacts.
+    pub order: ImpactOrder,
+}
+
+/// An impact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Impact<S> {
+    /// How well the impulses of compression satisfy the laws of contact; of restitution, where several contacts take part.
+    pub certificate: Certificate<S>,
+    /// Change of the kinetic energy, J: negative, or a rounding error, except with Newton's law.
+    pub energy: S,
+    /// Part of the expansion that was allowed, where all of it would have gained energy.
+    pub limited: Option<S>,
+    /// Collisions of single contacts one after the other; 1 where all act at once.
+    pub rounds: u32,
+}
+
+/// Largest number of collisions one after the other, for each contact.
+const COLLISIONS: u32 = 10_000;
+
+/// Computes the impulses of an impact, one number for each row, for contacts whose bodies touch; `problem.b` has the
+/// velocities before it, `work` [`work_len`](super::work_len) numbers.
+///
+/// - Without restitution: [`solve`]. The kinetic energy falls by the work of friction, and by that of the compression.
+/// - One contact with restitution: Routh's process (Keller, J. Appl. Mech. 53, 1986): the impulse grows from zero, friction
+///   is that of the velocities of the moment, and the law says where it ends.
+/// - Several contacts at once: the impulses of compression; then those of expansion, with normal ones not below the
+///   coefficient times those of compression, on top. If that would gain energy, the largest part of the expansion that
+///   does not is taken. Laws of Poisson and Stronge are the same here.
+/// - Newton's law: velocities after the impact are asked to reach `−e` times those before it. It may gain energy with
+///   friction, which the result tells.
+///
+/// # Errors
+/// [`ContactError`].
+pub fn impact<S: Real>(
+    problem: &Problem<S>,
+    options: &ImpactOptions,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Impact<S>, ContactError> {
+    let rows = problem.b.len();
+    impulses.fill(S::zero());
+    let zero = S::zero();
+    let restitution = problem.touches.iter().any(|touch| touch.contact.restitution > zero);
+    let newton = problem.touches.iter().any(|touch| touch.contact.law == RestitutionLaw::Newton);
+    let mut result = Impact {
+        certificate: Certificate { residual: zero, sweeps: 0, newton: 0 },
+        energy: zero,
+        limited: None,
+        rounds: 1,
+    };
+    if options.order == ImpactOrder::Sequential {
+        result.rounds = sequential(problem, options.effort, impulses)?;
+    } else if !restitution {
+        result.certificate = solve(problem, options.effort, impulses, work)?;
+    } else if newton {
+        let (shifted, work) = work.split_at_mut(rows);
+        shifted.copy_from_slice(problem.b);
+        for touch in problem.touches {
+            let row = touch.contact.row;
+            if problem.b[row] < zero {
+                shifted[row] = problem.b[row] + touch.contact.restitution * problem.b[row];
+            }
+        }
+        let asked = Problem { b: shifted, ..*problem };
+        result.certificate = solve(&asked, options.effort, impulses, work)?;
+    } else if let [touch] = problem.touches {
+        let block = Block::of(&alone(problem), touch, impulses);
+        let found = routh::collide(&block, &touch.contact)?;
+        impulses.copy_from_slice(&found[..rows]);
+    } else {
+        (result.certificate, result.limited) = expand(problem, options.effort, impulses, work)?;
+    }
+    if !impulses.iter().all(|p| p.is_finite()) {
+        return Err(ContactError::NotFinite);
+    }
+    result.energy = energy(problem, impulses);
+    Ok(result)
+}
+
+/// A problem without limits.
+fn alone<'a, S: Real>(problem: &'a Problem<'a, S>) -> Terms<'a, S> {
+    Terms { problem, least: &[], alpha: S::zero(), anchor: &[] }
+}
+
+/// Compression and expansion of several contacts at once.
+fn expand<S: Real>(
+    problem: &Problem<S>,
+    effort: Effort,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<(Certificate<S>, Option<S>), ContactError> {
+    let rows = problem.b.len();
+    let (zero, one) = (S::zero(), S::one());
+    let first = solve(problem, effort, impulses, work)?;
+    let (after, work) = work.split_at_mut(rows);
+    let (least, work) = work.split_at_mut(rows);
+    let (expansion, work) = work.split_at_mut(rows);
+    for (row, v) in after.iter_mut().enumerate() {
+        *v = velocity(problem, row, impulses);
+    }
+    least.fill(zero);
+    for touch in problem.touches {
+        least[touch.contact.row] = touch.contact.restitution * impulses[touch.contact.row];
+    }
+    expansion.copy_from_slice(least);
+    let second = solve_above(&Problem { b: after, ..*problem }, least, effort, expansion, work)?;
+    let certificate = Certificate {
+        residual: if second.residual > first.residual { second.residual } else { first.residual },
+        sweeps: first.sweeps + second.sweeps,
+        newton: first.newton + second.newton,
+    };
+    // ΔT(s) = c₀ + c₁ s + c₂ s² for a part s of the expansion, with c₀ ≤ 0 and c₂ ≥ 0.
+    let compressed = energy(problem, impulses);
+    let linear = expansion.iter().zip(&*after).fold(zero, |sum, (p, v)| sum + *p * *v);
+    let square = energy(&Problem { b: after, ..*problem }, expansion) - linear;
+    let mut limited = None;
+    if compressed + linear + square > zero {
+        let c0 = if compressed < zero { compressed } else { zero };
+        let root = (linear * linear - S::constant(4.0) * square * c0).sqrt();
+        let part = if linear > zero {
+            -(S::constant(2.0) * c0) / (linear + root)
+        } else if square > zero {
+            (root - linear) / (S::constant(2.0) * square)
+        } else {
+            one
+        };
+        limited = Some(if part < one { part } else { one });
+    }
+    let part = limited.unwrap_or(one);
+    for (p, expansion) in impulses.iter_mut().zip(&*expansion) {
+        *p = *p + part * *expansion;
+    }
+    Ok((certificate, limited))
+}
+
+/// Single contacts one after the other, the fastest first; gives the number of collisions.
+fn sequential<S: Real>(problem: &Problem<S>, effort: Effort, impulses: &mut [S]) -> Result<u32, ContactError> {
+    let zero = S::zero();
+    let fastest = problem.b.iter().fold(zero, |most, v| if v.abs() > most { v.abs() } else { most });
+    let slow = S::constant(match effort {
+        Effort::ToTolerance { tolerance, .. } => tolerance,
+        Effort::Sweeps(_) => 0.0,
+    }) * fastest;
+    let most = COLLISIONS.saturating_mul(problem.touches.len() as u32);
+    for collisions in 0..most {
+        let mut next = (slow, None);
+        for touch in problem.touches {
+            let approach = -velocity(problem, touch.contact.row, impulses);
+            if approach > next.0 {
+                next = (approach, Some(touch));
+            }
+        }
+        let Some(touch) = next.1 else { return Ok(collisions) };
+        let (row, rows) = (touch.contact.row, touch.contact.rows());
+        let mut block = Block::of(&alone(problem), touch, impulses);
+        let own: [S; 3] = core::array::from_fn(|k| if k < rows { impulses[row + k] } else { zero });
+        block.q = block.velocity(own);
+        let found = routh::collide(&block, &touch.contact)?;
+        for (p, more) in impulses[row..row + rows].iter_mut().zip(found) {
+            *p = *p + more;
+        }
+    }
+    Err(ContactError::NoEnd { collisions: most })
+}

@@ -1,0 +1,313 @@
+//! Impulses and forces of contacts: complementarity on friction cones, dense.
+//!
+//! With the inverse inertia `A = Φ M⁻¹Φᵀ` of the contacts' rows and their velocities `b` without impulses, the impulses `P`
+//! and velocities `v = b + A P` satisfy at every contact
+//!
+//! - `0 ≤ P_n ⊥ v_n ≥ 0`: bodies are pressed together, or part;
+//! - `|P_t| ≤ µ P_n`, and where the bodies slide, `P_t = −µ P_n v_t / |v_t|` (Coulomb's law on the exact cone).
+//!
+//! The same problem holds at three levels: impulses and velocities of an impact, forces and accelerations of closed
+//! contacts, impulses and velocities of a time step.
+
+mod cone;
+mod impact;
+mod local;
+mod newton;
+mod routh;
+#[cfg(test)]
+mod tests;
+
+use super::Contact;
+use crate::system::Real;
+
+pub use impact::{impact, Impact, ImpactOptions, ImpactOrder};
+
+/// A contact of a problem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch<S> {
+    /// The contact, with its row in the problem.
+    pub contact: Contact<S>,
+    /// Direction of slip, a unit vector, of a contact that slides already: its friction is `−µ P_n t̂`, whatever the
+    /// tangential velocity is.
+    pub slip: Option<[S; 2]>,
+}
+
+/// Contacts, the inverse inertia of their rows, and the velocities of these without impulses.
+#[derive(Clone, Copy, Debug)]
+pub struct Problem<'a, S> {
+    /// `A`, symmetric and positive semidefinite, row by row; 1/kg (1/(kg m²) for rotations).
+    pub a: &'a [S],
+    /// `b`, m/s (rad/s): velocities before an impact. At the level of accelerations m/s² (rad/s²).
+    pub b: &'a [S],
+    /// The contacts.
+    pub touches: &'a [Touch<S>],
+}
+
+/// Work for the impulses of contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Effort {
+    /// Until the relative residual is below a tolerance.
+    ToTolerance {
+        /// Relative residual.
+        tolerance: f64,
+        /// Largest number of rounds of sweeps and Newton steps.
+        rounds: u32,
+    },
+    /// A fixed number of sweeps over all contacts, whatever the residual is.
+    Sweeps(u32),
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort::ToTolerance { tolerance: 1e-11, rounds: 60 }
+    }
+}
+
+/// How well impulses satisfy the laws of contact, and the work that it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Certificate<S> {
+    /// Largest `|min(P_n, m v_n)|` and `|P_t − proj(P_t − m v_t)|` of a contact, with the mass `m` that it moves and the
+    /// projection onto the disc of radius `µ P_n`, relative to the largest impulse.
+    pub residual: S,
+    /// Sweeps over all contacts.
+    pub sweeps: u32,
+    /// Steps of Newton's method.
+    pub newton: u32,
+}
+
+/// Reason why no impulses or forces of contacts were found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum ContactError {
+    /// The iteration did not reach the tolerance.
+    NoConvergence {
+        /// The contact with the largest residual, by its place in the problem.
+        touch: usize,
+        /// Its relative residual.
+        residual: f64,
+        /// Sweeps over all contacts.
+        sweeps: u32,
+    },
+    /// Friction wedges a contact that slides: pressing it together makes its bodies approach faster (Painlevé).
+    Wedged {
+        /// The contact, by its place in the problem.
+        touch: usize,
+        /// Acceleration of the gap for a unit normal force, zero or negative, 1/kg.
+        pivot: f64,
+    },
+    /// Contacts that collide one after the other did not come to an end.
+    NoEnd {
+        /// Collisions.
+        collisions: u32,
+    },
+    /// A velocity or an inertia is not finite.
+    NotFinite,
+}
+
+impl core::fmt::Display for ContactError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            ContactError::NoConvergence { touch, residual, sweeps } => write!(
+                f,
+                "the impulses of the contacts have a relative residual of {residual:.1e} at touching contact {touch} after {sweeps} sweeps: allow more rounds, or reduce friction or mass ratios"
+            ),
+            ContactError::Wedged { touch, pivot } => write!(
+                f,
+                "friction wedges touching contact {touch} while it slides (its gap accelerates by {pivot:.1e} for a unit normal force): reduce the friction"
+            ),
+            ContactError::NoEnd { collisions } => write!(
+                f,
+                "contacts that collide one after the other did not come to an end in {collisions} collisions: solve them simultaneously"
+            ),
+            ContactError::NotFinite => write!(f, "a velocity or an inertia of a contact is not finite"),
+        }
+    }
+}
+
+impl core::error::Error for ContactError {}
+
+/// Room that [`solve`] and [`impact`] need for a problem with some number of rows.
+pub const fn work_len(rows: usize) -> usize {
+    rows * rows + 8 * rows
+}
+
+/// Sweeps in a round.
+const SWEEPS: u32 = 5;
+/// Steps of Newton's method in a round.
+const STEPS: u32 = 8;
+
+/// Computes the impulses of a problem; `impulses` has a number for each row, the start of the iteration and its result,
+/// and `work` [`work_len`] numbers.
+///
+/// Contacts are solved one after the other, exactly (block Gauss–Seidel); steps of Newton's method on the projection
+/// equations of Alart and Curnier (Comput. Methods Appl. Mech. Eng. 92, 1991) follow where this is slow. Where the
+/// contacts are redundant, impulses are not unique, and those that the iteration comes to first are taken.
+///
+/// # Errors
+/// [`ContactError`].
+pub fn solve<S: Real>(
+    problem: &Problem<S>,
+    effort: Effort,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Certificate<S>, ContactError> {
+    let rows = problem.b.len();
+    let (least, work) = work.split_at_mut(rows);
+    least.fill(S::zero());
+    solve_above(problem, least, effort, impulses, work)
+}
+
+/// A problem as the iterations see it.
+#[derive(Clone, Copy)]
+struct Terms<'a, S> {
+    problem: &'a Problem<'a, S>,
+    /// Least normal impulses, at the normal rows.
+    least: &'a [S],
+    /// Proximal term: velocities are `b + A P + α m⁻¹ (P − P₀)` with the mass `m` of each contact.
+    alpha: S,
+    /// `P₀`.
+    anchor: &'a [S],
+}
+
+impl<S: Real> Terms<'_, S> {
+    /// Added to the diagonal of a contact's rows.
+    fn proximal(&self, touch: &Touch<S>) -> S {
+        self.alpha * cone::most(self.problem, touch)
+    }
+
+    /// Velocity of a row of a contact.
+    fn velocity(&self, touch: &Touch<S>, row: usize, impulses: &[S]) -> S {
+        let v = velocity(self.problem, row, impulses);
+        if self.alpha > S::zero() {
+            v + self.proximal(touch) * (impulses[row] - self.anchor[row])
+        } else {
+            v
+        }
+    }
+}
+
+/// Work done, and the worst residual that is left.
+#[derive(Clone, Copy)]
+struct Progress<S> {
+    worst: (usize, S),
+    sweeps: u32,
+    newton: u32,
+}
+
+/// [`solve`] with normal impulses not below `least`.
+fn solve_above<S: Real>(
+    problem: &Problem<S>,
+    least: &[S],
+    effort: Effort,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Certificate<S>, ContactError> {
+    if !problem.a.iter().chain(problem.b).all(|x| x.is_finite()) {
+        return Err(ContactError::NotFinite);
+    }
+    let (anchor, work) = work.split_at_mut(impulses.len());
+    anchor.copy_from_slice(impulses);
+    let zero = S::zero();
+    let mut progress = Progress { worst: (0, zero), sweeps: 0, newton: 0 };
+    let (tolerance, rounds) = match effort {
+        Effort::Sweeps(count) => {
+            let terms = Terms { problem, least, alpha: zero, anchor };
+            for _ in 0..count {
+                sweep(&terms, impulses)?;
+            }
+            let (_, residual) = cone::residual(&terms, impulses);
+            return Ok(Certificate { residual, sweeps: count, newton: 0 });
+        }
+        Effort::ToTolerance { tolerance, rounds } => (tolerance.max(16.0 * S::epsilon()), rounds),
+    };
+    let done = |progress: Progress<S>| Certificate {
+        residual: progress.worst.1,
+        sweeps: progress.sweeps,
+        newton: progress.newton,
+    };
+    let plain = Terms { problem, least, alpha: zero, anchor };
+    if approach(&plain, tolerance, PLAIN.min(rounds), impulses, &mut progress, work)? {
+        return Ok(done(progress));
+    }
+    // Proximal steps: each is a problem with a larger diagonal, which is easier.
+    let mut alpha = S::constant(PROXIMAL);
+    impulses.copy_from_slice(anchor);
+    for _ in 0..rounds {
+        anchor.copy_from_slice(impulses);
+        let terms = Terms { problem, least, alpha, anchor };
+        let reached = approach(&terms, 0.1 * tolerance, PLAIN, impulses, &mut progress, work)?;
+        let plain = Terms { problem, least, alpha: zero, anchor };
+        progress.worst = cone::residual(&plain, impulses);
+        if progress.worst.1.to_f64() <= tolerance {
+            return Ok(done(progress));
+        }
+        alpha = alpha * S::constant(if reached { 0.5 } else { 4.0 });
+    }
+    let Progress { worst, sweeps, .. } = progress;
+    Err(ContactError::NoConvergence { touch: worst.0, residual: worst.1.to_f64(), sweeps })
+}
+
+/// Rounds without proximal terms, and in each proximal step.
+const PLAIN: u32 = 12;
+/// First proximal term, as a part of the diagonal.
+const PROXIMAL: f64 = 0.3;
+
+/// Sweeps and Newton steps, until the residual is below a tolerance; whether it is.
+fn approach<S: Real>(
+    terms: &Terms<S>,
+    tolerance: f64,
+    rounds: u32,
+    impulses: &mut [S],
+    progress: &mut Progress<S>,
+    work: &mut [S],
+) -> Result<bool, ContactError> {
+    for _ in 0..rounds {
+        for _ in 0..SWEEPS {
+            sweep(terms, impulses)?;
+            progress.sweeps += 1;
+            progress.worst = cone::residual(terms, impulses);
+            if progress.worst.1.to_f64() <= tolerance {
+                return Ok(true);
+            }
+        }
+        for _ in 0..STEPS {
+            if !newton::step(terms, impulses, progress.worst.1, work) {
+                break;
+            }
+            progress.newton += 1;
+            progress.worst = cone::residual(terms, impulses);
+            if progress.worst.1.to_f64() <= tolerance {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
+}
+
+/// Solves every contact by itself, one after the other.
+fn sweep<S: Real>(terms: &Terms<S>, impulses: &mut [S]) -> Result<(), ContactError> {
+    for (index, touch) in terms.problem.touches.iter().enumerate() {
+        let row = touch.contact.row;
+        let block = local::Block::of(terms, touch, impulses);
+        let found = local::solve(&block, touch, terms.least[row])
+            .map_err(|pivot| ContactError::Wedged { touch: index, pivot: pivot.to_f64() })?;
+        impulses[row..row + touch.contact.rows()].copy_from_slice(&found[..touch.contact.rows()]);
+    }
+    Ok(())
+}
+
+/// Velocity of a row, `b + A P`.
+fn velocity<S: Real>(problem: &Problem<S>, row: usize, impulses: &[S]) -> S {
+    let n = problem.b.len();
+    let terms = problem.a[row * n..(row + 1) * n].iter().zip(impulses);
+    terms.fold(problem.b[row], |sum, (a, p)| sum + *a * *p)
+}
+
+/// Change of the kinetic energy by impulses, `bᵀP + ½ PᵀA P`, J.
+fn energy<S: Real>(problem: &Problem<S>, impulses: &[S]) -> S {
+    let half = S::constant(0.5);
+    let each = impulses.iter().enumerate().zip(problem.b);
+    each.fold(S::zero(), |sum, ((row, p), b)| sum + *p * (half * (*b + velocity(problem, row, impulses))))
+}

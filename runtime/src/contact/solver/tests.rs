@@ -1,0 +1,361 @@
+//! Random impacts, and collisions with known answers.
+
+extern crate std;
+
+use std::vec;
+use std::vec::Vec;
+
+use super::{
+    energy, impact, solve, velocity, work_len, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
+};
+use crate::contact::{Contact, RestitutionLaw};
+
+/// A linear congruential generator; the high bits are used.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn between(&mut self, a: f64, b: f64) -> f64 {
+        a + (b - a) * self.next()
+    }
+}
+
+/// Owned data of a problem.
+struct Case {
+    a: Vec<f64>,
+    b: Vec<f64>,
+    touches: Vec<Touch<f64>>,
+}
+
+impl Case {
+    fn problem(&self) -> Problem<'_, f64> {
+        Problem { a: &self.a, b: &self.b, touches: &self.touches }
+    }
+
+    fn impact(&self, options: &ImpactOptions) -> Result<(Impact<f64>, Vec<f64>), ContactError> {
+        let mut impulses = vec![0.0; self.b.len()];
+        let mut work = vec![0.0; work_len(self.b.len())];
+        let result = impact(&self.problem(), options, &mut impulses, &mut work)?;
+        Ok((result, impulses))
+    }
+}
+
+fn contact(row: usize, friction: f64, restitution: f64, law: RestitutionLaw) -> Touch<f64> {
+    Touch { contact: Contact { row, tangents: true, friction, restitution, law }, slip: None }
+}
+
+/// Three directions at right angles.
+fn axes(r: &mut Random) -> [[f64; 3]; 3] {
+    let mut random = || [r.between(-1.0, 1.0), r.between(-1.0, 1.0), r.between(-1.0, 1.0)];
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let unit = |a: [f64; 3]| a.map(|x| x / a.iter().map(|x| x * x).sum::<f64>().sqrt());
+    let n = unit(random());
+    let t = unit(cross(n, random()));
+    [n, t, cross(n, t)]
+}
+
+/// Contacts of free bodies with one another and with the ground, whose masses differ by up to `ratio`, at random
+/// velocities; gives the kinetic energy too. Contacts of one body are redundant if there are more than two.
+fn random(r: &mut Random, contacts: usize, bodies: usize, ratio: f64, friction: f64, e: f64) -> (Case, f64) {
+    let (rows, freedoms) = (3 * contacts, 6 * bodies);
+    let mut masses = Vec::new();
+    for _ in 0..bodies {
+        let mass = ratio.powf(r.between(-0.5, 0.5));
+        masses.extend([mass; 3]);
+        masses.extend((0..3).map(|_| mass * r.between(0.1, 0.5)));
+    }
+    let mut phi = vec![0.0; rows * freedoms];
+    for k in 0..contacts {
+        let axes = axes(r);
+        let second = if bodies > 1 && k % 2 == 1 { Some((k + 1) % bodies) } else { None };
+        for (body, sign) in [(Some(k % bodies), 1.0), (second, -1.0)] {
+            let Some(body) = body else { continue };
+            let at = [r.between(-1.0, 1.0), r.between(-1.0, 1.0), r.between(-1.0, 1.0)];
+            for (i, n) in axes.iter().enumerate() {
+                let own = &mut phi[(3 * k + i) * freedoms + 6 * body..];
+                let arm = [at[1] * n[2] - at[2] * n[1], at[2] * n[0] - at[0] * n[2], at[0] * n[1] - at[1] * n[0]];
+                for j in 0..3 {
+                    own[j] += sign * n[j];
+                    own[3 + j] += sign * arm[j];
+                }
+            }
+        }
+    }
+    let mut a = vec![0.0; rows * rows];
+    for i in 0..rows {
+        for j in 0..=i {
+            let x: f64 = (0..freedoms).map(|k| phi[i * freedoms + k] * phi[j * freedoms + k] / masses[k]).sum();
+            (a[i * rows + j], a[j * rows + i]) = (x, x);
+        }
+    }
+    let v: Vec<f64> = (0..freedoms).map(|_| r.between(-1.0, 1.0)).collect();
+    let kinetic = 0.5 * v.iter().zip(&masses).map(|(v, m)| m * v * v).sum::<f64>();
+    let b = (0..rows).map(|i| (0..freedoms).map(|k| phi[i * freedoms + k] * v[k]).sum()).collect();
+    let touches = (0..contacts).map(|k| contact(3 * k, friction * r.next(), e * r.next(), RestitutionLaw::Poisson));
+    (Case { a, b, touches: touches.collect() }, kinetic)
+}
+
+#[test]
+fn plastic_impacts_satisfy_the_laws_and_never_gain_energy() {
+    let mut r = Random(1);
+    let (mut failed, mut sweeps) = (0, 0);
+    for k in 0..10_000 {
+        let contacts = [1, 2, 4][k % 3];
+        let bodies = if k % 2 == 0 { 1 } else { 3 };
+        let ratio = if k % 5 == 0 { 1e4 } else { 10.0 };
+        let (case, kinetic) = random(&mut r, contacts, bodies, ratio, if k % 7 == 0 { 3.0 } else { 1.0 }, 0.0);
+        match case.impact(&ImpactOptions::default()) {
+            Ok((result, _)) => {
+                assert!(result.certificate.residual <= 1e-11, "{k}: {result:?}");
+                assert!(result.energy <= 1e-13 * kinetic, "{k}: {result:?}");
+                sweeps = sweeps.max(result.certificate.sweeps);
+            }
+            Err(error) => {
+                failed += 1;
+                std::println!("{k} ({contacts} contacts, {bodies} bodies, ratio {ratio}): {error}");
+            }
+        }
+    }
+    std::println!("most sweeps {sweeps}, failed {failed}");
+    assert_eq!(failed, 0);
+}
+
+#[test]
+fn restitution_never_gains_energy() {
+    let mut r = Random(2);
+    let mut limited = 0;
+    for k in 0..1500 {
+        let contacts = [1, 2, 4][k % 3];
+        let (mut case, kinetic) = random(&mut r, contacts, if k % 2 == 0 { 1 } else { 3 }, 10.0, 1.0, 1.0);
+        if k % 5 == 0 {
+            case.touches.iter_mut().for_each(|t| t.contact.law = RestitutionLaw::Stronge);
+        }
+        let (result, _) = case.impact(&ImpactOptions::default()).unwrap_or_else(|e| panic!("{k}: {e}"));
+        assert!(result.energy <= 1e-12 * kinetic, "{k}: {result:?} {kinetic}");
+        limited += u32::from(result.limited.is_some());
+    }
+    assert!(limited > 10, "{limited}");
+}
+
+#[test]
+fn newtons_law_gains_energy_where_kane_says_and_tells_it() {
+    let mut r = Random(3);
+    let mut gained = 0;
+    for _ in 0..500 {
+        let (mut case, kinetic) = random(&mut r, 1, 1, 10.0, 1.0, 1.0);
+        case.touches[0].contact.law = RestitutionLaw::Newton;
+        let (result, _) = case.impact(&ImpactOptions::default()).unwrap();
+        gained += u32::from(result.energy > 1e-9 * kinetic);
+    }
+    assert!(gained > 0);
+}
+
+/// A chain of balls of mass 1 kg on a line; the first one comes with 1 m/s.
+fn cradle(balls: usize, e: f64) -> Case {
+    let n = balls - 1;
+    let mut a = vec![0.0; n * n];
+    for i in 0..n {
+        a[i * n + i] = 2.0;
+        if i > 0 {
+            (a[i * n + i - 1], a[(i - 1) * n + i]) = (-1.0, -1.0);
+        }
+    }
+    let mut b = vec![0.0; n];
+    b[0] = -1.0;
+    let contact = |row| Contact { row, tangents: false, friction: 0.0, restitution: e, law: RestitutionLaw::Poisson };
+    Case { a, b, touches: (0..n).map(|row| Touch { contact: contact(row), slip: None }).collect() }
+}
+
+#[test]
+fn newtons_cradle() {
+    let after = |impulses: &[f64]| {
+        let n = impulses.len() + 1;
+        (0..n)
+            .map(|k| {
+                let start = if k == 0 { 1.0 } else { 0.0 };
+                start - impulses.get(k).unwrap_or(&0.0) + if k > 0 { impulses[k - 1] } else { 0.0 }
+            })
+            .collect::<Vec<f64>>()
+    };
+    let near = |v: &[f64], to: &[f64]| v.iter().zip(to).all(|(v, to)| (v - to).abs() < 1e-12);
+    let sequential = ImpactOptions { order: ImpactOrder::Sequential, ..ImpactOptions::default() };
+    let (result, p) = cradle(3, 1.0).impact(&sequential).unwrap();
+    assert!(near(&after(&p), &[0.0, 0.0, 1.0]) && result.energy.abs() < 1e-14);
+    let (result, p) = cradle(5, 1.0).impact(&sequential).unwrap();
+    assert!(near(&after(&p), &[0.0, 0.0, 0.0, 0.0, 1.0]), "{:?}", after(&p));
+    assert_eq!(result.rounds, 4);
+    let (_, p) = cradle(3, 1.0).impact(&ImpactOptions::default()).unwrap();
+    assert!(near(&after(&p), &[-1.0 / 3.0, 2.0 / 3.0, 2.0 / 3.0]), "{:?}", after(&p));
+}
+
+/// A ball of radius 1 m and mass 1 kg on the floor: velocity of the centre, and of the contact by spin.
+fn ball(v: [f64; 3], spin: [f64; 2], friction: f64, e: f64) -> Case {
+    let a = [1.0, 0.0, 0.0, 0.0, 3.5, 0.0, 0.0, 0.0, 3.5];
+    let b = [v[2], v[0] + spin[0], v[1] + spin[1]];
+    Case { a: a.into(), b: b.into(), touches: vec![contact(0, friction, e, RestitutionLaw::Poisson)] }
+}
+
+#[test]
+fn a_ball_slides_through_or_grips() {
+    for law in [RestitutionLaw::Poisson, RestitutionLaw::Stronge] {
+        // Slip to the end: tangential impulse µ (1 + e) |v_n|.
+        let mut case = ball([3.0, 1.0, -1.0], [0.0; 2], 0.2, 0.5);
+        case.touches[0].contact.law = law;
+        let (_, p) = case.impact(&ImpactOptions::default()).unwrap();
+        let speed = 10.0_f64.sqrt();
+        assert!((p[0] - 1.5).abs() < 1e-14);
+        assert!((p[1] + 0.3 * 3.0 / speed).abs() < 1e-14 && (p[2] + 0.3 / speed).abs() < 1e-14);
+        // It grips: the contact stops, with 2/7 of the slip as impulse.
+        let mut case = ball([0.3, 0.1, -1.0], [0.0; 2], 0.2, 0.5);
+        case.touches[0].contact.law = law;
+        let (_, p) = case.impact(&ImpactOptions::default()).unwrap();
+        assert!((p[1] + 0.3 / 3.5).abs() < 1e-14 && (p[2] + 0.1 / 3.5).abs() < 1e-14);
+    }
+}
+
+/// A rod of length 2 m and mass 1 kg at an angle to the floor, its end on the floor.
+fn rod(angle: f64, v: [f64; 2], spin: f64, friction: f64, e: f64, law: RestitutionLaw) -> Case {
+    let (s, c) = angle.sin_cos();
+    let inertia = 1.0 / 3.0;
+    // Rows of the end at (−c, −s) from the centre: velocities (v_z − c ω, v_x + s ω).
+    let (n, t) = (-c, s);
+    let a = [1.0 + n * n / inertia, n * t / inertia, 0.0, n * t / inertia, 1.0 + t * t / inertia, 0.0, 0.0, 0.0, 1.0];
+    let b = [v[1] + n * spin, v[0] + t * spin, 0.0];
+    Case { a: a.into(), b: b.into(), touches: vec![contact(0, friction, e, law)] }
+}
+
+/// Routh's process in the plane in small steps of the impulse.
+fn planar(case: &Case) -> [f64; 2] {
+    let (a, mu) = (&case.a, case.touches[0].contact.friction);
+    let e = case.touches[0].contact.restitution;
+    let (mut v, mut p) = ([case.b[0], case.b[1]], [0.0, 0.0]);
+    let h = 1e-6;
+    let (mut end, mut work) = (f64::INFINITY, 0.0);
+    let mut compressed = false;
+    for _ in 0..100_000_000_u64 {
+        let hold = -a[3] / a[4];
+        let f = if v[1].abs() > 4.0 * h { -mu * v[1].signum() } else { hold.clamp(-mu, mu) };
+        let rate = [a[0] + a[1] * f, a[3] + a[4] * f];
+        work += h * (v[0] + 0.5 * h * rate[0]);
+        (v[0], v[1]) = (v[0] + h * rate[0], v[1] + h * rate[1]);
+        (p[0], p[1]) = (p[0] + h, p[1] + h * f);
+        if !compressed && v[0] >= 0.0 {
+            compressed = true;
+            end = match case.touches[0].contact.law {
+                RestitutionLaw::Stronge => work * (1.0 - e * e),
+                _ => (1.0 + e) * p[0],
+            };
+        }
+        let at = if case.touches[0].contact.law == RestitutionLaw::Stronge { work } else { p[0] };
+        if compressed && at >= end {
+            return p;
+        }
+    }
+    panic!("no end");
+}
+
+#[test]
+fn a_rod_strikes_the_floor_as_rouths_process_says() {
+    let mut r = Random(4);
+    for k in 0..24 {
+        let law = if k % 2 == 0 { RestitutionLaw::Poisson } else { RestitutionLaw::Stronge };
+        let angle = r.between(0.2, 1.4);
+        let case = rod(angle, [r.between(-1.0, 1.0), -1.0], r.between(-1.0, 1.0), r.between(0.05, 1.0), r.next(), law);
+        if case.b[0] >= 0.0 {
+            continue;
+        }
+        let (_, p) = case.impact(&ImpactOptions::default()).unwrap();
+        let by_steps = planar(&case);
+        assert!((p[0] - by_steps[0]).abs() < 2e-5 && (p[1] - by_steps[1]).abs() < 2e-5, "{k}: {p:?} {by_steps:?}");
+        assert!(p[2].abs() < 1e-15);
+    }
+}
+
+#[test]
+fn a_sliding_rod_wedges() {
+    // Painlevé: the end slides towards the centre of a flat rod with much friction.
+    let mut case = rod(1.0, [1.0, 0.0], 0.0, 3.0, 0.0, RestitutionLaw::Poisson);
+    let pivot = case.a[0] + 3.0 * case.a[1];
+    let slip = if pivot < 0.0 { [-1.0, 0.0] } else { [1.0, 0.0] };
+    case.touches[0].slip = Some(slip);
+    case.b = vec![-1.0, 0.0, 0.0];
+    let error = case.impact(&ImpactOptions::default()).unwrap_err();
+    assert!(matches!(error, ContactError::Wedged { touch: 0, pivot } if pivot < 0.0), "{error}");
+}
+
+#[test]
+fn many_contacts_agree_with_projected_gradients() {
+    // An independent iteration: projected gradient steps on the cone with the shifted velocity, very many of them.
+    let mut r = Random(5);
+    for _ in 0..20 {
+        let (case, _) = random(&mut r, 2, 3, 4.0, 0.6, 0.0);
+        let problem = case.problem();
+        let (_, p) = case.impact(&ImpactOptions::default()).unwrap();
+        let trace: f64 = (0..6).map(|i| case.a[i * 7]).sum();
+        let mut x = vec![0.0; 6];
+        for _ in 0..200_000 {
+            let v: Vec<f64> = (0..6).map(|row| velocity(&problem, row, &x)).collect();
+            for touch in &case.touches {
+                let (k, mu) = (touch.contact.row, touch.contact.friction);
+                let slip = v[k + 1].hypot(v[k + 2]);
+                let moved =
+                    [x[k] - (v[k] + mu * slip) / trace, x[k + 1] - v[k + 1] / trace, x[k + 2] - v[k + 2] / trace];
+                x[k..k + 3].copy_from_slice(&project(moved, mu));
+            }
+        }
+        for (p, x) in p.iter().zip(&x) {
+            assert!((p - x).abs() < 1e-8, "{p} {x}");
+        }
+        assert!(energy(&problem, &p) <= 0.0);
+    }
+}
+
+#[test]
+fn single_precision_and_fixed_work() {
+    let mut r = Random(6);
+    for k in 0..100 {
+        let (case, _) = random(&mut r, 2, 3, 4.0, 1.0, 0.0);
+        let narrow = |list: &[f64]| list.iter().map(|x| *x as f32).collect::<Vec<f32>>();
+        let (a, b) = (narrow(&case.a), narrow(&case.b));
+        let touches: Vec<Touch<f32>> = case
+            .touches
+            .iter()
+            .map(|t| Touch {
+                contact: Contact {
+                    row: t.contact.row,
+                    tangents: true,
+                    friction: t.contact.friction as f32,
+                    restitution: 0.0,
+                    law: RestitutionLaw::Poisson,
+                },
+                slip: None,
+            })
+            .collect();
+        let problem = Problem { a: &a, b: &b, touches: &touches };
+        let (mut p, mut work) = (vec![0.0_f32; 6], vec![0.0_f32; work_len(6)]);
+        let certificate = solve(&problem, Effort::default(), &mut p, &mut work).unwrap_or_else(|e| panic!("{k}: {e}"));
+        assert!(certificate.residual < 1e-5);
+        p.fill(0.0);
+        let certificate = solve(&problem, Effort::Sweeps(8), &mut p, &mut work).unwrap();
+        assert_eq!(certificate.sweeps, 8);
+        assert!(certificate.residual < 0.1, "{k}: {certificate:?}");
+    }
+}
+
+/// The nearest point of the cone `|t| ≤ µ n`.
+fn project([n, x, y]: [f64; 3], friction: f64) -> [f64; 3] {
+    let t = x.hypot(y);
+    if t <= friction * n {
+        return [n, x, y];
+    }
+    if friction * t <= -n {
+        return [0.0; 3];
+    }
+    let normal = (n + friction * t) / (1.0 + friction * friction);
+    [normal, friction * normal / t * x, friction * normal / t * y]
+}

@@ -1,0 +1,398 @@
+//! Rates of a mechanism whose contacts slide with friction.
+//!
+//! Sticking contacts are constraints like any other. A sliding contact keeps its normal row only; its friction is the force
+//! `−µ N t̂` against the slip direction `t̂`, with the normal force `N`, on which it acts back. Multipliers `λ` are linear
+//! in the forces on the joints: the response of all normal forces to the friction of each sliding contact for `N = 1`
+//! comes from the momenta `−µ Φ_tᵀt̂` (one solve each), and a small linear system gives `N`.
+
+use super::touching::add_row;
+use super::{Contact, Mode, Touching};
+use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
+use crate::Scalar;
+
+/// Speed of slip below which its direction is the one that it had where the step began, m/s.
+const SLOW: f64 = 1e-13;
+
+/// A mechanism with contacts and their modes: its rates include the friction of sliding contacts.
+#[derive(Clone, Debug)]
+pub struct WithContacts<Y: Touching> {
+    pub(super) system: Y,
+    modes: Y::PerContact<Mode>,
+    /// Direction of slip where the step began, for contacts that slide.
+    pub(super) slip: Y::PerContact<[Y::Scalar; 2]>,
+    /// Whether any contact slides with friction.
+    rubs: bool,
+    pub(super) at: Contacts<Y>,
+    /// Momenta of the state, freed of multipliers; the response to the friction of a contact.
+    pub(super) p: Y::Momenta,
+    pub(super) response: Y::Momenta,
+    pub(super) response_v: Y::Momenta,
+    pub(super) sigma: Y::Rows,
+    /// Friction on the joints for normal forces of 1 N, and in total.
+    pub(super) unit: Y::Momenta,
+    friction: Y::Momenta,
+    table: Y::Delassus,
+}
+
+/// What is known of all contacts at a state.
+#[derive(Clone, Debug)]
+pub(super) struct Contacts<Y: Touching> {
+    /// Velocities of the mechanism.
+    pub v: Y::Momenta,
+    /// Residuals of all rows; those of the normal rows are the gaps.
+    pub gaps: Y::Rows,
+    /// Velocities of all rows.
+    pub velocities: Y::Rows,
+    /// Entries of `Φ`, of all rows.
+    pub entries: Y::Entries,
+    /// Multipliers, those of sliding contacts without the effect of friction.
+    pub lambda: Y::Rows,
+    /// Force of each contact `[normal, tangential, tangential]`, N: on the second body, the opposite on the first.
+    pub forces: Y::PerContact<[Y::Scalar; 3]>,
+    /// Least pivot `1 − ∂N/∂N` of sliding contacts: at zero and below, friction wedges the contact (Painlevé).
+    pub wedge: Y::Scalar,
+}
+
+impl<Y: Touching> WithContacts<Y> {
+    /// All contacts are open at first.
+    pub fn new(mut system: Y) -> Self {
+        let zero = Y::Scalar::zero();
+        let (rows, momenta) = (|y: &Y| y.zero_rows(), |y: &Y| y.zero_momenta());
+        let modes = system.per_contact(Mode::Open);
+        system.act(modes.as_ref());
+        let count = system.contacts().len();
+        WithContacts {
+            modes,
+            slip: system.per_contact([zero; 2]),
+            rubs: false,
+            at: Contacts {
+                v: momenta(&system),
+                gaps: rows(&system),
+                velocities: rows(&system),
+                entries: system.zero_entries(),
+                lambda: rows(&system),
+                forces: system.per_contact([zero; 3]),
+                wedge: Y::Scalar::one(),
+            },
+            p: momenta(&system),
+            response: momenta(&system),
+            response_v: momenta(&system),
+            sigma: rows(&system),
+            unit: momenta(&system),
+            friction: momenta(&system),
+            table: system.zero_delassus(count * (count + 1)),
+            system,
+        }
+    }
+
+    /// The mechanism.
+    pub fn system(&self) -> &Y {
+        &self.system
+    }
+
+    /// The mechanism, for setting its inputs. Its modes must not be changed.
+    pub fn system_mut(&mut self) -> &mut Y {
+        &mut self.system
+    }
+
+    /// The modes of the contacts.
+    pub fn modes(&self) -> &[Mode] {
+        self.modes.as_ref()
+    }
+
+    /// Forces of the contacts `[normal, tangential, tangential]`, N (N m for stops of rotations), at a state: on the second
+    /// body, the opposite on the first.
+    pub fn forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> &[[Y::Scalar; 3]] {
+        self.look(t, q, p);
+        self.loads(t, q, true);
+        self.at.forces.as_ref()
+    }
+
+    /// Sets the modes and the directions of slip.
+    pub(super) fn set_modes(&mut self, modes: &[Mode], slip: &[[Y::Scalar; 2]]) {
+        self.modes.as_mut().copy_from_slice(modes);
+        self.slip.as_mut().copy_from_slice(slip);
+        self.system.act(modes);
+        let zero = Y::Scalar::zero();
+        let rubs = |(c, mode): (&Contact<Y::Scalar>, &Mode)| *mode == Mode::Slide && c.tangents && c.friction > zero;
+        self.rubs = self.system.contacts().iter().zip(modes).any(rubs);
+    }
+
+    /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
+    pub(super) fn borrow_modes(&mut self, modes: &[Mode]) {
+        self.system.act(modes);
+    }
+
+    /// Lets rows act by the modes again.
+    pub(super) fn restore(&mut self) {
+        self.system.act(self.modes.as_ref());
+    }
+
+    /// Velocities of the momenta `self.response`, in `self.response_v`.
+    pub(super) fn answer(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
+        self.system.project_momenta(t, q, &mut self.response, &mut self.response_v, &mut self.sigma);
+    }
+
+    /// Pivots of all rows, zero for those that do not act or depend on others, in `self.sigma`.
+    pub(super) fn find_pivots(&mut self, q: &Y::Coordinates) {
+        let (residual, pivots) = (&mut self.at.lambda, &mut self.sigma);
+        self.system.position_correction(q, residual, &mut self.response_v, pivots);
+    }
+
+    pub(super) fn contact(&self, k: usize) -> Contact<Y::Scalar> {
+        self.system.contacts()[k]
+    }
+
+    /// Velocities, gaps and their like at a state, in `self.at`.
+    pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        self.p.as_mut().copy_from_slice(p.as_ref());
+        self.system.project_momenta(t, q, &mut self.p, &mut self.at.v, &mut self.sigma);
+        let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
+        self.system.gaps(t, q, v, gaps, velocities, entries);
+    }
+
+    /// Tangential velocity of contact `k`, m/s, after [`WithContacts::look`].
+    pub(super) fn tangential(&self, k: usize) -> [Y::Scalar; 2] {
+        let c = self.contact(k);
+        let rows = self.at.velocities.as_ref();
+        if c.tangents {
+            [rows[c.row + 1], rows[c.row + 2]]
+        } else {
+            [Y::Scalar::zero(); 2]
+        }
+    }
+
+    /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
+    /// where the step began, it is the mirror image: it does not jump within a step that leads too far.
+    fn direction(&self, k: usize) -> [Y::Scalar; 2] {
+        let ([x, y], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
+        let speed = (x * x + y * y).sqrt();
+        if !(speed.to_f64() > SLOW) {
+            return [a, b];
+        }
+        let along = x * a + y * b;
+        let back = if along < Y::Scalar::zero() { along + along } else { Y::Scalar::zero() };
+        [(x - back * a) / speed, (y - back * b) / speed]
+    }
+
+    /// Notes the directions of slip where a step begins.
+    pub(super) fn note_slip(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        if self.rubs {
+            self.look(t, q, p);
+            for k in 0..self.modes.as_ref().len() {
+                if self.rubs(k) {
+                    self.slip.as_mut()[k] = self.direction(k);
+                }
+            }
+        }
+    }
+
+    fn rubs(&self, k: usize) -> bool {
+        let c = self.contact(k);
+        self.modes.as_ref()[k] == Mode::Slide && c.tangents && c.friction > Y::Scalar::zero()
+    }
+
+    /// Friction of contact `k` on the joints for a normal force of 1 N, in `self.unit`.
+    fn unit_friction(&mut self, k: usize) {
+        let c = self.contact(k);
+        self.unit.as_mut().fill(Y::Scalar::zero());
+        let [a, b] = self.direction(k);
+        for (row, along) in [(c.row + 1, a), (c.row + 2, b)] {
+            add_row(&self.system, &self.at.entries, row, -(c.friction * along), &mut self.unit);
+        }
+    }
+
+    /// Forces of all contacts that are closed, after [`WithContacts::look`]; the friction of those that slide as forces
+    /// on the joints. With `all`, those of sticking contacts include the effect of friction elsewhere.
+    pub(super) fn loads(&mut self, t: Y::Scalar, q: &Y::Coordinates, all: bool) {
+        let zero = Y::Scalar::zero();
+        self.friction.as_mut().fill(zero);
+        self.at.wedge = Y::Scalar::one();
+        self.system.multipliers(t, q, &self.at.v, &mut self.at.lambda);
+        let count = self.modes.as_ref().len();
+        if self.rubs {
+            self.normal_forces(t, q, count);
+        }
+        if self.rubs && all {
+            self.respond(t, q, false);
+            for (lambda, sigma) in self.at.lambda.as_mut().iter_mut().zip(self.sigma.as_ref()) {
+                *lambda = *lambda + *sigma;
+            }
+        }
+        for k in 0..count {
+            let c = self.contact(k);
+            let lambda = self.at.lambda.as_ref();
+            let own = |row: usize, acts: bool| if acts { -lambda[row] } else { zero };
+            let mode = self.modes.as_ref()[k];
+            let mut force = [zero; 3];
+            for (i, force) in force.iter_mut().enumerate().take(c.rows()) {
+                *force = own(c.row + i, mode.acts(i));
+            }
+            if self.rubs(k) {
+                let normal = if all { force[0] } else { self.table.as_ref()[k * (count + 1) + count] };
+                let [a, b] = self.direction(k);
+                force = [normal, -(c.friction * normal * a), -(c.friction * normal * b)];
+            }
+            self.at.forces.as_mut()[k] = force;
+        }
+    }
+
+    /// Multipliers of forces on the joints at rest, in `self.sigma`: of `self.unit`, or of all friction.
+    fn respond(&mut self, t: Y::Scalar, q: &Y::Coordinates, unit: bool) {
+        let force = if unit { &self.unit } else { &self.friction };
+        // The state's momenta have no multipliers, so that these are those of the force alone.
+        for (r, (p, f)) in self.response.as_mut().iter_mut().zip(self.p.as_ref().iter().zip(force.as_ref())) {
+            *r = *p + *f;
+        }
+        self.answer(t, q);
+    }
+
+    /// Normal forces `N` of the contacts that rub, from `N − R N = N₀`, and their friction in total.
+    fn normal_forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, count: usize) {
+        let (one, width) = (Y::Scalar::one(), count + 1);
+        for k in 0..count {
+            if !self.rubs(k) {
+                continue;
+            }
+            self.unit_friction(k);
+            self.respond(t, q, true);
+            for j in 0..count {
+                if !self.rubs(j) {
+                    continue;
+                }
+                let response = -self.sigma.as_ref()[self.contact(j).row];
+                self.table.as_mut()[j * width + k] = if j == k { one - response } else { -response };
+            }
+            self.table.as_mut()[k * width + count] = -self.at.lambda.as_ref()[self.contact(k).row];
+        }
+        self.eliminate(count);
+        for k in 0..count {
+            if self.rubs(k) {
+                self.unit_friction(k);
+                let normal = self.table.as_ref()[k * width + count];
+                for (sum, unit) in self.friction.as_mut().iter_mut().zip(self.unit.as_ref()) {
+                    *sum = *sum + normal * *unit;
+                }
+            }
+        }
+    }
+
+    /// Solves the system of [`WithContacts::normal_forces`] among the contacts that rub; notes the least pivot.
+    fn eliminate(&mut self, count: usize) {
+        let width = count + 1;
+        for k in 0..count {
+            if !self.rubs(k) {
+                continue;
+            }
+            let pivot = self.table.as_ref()[k * width + k];
+            if pivot < self.at.wedge {
+                self.at.wedge = pivot;
+            }
+            for j in 0..count {
+                if j == k || !self.rubs(j) {
+                    continue;
+                }
+                let table = self.table.as_mut();
+                let factor = table[j * width + k] / pivot;
+                for i in k..width {
+                    table[j * width + i] = table[j * width + i] - factor * table[k * width + i];
+                }
+            }
+        }
+        for k in 0..count {
+            if self.rubs(k) {
+                let table = self.table.as_mut();
+                table[k * width + count] = table[k * width + count] / table[k * width + k];
+            }
+        }
+    }
+}
+
+impl<Y: Touching> System for WithContacts<Y> {
+    system_within!(system: Y);
+
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.system.lie_joints()
+    }
+
+    fn rates_at(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+        qd: &mut Y::Coordinates,
+        pd: &mut Y::Momenta,
+    ) {
+        self.system.rates_at(t, q, p, qd, pd);
+        if self.rubs {
+            self.look(t, q, p);
+            self.loads(t, q, false);
+            for (rate, force) in pd.as_mut().iter_mut().zip(self.friction.as_ref()) {
+                *rate = *rate + *force;
+            }
+        }
+    }
+}
+
+impl<Y: Touching + Energetic> Energetic for WithContacts<Y> {
+    fn energies(&mut self, q: &Y::Coordinates, p: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
+        self.system.energies(q, p)
+    }
+}
+
+impl<Y: Touching + Conjugate> Conjugate for WithContacts<Y> {
+    fn conjugate_momenta(&mut self, q: &Y::Coordinates, v: &Y::Momenta, p: &mut Y::Momenta) {
+        self.system.conjugate_momenta(q, v, p);
+    }
+}
+
+impl<Y: Touching> Constrained for WithContacts<Y> {
+    type Rows = Y::Rows;
+    type Entries = Y::Entries;
+
+    fn zero_rows(&self) -> Y::Rows {
+        self.system.zero_rows()
+    }
+
+    fn zero_entries(&self) -> Y::Entries {
+        self.system.zero_entries()
+    }
+
+    fn rows(&self) -> &[Row] {
+        self.system.rows()
+    }
+
+    fn entry_columns(&self) -> &[usize] {
+        self.system.entry_columns()
+    }
+
+    fn constraint_residuals(&mut self, q: &Y::Coordinates, residual: &mut Y::Rows, jacobian: &mut Y::Entries) {
+        self.system.constraint_residuals(q, residual, jacobian);
+    }
+
+    fn project_momenta(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &mut Y::Momenta,
+        v: &mut Y::Momenta,
+        sigma: &mut Y::Rows,
+    ) {
+        self.system.project_momenta(t, q, p, v, sigma);
+    }
+
+    fn position_correction(
+        &mut self,
+        q: &Y::Coordinates,
+        residual: &mut Y::Rows,
+        dq: &mut Y::Momenta,
+        pivots: &mut Y::Rows,
+    ) {
+        self.system.position_correction(q, residual, dq, pivots);
+    }
+
+    /// Without the effect of friction on the other multipliers; [`WithContacts::forces`] includes it.
+    fn multipliers(&mut self, t: Y::Scalar, q: &Y::Coordinates, v: &Y::Momenta, lambda: &mut Y::Rows) {
+        self.system.multipliers(t, q, v, lambda);
+    }
+}

@@ -1,0 +1,238 @@
+//! Scenes whose motion is known by analysis.
+
+use mbd_codegen::model::{ConstraintKind, Contact, LoopKind, Model, Mount, Origin, Placement, Value};
+use mbd_runtime::contact::{Mode, RestitutionLaw};
+
+use super::scene::{model, Scene};
+
+/// A ball about a point of a body touches the floor.
+fn on_floor(model: &mut Model, name: &str, body: usize, xyz: [f64; 3], radius: f64, friction: f64, restitution: f64) {
+    let first = Mount { body: None, placement: Placement::IDENTITY };
+    let second = Mount { body: Some(body), placement: Placement { xyz: xyz.map(Value::Const), ..Placement::IDENTITY } };
+    let kind = LoopKind::RollingBall { normal: [0.0, 0.0, 1.0], radius: Value::Const(radius) };
+    model.contacts.push(Contact {
+        name: name.into(),
+        kind: ConstraintKind::Loop { kind, first, second },
+        shapes: None,
+        friction,
+        restitution,
+        law: RestitutionLaw::Poisson,
+        origin: Origin::default(),
+    });
+}
+
+fn ball(restitution: f64) -> Model {
+    let mut model = model(
+        r#"
+name = "ball"
+[[body]]
+name = "ball"
+mass = 0.3
+inertia = [0.01, 0.01, 0.01]
+[[joint]]
+name = "height"
+type = "prismatic"
+parent = "ground"
+child = "ball"
+axis = [0, 0, 1]
+"#,
+    );
+    on_floor(&mut model, "floor", 0, [0.0; 3], 0.1, 0.0, restitution);
+    model
+}
+
+#[test]
+fn a_bouncing_ball_comes_to_rest_at_the_sum_of_its_bounces() {
+    let (g, height, e) = (9.81, 1.0, 0.8);
+    let mut scene = Scene::new(ball(e), &[height + 0.1], &[0.0]);
+    scene.run(6.0);
+    let first = (2.0 * height / g as f64).sqrt();
+    let mut t = first;
+    let mut v = g * first;
+    for event in scene.events.0.iter().take(20) {
+        assert!((event.time - t).abs() < 1e-12, "{} {t}", event.time);
+        assert!((event.approach - v).abs() < 1e-11);
+        v *= e;
+        t += 2.0 * v / g;
+    }
+    let rest = first * (1.0 + e) / (1.0 - e);
+    let last = scene.events.0.last().unwrap();
+    assert!((last.rest.unwrap() - rest).abs() < 1e-10, "{:?} {rest}", last);
+    assert_eq!(scene.system.modes(), [Mode::Slide]);
+    assert!((scene.q[0] - 0.1).abs() < 1e-14, "{:e}", scene.q[0] - 0.1);
+    let force = scene.system.forces(6.0, &scene.q.clone(), &scene.p.clone())[0];
+    assert!((force[0] - 0.3 * g).abs() < 1e-12);
+}
+
+/// A block with two corners on the floor, in the plane of x and z; gravity is inclined instead of the floor.
+fn block(friction: f64, restitution: f64, slope: f64) -> Model {
+    let (x, z) = (9.81 * slope.sin(), -9.81 * slope.cos());
+    let slider = |name: &str, parent: &str, axis: &str| {
+        format!(
+            r#"
+[[body]]
+name = "{name}"
+[[joint]]
+name = "{name}"
+type = "prismatic"
+parent = "{parent}"
+child = "{name}"
+axis = {axis}
+"#
+        )
+    };
+    let mut model = model(&format!(
+        r#"
+name = "block"
+gravity = [{x}, 0, {z}]
+{}{}
+[[body]]
+name = "block"
+mass = 2.0
+inertia = [0.02, 0.03, 0.04]
+[[joint]]
+name = "turn"
+type = "revolute"
+parent = "z"
+child = "block"
+axis = [0, 1, 0]
+"#,
+        slider("x", "ground", "[1, 0, 0]"),
+        slider("z", "x", "[0, 0, 1]"),
+    ));
+    let body = model.bodies.len() - 1;
+    for (name, x) in [("back", -0.2), ("front", 0.2)] {
+        on_floor(&mut model, name, body, [x, 0.0, -0.1], 0.0, friction, restitution);
+    }
+    model
+}
+
+#[test]
+fn a_block_on_an_incline_stops_and_does_not_move() {
+    let (friction, slope, speed, g) = (0.8_f64, 30.0_f64.to_radians(), 2.0, 9.81_f64);
+    let mut scene = Scene::new(block(friction, 0.0, slope), &[0.0, 0.1, 0.0], &[speed, 0.0, 0.0]);
+    scene.run(4.0);
+    let braking = g * (friction * slope.cos() - slope.sin());
+    let (time, way) = (speed / braking, speed * speed / (2.0 * braking));
+    let stop = scene.events.0.first().unwrap();
+    assert!((stop.time - time).abs() < 1e-12, "{} {time}", stop.time);
+    assert!((scene.q[0] - way).abs() < 1e-12, "{:e}", scene.q[0] - way);
+    assert_eq!(scene.events.0.len(), 1, "{:?}", scene.events.0);
+    assert_eq!(scene.system.modes(), [Mode::Stick; 2]);
+    let there = scene.q.clone();
+    scene.run(100.0);
+    for (before, after) in there.iter().zip(&scene.q) {
+        assert_eq!(before, after);
+    }
+}
+
+#[test]
+fn a_block_that_slides_up_an_incline_comes_back() {
+    let (friction, slope, speed, g) = (0.3_f64, 30.0_f64.to_radians(), -2.0_f64, 9.81_f64);
+    let mut scene = Scene::new(block(friction, 0.0, slope), &[0.0, 0.1, 0.0], &[speed, 0.0, 0.0]);
+    scene.run(2.0);
+    let (up, down) = (g * (slope.sin() + friction * slope.cos()), g * (slope.sin() - friction * slope.cos()));
+    let turn = -speed / up;
+    let at = speed * turn + 0.5 * up * turn * turn + 0.5 * down * (2.0 - turn) * (2.0 - turn);
+    let stop = scene.events.0.first().unwrap();
+    assert!((stop.time - turn).abs() < 1e-12, "{} {turn}", stop.time);
+    assert!((scene.q[0] - at).abs() < 1e-11, "{:e}", scene.q[0] - at);
+    assert_eq!(scene.system.modes(), [Mode::Slide; 2]);
+}
+
+/// A free box with eight corners on the floor.
+fn free_box(friction: f64, restitution: f64) -> Model {
+    let mut model = model(
+        r#"
+name = "case"
+[[body]]
+name = "case"
+mass = 2.0
+inertia = [0.02, 0.03, 0.04]
+[[joint]]
+name = "case"
+type = "floating"
+parent = "ground"
+child = "case"
+"#,
+    );
+    for k in 0..8 {
+        let side = |bit: u32, size: f64| if k >> bit & 1 == 0 { -size } else { size };
+        let corner = [side(0, 0.2), side(1, 0.15), side(2, 0.1)];
+        on_floor(&mut model, &format!("corner/{k}"), 0, corner, 0.0, friction, restitution);
+    }
+    model
+}
+
+#[test]
+fn a_box_that_is_dropped_comes_to_rest() {
+    let mut scene =
+        Scene::new(free_box(0.5, 0.3), &[0.0, 0.0, 0.5, 0.1, 0.2, 0.05, 1.0], &[1.0, 0.2, 0.0, 0.5, 1.0, 0.7]);
+    let n = scene.q[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+    scene.q[3..].iter_mut().for_each(|x| *x /= n);
+    scene.tolerance = 1e-9;
+    for k in 1..=40 {
+        scene.run(0.05 * k as f64);
+        let energy = scene.energy();
+        println!(
+            "{:.2} z {:.6} E {:.6} events {} {:?}",
+            0.05 * k as f64,
+            scene.q[2],
+            energy,
+            scene.events.0.len(),
+            scene.system.modes()
+        );
+    }
+    println!("{:?}", scene.motion.as_ref().unwrap().contact_statistics());
+}
+
+#[test]
+fn random_drops_end_well() {
+    let mut seed = 7_u64;
+    let mut next = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    };
+    let mut failed = 0;
+    for k in 0..100 {
+        let (friction, restitution) = (0.5 + 0.5 * next(), 0.25 + 0.25 * next());
+        let mut q = vec![0.0, 0.0, 0.7, next(), next(), next(), next()];
+        let n = q[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
+        q[3..].iter_mut().for_each(|x| *x /= n);
+        let v: Vec<f64> = (0..6).map(|_| 2.0 * next()).collect();
+        let mut scene = Scene::new(free_box(friction, restitution), &q, &v);
+        scene.tolerance = 1e-8;
+        let before = scene.energy();
+        let clock = std::time::Instant::now();
+        let result = scene.try_run(2.0);
+        let after = scene.energy();
+        let lost = scene.motion.as_ref().map_or(0.0, |m| m.contact_statistics().lost);
+        if let Err(error) = result {
+            failed += 1;
+            println!("{k}: mu {friction} e {restitution} {error}");
+        }
+        if clock.elapsed().as_secs_f64() > 1.0 { println!("{k}: slow {:?} {:?}", clock.elapsed(), scene.motion.as_ref().map(|m| (*m.contact_statistics(), m.statistics()))); }
+        if after > before + 1e-6 || scene.q[2] < 0.09 { println!("{k}: {before} {after} {lost} z {}", scene.q[2]); }
+    }
+    println!("failed {failed}");
+}
+
+#[test]
+#[ignore]
+fn look_at_the_quadruped() {
+    let text = include_str!("../../../models/contacts/quadruped.toml");
+    let model = model(text);
+    let plan = mbd_codegen::plan::Plan::new(&model, 1e-9);
+    let q = plan.start();
+    let mut scene = Scene::new(model, &q, &vec![0.0; plan.dims.nv]);
+    scene.tolerance = 1e-9;
+    let mut t = 0.0;
+    while t < 0.4 {
+        t += 0.002;
+        let clock = std::time::Instant::now();
+        let r = scene.try_run(t);
+        let m = scene.motion.as_ref().unwrap();
+        println!("{t:.4} {:?} events {} {:?} {:?} {:?}", clock.elapsed(), scene.events.0.len(), scene.system.modes(), m.statistics(), r);
+        if r.is_err() { break; }
+    }
+}

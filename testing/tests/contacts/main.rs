@@ -1,0 +1,4 @@
+//! Motions with contacts against their known answers.
+
+mod known;
+mod scene;

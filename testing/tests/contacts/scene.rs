@@ -1,0 +1,88 @@
+//! Scenes with contacts, run by one method.
+
+use mbd_codegen::model::Model;
+use mbd_codegen::plan::Plan;
+use mbd_codegen::read;
+use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
+use mbd_runtime::contact::{ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, WithContacts};
+use mbd_runtime::integrate::{Dop853, Step, Tolerances};
+use mbd_runtime::{Conjugate, Energetic};
+
+pub type Mechanism = ContactInterpreter<f64>;
+type Closed = Projection<WithContacts<Mechanism>>;
+type Method = WithPostStep<WithContacts<Mechanism>, Dop853<WithContacts<Mechanism>>, Closed>;
+
+/// A motion with contacts, and its events.
+pub struct Scene {
+    pub model: Model,
+    pub system: WithContacts<Mechanism>,
+    pub motion: Option<Hybrid<Mechanism, Method>>,
+    pub events: Events,
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
+    pub tolerance: f64,
+}
+
+#[derive(Default)]
+pub struct Events(pub Vec<ContactEvent<f64>>);
+
+impl ContactObserver<Mechanism> for Events {
+    fn event(&mut self, _system: &mut WithContacts<Mechanism>, event: &ContactEvent<f64>) {
+        self.0.push(*event);
+    }
+}
+
+impl Scene {
+    /// A scene at `q` with velocities `v`.
+    pub fn new(model: Model, q: &[f64], v: &[f64]) -> Scene {
+        let plan = Plan::new(&model, 1e-9);
+        let mut mechanism: Mechanism = plan.default_contact_interpreter();
+        let q = q.to_vec();
+        let mut p = v.to_vec();
+        mechanism.conjugate_momenta(&q, &v.to_vec(), &mut p);
+        let system = WithContacts::new(mechanism);
+        Scene { model, system, motion: None, events: Events::default(), q, p, tolerance: 1e-12 }
+    }
+
+    /// Goes on to time `t`, s.
+    pub fn run(&mut self, t: f64) {
+        self.try_run(t).unwrap();
+    }
+
+    /// Goes on to time `t`, s, or to where the motion fails.
+    pub fn try_run(&mut self, t: f64) -> Result<(), HybridError> {
+        let mut motion = self.motion.take().unwrap_or_else(|| {
+            let projection = Projection::new(
+                &self.system,
+                Stabilisation::Mass,
+                Effort { energy: f64::INFINITY, ..Effort::default() },
+            );
+            let method = WithPostStep::new(&self.system, Dop853::new(&self.system), projection);
+            let step = Step::Adaptive(Tolerances::new(self.tolerance));
+            Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap()
+        });
+        let result = motion.run(&mut self.system, t, &mut self.events);
+        motion.state(&self.system, &mut self.q, &mut self.p);
+        self.motion = Some(motion);
+        result
+    }
+
+    /// Velocities.
+    pub fn v(&mut self) -> Vec<f64> {
+        use mbd_runtime::Constrained;
+        let (mut v, mut sigma, mut p) = (self.p.clone(), self.system.zero_rows(), self.p.clone());
+        self.system.project_momenta(0.0, &self.q, &mut p, &mut v, &mut sigma);
+        v
+    }
+
+    /// Kinetic and potential energy, J.
+    pub fn energy(&mut self) -> f64 {
+        let (kinetic, potential) = self.system.energies(&self.q, &self.p);
+        kinetic + potential
+    }
+}
+
+/// A model from its text.
+pub fn model(text: &str) -> Model {
+    read::model("scene.toml", text, &Default::default()).unwrap_or_else(|e| panic!("{e}")).model
+}
