@@ -6,6 +6,7 @@
 
 mod assembly;
 mod hybrid;
+mod instant;
 #[cfg(feature = "alloc")]
 mod interpreted;
 mod solver;

@@ -5,13 +5,21 @@
 //! in the forces on the joints: the response of all normal forces to the friction of each sliding contact for `N = 1`
 //! comes from the momenta `−µ Φ_tᵀt̂` (one solve each), and a small linear system gives `N`.
 
+use super::instant::Touches;
 use super::touching::add_row;
-use super::{Contact, Mode, Touching};
+use super::{Contact, Effort, Mode, Touching};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
 
 /// Speed of slip below which its direction is the one that it had where the step began, m/s.
 const SLOW: f64 = 1e-13;
+/// Speed of slip, m/s, up to which a contact that begins to slide has its friction against the acceleration of slip.
+///
+/// Where slip begins, friction turns it within about `|v|/(µ N/m)` into the direction of its acceleration: explicit steps
+/// would have to be as short, and the speed grows from zero as slowly as `t²`. So this fast motion is left out until its
+/// time has grown; the velocity then errs by about `ω m/(µ N)` times the square of this speed, where `ω` is the rate at
+/// which the direction turns, which is near 1e-11 m/s.
+const CREEP: f64 = 1e-5;
 
 /// A mechanism with contacts and their modes: its rates include the friction of sliding contacts.
 #[derive(Clone, Debug)]
@@ -20,6 +28,10 @@ pub struct WithContacts<Y: Touching> {
     modes: Y::PerContact<Mode>,
     /// Direction of slip where the step began, for contacts that slide.
     pub(super) slip: Y::PerContact<[Y::Scalar; 2]>,
+    /// Whether a contact begins to slide: its friction is against the acceleration of slip.
+    begins: Y::PerContact<bool>,
+    /// Memory for the forces by which the direction of slip that begins is found.
+    instant: Option<Touches<Y>>,
     /// Whether any contact slides with friction.
     rubs: bool,
     pub(super) at: Contacts<Y>,
@@ -64,6 +76,8 @@ impl<Y: Touching> WithContacts<Y> {
         WithContacts {
             modes,
             slip: system.per_contact([zero; 2]),
+            begins: system.per_contact(false),
+            instant: Some(Touches::new(&system)),
             rubs: false,
             at: Contacts {
                 v: momenta(&system),
@@ -109,18 +123,35 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// Sets the modes and the directions of slip.
-    pub(super) fn set_modes(&mut self, modes: &[Mode], slip: &[[Y::Scalar; 2]]) {
-        self.modes.as_mut().copy_from_slice(modes);
-        self.slip.as_mut().copy_from_slice(slip);
-        self.system.act(modes);
-        let zero = Y::Scalar::zero();
-        let rubs = |(c, mode): (&Contact<Y::Scalar>, &Mode)| *mode == Mode::Slide && c.tangents && c.friction > zero;
-        self.rubs = self.system.contacts().iter().zip(modes).any(rubs);
+    pub(super) fn set_modes(&mut self, found: &Touches<Y>) {
+        self.modes.as_mut().copy_from_slice(found.modes.as_ref());
+        self.slip.as_mut().copy_from_slice(found.slip.as_ref());
+        self.begins.as_mut().copy_from_slice(found.begins.as_ref());
+        self.modes_are_set();
+    }
+
+    /// Opens all contacts.
+    pub(super) fn open_all(&mut self) {
+        self.modes.as_mut().fill(Mode::Open);
+        self.begins.as_mut().fill(false);
+        self.modes_are_set();
+    }
+
+    fn modes_are_set(&mut self) {
+        self.restore();
+        self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
     }
 
     /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
     pub(super) fn borrow_modes(&mut self, modes: &[Mode]) {
         self.system.act(modes);
+    }
+
+    /// Multipliers of the rows that act by `modes`, in `self.at.lambda`, after [`WithContacts::look`].
+    pub(super) fn hold(&mut self, t: Y::Scalar, q: &Y::Coordinates, modes: &[Mode]) {
+        self.borrow_modes(modes);
+        self.system.multipliers(t, q, &self.at.v, &mut self.at.lambda);
+        self.restore();
     }
 
     /// Lets rows act by the modes again.
@@ -165,6 +196,9 @@ impl<Y: Touching> WithContacts<Y> {
     /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
     /// where the step began, it is the mirror image: it does not jump within a step that leads too far.
     fn direction(&self, k: usize) -> [Y::Scalar; 2] {
+        if self.begins.as_ref()[k] {
+            return self.slip.as_ref()[k];
+        }
         let ([x, y], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
         let speed = (x * x + y * y).sqrt();
         if !(speed.to_f64() > SLOW) {
@@ -177,13 +211,55 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Notes the directions of slip where a step begins.
     pub(super) fn note_slip(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
-        if self.rubs {
-            self.look(t, q, p);
-            for k in 0..self.modes.as_ref().len() {
-                if self.rubs(k) {
-                    self.slip.as_mut()[k] = self.direction(k);
+        if !self.rubs {
+            return;
+        }
+        self.look(t, q, p);
+        for k in 0..self.modes.as_ref().len() {
+            let [x, y] = self.tangential(k);
+            let begins = self.begins.as_ref()[k];
+            self.begins.as_mut()[k] = begins && !((x * x + y * y).sqrt().to_f64() > CREEP);
+            if self.rubs(k) {
+                self.slip.as_mut()[k] = self.direction(k);
+            }
+        }
+    }
+
+    /// Directions of slip that begins, after [`WithContacts::look`]: with forces that satisfy Coulomb's law at the level of
+    /// accelerations, friction against the acceleration of slip. Where no such forces are found, the directions stay.
+    fn begin(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
+        let Some(mut instant) = self.instant.take() else { return };
+        instant.take_closed(self);
+        for i in 0..instant.count {
+            let k = instant.order()[i];
+            if self.rubs(k) && !self.begins.as_ref()[k] {
+                instant.problem.as_mut()[i].slip = Some(self.direction(k));
+            }
+        }
+        if instant.find_forces(self, t, q, Effort::default()).is_ok() {
+            for i in 0..instant.count {
+                let k = instant.order()[i];
+                if self.begins.as_ref()[k] {
+                    self.turn_slip(&instant, i, k);
                 }
             }
+        }
+        self.instant = Some(instant);
+    }
+
+    /// The direction of slip of contact `k`, which is the problem's contact `i`: against its friction, or along its
+    /// acceleration where it has none.
+    fn turn_slip(&mut self, instant: &Touches<Y>, i: usize, k: usize) {
+        let zero = Y::Scalar::zero();
+        let c = instant.problem.as_ref()[i].contact;
+        let f = instant.impulses.as_ref();
+        let [n, mut x, mut y] = [f[c.row], -f[c.row + 1], -f[c.row + 2]];
+        if !(n > zero) {
+            (x, y) = (instant.acceleration(c.row + 1), instant.acceleration(c.row + 2));
+        }
+        let size = (x * x + y * y).sqrt();
+        if size > zero {
+            self.slip.as_mut()[k] = [x / size, y / size];
         }
     }
 
@@ -206,6 +282,9 @@ impl<Y: Touching> WithContacts<Y> {
     /// on the joints. With `all`, those of sticking contacts include the effect of friction elsewhere.
     pub(super) fn loads(&mut self, t: Y::Scalar, q: &Y::Coordinates, all: bool) {
         let zero = Y::Scalar::zero();
+        if self.begins.as_ref().contains(&true) {
+            self.begin(t, q);
+        }
         self.friction.as_mut().fill(zero);
         self.at.wedge = Y::Scalar::one();
         self.system.multipliers(t, q, &self.at.v, &mut self.at.lambda);

@@ -5,9 +5,8 @@ mod resolve;
 mod select;
 mod watch;
 
-use super::{
-    Certificate, Contact, ContactError, Effort, Impact, ImpactOrder, Mode, Problem, Touch, Touching, WithContacts,
-};
+use super::instant::Touches;
+use super::{Certificate, ContactError, Effort, Impact, ImpactOrder, Mode, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
 use crate::system::Real;
@@ -239,26 +238,11 @@ pub struct Hybrid<Y: Touching, M> {
     immobile: bool,
     /// The contact, cause and force of an event that is being resolved, where they decide on the mode that follows.
     forced: Option<(usize, Cause, [Y::Scalar; 3])>,
+    /// Whether the last event was one of redundant forces that changed nothing, so that the next step goes on.
+    unchanged: bool,
     /// Events at the last instant.
     crowded: (Y::Scalar, u32),
     statistics: ContactStatistics,
-}
-
-/// The contacts of an event, and memory for their impulses and forces.
-#[derive(Clone, Debug)]
-struct Touches<Y: Touching> {
-    count: usize,
-    order: Y::PerContact<usize>,
-    problem: Y::PerContact<Touch<Y::Scalar>>,
-    open: Y::PerContact<Mode>,
-    modes: Y::PerContact<Mode>,
-    slip: Y::PerContact<[Y::Scalar; 2]>,
-    /// Contacts that stay closed although they would depart slowly.
-    settles: Y::PerContact<bool>,
-    a: Y::Delassus,
-    b: Y::Delassus,
-    impulses: Y::Delassus,
-    work: Y::Delassus,
 }
 
 impl<Y, M> Hybrid<Y, M>
@@ -298,6 +282,7 @@ where
             settling: zero,
             immobile: false,
             forced: None,
+            unchanged: false,
             crowded: (t, 0),
             statistics: ContactStatistics::default(),
         };
@@ -317,9 +302,7 @@ where
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
         let zero = Y::Scalar::zero();
-        self.touching.modes.as_mut().fill(Mode::Open);
-        self.touching.slip.as_mut().fill([zero; 2]);
-        system.set_modes(self.touching.modes.as_ref(), self.touching.slip.as_ref());
+        system.open_all();
         self.q.as_mut().copy_from_slice(q.as_ref());
         self.p.as_mut().copy_from_slice(p.as_ref());
         system.look(t, &self.q, &self.p);
@@ -374,7 +357,13 @@ where
         t_end: Y::Scalar,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<(), HybridError> {
+        let mut left = self.solver.limits.steps;
         while self.time() < t_end {
+            if left == 0 {
+                let (time, steps) = (self.time().to_f64(), self.solver.limits.steps);
+                return Err(HybridError::Step(StepError::TooManySteps { time, steps }));
+            }
+            left -= 1;
             self.advance(system, t_end, observer)?;
         }
         Ok(())
@@ -427,45 +416,6 @@ where
 
     fn count(&self, system: &WithContacts<Y>) -> usize {
         system.modes().len()
-    }
-}
-
-impl<Y: Touching> Touches<Y> {
-    fn new(system: &Y) -> Self {
-        let rows: usize = system.contacts().iter().map(Contact::rows).sum();
-        let touch = Touch {
-            contact: Contact {
-                row: 0,
-                tangents: false,
-                friction: Y::Scalar::zero(),
-                restitution: Y::Scalar::zero(),
-                law: super::RestitutionLaw::Poisson,
-            },
-            slip: None,
-        };
-        Touches {
-            count: 0,
-            order: system.per_contact(0),
-            problem: system.per_contact(touch),
-            open: system.per_contact(Mode::Open),
-            modes: system.per_contact(Mode::Open),
-            slip: system.per_contact([Y::Scalar::zero(); 2]),
-            settles: system.per_contact(false),
-            a: system.zero_delassus(rows * rows),
-            b: system.zero_delassus(rows),
-            impulses: system.zero_delassus(rows),
-            work: system.zero_delassus(super::work_len(rows)),
-        }
-    }
-
-    /// The contacts that take part.
-    fn order(&self) -> &[usize] {
-        &self.order.as_ref()[..self.count]
-    }
-
-    /// Number of their rows.
-    fn rows(&self) -> usize {
-        self.problem.as_ref()[..self.count].iter().map(|touch| touch.contact.rows()).sum()
     }
 }
 

@@ -42,6 +42,7 @@ where
         // Forces of redundant contacts may have been redistributed, and nothing else.
         let happened = event.impact.is_some() || event.cause == Cause::Stopped || self.statistics.switches > switches;
         self.statistics.events += u64::from(happened);
+        self.unchanged = !happened;
         Ok(happened.then_some(event))
     }
 
@@ -70,7 +71,7 @@ where
         self.select(system, t)?;
         let changed = self.touching.modes.as_ref().iter().zip(system.modes()).filter(|(new, old)| new != old);
         self.statistics.switches += changed.count() as u64;
-        system.set_modes(self.touching.modes.as_ref(), self.touching.slip.as_ref());
+        system.set_modes(&self.touching);
         system.look(t, &self.q, &self.p);
         self.p.as_mut().copy_from_slice(system.p.as_ref());
         if !self.p.as_ref().iter().chain(self.q.as_ref()).all(|x| x.is_finite()) {
@@ -89,7 +90,7 @@ where
         for k in 0..self.count(system) {
             let near = system.gap(k).to_f64() <= self.rules.touching;
             if system.modes()[k] != Mode::Open || near {
-                self.take(system, k);
+                self.touching.take(system, k);
             }
         }
     }
@@ -115,9 +116,8 @@ where
             return Ok(None);
         }
         let rest = self.mark_settling(system, t);
-        self.assemble(system, t);
         let touching = &mut self.touching;
-        let rows = touching.rows();
+        touching.assemble(system, t, &self.q);
         let mut i = 0;
         for &k in &touching.order.as_ref()[..touching.count] {
             let c = system.contact(k);
@@ -126,17 +126,12 @@ where
                 i += 1;
             }
         }
-        let problem = super::Problem {
-            a: &touching.a.as_ref()[..rows * rows],
-            b: &touching.b.as_ref()[..rows],
-            touches: &touching.problem.as_ref()[..touching.count],
-        };
-        let impulses = &mut touching.impulses.as_mut()[..rows];
+        let (problem, impulses, work) = touching.parts();
         impulses.fill(zero);
         let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order, ..ImpactOptions::default() };
-        let result = impact(&problem, &options, impulses, touching.work.as_mut())
+        let result = impact(&problem, &options, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
-        system.kick(&touching.order.as_ref()[..touching.count], &touching.impulses.as_ref()[..rows]);
+        system.kick(touching.order(), touching.impulses.as_ref());
         self.p.as_mut().copy_from_slice(system.p.as_ref());
         self.note(&result);
         if let Some(event) = event {
@@ -145,7 +140,7 @@ where
             event.impact = Some(result);
         }
         // Velocities after the impact, with no contact held.
-        system.set_modes(self.touching.open.as_ref(), self.touching.slip.as_ref());
+        system.open_all();
         system.look(t, &self.q, &self.p);
         Ok(Some(result))
     }
@@ -214,7 +209,7 @@ where
                 self.departures.as_mut()[k] = Departure { time: t, speed: rate };
             }
             if !departs {
-                self.take(system, k);
+                self.touching.take(system, k);
             }
         }
     }

@@ -141,7 +141,7 @@ where
     fn overloaded(&mut self, system: &mut WithContacts<Y>) -> Result<Option<Found<Y::Scalar>>, HybridError> {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let Some(contact) = self.doubtful(system) else { return Ok(None) };
-        if self.holds_at(system, one)? {
+        if core::mem::take(&mut self.unchanged) || self.holds_at(system, one)? {
             return Ok(None);
         }
         let (t, h) = self.solver.last_step();
@@ -177,7 +177,7 @@ where
         let (t, h) = self.solver.last_step();
         self.solver.dense(system, theta, &mut self.q, &mut self.p);
         system.look(t + theta * h, &self.q, &self.p);
-        self.take_closed(system);
+        self.touching.take_closed(system);
         self.select(system, t + theta * h)?;
         Ok(self.touching.modes.as_ref() == system.modes())
     }
