@@ -20,6 +20,8 @@ const SLOW: f64 = 1e-13;
 /// time has grown; the velocity then errs by about `ω m/(µ N)` times the square of this speed, where `ω` is the rate at
 /// which the direction turns, which is near 1e-11 m/s.
 const CREEP: f64 = 1e-5;
+/// Part of the largest force below which a force does not tell the direction of slip.
+const UNSURE: f64 = 1e-3;
 
 /// A mechanism with contacts and their modes: its rates include the friction of sliding contacts.
 #[derive(Clone, Debug)]
@@ -248,13 +250,14 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// The direction of slip of contact `k`, which is the problem's contact `i`: against its friction, or along its
-    /// acceleration where it has none.
+    /// acceleration where its force is small, because others can take it over.
     fn turn_slip(&mut self, instant: &Touches<Y>, i: usize, k: usize) {
         let zero = Y::Scalar::zero();
         let c = instant.problem.as_ref()[i].contact;
-        let f = instant.impulses.as_ref();
+        let f = &instant.impulses.as_ref()[..instant.rows()];
+        let largest = f.iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
         let [n, mut x, mut y] = [f[c.row], -f[c.row + 1], -f[c.row + 2]];
-        if !(n > zero) {
+        if !(n > Y::Scalar::constant(UNSURE) * largest) {
             (x, y) = (instant.acceleration(c.row + 1), instant.acceleration(c.row + 2));
         }
         let size = (x * x + y * y).sqrt();

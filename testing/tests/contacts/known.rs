@@ -200,11 +200,23 @@ fn random_drops_end_well() {
         let n = q[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
         q[3..].iter_mut().for_each(|x| *x /= n);
         let v: Vec<f64> = (0..6).map(|_| 2.0 * next()).collect();
+        if std::env::var("CASE").is_ok_and(|c| c != k.to_string()) { continue; }
         let mut scene = Scene::new(free_box(friction, restitution), &q, &v);
         scene.tolerance = 1e-8;
         let before = scene.energy();
         let clock = std::time::Instant::now();
-        let result = scene.try_run(2.0);
+        let mut result = Ok(());
+        let mut t = 0.0;
+        while t < 2.0 && result.is_ok() {
+            t += 0.01;
+            let c = std::time::Instant::now();
+            result = scene.try_run(t);
+            if c.elapsed().as_secs_f64() > 0.2 {
+                let m = scene.motion.as_ref().unwrap();
+                println!("{k} {t:.3} {:?} {:?} {:?} {:?} rejected {}", c.elapsed(), scene.events.0.len(), scene.system.modes(), m.statistics().steps, m.statistics().rejections);
+            }
+            if clock.elapsed().as_secs_f64() > 5.0 { println!("{k}: gives up"); break; }
+        }
         let after = scene.energy();
         let lost = scene.motion.as_ref().map_or(0.0, |m| m.contact_statistics().lost);
         if let Err(error) = result {

@@ -59,7 +59,9 @@ impl Scene {
             );
             let method = WithPostStep::new(&self.system, Dop853::new(&self.system), projection);
             let step = Step::Adaptive(Tolerances::new(self.tolerance));
-            Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap()
+            let mut motion = Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap();
+            motion.limits_mut().steps = 10_000;
+            motion
         });
         let result = motion.run(&mut self.system, t, &mut self.events);
         motion.state(&self.system, &mut self.q, &mut self.p);

@@ -9,8 +9,8 @@ use crate::Scalar;
 
 /// Number of stretches of a step at whose ends the functions are evaluated.
 const STRETCHES: u32 = 4;
-/// How often a stretch is halved in search of a point where a function is positive.
-const HALVINGS: u32 = 40;
+/// How often a stretch is halved in search of a point where a gap is positive, and another function.
+const HALVINGS: [u32; 2] = [40, 4];
 
 /// The functions of one contact: it stays in its mode while both are positive.
 #[derive(Clone, Copy, Debug)]
@@ -241,7 +241,7 @@ where
         value: impl Fn(&Watched<Y::Scalar>) -> Y::Scalar,
     ) -> Option<(Y::Scalar, Y::Scalar)> {
         let mut width = to - from;
-        for _ in 0..HALVINGS {
+        for _ in 0..HALVINGS[usize::from(system.modes()[k] != Mode::Open)] {
             width = Y::Scalar::constant(0.5) * width;
             let x = from + width;
             let found = self.value_at(system, k, x, &value);
