@@ -19,7 +19,7 @@ const SLOW: f64 = 1e-13;
 /// would have to be as short, and the speed grows from zero as slowly as `t²`. So this fast motion is left out until its
 /// time has grown; the velocity then errs by about `ω m/(µ N)` times the square of this speed, where `ω` is the rate at
 /// which the direction turns, which is near 1e-11 m/s.
-const CREEP: f64 = 1e-5;
+pub(super) const CREEP: f64 = 1e-5;
 /// Part of the largest force below which a force does not tell the direction of slip.
 const UNSURE: f64 = 1e-3;
 

@@ -171,80 +171,87 @@ fn a_box_that_is_dropped_comes_to_rest() {
     let n = scene.q[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
     scene.q[3..].iter_mut().for_each(|x| *x /= n);
     scene.tolerance = 1e-9;
-    for k in 1..=40 {
-        scene.run(0.05 * k as f64);
-        let energy = scene.energy();
-        println!(
-            "{:.2} z {:.6} E {:.6} events {} {:?}",
-            0.05 * k as f64,
-            scene.q[2],
-            energy,
-            scene.events.0.len(),
-            scene.system.modes()
-        );
-    }
-    println!("{:?}", scene.motion.as_ref().unwrap().contact_statistics());
+    let before = scene.energy();
+    scene.run(2.0);
+    let statistics = *scene.motion.as_ref().unwrap().contact_statistics();
+    assert!(scene.energy() <= before - statistics.lost + 1e-6);
+    assert!(statistics.residual <= 1e-11, "{statistics:?}");
+    // It lies on its largest side.
+    assert!((scene.q[2] - 0.1).abs() < 1e-10, "{:?}", scene.q);
+    let held = scene.system.modes().iter().filter(|mode| **mode == Mode::Stick).count();
+    assert_eq!(held, 4, "{:?}", scene.system.modes());
 }
 
-#[test]
-fn random_drops_end_well() {
-    let mut seed = 7_u64;
-    let mut next = move || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
-    };
+/// A generator of numbers between −1 and 1.
+fn random(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0
+    }
+}
+
+/// Boxes that are thrown on the floor bounce, slide and come to rest. None of them falls through or gains energy, and what
+/// is not followed to its end is an error.
+fn drops(count: usize) -> usize {
+    let mut next = random(7);
     let mut failed = 0;
-    for k in 0..100 {
+    for k in 0..count {
         let (friction, restitution) = (0.5 + 0.5 * next(), 0.25 + 0.25 * next());
         let mut q = vec![0.0, 0.0, 0.7, next(), next(), next(), next()];
         let n = q[3..].iter().map(|x| x * x).sum::<f64>().sqrt();
         q[3..].iter_mut().for_each(|x| *x /= n);
         let v: Vec<f64> = (0..6).map(|_| 2.0 * next()).collect();
-        if std::env::var("CASE").is_ok_and(|c| c != k.to_string()) { continue; }
         let mut scene = Scene::new(free_box(friction, restitution), &q, &v);
         scene.tolerance = 1e-8;
+        scene.steps = 1500;
         let before = scene.energy();
-        let clock = std::time::Instant::now();
-        let mut result = Ok(());
-        let mut t = 0.0;
-        while t < 2.0 && result.is_ok() {
-            t += 0.01;
-            let c = std::time::Instant::now();
-            result = scene.try_run(t);
-            if c.elapsed().as_secs_f64() > 0.2 {
-                let m = scene.motion.as_ref().unwrap();
-                println!("{k} {t:.3} {:?} {:?} {:?} {:?} rejected {}", c.elapsed(), scene.events.0.len(), scene.system.modes(), m.statistics().steps, m.statistics().rejections);
-            }
-            if clock.elapsed().as_secs_f64() > 5.0 { println!("{k}: gives up"); break; }
+        if let Err(error) = scene.try_run(2.0) {
+            failed += 1;
+            println!("{k}: friction {friction}, restitution {restitution}: {error}");
+            continue;
         }
         let after = scene.energy();
-        let lost = scene.motion.as_ref().map_or(0.0, |m| m.contact_statistics().lost);
-        if let Err(error) = result {
-            failed += 1;
-            println!("{k}: mu {friction} e {restitution} {error}");
-        }
-        if clock.elapsed().as_secs_f64() > 1.0 { println!("{k}: slow {:?} {:?}", clock.elapsed(), scene.motion.as_ref().map(|m| (*m.contact_statistics(), m.statistics()))); }
-        if after > before + 1e-6 || scene.q[2] < 0.09 { println!("{k}: {before} {after} {lost} z {}", scene.q[2]); }
+        let lost = scene.motion.as_ref().map_or(0.0, |motion| motion.contact_statistics().lost);
+        // Friction takes the rest.
+        assert!(after <= before - lost + 1e-6, "{k}: {before} {after} {lost}");
+        assert!(scene.q[2] > 0.1 - 1e-9, "{k}: {:?}", scene.q);
+        assert!(scene.q.iter().all(|x| x.is_finite()), "{k}");
     }
-    println!("failed {failed}");
+    failed
 }
 
 #[test]
+fn boxes_that_are_thrown_end_on_the_floor() {
+    let failed = drops(6);
+    assert!(failed <= 2, "{failed}");
+}
+
+/// Takes minutes.
+#[test]
 #[ignore]
-fn look_at_the_quadruped() {
-    let text = include_str!("../../../models/contacts/quadruped.toml");
-    let model = model(text);
+fn many_boxes_that_are_thrown_end_on_the_floor() {
+    let failed = drops(100);
+    println!("{failed} of 100 are not followed to their end");
+    assert!(failed <= 40, "{failed}");
+}
+
+#[test]
+fn a_quadruped_that_is_dropped_lands_on_its_feet_and_kneels() {
+    let model = model(include_str!("../../../models/contacts/quadruped.toml"));
     let plan = mbd_codegen::plan::Plan::new(&model, 1e-9);
-    let q = plan.start();
-    let mut scene = Scene::new(model, &q, &vec![0.0; plan.dims.nv]);
+    let mut scene = Scene::new(model, &plan.start(), &vec![0.0; plan.dims.nv]);
     scene.tolerance = 1e-9;
-    let mut t = 0.0;
-    while t < 0.4 {
-        t += 0.002;
-        let clock = std::time::Instant::now();
-        let r = scene.try_run(t);
-        let m = scene.motion.as_ref().unwrap();
-        println!("{t:.4} {:?} events {} {:?} {:?} {:?}", clock.elapsed(), scene.events.0.len(), scene.system.modes(), m.statistics(), r);
-        if r.is_err() { break; }
-    }
+    scene.steps = 600;
+    let before = scene.energy();
+    scene.run(0.3);
+    // All four feet fall by the same height: that of the lowest point of a sphere below the legs.
+    let height = 0.3 - 0.016 - 2.0 * 0.16 * 0.7_f64.cos();
+    let landing = &scene.events.0[0];
+    assert!((landing.time - (2.0 * height / 9.81).sqrt()).abs() < 1e-9, "{landing:?}");
+    let taken: usize = scene.system.modes().iter().filter(|mode| **mode == Mode::Stick).count();
+    assert_eq!(taken, 4, "{:?}", scene.system.modes());
+    assert!(scene.energy() < before);
+    // The gaps of the feet stay closed.
+    assert!(scene.gaps().iter().step_by(3).take(4).all(|gap| gap.abs() < 1e-11), "{:?}", scene.gaps());
 }

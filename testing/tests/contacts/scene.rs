@@ -4,9 +4,11 @@ use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
-use mbd_runtime::contact::{ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, WithContacts};
+use mbd_runtime::contact::{
+    ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, Touching, WithContacts,
+};
 use mbd_runtime::integrate::{Dop853, Step, Tolerances};
-use mbd_runtime::{Conjugate, Energetic};
+use mbd_runtime::{Conjugate, Constrained, Energetic};
 
 pub type Mechanism = ContactInterpreter<f64>;
 type Closed = Projection<WithContacts<Mechanism>>;
@@ -14,13 +16,14 @@ type Method = WithPostStep<WithContacts<Mechanism>, Dop853<WithContacts<Mechanis
 
 /// A motion with contacts, and its events.
 pub struct Scene {
-    pub model: Model,
     pub system: WithContacts<Mechanism>,
     pub motion: Option<Hybrid<Mechanism, Method>>,
     pub events: Events,
     pub q: Vec<f64>,
     pub p: Vec<f64>,
     pub tolerance: f64,
+    /// Largest number of steps of a run.
+    pub steps: u64,
 }
 
 #[derive(Default)]
@@ -41,7 +44,7 @@ impl Scene {
         let mut p = v.to_vec();
         mechanism.conjugate_momenta(&q, &v.to_vec(), &mut p);
         let system = WithContacts::new(mechanism);
-        Scene { model, system, motion: None, events: Events::default(), q, p, tolerance: 1e-12 }
+        Scene { system, motion: None, events: Events::default(), q, p, tolerance: 1e-12, steps: u64::MAX }
     }
 
     /// Goes on to time `t`, s.
@@ -60,7 +63,7 @@ impl Scene {
             let method = WithPostStep::new(&self.system, Dop853::new(&self.system), projection);
             let step = Step::Adaptive(Tolerances::new(self.tolerance));
             let mut motion = Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap();
-            motion.limits_mut().steps = 10_000;
+            motion.limits_mut().steps = self.steps;
             motion
         });
         let result = motion.run(&mut self.system, t, &mut self.events);
@@ -71,10 +74,18 @@ impl Scene {
 
     /// Velocities.
     pub fn v(&mut self) -> Vec<f64> {
-        use mbd_runtime::Constrained;
         let (mut v, mut sigma, mut p) = (self.p.clone(), self.system.zero_rows(), self.p.clone());
         self.system.project_momenta(0.0, &self.q, &mut p, &mut v, &mut sigma);
         v
+    }
+
+    /// Residuals of all rows; those of normal rows are gaps, m.
+    pub fn gaps(&mut self) -> Vec<f64> {
+        let v = self.v();
+        let system = self.system.system_mut();
+        let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
+        system.gaps(0.0, &self.q, &v, &mut gaps, &mut rates, &mut entries);
+        gaps
     }
 
     /// Kinetic and potential energy, J.

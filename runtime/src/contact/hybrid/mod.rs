@@ -25,7 +25,8 @@ pub struct ContactRules {
     pub touching: f64,
     /// Height of a bounce, m (rad), below which no more bounces are followed: the bodies stay together.
     pub bounce: f64,
-    /// Speed of slip, m/s, below which bodies do not slide.
+    /// Speed of slip, m/s, below which bodies stop at an event if friction can hold them: they would within the time
+    /// `|v|/(µ N/m)`.
     pub slip: f64,
     /// Largest number of events within a step of the integration, or at one instant.
     pub events: u32,
@@ -38,7 +39,7 @@ impl Default for ContactRules {
             order: ImpactOrder::default(),
             touching: 1e-11,
             bounce: 1e-12,
-            slip: 1e-10,
+            slip: 1e-6,
             events: 1000,
         }
     }

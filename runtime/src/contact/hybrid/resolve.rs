@@ -10,6 +10,9 @@ use crate::Scalar;
 /// Speeds of approach below this part of the fastest of an event count as zero.
 const SLOW: f64 = 1e-9;
 
+/// Speed of approach, m/s (rad/s), below which there is no impact.
+const APPROACH: f64 = 1e-10;
+
 impl<Y, M> Hybrid<Y, M>
 where
     Y: Touching,
@@ -35,7 +38,8 @@ where
             rest: None,
         };
         system.look(t, &self.q, &self.p);
-        self.forced = (!self.redundant).then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
+        let own = !self.redundant || found.cause == Cause::Stopped;
+        self.forced = own.then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
         self.settle_modes(system, t, Some(&mut event))?;
         self.forced = None;
         event.modes[1] = system.modes()[found.contact];
@@ -77,8 +81,8 @@ where
         if !self.p.as_ref().iter().chain(self.q.as_ref()).all(|x| x.is_finite()) {
             return Err(HybridError::NotFinite { time: t.to_f64() });
         }
-        self.evaluate(system, t, false);
         self.redundant = self.has_redundant_rows(system);
+        self.evaluate(system, t, false);
         self.solver.limits.first_step = 0.0;
         self.solver.restart(system, t, &self.q, &self.p)?;
         Ok(())
@@ -112,7 +116,7 @@ where
                 most
             }
         });
-        if !(fastest.to_f64() > self.rules.slip) {
+        if !(fastest.to_f64() > APPROACH) {
             return Ok(None);
         }
         let rest = self.mark_settling(system, t);
@@ -162,7 +166,7 @@ where
             let k = self.touching.order()[i];
             let Departure { time, speed } = self.departures.as_ref()[k];
             let approach = -system.gap_rate(k);
-            let lands = system.modes()[k] == Mode::Open && approach.to_f64() > self.rules.slip;
+            let lands = system.modes()[k] == Mode::Open && approach.to_f64() > APPROACH;
             if !(lands && speed > zero && t > time) {
                 continue;
             }
@@ -195,7 +199,7 @@ where
                 most
             }
         });
-        let slow = self.rules.slip.max(SLOW * fastest.to_f64());
+        let slow = APPROACH.max(SLOW * fastest.to_f64());
         self.touching.count = 0;
         // What is kept takes the place of what was before it.
         for i in 0..taken {

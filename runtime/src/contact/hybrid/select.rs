@@ -1,6 +1,7 @@
 //! The modes of contacts that touch, by the accelerations and forces of the instant.
 
 use super::{Cause, Hybrid, HybridError};
+use crate::contact::with_contacts::CREEP;
 use crate::contact::{Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
 use crate::system::Real;
@@ -49,6 +50,8 @@ where
                     let size = (x * x + y * y).sqrt();
                     Some([-(x / size), -(y / size)])
                 }
+                // It may slide on, in the direction in which it is accelerated.
+                Some((contact, Cause::Stopped, _)) if contact == k && speed.to_f64() < CREEP => None,
                 _ => slides.then(|| [x / speed, y / speed]),
             };
             self.touching.problem.as_mut()[i].slip = slip;

@@ -12,6 +12,11 @@ const STRETCHES: u32 = 4;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
 const HALVINGS: [u32; 2] = [40, 4];
 
+/// Overlaps, m (rad), that end an open contact in free flight, and while other contacts are held closed. Rounding errors of
+/// a gap that has just been zero are smaller than the first; holding a contact moves others by its own small gap. What
+/// lands is moved back to where the gap is zero.
+const OVERLAP: [f64; 2] = [1e-15, 1e-11];
+
 /// The functions of one contact: it stays in its mode while both are positive.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Watched<S> {
@@ -290,8 +295,13 @@ impl<Y: Touching> WithContacts<Y> {
         let zero = Y::Scalar::zero();
         let c = self.contact(k);
         let [normal, x, y] = self.at.forces.as_ref()[k];
+        let held = usize::from(self.modes().iter().any(|mode| *mode != Mode::Open));
         match self.modes()[k] {
-            Mode::Open => Watched { first: self.gap(k), rate: self.gap_rate(k), second: None },
+            Mode::Open => Watched {
+                first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]),
+                rate: self.gap_rate(k),
+                second: None,
+            },
             Mode::Slide => {
                 let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
                 let rubs = c.tangents && c.friction > zero;

@@ -1,0 +1,153 @@
+//! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
+
+use super::{
+    solve, Certificate, Contact, ContactError, Effort, Mode, Problem, RestitutionLaw, Touch, Touching, WithContacts,
+};
+use crate::Scalar;
+
+/// The contacts that take part, and memory for their impulses and forces.
+#[derive(Clone, Debug)]
+pub(super) struct Touches<Y: Touching> {
+    pub count: usize,
+    pub order: Y::PerContact<usize>,
+    pub problem: Y::PerContact<Touch<Y::Scalar>>,
+    pub open: Y::PerContact<Mode>,
+    pub modes: Y::PerContact<Mode>,
+    pub slip: Y::PerContact<[Y::Scalar; 2]>,
+    /// Whether a contact begins to slide.
+    pub begins: Y::PerContact<bool>,
+    /// Contacts that stay closed although they would depart slowly.
+    pub settles: Y::PerContact<bool>,
+    pub a: Y::Delassus,
+    pub b: Y::Delassus,
+    pub impulses: Y::Delassus,
+    pub work: Y::Delassus,
+}
+
+impl<Y: Touching> Touches<Y> {
+    pub fn new(system: &Y) -> Self {
+        let rows: usize = system.contacts().iter().map(Contact::rows).sum();
+        let touch = Touch {
+            contact: Contact {
+                row: 0,
+                tangents: false,
+                friction: Y::Scalar::zero(),
+                restitution: Y::Scalar::zero(),
+                law: RestitutionLaw::Poisson,
+            },
+            slip: None,
+        };
+        Touches {
+            count: 0,
+            order: system.per_contact(0),
+            problem: system.per_contact(touch),
+            open: system.per_contact(Mode::Open),
+            modes: system.per_contact(Mode::Open),
+            slip: system.per_contact([Y::Scalar::zero(); 2]),
+            begins: system.per_contact(false),
+            settles: system.per_contact(false),
+            a: system.zero_delassus(rows * rows),
+            b: system.zero_delassus(rows),
+            impulses: system.zero_delassus(rows),
+            work: system.zero_delassus(super::work_len(rows)),
+        }
+    }
+
+    /// The contacts that take part.
+    pub fn order(&self) -> &[usize] {
+        &self.order.as_ref()[..self.count]
+    }
+
+    /// Number of their rows.
+    pub fn rows(&self) -> usize {
+        self.problem.as_ref()[..self.count].iter().map(|touch| touch.contact.rows()).sum()
+    }
+
+    /// Takes one contact into the problem.
+    pub fn take(&mut self, system: &WithContacts<Y>, k: usize) {
+        let row = self.rows();
+        self.order.as_mut()[self.count] = k;
+        self.problem.as_mut()[self.count] = Touch { contact: Contact { row, ..system.contact(k) }, slip: None };
+        self.count += 1;
+    }
+
+    /// Takes the contacts that are closed into the problem.
+    pub fn take_closed(&mut self, system: &WithContacts<Y>) {
+        self.count = 0;
+        for (k, mode) in system.modes().iter().enumerate() {
+            if *mode != Mode::Open {
+                self.take(system, k);
+            }
+        }
+    }
+
+    /// Inverse inertia of the contacts in the problem.
+    pub fn assemble(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
+        let rows = self.rows();
+        let order = &self.order.as_ref()[..self.count];
+        system.inverse_inertia(t, q, order, self.open.as_ref(), &mut self.a.as_mut()[..rows * rows]);
+    }
+
+    /// Accelerations of the rows if no contact had a force, in `b`. With all rows of sticking contacts and the normal rows
+    /// of sliding ones held, the forces `f` keep them from accelerating, `b + A f = 0`.
+    pub fn free_accelerations(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
+        let zero = Y::Scalar::zero();
+        self.modes.as_mut().fill(Mode::Open);
+        for (i, &k) in self.order.as_ref()[..self.count].iter().enumerate() {
+            let slides = self.problem.as_ref()[i].slip.is_some();
+            self.modes.as_mut()[k] = if slides { Mode::Slide } else { Mode::Stick };
+        }
+        system.hold(t, q, self.modes.as_ref());
+        let rows = self.rows();
+        let (a, b) = (self.a.as_ref(), self.b.as_mut());
+        b.fill(zero);
+        let mut column = 0;
+        for (i, &k) in self.order.as_ref()[..self.count].iter().enumerate() {
+            let c = system.contact(k);
+            for j in 0..c.rows() {
+                let held = j == 0 || self.problem.as_ref()[i].slip.is_none();
+                let lambda = if held { system.at.lambda.as_ref()[c.row + j] } else { zero };
+                for (row, b) in b.iter_mut().enumerate().take(rows) {
+                    *b = *b + a[row * rows + column] * lambda;
+                }
+                column += 1;
+            }
+        }
+        self.modes.as_mut().fill(Mode::Open);
+    }
+
+    /// The problem of `a` and `b`, memory for its impulses, and for the solver.
+    #[allow(clippy::type_complexity, reason = "three parts, borrowed together")]
+    pub fn parts(&mut self) -> (Problem<'_, Y::Scalar>, &mut [Y::Scalar], &mut [Y::Scalar]) {
+        let rows = self.rows();
+        let problem = Problem {
+            a: &self.a.as_ref()[..rows * rows],
+            b: &self.b.as_ref()[..rows],
+            touches: &self.problem.as_ref()[..self.count],
+        };
+        (problem, &mut self.impulses.as_mut()[..rows], self.work.as_mut())
+    }
+
+    /// Forces of the contacts, in `impulses`, at the state that was looked at last: forces and accelerations are
+    /// complementary on the friction cones, and contacts with a direction of slip have their friction against it.
+    pub fn find_forces(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        effort: Effort,
+    ) -> Result<Certificate<Y::Scalar>, ContactError> {
+        self.assemble(system, t, q);
+        self.free_accelerations(system, t, q);
+        let (problem, forces, work) = self.parts();
+        forces.fill(Y::Scalar::zero());
+        solve(&problem, effort, forces, work)
+    }
+
+    /// Acceleration of a row, after [`Touches::find_forces`].
+    pub fn acceleration(&self, row: usize) -> Y::Scalar {
+        let rows = self.rows();
+        let (a, b, f) = (self.a.as_ref(), self.b.as_ref(), self.impulses.as_ref());
+        (0..rows).fold(b[row], |sum, column| sum + a[row * rows + column] * f[column])
+    }
+}
