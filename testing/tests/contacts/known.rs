@@ -46,7 +46,7 @@ fn a_bouncing_ball_comes_to_rest_at_the_sum_of_its_bounces() {
     let (g, height, e) = (9.81, 1.0, 0.8);
     let mut scene = Scene::new(ball(e), &[height + 0.1], &[0.0]);
     scene.run(6.0);
-    let first = (2.0 * height / g as f64).sqrt();
+    let first = (2.0 * height / g).sqrt();
     let mut t = first;
     let mut v = g * first;
     for event in scene.events.0.iter().take(20) {
