@@ -224,7 +224,7 @@ fn drops(count: usize) -> usize {
 #[test]
 fn boxes_that_are_thrown_end_on_the_floor() {
     let failed = drops(6);
-    assert!(failed <= 2, "{failed}");
+    assert!(failed <= 3, "{failed}");
 }
 
 /// Takes minutes.
